@@ -1,0 +1,88 @@
+"""Decomposition: the ordered parts of a model, with the invariants that hold wherever one is made."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdp.mesh import Floats, Mesh
+from mdp.plane import Plane
+from mdp.pose import Pose
+from profiles.errors import DecompositionError
+
+VOLUME_TOLERANCE = 1e-6
+ORDER_TOLERANCE_MM = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One part: printed at one pose of the table, upward from its base plane.
+
+    mesh lies in the workpiece frame. rotation (3, 3) turns the workpiece frame into the part frame's orientation at
+    the pose, so rotation @ direction = +z and a point w has part coordinates rotation @ w - (0, 0, base.offset_mm).
+    """
+
+    index: int
+    mesh: Mesh
+    base: Plane
+    pose: Pose
+    rotation: Floats
+    volume_mm3: float
+    risky_area_mm2: float
+
+    @property
+    def direction(self) -> Floats:
+        """Unit printing direction in the workpiece frame: the base plane's normal."""
+        return self.base.normal
+
+    def in_part_frame(self) -> Mesh:
+        """The part's mesh in its own frame: direction is +z, base plane is z = 0."""
+        return self.mesh.moved(self.rotation, (0.0, 0.0, -self.base.offset_mm))
+
+
+@dataclass(frozen=True, eq=False)
+class Decomposition:
+    """A model and its parts in print order (index 1, 2, ...); part 1 stands on the platform.
+
+    risky_area_mm2 is what printing the whole model straight up leaves to support, residual_area_mm2 what the parts do.
+    """
+
+    name: str
+    mesh: Mesh
+    parts: tuple[Part, ...]
+    beam_width: int
+    ranker: str
+    risky_area_mm2: float
+    residual_area_mm2: float
+    candidates_evaluated: int
+    rounds: int
+    search_s: float
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._check_volume()
+        self._check_order()
+
+    @property
+    def reduction(self) -> float:
+        """Share of the risky area that the parts make safe, 0..1; 0 for a model without risky faces."""
+        return 1.0 - self.residual_area_mm2 / self.risky_area_mm2 if self.risky_area_mm2 > 0 else 0.0
+
+    def _check_volume(self) -> None:
+        whole, together = self.mesh.volume_mm3, sum(part.volume_mm3 for part in self.parts)
+        if abs(together - whole) > VOLUME_TOLERANCE * whole:
+            raise DecompositionError(f"the parts of {self.name} add up to {together:.6g} mm3, the model has {whole:.6g} mm3")
+
+    def _check_order(self) -> None:
+        """A part lies above its base plane, everything printed before it lies below."""
+        for position, part in enumerate(self.parts):
+            if part.index != position + 1:
+                raise DecompositionError(f"part {part.index} of {self.name} stands at place {position + 1} of the print order")
+            lowest = float(part.base.heights_mm(part.mesh.vertices).min())
+            if lowest < -ORDER_TOLERANCE_MM:
+                raise DecompositionError(f"part {part.index} of {self.name} reaches {-lowest:.4g} mm below its base plane")
+            for earlier in self.parts[:position]:
+                highest = float(np.max(part.base.heights_mm(earlier.mesh.vertices)))
+                if highest > ORDER_TOLERANCE_MM:
+                    raise DecompositionError(
+                        f"part {earlier.index} of {self.name} stands {highest:.4g} mm above the base plane of part {part.index}"
+                    )

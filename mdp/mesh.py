@@ -1,0 +1,64 @@
+"""Mesh: a closed, oriented triangle mesh in mm, and its measures."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A closed, consistently outward-oriented triangle mesh.
+
+    vertices: (n, 3) float64, mm; faces: (m, 3) int32, counter-clockwise seen from outside. Both arrays are read-only.
+    """
+
+    vertices: Floats
+    faces: Ints
+
+    def __post_init__(self) -> None:
+        vertices = np.array(self.vertices, dtype=np.float64, order="C")
+        faces = np.array(self.faces, dtype=np.int32, order="C")
+        vertices.setflags(write=False)
+        faces.setflags(write=False)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
+
+    @cached_property
+    def _crosses(self) -> Floats:
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def areas_mm2(self) -> Floats:
+        """(m,) areas of the faces."""
+        areas: Floats = 0.5 * np.linalg.norm(self._crosses, axis=1)
+        return areas
+
+    @cached_property
+    def normals(self) -> Floats:
+        """(m, 3) unit outward normals; zero for a face without area."""
+        lengths = 2.0 * self.areas_mm2
+        normals: Floats = self._crosses / np.where(lengths > 0, lengths, 1.0)[:, None]
+        return normals
+
+    @cached_property
+    def volume_mm3(self) -> float:
+        """Volume by the divergence theorem, about the box centre for accuracy."""
+        middle = 0.5 * (self.bounds_mm[0] + self.bounds_mm[1])
+        corner = self.vertices[self.faces[:, 0]] - middle
+        return float(np.einsum("ij,ij->", corner, self._crosses) / 6.0)
+
+    @cached_property
+    def bounds_mm(self) -> Floats:
+        """(2, 3) least and greatest coordinates."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    def moved(self, rotation: Any, shift_mm: Any = (0.0, 0.0, 0.0)) -> "Mesh":
+        """The mesh with every vertex v at rotation @ v + shift_mm; rotation is (3, 3)."""
+        return Mesh(self.vertices @ np.asarray(rotation, dtype=np.float64).T + np.asarray(shift_mm, dtype=np.float64), self.faces)

@@ -1,0 +1,117 @@
+"""Pose: the tilt and turn of the table that bring a direction of the workpiece upright.
+
+The table's rotation is R = R_tilt R_turn with each factor a right-handed rotation about its axis by
+-sign * (value - zero_deg), the rule of LinuxCNC's xyzac-trt-kins written for any two axes.
+"""
+
+from dataclasses import dataclass
+from math import acos, atan2, ceil, cos, degrees, floor, hypot, radians, sin
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.machine import Machine, RotaryAxis
+
+UP = np.array([0.0, 0.0, 1.0])
+SINGULAR = 1e-9
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Values of the tilt and the turn axis as the firmware knows them, degrees."""
+
+    tilt_deg: float
+    turn_deg: float
+
+
+def level(machine: Machine) -> Pose:
+    """The pose in which the table is level and unturned."""
+    return Pose(machine.tilt.zero_deg, machine.turn.zero_deg)
+
+
+def about(axis: Floats, angle_rad: float) -> Floats:
+    """(3, 3) right-handed rotation about a unit axis (Rodrigues' formula)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Floats = np.eye(3) + sin(angle_rad) * cross + (1.0 - cos(angle_rad)) * (cross @ cross)
+    return rotation
+
+
+def unit(vector: object) -> Floats:
+    """The vector scaled to length 1."""
+    array = np.asarray(vector, dtype=np.float64)
+    return array / np.linalg.norm(array)
+
+
+def axis_rotation(axis: RotaryAxis, value_deg: float) -> Floats:
+    """(3, 3) rotation of the table by one axis at a value."""
+    return about(unit(axis.axis), radians(-axis.sign * (value_deg - axis.zero_deg)))
+
+
+def rotation(machine: Machine, pose: Pose) -> Floats:
+    """(3, 3) rotation from the workpiece frame to the orientation of the machine frame at a pose."""
+    return axis_rotation(machine.tilt, pose.tilt_deg) @ axis_rotation(machine.turn, pose.turn_deg)
+
+
+def poses(machine: Machine, direction: Floats, near_turn_deg: float | None = None) -> list[Pose]:
+    """Poses within the axis limits that bring `direction` (unit, workpiece frame) to the machine's +z.
+
+    Both branches, each with the turn equivalent nearest to `near_turn_deg` (default: the turn's zero) inside the
+    limits. At a level table any turn serves and the one nearest to `near_turn_deg` is given. Empty: out of reach.
+    """
+    near = machine.turn.zero_deg if near_turn_deg is None else near_turn_deg
+    found = []
+    for tilt_rad, turn_rad in _angles(unit(machine.tilt.axis), unit(machine.turn.axis), direction):
+        tilt = machine.tilt.zero_deg - machine.tilt.sign * degrees(tilt_rad)
+        turn = near if turn_rad is None else machine.turn.zero_deg - machine.turn.sign * degrees(turn_rad)
+        tilt_inside = nearest_turn(tilt, machine.tilt.limits_deg, machine.tilt.zero_deg)
+        turn_inside = nearest_turn(turn, machine.turn.limits_deg, near)
+        if tilt_inside is not None and turn_inside is not None:
+            found.append(Pose(tilt_inside, turn_inside))
+    return found
+
+
+def nearest_turn(value_deg: float, limits_deg: tuple[float, float], near_deg: float) -> float | None:
+    """The value plus whole turns that lies inside the limits and nearest to near_deg; None when none does."""
+    least, most = limits_deg[0] - 1e-9, limits_deg[1] + 1e-9
+    low, high = ceil((least - value_deg) / 360.0), floor((most - value_deg) / 360.0)
+    if low > high:
+        return None
+    turns = min(max(round((near_deg - value_deg) / 360.0), low), high)
+    return value_deg + 360.0 * turns
+
+
+def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tuple[float, float | None]]:
+    """Rotations (tilt, turn), radians, with R_tilt R_turn direction = up: subproblem 2 of Paden and Kahan.
+
+    The turned direction c has the same turn_axis component as `direction` and the same tilt_axis component as up.
+    """
+    k = float(tilt_axis @ turn_axis)
+    p, q = float(turn_axis @ direction), float(tilt_axis @ UP)
+    determinant = 1.0 - k * k
+    along_turn, along_tilt = (p - k * q) / determinant, (q - k * p) / determinant
+    rest2 = 1.0 - along_turn**2 - along_tilt**2 - 2.0 * along_turn * along_tilt * k
+    if rest2 < -1e-9:
+        return []
+    normal = np.cross(turn_axis, tilt_axis)
+    length = (max(rest2, 0.0) / determinant) ** 0.5
+    solutions: list[tuple[float, float | None]] = []
+    for side in (1.0, -1.0):
+        c = along_turn * turn_axis + along_tilt * tilt_axis + side * length * normal
+        tilt = _turn_between(tilt_axis, c, UP)
+        free = hypot(*np.cross(turn_axis, direction)) < SINGULAR
+        solutions.append((tilt, None if free else _turn_between(turn_axis, direction, c)))
+        if length < SINGULAR:
+            break
+    return solutions
+
+
+def _turn_between(axis: Floats, a: Floats, b: Floats) -> float:
+    """Angle about `axis` that turns the part of a across it onto that of b, radians in (-pi, pi]."""
+    across_a, across_b = a - axis * (axis @ a), b - axis * (axis @ b)
+    return atan2(float(axis @ np.cross(across_a, across_b)), float(across_a @ across_b))
+
+
+def angle_between_deg(a: Floats, b: Floats) -> float:
+    """Angle between two unit vectors, degrees."""
+    return degrees(acos(max(-1.0, min(1.0, float(a @ b)))))

@@ -1,0 +1,75 @@
+"""The tree of errors a person can fix; each class is raised in one package, all are caught in machine/app/cli.py.
+
+UserError                         message (one sentence: thing, value, what is allowed) and exit 1
+  ProfileError                    profiles: all problems of a file or of the --set options at once
+  MeshError                       mdp: unreadable, empty, open, flat: says what and where
+  DecompositionError              mdp: an invariant of the decomposition cannot be met
+  SliceError                      slicer: a setting that cannot be sliced with
+  MoveError                       machine: out of limits, unreachable, collision: part, axis, value, allowed
+  GcodeError                      machine: a G-code text that cannot be read, with the line
+  OutputError                     machine: a file that cannot be written
+  PrinterError                    machine/link
+    PortError                     cannot open, lost
+    LocalProtocolError            we broke the protocol
+    RemoteProtocolError           the printer asked for something impossible
+    FirmwareError                 the printer reported an error; its own text is kept
+    PrinterTimeout                silence beyond the bound
+
+Anything else is a bug: short message, log file, exit 3. Ctrl-C: stop safely, exit 130.
+"""
+
+
+class UserError(Exception):
+    """Something the person at the keyboard can fix; str() is the full sentence."""
+
+
+class ProfileError(UserError):
+    """A profile or a --set option is wrong; the message lists every problem with its key."""
+
+
+class MeshError(UserError):
+    """The model file cannot become a valid solid; the message says what is wrong and where."""
+
+
+class DecompositionError(UserError):
+    """The parts of a model cannot be made consistent."""
+
+
+class SliceError(UserError):
+    """A part cannot be sliced with these settings."""
+
+
+class MoveError(UserError):
+    """A move the machine cannot make; the message names part, axis, value and what is allowed."""
+
+
+class GcodeError(UserError):
+    """A G-code text that cannot be read; the message names the line."""
+
+
+class OutputError(UserError):
+    """A file or folder that cannot be written."""
+
+
+class PrinterError(UserError):
+    """The connection to the printer or the printer itself failed."""
+
+
+class PortError(PrinterError):
+    """The port cannot be opened or was lost."""
+
+
+class LocalProtocolError(PrinterError):
+    """This program was about to break the serial protocol."""
+
+
+class RemoteProtocolError(PrinterError):
+    """The printer said something that the protocol does not allow."""
+
+
+class FirmwareError(PrinterError):
+    """The printer reported an error; the message holds its own text."""
+
+
+class PrinterTimeout(PrinterError):
+    """The printer stayed silent beyond the allowed time."""

@@ -1,0 +1,24 @@
+"""The material: filament, temperatures, cooling, retraction."""
+
+from pydantic import Field
+
+from profiles.machine import Frozen
+
+
+class Material(Frozen):
+    """A filament and how it wants to be melted."""
+
+    name: str = Field(description="what people call it")
+    diameter_mm: float = Field(1.75, ge=1, le=4, description="filament diameter, mm")
+    density_g_cm3: float = Field(1.24, gt=0, le=10, description="density, g/cm3")
+    nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature, deg C")
+    first_layer_nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature of part 1's first layer, deg C")
+    bed_c: float = Field(ge=0, le=200, description="bed temperature, deg C; 0: bed off")
+    fan: float = Field(ge=0, le=1, description="part fan from the second layer on, 0 to 1")
+    flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on all extruded volume")
+    retract_mm: float = Field(ge=0, le=15, description="filament pulled back before a travel that crosses outside, mm")
+    retract_speed_mm_s: float = Field(35.0, gt=0, le=200, description="speed of retraction and priming, mm/s")
+    prime_extra_mm: float = Field(
+        0.0, ge=0, le=10, description="filament pushed beyond what was retracted after a reorientation, mm"
+    )
+    volumetric_limit_mm3_s: float = Field(gt=0, le=200, description="most plastic the hot end melts, mm3/s")

@@ -1,0 +1,96 @@
+"""The process: how a part is sliced and printed, and how the parts are searched."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from profiles.machine import Frozen, Vector
+
+
+class Process(Frozen):
+    """Slicing and printing settings."""
+
+    name: str = Field(description="what people call it")
+    scale: float = Field(1.0, gt=0, le=100000, description="factor on the model's size before anything else")
+    rotate_deg: Vector = Field(
+        (0.0, 0.0, 0.0), description="turns of the model about x, then y, then z before anything else, deg"
+    )
+    self_supporting_angle_deg: float = Field(
+        45.0, ge=0, le=85, description="steepest overhang, from the printing direction, that prints without support, deg"
+    )
+    layer_height_mm: float = Field(0.2, ge=0.02, le=2, description="height of a layer, mm")
+    first_layer_height_mm: float = Field(0.2, ge=0.02, le=2, description="height of part 1's first layer, mm")
+    line_width_mm: float = Field(0.45, ge=0.1, le=4, description="width of a bead, mm")
+    walls: int = Field(3, ge=0, le=50, description="number of walls")
+    top_layers: int = Field(4, ge=0, le=1000, description="solid layers under a surface that faces the printing direction")
+    bottom_layers: int = Field(4, ge=0, le=1000, description="solid layers over a surface that faces away from it")
+    infill_density: float = Field(0.2, ge=0, le=1, description="share of the inside that is filled")
+    infill_pattern: Literal["rectilinear", "grid", "triangles", "concentric"] = Field(
+        "grid", description="pattern of the sparse infill"
+    )
+    infill_angle_deg: float = Field(45.0, ge=0, le=360, description="direction of the infill lines in the part's frame, deg")
+    infill_overlap: float = Field(
+        0.15, ge=0, le=0.5, description="reach of infill into the innermost wall, share of a line width"
+    )
+    support: Literal["none", "auto"] = Field("auto", description="auto: support what the decomposition left risky")
+    support_density: float = Field(0.15, gt=0, le=1, description="share of the support's inside that is filled")
+    support_gap_mm: float = Field(0.2, ge=0, le=2, description="gap along the printing direction between support and part, mm")
+    support_distance_mm: float = Field(
+        0.6, ge=0, le=5, description="gap across the printing direction between support and part, mm"
+    )
+    skirt_loops: int = Field(1, ge=0, le=20, description="loops around part 1's first layer, not touching it")
+    skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from part 1, mm")
+    brim_mm: float = Field(0.0, ge=0, le=50, description="width of the brim around part 1's first layer, mm; 0: none")
+    interface_overlap_mm: float = Field(
+        0.1, ge=0, le=1, description="how deep a part's first layer is pressed into the part it stands on, mm"
+    )
+    interface_flow: float = Field(
+        1.05, ge=0.5, le=1.5, description="factor on extruded volume of a part's first layer on plastic"
+    )
+    interface_speed_mm_s: float = Field(25.0, gt=0, le=1000, description="speed of a part's first layer on plastic, mm/s")
+    outer_wall_speed_mm_s: float = Field(40.0, gt=0, le=1000, description="speed of outer walls, mm/s")
+    inner_wall_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of inner walls, mm/s")
+    skin_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of solid skins, mm/s")
+    infill_speed_mm_s: float = Field(80.0, gt=0, le=1000, description="speed of sparse infill, mm/s")
+    support_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of support, mm/s")
+    first_layer_speed_mm_s: float = Field(20.0, gt=0, le=1000, description="speed of part 1's first layer, mm/s")
+    travel_speed_mm_s: float = Field(150.0, gt=0, le=2000, description="speed of travels, mm/s")
+    lift_speed_mm_s: float = Field(10.0, gt=0, le=500, description="speed of lifts along the nozzle, mm/s")
+    retract_travel_mm: float = Field(1.5, ge=0, le=100, description="shortest travel that is worth a retraction, mm")
+    least_layer_time_s: float = Field(5.0, ge=0, le=600, description="layers printed faster than this are slowed down, s")
+    least_speed_mm_s: float = Field(10.0, gt=0, le=1000, description="slowing for the layer time stops here, mm/s")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("layer_height_mm", "first_layer_height_mm"):
+            if getattr(self, key) > 0.9 * self.line_width_mm:
+                raise ValueError(
+                    f"{key} is {getattr(self, key):g} mm: at most 0.9 of line_width_mm ({0.9 * self.line_width_mm:g} mm) is allowed"
+                )
+        if self.interface_overlap_mm >= self.layer_height_mm:
+            raise ValueError(
+                f"interface_overlap_mm is {self.interface_overlap_mm:g} mm: it must be below layer_height_mm ({self.layer_height_mm:g} mm)"
+            )
+        return self
+
+
+class Search(Frozen):
+    """How the parts are searched."""
+
+    directions: int = Field(600, ge=1, le=100000, description="directions sampled on the Gaussian sphere")
+    least_elevation_deg: float = Field(10.0, ge=0, le=89, description="least angle of a direction above the platform, deg")
+    offset_step_mm: float = Field(1.0, gt=0, le=100, description="distance of the sampled planes of a direction, mm")
+    beam_width: int = Field(2, ge=1, le=1000, description="how many decompositions are followed at a time")
+    least_volume_share: float = Field(
+        0.02, ge=0, lt=1, description="criterion IV: a part has at least this share of the model's volume (published: 0.1)"
+    )
+    least_interface_mm2: float = Field(4.0, ge=0, le=1e6, description="least area a part stands on, mm2")
+    most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
+    least_gain: float = Field(0.005, ge=0, le=1, description="a cut must make at least this share of the model's risky area safe")
+    platform_radius_mm: float | None = Field(
+        None, gt=0, description="criterion III: radius of the disc that every plane must clear; absent: the model's footprint"
+    )
+    count_platform_faces: bool = Field(
+        False, description="true: faces standing on the platform count as risky (the authors' terms)"
+    )
+    clearance: bool = Field(True, description="false: the head's bodies and the axis limits are ignored (the authors' terms)")

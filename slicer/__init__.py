@@ -1,0 +1,1 @@
+"""From a part to layers of paths in the part's own frame."""

@@ -1,0 +1,81 @@
+"""Paths: what the slicer hands over; one object per path, one array row per point, all in the part frame."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from math import pi
+
+import numpy as np
+
+from mdp.mesh import Floats
+
+
+class Kind(StrEnum):
+    """What a path is for; the values are the names that G-code viewers know from PrusaSlicer."""
+
+    OUTER_WALL = "External perimeter"
+    INNER_WALL = "Perimeter"
+    GAP = "Gap fill"
+    INFILL = "Internal infill"
+    SKIN = "Solid infill"
+    TOP_SKIN = "Top solid infill"
+    SKIRT = "Skirt/Brim"
+    SUPPORT = "Support material"
+
+
+def bead_area_mm2(width_mm: float, height_mm: float) -> float:
+    """Cross-section of a bead: a rectangle with half-round sides, (w - h) h + pi h^2 / 4 (PrusaSlicer's model)."""
+    return (width_mm - height_mm) * height_mm + pi * height_mm**2 / 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """One continuous bead.
+
+    points: (n, 2) mm, n >= 2; a closed path repeats its first point at the end. flow: factor on the bead's volume.
+    approach: (k, 2) mm, points that the travel to the first point passes, k >= 0. retract: pull the filament back
+    during that travel.
+    """
+
+    kind: Kind
+    points: Floats
+    width_mm: float
+    speed_mm_s: float
+    flow: float
+    approach: Floats
+    retract: bool
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the bead."""
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Paths printed with the tip at z_mm above the base plane, in order; every bead is height_mm high."""
+
+    z_mm: float
+    height_mm: float
+    paths: tuple[Path, ...]
+    fan: float
+
+    def volume_mm3(self, path: Path) -> float:
+        """Plastic that a path of this layer extrudes."""
+        return path.length_mm * bead_area_mm2(path.width_mm, self.height_mm) * path.flow
+
+
+@dataclass(frozen=True, eq=False)
+class SlicedPart:
+    """A part's layers from its base plane upward; index and pose are those of the Part.
+
+    unsupported_mm2: area of risky faces that no support could be given, reported as a finding.
+    """
+
+    index: int
+    layers: tuple[Layer, ...]
+    unsupported_mm2: float = 0.0
+
+    @property
+    def volume_mm3(self) -> float:
+        """All plastic of the part, skirt and support included."""
+        return sum(layer.volume_mm3(path) for layer in self.layers for path in layer.paths)
