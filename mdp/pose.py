@@ -13,7 +13,7 @@ from mdp.mesh import Floats
 from profiles.machine import Machine, RotaryAxis
 
 UP = np.array([0.0, 0.0, 1.0])
-SINGULAR = 1e-9
+SINGULAR = 1e-7  # sine of an angle that no table can show; nearer to the singular pose the turn is not defined
 
 
 @dataclass(frozen=True)

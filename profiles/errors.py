@@ -13,7 +13,7 @@ UserError                         message (one sentence: thing, value, what is a
     LocalProtocolError            we broke the protocol
     RemoteProtocolError           the printer asked for something impossible
     FirmwareError                 the printer reported an error; its own text is kept
-    PrinterTimeout                silence beyond the bound
+    SilenceError                silence beyond the bound
 
 Anything else is a bug: short message, log file, exit 3. Ctrl-C: stop safely, exit 130.
 """
@@ -71,5 +71,5 @@ class FirmwareError(PrinterError):
     """The printer reported an error; the message holds its own text."""
 
 
-class PrinterTimeout(PrinterError):
+class SilenceError(PrinterError):
     """The printer stayed silent beyond the allowed time."""

@@ -65,11 +65,13 @@ class Process(Frozen):
         for key in ("layer_height_mm", "first_layer_height_mm"):
             if getattr(self, key) > 0.9 * self.line_width_mm:
                 raise ValueError(
-                    f"{key} is {getattr(self, key):g} mm: at most 0.9 of line_width_mm ({0.9 * self.line_width_mm:g} mm) is allowed"
+                    f"{key} is {getattr(self, key):g} mm: at most 0.9 of line_width_mm "
+                    f"({0.9 * self.line_width_mm:g} mm) is allowed"
                 )
         if self.interface_overlap_mm >= self.layer_height_mm:
             raise ValueError(
-                f"interface_overlap_mm is {self.interface_overlap_mm:g} mm: it must be below layer_height_mm ({self.layer_height_mm:g} mm)"
+                f"interface_overlap_mm is {self.interface_overlap_mm:g} mm: it must be below layer_height_mm "
+                f"({self.layer_height_mm:g} mm)"
             )
         return self
 

@@ -1,0 +1,1 @@
+"""Machine shapes: one file per shape, the same few functions in each."""
