@@ -40,7 +40,8 @@ def about(axis: Floats, angle_rad: float) -> Floats:
 def unit(vector: object) -> Floats:
     """The vector scaled to length 1."""
     array = np.asarray(vector, dtype=np.float64)
-    return array / np.linalg.norm(array)
+    scaled: Floats = array / np.linalg.norm(array)
+    return scaled
 
 
 def axis_rotation(axis: RotaryAxis, value_deg: float) -> Floats:
@@ -50,7 +51,16 @@ def axis_rotation(axis: RotaryAxis, value_deg: float) -> Floats:
 
 def rotation(machine: Machine, pose: Pose) -> Floats:
     """(3, 3) rotation from the workpiece frame to the orientation of the machine frame at a pose."""
-    return axis_rotation(machine.tilt, pose.tilt_deg) @ axis_rotation(machine.turn, pose.turn_deg)
+    both: Floats = axis_rotation(machine.tilt, pose.tilt_deg) @ axis_rotation(machine.turn, pose.turn_deg)
+    return both
+
+
+def shift(machine: Machine, pose: Pose) -> Floats:
+    """(3,) X Y Z of the workpiece origin at a pose: a workpiece point w is reached at rotation @ w + shift."""
+    tilt_point, turn_point = np.array(machine.tilt.point_mm), np.array(machine.turn.point_mm)
+    carried: Floats = axis_rotation(machine.tilt, pose.tilt_deg) @ (turn_point - tilt_point)
+    origin: Floats = carried + tilt_point + np.array(machine.tool_mm)
+    return origin
 
 
 def poses(machine: Machine, direction: Floats, near_turn_deg: float | None = None) -> list[Pose]:

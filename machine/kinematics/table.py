@@ -6,24 +6,26 @@ tip = tilt_point + R_tilt (turn_point + R_turn w - tilt_point), X Y Z = tip + to
 import numpy as np
 
 from mdp.mesh import Floats
-from mdp.pose import Pose, axis_rotation, rotation, unit
+from mdp.pose import Pose, rotation, shift, unit
 from profiles.machine import Machine, RotaryAxis
 
 
 def machine_points(machine: Machine, pose: Pose, workpiece_mm: Floats) -> Floats:
     """(n, 3) X Y Z positions at which the tip touches the (n, 3) workpiece points, the table standing at a pose."""
-    return workpiece_mm @ rotation(machine, pose).T + _shift(machine, pose)
+    points: Floats = workpiece_mm @ rotation(machine, pose).T + shift(machine, pose)
+    return points
 
 
 def workpiece_points(machine: Machine, pose: Pose, machine_mm: Floats) -> Floats:
     """(n, 3) workpiece points under the tip when X Y Z are (n, 3) machine_mm and the table stands at a pose."""
-    points: Floats = (machine_mm - _shift(machine, pose)) @ rotation(machine, pose)
+    points: Floats = (machine_mm - shift(machine, pose)) @ rotation(machine, pose)
     return points
 
 
 def part_shift(machine: Machine, pose: Pose, base_offset_mm: float) -> Floats:
     """(3,) what to add to part coordinates to get X Y Z: part and machine frame differ by this translation only."""
-    return _shift(machine, pose) + np.array([0.0, 0.0, base_offset_mm])
+    moved: Floats = shift(machine, pose) + np.array([0.0, 0.0, base_offset_mm])
+    return moved
 
 
 def workpiece_path(machine: Machine, axes: Floats) -> Floats:
@@ -33,14 +35,6 @@ def workpiece_path(machine: Machine, axes: Floats) -> Floats:
     carried = _turned(machine.tilt, axes[:, 3], tip - tilt_point) + tilt_point
     points: Floats = _turned(machine.turn, axes[:, 4], carried - turn_point)
     return points
-
-
-def _shift(machine: Machine, pose: Pose) -> Floats:
-    tilt_point, turn_point = np.array(machine.tilt.point_mm), np.array(machine.turn.point_mm)
-    moved: Floats = (
-        axis_rotation(machine.tilt, pose.tilt_deg) @ (turn_point - tilt_point) + tilt_point + np.array(machine.tool_mm)
-    )
-    return moved
 
 
 def _turned(axis: RotaryAxis, values_deg: Floats, points: Floats) -> Floats:

@@ -1,0 +1,52 @@
+"""Overhang: which faces cannot be printed along a direction without support.
+
+A face is risky when n . d < -(sin alpha + 1e-4), with the sign of RoboFDM's Eq. 1; the printed formula of the 2020 paper has
+it reversed. The 1e-4 keeps exact 45 degree faces, common in printed models, on the safe side of float rounding.
+"""
+
+from math import radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats, Mesh
+from mdp.plane import Plane
+
+ROUNDING = 1e-4
+PLATFORM_TOLERANCE_MM = 0.3  # a first layer's chamfer still stands on the platform
+BASE_TOLERANCE_MM = 1e-6  # faces of a part that a cut made lie in its base plane up to rounding
+UP = np.array([0.0, 0.0, 1.0])
+
+Mask = NDArray[np.bool_]
+
+
+def threshold(self_supporting_angle_deg: float) -> float:
+    """The value of n . d below which a face is risky."""
+    return -(sin(radians(self_supporting_angle_deg)) + ROUNDING)
+
+
+def facing_down(mesh: Mesh, direction: Floats, self_supporting_angle_deg: float) -> Mask:
+    """(m,) faces that overhang too far along a unit direction, whatever they rest on."""
+    down: Mask = np.asarray(np.less(mesh.normals @ direction, threshold(self_supporting_angle_deg)))
+    return down
+
+
+def standing(mesh: Mesh) -> Mask:
+    """(m,) faces that stand on the platform: all of a face within 0.3 mm of it."""
+    on_platform: Mask = np.all(mesh.vertices[mesh.faces, 2] <= PLATFORM_TOLERANCE_MM, axis=1)
+    return on_platform
+
+
+def risky_upright(mesh: Mesh, self_supporting_angle_deg: float, count_platform_faces: bool = False) -> Mask:
+    """(m,) risky faces of a solid printed straight up on the platform."""
+    down = facing_down(mesh, UP, self_supporting_angle_deg)
+    risky: Mask = down if count_platform_faces else np.logical_and(down, ~standing(mesh))
+    return risky
+
+
+def risky_above(mesh: Mesh, base: Plane, self_supporting_angle_deg: float) -> Mask:
+    """(m,) risky faces of a part printed upward from its base plane, on which the faces in that plane rest."""
+    down = facing_down(mesh, base.normal, self_supporting_angle_deg)
+    resting: Mask = np.all(base.heights_mm(mesh.vertices)[mesh.faces] <= BASE_TOLERANCE_MM, axis=1)
+    risky: Mask = np.logical_and(down, ~resting)
+    return risky

@@ -1,0 +1,126 @@
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.candidates import directions
+from mdp.clearance import least_tip_height_mm
+from mdp.decomposition import Decomposition
+from mdp.mesh import Mesh
+from mdp.pose import Pose, rotation
+from mdp.search import decompose
+from mdp.sequence import least_rotation
+from profiles.errors import DecompositionError
+from profiles.profile import load
+from tests import shapes
+from tests.checks import assert_closed
+
+
+def _decomposed(mesh: Mesh, *settings_: str, machine: str = "generic_ac") -> Decomposition:
+    return decompose(mesh, "shape", load(machine=machine, settings=("search.directions=200", *settings_)))
+
+
+def test_a_leaning_arm_becomes_a_part_of_its_own_without_risk() -> None:
+    found = _decomposed(shapes.branch())
+    assert len(found.parts) == 2
+    assert found.parts[1].direction[0] > 0.2
+    assert found.reduction > 0.95
+
+
+@pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
+@pytest.mark.parametrize("name", ["tee", "branch", "bowl", "hollow"])
+def test_parts_are_closed_add_up_and_come_in_a_printable_order(name: str, machine: str) -> None:
+    mesh = getattr(shapes, name)()
+    found = _decomposed(mesh, machine=machine)
+    assert sum(part.volume_mm3 for part in found.parts) == pytest.approx(mesh.volume_mm3, rel=1e-9)
+    for part in found.parts:
+        assert_closed(part.mesh)
+        assert rotation(load(machine=machine).machine, part.pose) @ part.direction == pytest.approx([0, 0, 1], abs=1e-7)
+        assert part.in_part_frame().bounds_mm[0, 2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_residual_that_the_sweep_promised_is_the_area_left_on_the_parts() -> None:
+    found = _decomposed(shapes.tee(), "process.self_supporting_angle_deg=20")
+    by_parts = sum(part.risky_area_mm2 for part in found.parts)
+    assert found.residual_area_mm2 == pytest.approx(by_parts)
+    assert found.residual_area_mm2 < found.risky_area_mm2
+
+
+def test_a_box_is_one_part_and_says_why() -> None:
+    found = _decomposed(shapes.box())
+    assert len(found.parts) == 1
+    assert found.notes == ("no face needs support: the model is printed straight up as one part",)
+
+
+def test_no_feasible_cut_names_the_constraints_with_their_counts() -> None:
+    found = _decomposed(shapes.tee(), "search.least_volume_share=0.9")
+    assert len(found.parts) == 1
+    assert "search.least_volume_share" in found.notes[0]
+
+
+def test_every_part_clears_the_table_by_the_heads_own_measure() -> None:
+    machine = load().machine
+    for part in _decomposed(shapes.tee(height=60.0)).parts[1:]:
+        assert part.mesh.bounds_mm[0, 2] >= least_tip_height_mm(machine, part.pose)
+
+
+def test_without_clearance_more_candidates_survive() -> None:
+    low = shapes.tee(height=14.0)
+    assert len(_decomposed(low).parts) == 1
+    assert len(_decomposed(low, "search.clearance=false").parts) > 1
+
+
+def test_the_same_search_twice_gives_the_same_parts() -> None:
+    first, second = _decomposed(shapes.branch()), _decomposed(shapes.branch())
+    for a, b in zip(first.parts, second.parts, strict=True):
+        assert np.array_equal(a.mesh.vertices, b.mesh.vertices)
+        assert a.pose == b.pose
+
+
+def test_a_wider_beam_is_never_worse_on_a_tee() -> None:
+    narrow, wide = (_decomposed(shapes.tee(), f"search.beam_width={width}").residual_area_mm2 for width in (1, 4))
+    assert wide <= narrow + 1e-9
+
+
+def test_swapped_parts_are_refused() -> None:
+    found = _decomposed(shapes.branch())
+    swapped = [found.parts[1], found.parts[0]]
+    fields = vars(found) | {"parts": tuple(swapped)}
+    with pytest.raises(DecompositionError, match="stands at place 1"):
+        Decomposition(**fields)
+
+
+def test_the_clearance_of_one_box_is_the_closed_formula() -> None:
+    machine = load().machine
+    head = machine.head.model_copy(update={"silhouette_mm": [(0.0, 0.0)]})
+    boxed = machine.model_copy(update={"head": head, "clearance_mm": 0.0})
+    for tilt in (20.0, 55.0, 80.0):
+        t = np.radians(tilt)
+        corners = [y * s * np.sin(t) - 40 * np.cos(t) for y, s in product((30.0, -25.0), (1, -1)) if y * s > 0]
+        beam = [y * np.sin(t) - 60 * np.cos(t) for y in (45.0,)]
+        both = {least_tip_height_mm(boxed, Pose(tilt, 0.0)), least_tip_height_mm(boxed, Pose(-tilt, 180.0))}
+        assert max(both) == pytest.approx(max(0.0, *corners, *beam))
+
+
+def test_directions_are_spread_over_the_cap() -> None:
+    found = directions(load().search)
+    nearest = np.sort(np.arccos(np.clip(found @ found.T, -1, 1)), axis=1)[:, 1]
+    assert len(found) == 600
+    assert found[:, 2].min() >= np.sin(np.radians(10.0))
+    assert np.degrees(nearest).min() > 3.5
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(st.floats(0, 80), st.floats(-180, 180)), min_size=1, max_size=6))
+def test_the_pose_sequence_turns_no_more_than_the_best_of_all_branches(angles: list[tuple[float, float]]) -> None:
+    machine = load().machine
+    options = [[Pose(0.0, 0.0)], *([Pose(a, c), Pose(-a, c + 180.0)] for a, c in angles)]
+    chosen = least_rotation(machine, options)
+    turned = [[Pose(p.tilt_deg, p.turn_deg + 360.0 * k) for p in poses for k in (-1, 0, 1)] for poses in options[1:]]
+    assert _total(chosen) <= min(_total([options[0][0], *poses]) for poses in product(*turned[:3])) + 1e-6 or len(angles) > 3
+
+
+def _total(poses: list[Pose]) -> float:
+    return sum(abs(a.tilt_deg - b.tilt_deg) + abs(a.turn_deg - b.turn_deg) for a, b in zip(poses, poses[1:], strict=False))
