@@ -9,11 +9,15 @@ from slicer.paths import Kind
 
 @dataclass(frozen=True)
 class BeginPart:
-    """The moves after this print part `index` at `pose`; turn and tilt have been reached by a Reorient."""
+    """The moves after this print part `index` at `pose`; turn and tilt have been reached by a Reorient.
+
+    unsupported_mm2: area of its risky faces that no support could be given.
+    """
 
     index: int
     pose: Pose
     layers: int
+    unsupported_mm2: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,156 @@
+"""Collide: how far the head's bodies stay from the table and from what is printed, by separating directions.
+
+The distance of two convex bodies is the greatest gap over all unit directions d, where the gap is the least d . x of the one
+minus the greatest d . x of the other. Trying some directions gives a lower bound of the distance: a verdict "clear" is always
+right. A move along a line is tried as the convex body it sweeps: one direction must part both ends from the obstacle.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from manifold3d import Manifold
+
+from machine.kinematics.table import machine_points
+from mdp.mesh import Floats
+from mdp.pose import UP, Pose, rotation
+from profiles.machine import Machine, Vector
+
+FIELD = 120
+REFINEMENTS = 40
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A piece of the hot end: the hull of discs [radius, height above the tip] and everything above them."""
+
+    name: str
+    discs_mm: tuple[tuple[float, float], ...]
+    need_mm: float
+
+    def least(self, directions: Floats) -> Floats:
+        """(k,) least d . x over the body, tip at the origin, for (k, 3) directions; minus infinity for downward ones."""
+        across = np.hypot(directions[:, 0], directions[:, 1])
+        lowest = np.min([directions[:, 2] * h - across * r for r, h in self.discs_mm], axis=0)
+        return np.where(directions[:, 2] >= 0.0, lowest, -np.inf)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A box that moves with the head, relative to the tip."""
+
+    name: str
+    min_mm: Vector
+    max_mm: Vector
+    need_mm: float
+
+    def least(self, directions: Floats) -> Floats:
+        """(k,) least d . x over the body, tip at the origin, for (k, 3) directions."""
+        least: Floats = np.where(directions > 0, directions * self.min_mm, directions * self.max_mm).sum(axis=1)
+        return least
+
+
+Body = Ring | Block
+
+
+def bodies(machine: Machine) -> tuple[Body, ...]:
+    """The head's bodies with the distance each must keep: clearance_mm, or its own height above the tip when that is less.
+
+    (The tip itself prints one layer above the table, so what hangs lower than clearance_mm cannot keep clearance_mm.)
+    """
+    profile = machine.head.silhouette_mm
+    rings = [
+        Ring("hot end" if height > 0 else "nozzle tip", tuple(profile[i : i + 2]), min(machine.clearance_mm, height))
+        for i, (_, height) in enumerate(profile)
+    ]
+    boxes = [Block(box.name, box.min_mm, box.max_mm, min(machine.clearance_mm, box.min_mm[2])) for box in machine.head.boxes]
+    return (*rings, *boxes)
+
+
+def directions(normal: Floats) -> Floats:
+    """(k, 3) unit directions to try against a table of this normal: between it and up, beside it, and all around."""
+    share = np.linspace(0.0, 1.0, 9)[:, None]
+    across = np.array([normal[0], normal[1], 0.0])
+    fan = [(1.0 - share) * normal + share * UP, (1.0 - share) * UP - share * across, (1.0 - share) * normal + share * across]
+    faces = np.vstack([np.eye(3), -np.eye(3)])
+    tried = np.vstack([*fan, faces, spread(FIELD)])
+    size = np.linalg.norm(tried, axis=1)
+    kept: Floats = tried[size > 1e-9] / size[size > 1e-9][:, None]
+    return kept
+
+
+def spread(count: int) -> Floats:
+    """(count, 3) unit directions spread evenly over the sphere (Fibonacci lattice)."""
+    k = np.arange(count) + 0.5
+    z = 1.0 - 2.0 * k / count
+    angle = pi * (1.0 + 5.0**0.5) * k
+    around = np.sqrt(1.0 - z * z)
+    return np.column_stack([around * np.cos(angle), around * np.sin(angle), z])
+
+
+def table_reach(machine: Machine, pose: Pose, tried: Floats) -> Floats:
+    """(k,) greatest d . x over the table's plate at a pose, in the frame of X Y Z, for (k, 3) directions."""
+    normal = rotation(machine, pose) @ UP
+    centre = machine_points(machine, pose, np.zeros((1, 3)))[0]
+    along = tried @ normal
+    across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
+    reach: Floats = tried @ centre + machine.table.radius_mm * across + np.maximum(0.0, -along) * machine.table.thickness_mm
+    return reach
+
+
+@dataclass(frozen=True, eq=False)
+class Printed:
+    """What stands on the table: the corners of its convex hull, workpiece frame, and how far beads reach outside them."""
+
+    points_mm: Floats
+    bead_mm: float
+
+    def reach(self, machine: Machine, pose: Pose, tried: Floats) -> Floats:
+        """(k,) greatest d . x over what is printed at a pose, in the frame of X Y Z."""
+        if not len(self.points_mm):
+            return np.full(len(tried), -np.inf)
+        reach: Floats = (machine_points(machine, pose, self.points_mm) @ tried.T).max(axis=0) + self.bead_mm
+        return reach
+
+
+def hull(points_mm: Floats, bead_mm: float) -> Printed:
+    """What (n, 3) workpiece points, the centres of beads that reach bead_mm to each side, cover at most."""
+    corners = np.zeros((0, 3))
+    if len(points_mm) > 3:
+        corners = np.asarray(Manifold.hull_points(points_mm).to_mesh64().vert_properties)[:, :3]
+    return Printed(corners if len(corners) else points_mm.reshape(-1, 3), bead_mm)
+
+
+def together(pieces: list[Printed]) -> Printed:
+    """Several printed pieces as one."""
+    points = [piece.points_mm for piece in pieces]
+    return Printed(np.vstack([np.zeros((0, 3)), *points]), max((piece.bead_mm for piece in pieces), default=0.0))
+
+
+def sweep_gaps(body: Body, start: Floats, end: Floats, tried: Floats, reach: Floats) -> Floats:
+    """(n,) lower bounds of the distance of a body from an obstacle while the tip goes from (n, 3) start to (n, 3) end."""
+    with np.errstate(invalid="ignore"):
+        offset = body.least(tried) - reach
+    ends = np.minimum(start @ tried.T, end @ tried.T)
+    best: Floats = (ends + offset).max(axis=1)
+    return best
+
+
+def refined_gap(body: Body, start: Floats, end: Floats, machine: Machine, pose: Pose) -> float:
+    """The distance of one swept body from the table, improved from the best tried direction by ever smaller steps.
+
+    The gap is a concave function of the direction, so going uphill cannot get stuck.
+    """
+    tried = directions(rotation(machine, pose) @ UP)
+    step, best, gap = 0.2, tried[0], -np.inf
+    for _ in range(REFINEMENTS):
+        reach = table_reach(machine, pose, tried)
+        gaps = np.minimum(tried @ start, tried @ end) + body.least(tried) - reach
+        k = int(np.argmax(gaps))
+        if gaps[k] > gap + 1e-6:
+            gap, best = float(gaps[k]), tried[k]
+        else:
+            step *= 0.5
+        tried = best + step * spread(24)
+        tried /= np.linalg.norm(tried, axis=1)[:, None]
+    return gap

@@ -1,0 +1,47 @@
+"""Findings: what a person must know before a print is started."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.parse import ParsedProgram
+
+Severity = Literal["error", "warning"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing wrong; line, part and layer tell where it shows first (0: the file as a whole, before the first part)."""
+
+    severity: Severity
+    code: str
+    line: int
+    part: int
+    layer: int
+    message: str
+
+
+def per_part(
+    program: ParsedProgram, rows: NDArray[np.bool_], badness: NDArray[np.float64], severity: Severity, code: str, message: str
+) -> list[Finding]:
+    """One finding for every part that has rows marked: the first marked row's place.
+
+    message takes {value} (the badness of the worst row of that part, as %.3f) and {count}.
+    """
+    marked = np.flatnonzero(rows)
+    found = []
+    for part in np.unique(program.part[marked]):
+        mine = marked[program.part[marked] == part]
+        worst = float(badness[mine].max())
+        text = message.format(value=f"{worst:.3f}".rstrip("0").rstrip("."), count=len(mine))
+        found.append(Finding(severity, code, int(program.line[mine[0]]), int(part), int(program.layer[mine[0]]), text))
+    return found
+
+
+def at_line(program: ParsedProgram, row: int, line: int, severity: Severity, code: str, message: str) -> Finding:
+    """A finding about an event before row `row`."""
+    last = min(max(row - 1, 0), len(program.line) - 1)
+    part, layer = (int(program.part[last]), int(program.layer[last])) if len(program.line) and row > 0 else (0, 0)
+    return Finding(severity, code, line, part, layer, message)

@@ -1,0 +1,71 @@
+"""Heat: findings about temperatures and flow, and about numbers nobody has measured."""
+
+from math import pi
+
+import numpy as np
+
+from machine.dryrun.findings import Finding, at_line, per_part
+from machine.parse import MoveKind, ParsedProgram
+from profiles.profile import Profile
+
+MELTING_C = 150.0
+SLACK = 1.005
+
+
+def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
+    """All findings about heat, flow and the profile."""
+    return [*_cold(program), *_left_on(program), *_flow(program, profile), *_profile(program, profile), *_ignored(program)]
+
+
+def _cold(program: ParsedProgram) -> list[Finding]:
+    """Filament pushed while the nozzle has not been waited for, or its heater is off."""
+    hot = np.zeros(len(program.line), dtype=np.bool_)
+    heating = [e for e in program.events if e.code in ("M104", "M109")]
+    warm = False
+    for event, following in zip(heating, [*heating[1:], None], strict=True):
+        warm = event.value >= MELTING_C and (warm or event.code == "M109")
+        hot[event.row : following.row if following else None] = warm
+    rows = (program.e_mm > 1e-9) & ~hot
+    message = "{count} moves push filament through a nozzle that is not hot: M109 S must come first and stay on"
+    return per_part(program, rows, program.e_mm, "error", "cold-extrusion", message)
+
+
+def _left_on(program: ParsedProgram) -> list[Finding]:
+    found = []
+    for codes, name, off in ((("M104", "M109"), "nozzle", "M104 S0"), (("M140", "M190"), "bed", "M140 S0")):
+        events = [e for e in program.events if e.code in codes]
+        if events and events[-1].value > 0:
+            message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing"
+            found.append(at_line(program, events[-1].row, events[-1].line, "error", "heater-on", message))
+    return found
+
+
+def _flow(program: ParsedProgram, profile: Profile) -> list[Finding]:
+    """Plastic per second at the asked speed, against what the hot end melts."""
+    material = profile.material
+    rows = program.kind == MoveKind.EXTRUDE
+    length = np.linalg.norm(program.end[:, :3] - program.start[:, :3], axis=1)
+    area = pi * material.diameter_mm**2 / 4.0
+    flow = program.e_mm * area / np.maximum(length, 1e-9) * program.feed / 60.0
+    most = material.volumetric_limit_mm3_s
+    rounding = 1e-5 * area / np.maximum(length, 1e-9) * program.feed / 60.0  # E is written to 1e-5 mm
+    message = f"{{value}} mm3/s are asked for, {material.name} allows {most:g} mm3/s (moves: {{count}})"
+    return per_part(program, rows & (flow > most * SLACK + 2.0 * rounding), flow, "warning", "flow", message)
+
+
+def _profile(program: ParsedProgram, profile: Profile) -> list[Finding]:
+    found = []
+    if profile.machine.uncalibrated:
+        keys = ", ".join(profile.machine.uncalibrated)
+        found.append(Finding("warning", "uncalibrated", 0, 0, 0, f"no source gives these numbers, measure them: {keys}"))
+    for line, part, area in program.unsupported:
+        message = f"{area:g} mm2 of risky faces could be given no support"
+        found.append(Finding("warning", "unsupported", line, part, 0, message))
+    return found
+
+
+def _ignored(program: ParsedProgram) -> list[Finding]:
+    return [
+        Finding("warning", "ignored", line, 0, 0, f"{code} is not known to the dry run and was ignored ({count} times)")
+        for code, (line, count) in program.ignored.items()
+    ]

@@ -1,0 +1,96 @@
+"""Motion: findings about axes: limits, speeds, homing, turning while plastic flows."""
+
+import numpy as np
+
+from machine.dryrun.findings import Finding, at_line, per_part
+from machine.dryrun.timeline import axis_speeds, lengths
+from machine.limits import ROUNDING, axis_limits
+from machine.parse import MoveKind, ParsedProgram
+from mdp.mesh import Floats
+from profiles.machine import Machine
+
+SLACK = 1.001
+LEVEL_DEG = 0.01
+
+
+def findings(program: ParsedProgram, machine: Machine) -> list[Finding]:
+    """All findings about the axes."""
+    return [
+        *_outside(program, machine),
+        *_too_fast(program, machine),
+        *_homing(program, machine),
+        *_unhomed(program),
+        *_turning_strokes(program, machine),
+    ]
+
+
+def _outside(program: ParsedProgram, machine: Machine) -> list[Finding]:
+    found = []
+    for axis, (letter, (least, most)) in enumerate(axis_limits(machine).items()):
+        values = program.end[:, axis]
+        unit = "mm" if axis < 3 else "deg"
+        allowed = f"allowed is {least:g} to {most:g} {unit} (moves: {{count}})"
+        above, below = values > most + ROUNDING, values < least - ROUNDING
+        found += per_part(program, above, values, "error", "axis-limit", f"{letter} goes to {{value}} {unit}, {allowed}")
+        found += per_part(program, below, -values, "error", "axis-limit", f"{letter} goes to -{{value}} {unit}, {allowed}")
+    return found
+
+
+def deltas(program: ParsedProgram) -> Floats:
+    """(n, 6) changes of X Y Z tilt turn E."""
+    return np.column_stack([program.end - program.start, program.e_mm])
+
+
+def _too_fast(program: ParsedProgram, machine: Machine) -> list[Finding]:
+    change = deltas(program)
+    length, _ = lengths(change)
+    speed = np.abs(change) / np.maximum(length, 1e-9)[:, None] * (program.feed / 60.0)[:, None]
+    names = [*axis_limits(machine), "E"]
+    found = []
+    for axis, (letter, most) in enumerate(zip(names, axis_speeds(machine), strict=True)):
+        unit = "deg/s" if axis in (3, 4) else "mm/s"
+        rounding = length * 0.0 + 1.0 / 60.0  # F is written as a whole number
+        message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most:g} {unit} (moves: {{count}})"
+        found += per_part(program, speed[:, axis] > most * SLACK + rounding, speed[:, axis], "warning", "axis-speed", message)
+    return found
+
+
+def _homing(program: ParsedProgram, machine: Machine) -> list[Finding]:
+    found = []
+    for event in program.events:
+        if event.code != "G28" or event.row == 0:
+            continue
+        tilt = float(program.end[event.row - 1, 3])
+        later = [e for e in program.events if e.code == "G92" and machine.tilt.letter in e.letters and e.row == event.row]
+        if abs(tilt - machine.tilt.zero_deg) > LEVEL_DEG and not any(e.line < event.line for e in later):
+            message = f"homing while the table stands at {machine.tilt.letter}{tilt:.3f}: it must be level"
+            found.append(at_line(program, event.row, event.line, "error", "homing-tilted", message))
+    return found
+
+
+def _unhomed(program: ParsedProgram) -> list[Finding]:
+    """The first move of a linear axis that has been neither homed nor given a position."""
+    known: set[str] = set()
+    events = sorted((e for e in program.events if e.code in ("G28", "G92")), key=lambda e: e.row)
+    change = np.abs(program.end - program.start) > 1e-9
+    for axis, letter in enumerate("XYZ"):
+        moved = np.flatnonzero(change[:, axis])
+        first = int(moved[0]) if len(moved) else len(change)
+        homed = [
+            e for e in events if e.row <= first and (letter in e.letters or (e.code == "G28" and not set(e.letters) & set("XYZ")))
+        ]
+        if len(moved) and not homed:
+            known.add(letter)
+            row = first
+            message = f"{letter} moves before it is homed"
+            return [
+                Finding("error", "not-homed", int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
+            ]
+    return []
+
+
+def _turning_strokes(program: ParsedProgram, machine: Machine) -> list[Finding]:
+    rows = (program.kind == MoveKind.ROTATE) & (program.e_mm > 1e-9)
+    letters = f"{machine.tilt.letter} or {machine.turn.letter}"
+    message = f"{letters} turns while {{value}} mm of filament are extruded (moves: {{count}})"
+    return per_part(program, rows, program.e_mm, "error", "turning-stroke", message)

@@ -1,0 +1,107 @@
+"""Run: a G-code text played through the machine's kinematics, without a machine."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun import clearance, heat, motion
+from machine.dryrun.findings import Finding
+from machine.dryrun.timeline import move_times
+from machine.kinematics.table import workpiece_path
+from machine.limits import axis_limits
+from machine.parse import MoveKind, ParsedProgram, parse_gcode
+from mdp.mesh import Floats
+from profiles.profile import Profile
+
+STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1")
+
+
+@dataclass(frozen=True, eq=False)
+class DryRun:
+    """What a G-code text does on a machine.
+
+    times_s: (n,) seconds of each row of program; dwell_s: waiting told by G4 (heating and homing are not counted).
+    segments_mm: (m, 2, 3) deposited segments, workpiece frame; segment_row: (m,) their rows in program, which hold line,
+    part, layer, type, width and height; segment_mm3: (m,) their volumes.
+    """
+
+    program: ParsedProgram
+    times_s: Floats
+    dwell_s: float
+    segments_mm: Floats
+    segment_row: NDArray[np.int64]
+    segment_mm3: Floats
+    findings: tuple[Finding, ...]
+    letters: tuple[str, ...]
+
+    @property
+    def time_s(self) -> float:
+        """Seconds of all moves and dwells."""
+        return float(self.times_s.sum()) + self.dwell_s
+
+    @property
+    def segment_type(self) -> list[str]:
+        """The ;TYPE: name of each segment."""
+        return [self.program.types[k] for k in self.program.type[self.segment_row]]
+
+    @property
+    def failed(self) -> bool:
+        """True when a finding is an error."""
+        return any(finding.severity == "error" for finding in self.findings)
+
+
+def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
+    """Read G-code lines and play them: times, deposited plastic, findings. Raises GcodeError for what is not G-code."""
+    machine = profile.machine
+    program = parse_gcode(lines, machine)
+    rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
+    ends = [workpiece_path(machine, side[rows]) for side in (program.start, program.end)]
+    segments = np.stack(ends, axis=1)
+    area = pi * profile.material.diameter_mm**2 / 4.0
+    stop = np.zeros(len(program.line), dtype=np.bool_)
+    stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
+    found = [
+        *motion.findings(program, machine),
+        *clearance.findings(program, segments, rows, machine),
+        *heat.findings(program, profile),
+    ]
+    found.sort(key=lambda finding: (finding.severity, finding.line))
+    return DryRun(
+        program=program,
+        times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine),
+        dwell_s=sum(event.value for event in program.events if event.code == "G4"),
+        segments_mm=segments,
+        segment_row=rows,
+        segment_mm3=program.e_mm[rows] * area,
+        findings=tuple(found),
+        letters=tuple(axis_limits(machine)),
+    )
+
+
+def summary(run: DryRun) -> dict[str, object]:
+    """The figures of `simulate --json` and `export --json`."""
+    program = run.program
+    travels = program.kind == MoveKind.TRAVEL
+    points = run.segments_mm.reshape(-1, 3)
+    return {
+        "time_s": run.time_s,
+        "filament_mm": float(np.max(program.filament_mm, initial=0.0)),
+        "extruded_mm3": float(run.segment_mm3.sum()),
+        "travel_mm": float(np.linalg.norm((program.end - program.start)[travels, :3], axis=1).sum()),
+        "layers": program.layers,
+        "parts": len(program.parts),
+        "reorientations": int((program.kind == MoveKind.ROTATE).sum()),
+        "retractions": int(((program.kind == MoveKind.RETRACT) & (program.e_mm < 0)).sum()),
+        "bounds_mm": [points.min(axis=0).tolist(), points.max(axis=0).tolist()] if len(points) else [],
+        "axes": {
+            letter: [float(program.end[:, k].min()), float(program.end[:, k].max())] if len(program.end) else []
+            for k, letter in enumerate(run.letters)
+        },
+        "findings": [
+            {"severity": f.severity, "code": f.code, "line": f.line, "part": f.part, "layer": f.layer, "message": f.message}
+            for f in run.findings
+        ],
+    }

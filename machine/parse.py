@@ -1,0 +1,348 @@
+"""Parse: G-code text back into moves with absolute positions, one array row per move."""
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats
+from profiles.errors import GcodeError
+from profiles.machine import Machine
+
+LONGEST_LINE = 2000
+INCH_MM = 25.4
+DEFAULT_FEED = 1500.0
+BLOCK = re.compile(r"(?:[A-Z] *[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+) *)*")
+WORD = re.compile(r"([A-Z]) *([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
+FLAGS = re.compile(r"[GM][0-9]+(?:\.[0-9]+)?(?: *[A-Z] *(?:[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))?)*")
+FLAG = re.compile(r"([A-Z]) *([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))?")
+MACRO = re.compile(r"[A-Z_][A-Z0-9_]+(?: .*)?")
+PAREN = re.compile(r"\([^)]*\)")
+E_AXIS = 5
+
+
+class MoveKind(IntEnum):
+    """What a straight move does; RETRACT: filament alone, back or forth; ROTATE: the table turns."""
+
+    TRAVEL = 0
+    EXTRUDE = 1
+    RETRACT = 2
+    ROTATE = 3
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that is not a move: code as written ("M104"), its S (or P) value, letters named; before row `row`."""
+
+    line: int
+    code: str
+    value: float
+    letters: str
+    row: int
+
+
+@dataclass(frozen=True, eq=False)
+class ParsedProgram:
+    """A G-code text as arrays with one row per move (n rows).
+
+    line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row
+    before where G28 or G92 set a position. e_mm: filament pushed by the move. filament_mm: running sum of e_mm. feed:
+    F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
+    type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
+    layers: number of layer changes. parts: numbers of the parts in order. unsupported: (line, part, mm2).
+    """
+
+    line: NDArray[np.int64]
+    start: Floats
+    end: Floats
+    e_mm: Floats
+    filament_mm: Floats
+    feed: Floats
+    kind: NDArray[np.int8]
+    part: NDArray[np.int64]
+    layer: NDArray[np.int64]
+    type: NDArray[np.int64]
+    types: tuple[str, ...]
+    width_mm: Floats
+    height_mm: Floats
+    events: tuple[Event, ...]
+    ignored: dict[str, tuple[int, int]]
+    layers: int
+    parts: tuple[int, ...]
+    unsupported: tuple[tuple[int, int, float], ...]
+
+
+@dataclass
+class Reader:
+    """The firmware's state while reading: position, modes, and what the comments said."""
+
+    letters: dict[str, int]
+    home: list[float]
+    at: list[float]
+    e_shift: float = 0.0
+    relative: bool = False
+    relative_e: bool = False
+    scale: float = 1.0
+    feed: float = DEFAULT_FEED
+    motion: bool = False
+    part: int = 0
+    layer: int = 0
+    layers: int = 0
+    type: int = 0
+    width: float = 0.0
+    height: float = 0.0
+    number: int = 0
+    types: list[str] = field(default_factory=lambda: [""])
+    parts: list[int] = field(default_factory=list)
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
+    unsupported: list[tuple[int, int, float]] = field(default_factory=list)
+
+
+def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
+    """Read G-code lines (with or without line ends).
+
+    Raises GcodeError, with the line, for what is not G-code and for motion codes that are not supported; M codes and
+    macros that are not known are counted in `ignored`: code -> (first line, how often).
+    """
+    letters = {"X": 0, "Y": 1, "Z": 2, machine.tilt.letter: 3, machine.turn.letter: 4, "E": E_AXIS}
+    linear = [min(max(0.0, axis.limits_mm[0]), axis.limits_mm[1]) for axis in (machine.x, machine.y, machine.z)]
+    home = [*linear, machine.tilt.zero_deg, machine.turn.zero_deg, 0.0]
+    reader = Reader(letters, home, home.copy())
+    for number, line in enumerate(lines, start=1):
+        reader.number = number
+        code, _, remark = line.partition(";")
+        if len(code) > LONGEST_LINE:
+            raise GcodeError(f"line {number} is {len(line)} characters long: a G-code line has at most {LONGEST_LINE}")
+        if remark:
+            _remark(reader, remark)
+        code = code.strip()
+        if code:
+            _command(reader, code)
+    return _arrays(reader)
+
+
+def _command(reader: Reader, text: str) -> None:
+    """One line without its ; comment."""
+    code = text.upper()
+    if "(" in code:
+        code = PAREN.sub(" ", code).strip()
+    if code.startswith("N") or "*" in code:
+        code = _unframed(reader, code)
+    if not code or code == "%":
+        return
+    if BLOCK.fullmatch(code):
+        words = [(letter, float(value)) for letter, value in WORD.findall(code)]
+        letter, value = words[0]
+        if letter == "G" and value in (0.0, 1.0):
+            _straight(reader, words[1:])
+            return
+        if letter in "GMT":
+            _dispatch(reader, _name(letter, value), words[1:])
+        elif reader.motion and letter in reader.letters:
+            _straight(reader, words)
+        elif letter == "F":
+            reader.feed = value * reader.scale
+        else:
+            raise GcodeError(f"line {reader.number}: {_shown(text)} begins with no command: G, M or T is expected")
+        return
+    _irregular(reader, code, text)
+
+
+def _irregular(reader: Reader, code: str, text: str) -> None:
+    """Lines whose words are not all letter and number: axis names alone, texts, macros."""
+    head = re.match(r"([GM]) *([0-9]+(?:\.[0-9]+)?)", code)
+    if head and (head[1] == "M" or FLAGS.fullmatch(code)):
+        name = _name(head[1], float(head[2]))
+        words = (
+            [(letter, float(value or 0.0)) for letter, value in FLAG.findall(code[head.end() :])] if FLAGS.fullmatch(code) else []
+        )
+        if name in ("G0", "G1", "G92"):
+            raise GcodeError(f"line {reader.number}: {_shown(text)} has a word without a number")
+        _dispatch(reader, name, words)
+    elif MACRO.fullmatch(code) and text.isprintable() and not code.startswith(("G0 ", "G1 ")):
+        _ignore(reader, code.split()[0])
+    else:
+        raise GcodeError(f"line {reader.number}: {_shown(text)} cannot be read as G-code")
+
+
+def _unframed(reader: Reader, code: str) -> str:
+    """Without N number and checksum; a wrong checksum is refused."""
+    body, star, given = code.partition("*")
+    if star:
+        total = 0
+        for byte in body.encode("utf-8", "replace"):
+            total ^= byte
+        if not given.strip().isdigit() or int(given) != total:
+            raise GcodeError(
+                f"line {reader.number}: {_shown(code)} has checksum {given.strip()[:8]!r}, its characters give {total}"
+            )
+    return re.sub(r"^N *[0-9]+ *", "", body.strip())
+
+
+def _straight(reader: Reader, words: list[tuple[str, float]]) -> None:
+    """G0 and G1: a row, unless only F is given."""
+    reader.motion = True
+    at, letters, before = reader.at, reader.letters, tuple(reader.at)
+    moved = False
+    for letter, value in words:
+        axis = letters.get(letter)
+        if axis is None:
+            if letter != "F":
+                raise GcodeError(
+                    f"line {reader.number}: word {letter}{value:g} of a move is not known: this machine has {' '.join(letters)} F"
+                )
+            if value <= 0:
+                raise GcodeError(f"line {reader.number}: F is {value:g}: a feed must be above 0")
+            reader.feed = value * reader.scale
+            continue
+        moved = True
+        value *= 1.0 if axis in (3, 4) else reader.scale
+        if axis == E_AXIS:
+            at[axis] = at[axis] + value if reader.relative_e else value + reader.e_shift
+        else:
+            at[axis] = at[axis] + value if reader.relative else value
+    if moved:
+        reader.rows.append(
+            (reader.number, *before, *at, reader.feed, reader.part, reader.layer, reader.type, reader.width, reader.height)
+        )
+
+
+def _dispatch(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    action = CODES.get(name)
+    if action is not None:
+        action(reader, name, words)
+    elif name[0] in "GT":
+        raise GcodeError(f"line {reader.number}: {name} is not supported: G0, G1, G4, G20, G21, G28, G90, G91, G92 and T0 are")
+    else:
+        _ignore(reader, name)
+
+
+def _ignore(reader: Reader, name: str) -> None:
+    first, count = reader.ignored.get(name, (reader.number, 0))
+    reader.ignored[name] = (first, count + 1)
+
+
+def _mode(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    """G20 G21 G90 G91 M82 M83; G90 and G91 set E too, as in Marlin."""
+    if name in ("G20", "G21"):
+        reader.scale = INCH_MM if name == "G20" else 1.0
+    elif name in ("G90", "G91"):
+        reader.relative = reader.relative_e = name == "G91"
+    else:
+        reader.relative_e = name == "M83"
+
+
+def _home(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    """G28: the named axes, or all, stand at 0 (or the nearest place inside their limits)."""
+    named = [letter for letter, _ in words if letter in reader.letters and letter != "E"] or [
+        k for k in reader.letters if k != "E"
+    ]
+    _note(reader, name, [(letter, 0.0) for letter in named])
+    for letter in named:
+        reader.at[reader.letters[letter]] = reader.home[reader.letters[letter]]
+
+
+def _set(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    """G92: the named axes stand at the given values from now on; E keeps its sum and changes its zero."""
+    _note(reader, name, words)
+    for letter, value in words or [(letter, 0.0) for letter in reader.letters]:
+        axis = reader.letters.get(letter)
+        if axis == E_AXIS:
+            reader.e_shift = reader.at[E_AXIS] - value * reader.scale
+        elif axis is not None:
+            reader.at[axis] = value * (1.0 if axis in (3, 4) else reader.scale)
+
+
+def _note(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    values = dict(words)
+    value = values.get("S", values.get("R", 0.0))
+    if name == "G4":
+        value = values.get("S", values.get("P", 0.0) / 1000.0)
+    reader.events.append(Event(reader.number, name, value, "".join(letter for letter, _ in words), len(reader.rows)))
+
+
+def _nothing(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    """Codes without a bearing on motion or heat."""
+
+
+def _refuse_arc(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    raise GcodeError(f"line {reader.number}: {name} (an arc) is not supported: write straight moves")
+
+
+Action = Callable[[Reader, str, list[tuple[str, float]]], None]
+ACTIONS: tuple[tuple[Action, str], ...] = (
+    (_mode, "G20 G21 G90 G91 M82 M83"),
+    (_note, "G4 M0 M1 M18 M84 M104 M106 M107 M109 M140 M190 M400"),
+    (_nothing, "G17 G94 M73 M105 M110 M115 M117 M118 M155 M201 M203 M204 M205 M220 M221 T0"),
+    (_home, "G28"),
+    (_set, "G92"),
+    (_refuse_arc, "G2 G3"),
+)
+CODES: dict[str, Action] = {code: action for action, codes in ACTIONS for code in codes.split()}
+
+
+def _remark(reader: Reader, remark: str) -> None:
+    """The comments that viewers know: what a move is for."""
+    text = remark.strip()
+    if text == "LAYER_CHANGE":
+        reader.layer += 1
+        reader.layers += 1
+        return
+    key, colon, value = text.partition(":")
+    if not colon:
+        return
+    if key == "TYPE":
+        if value not in reader.types:
+            reader.types.append(value)
+        reader.type = reader.types.index(value)
+    elif key in ("WIDTH", "HEIGHT"):
+        setattr(reader, key.lower(), _positive(value))
+    elif key == "PART":
+        _part(reader, value)
+    elif key == "UNSUPPORTED":
+        reader.unsupported.append((reader.number, reader.part, _positive(value)))
+
+
+def _part(reader: Reader, value: str) -> None:
+    number = value.split()[0] if value.split() else ""
+    if number.isdigit():
+        reader.part, reader.layer = int(number), 0
+        reader.parts.append(reader.part)
+
+
+def _positive(text: str) -> float:
+    """The number of a comment; 0 when it is none, for a comment must not stop a print."""
+    return float(text) if re.fullmatch(r" *[0-9]+(?:\.[0-9]+)? *", text) else 0.0
+
+
+def _name(letter: str, value: float) -> str:
+    return f"{letter}{value:g}"
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:40] + "...")
+
+
+def _arrays(reader: Reader) -> ParsedProgram:
+    table = np.array(reader.rows, dtype=np.float64).reshape(-1, 19)
+    start, end = table[:, 1:6], table[:, 7:12]
+    e_mm = table[:, 12] - table[:, 6]
+    turned = (np.abs(end[:, 3:] - start[:, 3:]) > 1e-9).any(axis=1)
+    travelled = (np.abs(end[:, :3] - start[:, :3]) > 1e-9).any(axis=1)
+    kind = np.select(
+        [turned, travelled & (e_mm > 1e-9), ~travelled & (np.abs(e_mm) > 1e-9)],
+        [MoveKind.ROTATE, MoveKind.EXTRUDE, MoveKind.RETRACT],
+        MoveKind.TRAVEL,
+    ).astype(np.int8)
+    whole = table[:, [0, 14, 15, 16]].astype(np.int64)
+    return ParsedProgram(
+        line=whole[:, 0], start=start, end=end, e_mm=e_mm, filament_mm=np.cumsum(e_mm), feed=table[:, 13], kind=kind,
+        part=whole[:, 1], layer=whole[:, 2], type=whole[:, 3], types=tuple(reader.types),
+        width_mm=table[:, 17], height_mm=table[:, 18], events=tuple(reader.events), ignored=reader.ignored,
+        layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
+    )  # fmt: skip

@@ -1,0 +1,195 @@
+"""Plan: sliced parts in order become one program of strokes, travels and reorientations in machine coordinates."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import inf, pi
+
+import numpy as np
+
+from machine import limits
+from machine.collide import Printed, hull, together
+from machine.kinematics.table import part_shift, workpiece_points
+from machine.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Retract, Stroke, Travel
+from machine.reorient import approach_z, safe_pose
+from machine.rows import rows
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Floats
+from mdp.pose import Pose, level
+from profiles.profile import Profile
+from slicer.paths import Layer, Path, SlicedPart, bead_area_mm2
+
+STANDING_MM = 1e-6
+
+
+@dataclass
+class Tip:
+    """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back."""
+
+    at_mm: Floats
+    pose: Pose
+    retracted_mm: float = 0.0
+    prime_extra_mm: float = 0.0
+
+
+def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile) -> MachineProgram:
+    """The machine program of a decomposition's sliced parts, in print order; parts without a path are left out.
+
+    After the last part the table goes back to level, so that the next print's homing finds it level.
+    Raises MoveError: a point outside the axis limits, or no safe place for the head while the table turns.
+    """
+    parts = {part.index: part for part in decomposition.parts}
+    pieces = [piece for piece in sliced if any(layer.paths for layer in piece.layers)]
+    machine = profile.machine
+    tip = Tip(np.zeros(3), level(machine))
+    moves: list[Move] = []
+    printed: list[Printed] = []
+    for piece in pieces:
+        part = parts[piece.index]
+        shift = part_shift(machine, part.pose, part.base.offset_mm)
+        begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported_mm2)
+        moves += _reach(tip, begin, _first_point(piece) + shift, together(printed), profile, first=not printed)
+        for number, layer in enumerate(piece.layers, start=1):
+            if layer.paths:
+                moves += _layer(tip, part.index, number, layer, shift, profile)
+        printed.append(_printed(piece, part, shift, profile))
+    if pieces:
+        moves += _finish(tip, pieces[-1].index, together(printed), profile)
+    program = MachineProgram(decomposition.name, tuple(moves))
+    limits.check(program, rows(program, machine.tilt.zero_deg, machine.turn.zero_deg), machine)
+    return program
+
+
+def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile: Profile, first: bool) -> Iterator[Move]:
+    """Retract, lift, turn the table, cross over to above the target, go down.
+
+    Where the start block leaves the tip is not known: the first two travels stand for going up, then across.
+    """
+    if first:
+        tip.at_mm = target.copy()
+    else:
+        yield from _retract(tip, profile)
+    safe = safe_pose(profile.machine, printed, tip.at_mm, tip.pose, part.pose, part.index)
+    if first:
+        tip.at_mm[2] = safe.z_mm
+        for speed in (_lift_speed(profile), _travel_speed(profile)):
+            yield Travel(np.array([tip.at_mm, tip.at_mm]), speed)
+    yield from _go(tip, [*tip.at_mm[:2], safe.z_mm], profile)
+    if safe.over_mm is not None:
+        yield from _go(tip, [*safe.over_mm, safe.z_mm], profile)
+    if first or tip.pose != part.pose:
+        yield _reorient(tip, part.pose, profile)
+        tip.prime_extra_mm = 0.0 if first else profile.material.prime_extra_mm
+    yield part
+    across_z = approach_z(profile.machine, printed, part.pose, safe, target, part.index)
+    yield from _go(tip, [*target[:2], across_z], profile)
+    yield from _go(tip, list(target), profile)
+
+
+def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
+    speed = limits.turn_speed(pose.tilt_deg - tip.pose.tilt_deg, pose.turn_deg - tip.pose.turn_deg, profile.machine)
+    tip.pose = pose
+    return Reorient(pose, speed)
+
+
+def _layer(tip: Tip, part: int, number: int, layer: Layer, shift: Floats, profile: Profile) -> Iterator[Move]:
+    yield BeginLayer(part, number, layer.z_mm, layer.height_mm, layer.fan)
+    z = layer.z_mm + float(shift[2])
+    for path in layer.paths:
+        points = np.column_stack([path.points + shift[:2], np.full(len(path.points), z)])
+        yield from _to_path(tip, path, points[0], shift, profile)
+        yield from _prime(tip, profile)
+        yield _stroke(path, layer.height_mm, points, profile)
+        tip.at_mm = points[-1]
+
+
+def _to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile) -> Iterator[Move]:
+    """Up to the layer first, then along the approach to the path's start."""
+    if float(np.linalg.norm(start - tip.at_mm)) <= STANDING_MM:
+        return
+    if path.retract:
+        yield from _retract(tip, profile)
+    if abs(float(start[2] - tip.at_mm[2])) > STANDING_MM:
+        yield from _go(tip, [*tip.at_mm[:2], start[2]], profile)
+    between = np.column_stack([path.approach.reshape(-1, 2) + shift[:2], np.full(len(path.approach), start[2])])
+    points = np.vstack([tip.at_mm, between, start])
+    keep = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])
+    if keep.sum() > 1:
+        yield Travel(points[keep], _travel_speed(profile))
+    tip.at_mm = start
+
+
+def _go(tip: Tip, target: list[float], profile: Profile) -> Iterator[Move]:
+    """A straight travel; straight up and down at the lift speed."""
+    points = np.array([tip.at_mm, target], dtype=np.float64)
+    if float(np.linalg.norm(points[1] - points[0])) > STANDING_MM:
+        upright = bool(np.all(np.abs(points[1, :2] - points[0, :2]) <= STANDING_MM))
+        speed = _lift_speed(profile) if upright else _travel_speed(profile)
+        yield Travel(points, limits.travel_speed(points, speed, profile.machine))
+        tip.at_mm = points[1]
+
+
+def _travel_speed(profile: Profile) -> float:
+    return min(profile.process.travel_speed_mm_s, profile.machine.x.speed_mm_s, profile.machine.y.speed_mm_s)
+
+
+def _lift_speed(profile: Profile) -> float:
+    return min(profile.process.lift_speed_mm_s, profile.machine.z.speed_mm_s)
+
+
+def _stroke(path: Path, height_mm: float, points: Floats, profile: Profile) -> Stroke:
+    """Filament by volume; the speed lowered to what the axes, the extruder and the hot end can do."""
+    machine, material = profile.machine, profile.material
+    area = bead_area_mm2(path.width_mm, height_mm) * path.flow * material.flow
+    filament_area = pi * material.diameter_mm**2 / 4.0
+    length = np.hypot(*np.diff(path.points, axis=0).T)
+    fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s * filament_area) / area if area > 0 else inf
+    speed = limits.travel_speed(points, min(path.speed_mm_s, fastest), machine)
+    return Stroke(path.kind, points, length * area / filament_area, speed, path.width_mm)
+
+
+def _retract(tip: Tip, profile: Profile) -> Iterator[Move]:
+    amount = profile.material.retract_mm - tip.retracted_mm
+    if amount > 0:
+        tip.retracted_mm += amount
+        yield Retract(amount, _filament_speed(profile))
+
+
+def _prime(tip: Tip, profile: Profile) -> Iterator[Move]:
+    amount = tip.retracted_mm + tip.prime_extra_mm
+    if amount > 0:
+        tip.retracted_mm = tip.prime_extra_mm = 0.0
+        yield Retract(-amount, _filament_speed(profile))
+
+
+def _filament_speed(profile: Profile) -> float:
+    return min(profile.material.retract_speed_mm_s, profile.machine.extruder_speed_mm_s)
+
+
+def _finish(tip: Tip, part: int, printed: Printed, profile: Profile) -> Iterator[Move]:
+    """Retract, lift, bring the table back to level."""
+    yield from _retract(tip, profile)
+    home = level(profile.machine)
+    if tip.pose == home:
+        z = min(float(tip.at_mm[2]) + profile.machine.lift_mm, profile.machine.z.limits_mm[1])
+        yield from _go(tip, [*tip.at_mm[:2], z], profile)
+        return
+    safe = safe_pose(profile.machine, printed, tip.at_mm, tip.pose, home, part)
+    yield from _go(tip, [*tip.at_mm[:2], safe.z_mm], profile)
+    if safe.over_mm is not None:
+        yield from _go(tip, [*safe.over_mm, safe.z_mm], profile)
+    yield _reorient(tip, home, profile)
+
+
+def _first_point(piece: SlicedPart) -> Floats:
+    """(3,) part frame: where the first path begins."""
+    layer = next(layer for layer in piece.layers if layer.paths)
+    return np.array([*layer.paths[0].points[0], layer.z_mm])
+
+
+def _printed(piece: SlicedPart, part: Part, shift: Floats, profile: Profile) -> Printed:
+    """What a finished part covers, in the workpiece frame."""
+    points = [
+        np.column_stack([path.points, np.full(len(path.points), layer.z_mm)]) for layer in piece.layers for path in layer.paths
+    ]
+    widest = max(path.width_mm for layer in piece.layers for path in layer.paths)
+    return hull(workpiece_points(profile.machine, part.pose, np.vstack(points) + shift), 0.5 * widest)
