@@ -1,0 +1,297 @@
+"""A Marlin-like firmware without I/O: bytes in, bytes out, time is virtual and handed in.
+
+Its habits are Marlin's (gcode/queue.cpp, bugfix-2.1.x of 2024-09), the awkward ones above all: line numbers and checksums with
+its exact words, a repeat of the last line swallowed in silence, `ok` = taken, withheld while the planner is full.
+"""
+
+import re
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf
+
+from machine.link.commands import COMMANDS, Body, move, words_of
+from machine.link.framing import checksum
+from machine.link.record import Record, moves_of
+from profiles.machine import Machine
+
+BUFSIZE = 4  # lines waiting, the one at work included
+MAX_CMD_SIZE = 96
+BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
+DIGITS = re.compile(rb"\s*([-+]?\d+)")
+URGENT = re.compile(rb"\s*(?:N\d+\s*)?M(112|108|410)(?!\d)")
+BANNER = "start\nMarlin bugfix-2.1.x (simulated)\necho: Last Updated: 2024-09-29 | Author: (none, default config)\n"
+
+
+@dataclass(frozen=True)
+class Habits:
+    """Build options of a firmware. rx_ring: bytes of a UART's receive ring that overflows; None: USB, which waits."""
+
+    advanced_ok: bool = True
+    emergency_parser: bool = True
+    busy: bool = True
+    autoreport: bool = True
+    rx_ring: int | None = None
+
+
+class Firmware:
+    """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile."""
+
+    def __init__(self, machine: Machine, habits: Habits | None = None, busy_s: float = BUSY_S) -> None:
+        self._habits = habits or Habits()
+        self._said: list[str] = []
+        self.body = Body(machine, self._said.append)
+        self._busy_every_s = busy_s
+        self._busy_s = inf
+        self._lines: deque[bytes] = deque()
+        self._half = b""
+        self._scanned = b""
+        self._queue: deque[tuple[str, str]] = deque()
+        self._last = 0
+        self._wake_s: float | None = None
+        self._work: Iterator[float] | None = None
+        self._lost_bytes = 0
+        self._taken = 0
+        self.dead = False
+
+    def receive(self, data: bytes) -> None:
+        """Bytes arrive on the line."""
+        if self.dead:
+            return
+        if self._habits.emergency_parser:
+            self._read_urgent(data)
+        if self._habits.rx_ring is not None:
+            kept = data[: max(0, self._habits.rx_ring - 1 - len(self._half) - sum(len(x) + 1 for x in self._lines))]
+            self._lost_bytes += len(data) - len(kept)
+            data = kept
+        *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
+        self._lines.extend(lines)
+
+    def advance(self, until_s: float = inf) -> bytes:
+        """Work until a virtual time; with inf until there is nothing to do, the clock jumping over all waits."""
+        body = self.body
+        while not self.dead:
+            self._fetch()
+            if self._wake_s is not None:
+                if self._wake_s > until_s:
+                    self._pass(until_s)
+                    break
+                self._pass(self._wake_s)
+                self._wake_s = None
+            elif self._queue:
+                self._run()
+            else:
+                if until_s < inf:
+                    self._pass(until_s)
+                break
+        if until_s < inf:
+            body.now_s = max(body.now_s, until_s)
+        said = "".join([f"{line}\n" for line in self._said])
+        self._said.clear()
+        return said.encode("ascii", "replace")
+
+    def next_s(self) -> float:
+        """The virtual time at which something happens without further bytes; inf when nothing will."""
+        if self.dead:
+            return inf
+        if self._wake_s is None:
+            return self.body.now_s if self._queue or self._lines else self.body.report_s
+        return min(self._wake_s, self.body.report_s, self._busy_s)
+
+    def reset(self, banner: bool = True) -> None:
+        """The board restarts: counter, queues, position and temperatures are lost."""
+        body = self.body
+        body.note("reset")
+        body.off()
+        body.motion.native[:] = [0.0] * 6
+        body.motion.shift[:] = [0.0] * 6
+        body.motion.relative = body.motion.filament_relative = body.motion.inches = False
+        body.report_s, body.report_every_s, body.waits_for_heat = inf, 0.0, False
+        self._forget()
+        self._last, self.dead = 0, False
+        if banner:
+            self._said += BANNER.splitlines()
+
+    def record(self) -> Record:
+        """What was done so far."""
+        body = self.body
+        start, end, feed, begin, duration = moves_of(body.motion.rows)
+        return Record(
+            machine=body.machine,
+            start=start,
+            end=end,
+            feed_mm_s=feed,
+            begin_s=begin,
+            duration_s=duration,
+            events=tuple(body.events),
+            nozzle_target_c=body.nozzle.target_c,
+            bed_target_c=body.bed.target_c,
+            fan=body.fan,
+            clamped=body.motion.clamped,
+            unknown=body.unknown,
+            lines=self._taken,
+            lost_bytes=self._lost_bytes,
+        )
+
+    def _forget(self) -> None:
+        self._lines.clear()
+        self._queue.clear()
+        self._half = self._scanned = b""
+        self._wake_s = self._work = None
+
+    def _read_urgent(self, data: bytes) -> None:
+        """The emergency parser reads M112, M108 and M410 from the raw bytes, whatever waits before them."""
+        scanned = self._scanned + data
+        end = scanned.rfind(b"\n") + 1
+        self._scanned = scanned[end:][-MAX_CMD_SIZE:]
+        if b"M112" not in scanned and b"M108" not in scanned and b"M410" not in scanned:
+            return
+        for line in scanned[:end].split(b"\n"):
+            if found := URGENT.match(line):
+                self._do_urgent(found[1])
+
+    def _do_urgent(self, number: bytes) -> None:
+        body = self.body
+        if number == b"112":
+            self._kill()
+        elif number == b"108":
+            body.impatient = True
+            if body.waits_for_heat:
+                self._wake_s = body.now_s
+        else:
+            body.motion.halt(body.now_s)
+            if self._wake_s is not None:
+                self._wake_s = body.now_s
+
+    def _kill(self) -> None:
+        self.body.note("M112")
+        self.body.off()
+        self._said += ["echo:M112 Shutdown", "Error:Printer halted. kill() called!", "//action:poweroff"]
+        self._forget()
+        self.dead = True
+
+    def _fetch(self) -> None:
+        """Move lines from the receive ring into the queue while it has room, checking number and checksum."""
+        while self._lines and len(self._queue) < BUFSIZE:
+            line = self._lines.popleft().partition(b";")[0][: MAX_CMD_SIZE - 1].lstrip(b" ")
+            if not line:
+                continue
+            label = ""
+            if line[:1] == b"N":
+                complaint = self._complaint(line)
+                if complaint == "":
+                    continue
+                if complaint is not None:
+                    self._ask_again(complaint)
+                    break
+                label = f" N{self._last}"
+                line = line[1 : line.rindex(b"*")].lstrip(b"-+0123456789").lstrip(b" ")
+            self._queue.append((label, line.decode("ascii", "replace").rstrip()))
+
+    def _complaint(self, line: bytes) -> str | None:
+        """What is wrong with a numbered line; "" for a repeat that Marlin drops in silence, None when it is taken."""
+        star = line.rfind(b"*")
+        renumbers = b"M110" in line
+        second = line.find(b"N", line.find(b"M110")) if renumbers else -1
+        found = DIGITS.match(line, 1 + max(second, 0))
+        number = int(found[1]) if found else 0
+        if not renumbers and number != self._last + 1:
+            return "" if self._last - 1 <= number <= self._last else "Line Number is not Last Line Number+1"
+        if star < 0:
+            return "No Checksum with line number"
+        told = DIGITS.match(line, star + 1)
+        if (int(told[1]) if told else 0) != checksum(line[:star]):
+            return "checksum mismatch"
+        self._last = number
+        return None
+
+    def _ask_again(self, complaint: str) -> None:
+        self._said += [f"Error:{complaint}, Last Line: {self._last}", f"Resend: {self._last + 1}", "ok"]
+        self._lines.clear()
+        self._half = b""
+
+    def _run(self) -> None:
+        """Begin or go on with the oldest line of the queue."""
+        body = self.body
+        label, text = self._queue[0]
+        if text[:2] in ("G1", "G0") and not text[2:3].isdigit():
+            if not body.motion.free(body.now_s):
+                self._sleep(body.motion.next_free_s())
+                return
+            move(body, words_of(text[2:]))
+            self._finish(label)
+            return
+        if self._work is None:
+            answer = self._begin(text)
+            if self.dead:
+                return
+            if answer is None or isinstance(answer, str):
+                self._finish(label, answer)
+                return
+            self._work = answer
+        wake_s = next(self._work, None)
+        if wake_s is None:
+            self._work = None
+            self._finish(label)
+        else:
+            self._sleep(wake_s)
+
+    def _begin(self, text: str) -> Iterator[float] | str | None:
+        name, _, rest = text.partition(" ")
+        if name == "M112":
+            self._kill()
+            return None
+        if name == "M115":
+            self._introduce()
+            return None
+        command = COMMANDS.get(name)
+        if command is None:
+            self.body.unknown += 1
+            self._said.append(f'echo:Unknown command: "{text}"')
+            return None
+        return command(self.body, {} if name == "M117" else words_of(rest), text)
+
+    def _introduce(self) -> None:
+        habits = self._habits
+        letters = self.body.motion.letters[3:5]
+        self._said += [
+            "FIRMWARE_NAME:Marlin bugfix-2.1.x (simulated) PROTOCOL_VERSION:1.0 MACHINE_TYPE:tiltprint EXTRUDER_COUNT:1 "
+            f"AXIS_COUNT:5 ROTARY:{''.join(letters)}",
+            "Cap:SERIAL_XON_XOFF:0",
+            f"Cap:AUTOREPORT_TEMP:{int(habits.autoreport)}",
+            f"Cap:EMERGENCY_PARSER:{int(habits.emergency_parser)}",
+            "Cap:PROGRESS:0",
+        ]
+
+    def _finish(self, label: str, answer: str | None = None) -> None:
+        self._queue.popleft()
+        self._taken += 1
+        self._busy_s = self.body.now_s + self._busy_every_s
+        if answer is not None:
+            self._said.append(answer)
+        elif self._habits.advanced_ok:
+            free = min(self.body.motion.free(self.body.now_s), 15)
+            self._said.append(f"ok{label} P{free} B{BUFSIZE - 1 - len(self._queue)}")
+        else:
+            self._said.append("ok")
+
+    def _sleep(self, wake_s: float) -> None:
+        if self._wake_s is None:
+            self._wake_s = wake_s
+
+    def _pass(self, to_s: float) -> None:
+        """Let the clock run, saying on the way what is due."""
+        body = self.body
+        while True:
+            busy_s = self._busy_s if self._wake_s is not None and self._habits.busy and not body.waits_for_heat else inf
+            due_s = min(busy_s, body.report_s)
+            if due_s > to_s or due_s == inf:
+                break
+            body.now_s = max(body.now_s, due_s)
+            if due_s == busy_s:
+                self._said.append("echo:busy: processing")
+                self._busy_s = body.now_s + self._busy_every_s
+            else:
+                self._said.append(f" {body.temperatures()}")
+                body.report_s = body.now_s + body.report_every_s
+        body.now_s = max(body.now_s, to_s)

@@ -1,0 +1,76 @@
+"""Framing: a command becomes `N<number> <command>*<checksum>`; what may not be sent is refused."""
+
+from profiles.errors import LocalProtocolError
+
+LINE_LIMIT = 95  # Marlin keeps MAX_CMD_SIZE - 1 characters; a longer line loses its checksum and is asked for again for ever
+REFUSED = {
+    "M0": "waits for a person at the printer's own buttons",
+    "M1": "waits for a person at the printer's own buttons",
+    "M108": "is an order of the sender",
+    "M110": "would break the line numbers",
+    "M112": "is an order of the sender",
+    "M410": "is an order of the sender",
+}
+
+
+def checksum(body: bytes) -> int:
+    """XOR of all bytes, folded as one big integer (seven shifts serve up to 128 bytes)."""
+    if len(body) > 128:
+        raise ValueError(f"{len(body)} bytes to check: at most 128 are allowed")
+    x = int.from_bytes(body, "little")
+    for shift in (512, 256, 128, 64, 32, 16, 8):
+        x ^= x >> shift
+    return x & 0xFF
+
+
+def frame(number: int, command: str) -> bytes:
+    """The bytes of one numbered line, newline included. LocalProtocolError when it is longer than LINE_LIMIT."""
+    body = b"N%d %s" % (number, command.encode("ascii"))
+    if len(body) > LINE_LIMIT:
+        raise too_long(command)
+    framed = b"%s*%d\n" % (body, checksum(body))
+    if len(framed) > LINE_LIMIT + 1:
+        raise too_long(command)
+    return framed
+
+
+def too_long(command: str) -> LocalProtocolError:
+    """The error for a command that does not fit in a line."""
+    return LocalProtocolError(
+        f"the command {command[:40]!r}... is {len(command)} characters long: with number and checksum "
+        f"at most {LINE_LIMIT} are allowed"
+    )
+
+
+def command_of(line: str, place: int) -> str:
+    """The command in a line of a program, without comment and blanks; "" when there is none.
+
+    place is the line's number in the program, for messages. Raises LocalProtocolError for a character outside printable
+    ASCII, for a `*`, and for commands that only the sender itself may give.
+    """
+    command = line.partition(";")[0].strip()
+    if not command:
+        return ""
+    if not (command.isascii() and command.isprintable()):
+        command = command.replace("\t", " ")
+        bad = next((c for c in command if not (c.isascii() and c.isprintable())), None)
+        if bad is not None:
+            raise LocalProtocolError(f"line {place} holds the character {bad!r}: only printable ASCII can be sent")
+    if "*" in command:
+        raise LocalProtocolError(f"line {place} ({command[:40]!r}) holds a '*': checksums are added by the sender")
+    if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
+        raise LocalProtocolError(f"line {place} holds {name_of(command)}, which {reason}: remove it from the program")
+    if len(command) > LINE_LIMIT - 6 and len(command) + len(str(place)) + 6 > LINE_LIMIT:
+        raise LocalProtocolError(
+            f"line {place} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
+            f"{LINE_LIMIT} are allowed"
+        )
+    return command
+
+
+def name_of(command: str) -> str:
+    """The letter and number a command begins with, "M109" of "M109 S210"."""
+    end = 1
+    while end < len(command) and (command[end].isdigit() or command[end] == "."):
+        end += 1
+    return command[:end].upper()

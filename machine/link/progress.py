@@ -1,0 +1,66 @@
+"""How far a print is: counts, temperatures, and what the program's own comments and M73 tell."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from machine.link.events import Temperature
+
+PART = re.compile(r";\s*PART:\s*(\d+)(?:\s+of\s+(\d+))?", re.IGNORECASE)
+WORD = re.compile(r"([PR])\s*(\d+\.?\d*)")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """A moment of a print. None: not known (yet)."""
+
+    sent: int
+    acknowledged: int
+    total: int | None
+    elapsed_s: float
+    left_s: float | None
+    share: float | None
+    temperature: Temperature
+    part: int | None
+    parts: int | None
+    layer: int | None
+
+
+@dataclass
+class Place:
+    """Where in the program the sender stands, gathered line by line."""
+
+    part: int | None = None
+    parts: int | None = None
+    layer: int | None = None
+    percent: float | None = None
+    minutes_left: float | None = None
+    told_at_s: float = field(default=0.0)
+
+    def comment(self, line: str) -> None:
+        """Take note of `;PART:2 of 3` and `;LAYER_CHANGE`."""
+        if line.startswith(";LAYER_CHANGE"):
+            self.layer = 1 if self.layer is None else self.layer + 1
+        elif found := PART.match(line):
+            self.part, self.layer = int(found[1]), None
+            self.parts = int(found[2]) if found[2] else self.parts
+
+    def told(self, command: str, now_s: float) -> None:
+        """Take note of M73's P (per cent done) and R (minutes left)."""
+        words = {letter: float(value) for letter, value in WORD.findall(command[3:].upper())}
+        self.percent = words.get("P", self.percent)
+        if "R" in words:
+            self.minutes_left, self.told_at_s = words["R"], now_s
+
+    def left_s(self, elapsed_s: float, total_s: float | None) -> float | None:
+        """Time left: M73's last word less what has passed since, else the total less what has passed."""
+        if self.minutes_left is not None:
+            return max(0.0, 60.0 * self.minutes_left - (elapsed_s - self.told_at_s))
+        return None if total_s is None else max(0.0, total_s - elapsed_s)
+
+    def share(self, acknowledged: int, total: int | None) -> float | None:
+        """Done so far, 0 to 1: by M73, else by lines."""
+        if self.percent is not None:
+            return min(1.0, self.percent / 100.0)
+        return acknowledged / total if total else None

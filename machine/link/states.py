@@ -1,0 +1,101 @@
+"""The states of a conversation with a printer, and every transition between them in one table.
+
+All transitions live here; protocol.py decides which signal an event amounts to, and what is done on entering a state.
+A signal that a state's row does not name leaves the state as it is.
+"""
+
+from enum import Enum, auto
+
+
+class State(Enum):
+    """Where the conversation stands."""
+
+    DRAIN = auto()  # port just opened: old words and a start-up banner are listened to
+    SYNC = auto()  # M110 sent, the line numbers are not agreed yet
+    HELLO = auto()  # M115 and M105 sent: the printer's habits are learned
+    OPEN = auto()  # lines may be sent, as many as the window allows
+    PROBING = auto()  # silence or doubt: a new numbered M105 shows what arrived
+    QUIET = auto()  # a resend was asked: nothing is sent until late lines have run dry
+    REPEAT = auto()  # lines of the history are repeated one by one
+    HALTED = auto()  # the firmware reported an error
+    LOST = auto()  # silence, restart or nonsense: nothing more can be known
+
+
+class Signal(Enum):
+    """What an event or the passing of time amounts to."""
+
+    HUSH = auto()  # nothing heard for a while
+    SYNCED = auto()  # M110 was answered
+    GREETED = auto()  # M115 and M105 were answered
+    RESEND = auto()  # a plausible line is wanted again
+    DOUBT = auto()  # an implausible line is wanted again, for the first time
+    IMPOSSIBLE = auto()  # the printer insists on it, or asks for the same line for ever
+    STALL = auto()  # no acknowledgement in time
+    ANSWERED = auto()  # the probe was answered: all lines before it arrived
+    CAUGHT_UP = auto()  # the whole history was repeated and acknowledged
+    SILENT = auto()  # probes or handshakes remain without answer
+    START = auto()  # the printer started anew
+    FAULT = auto()  # the firmware reported an error
+    UNCHECKED = auto()  # the printer ran a torn line without number and checksum
+
+
+TABLE: dict[State, dict[Signal, State]] = {
+    State.DRAIN: {
+        Signal.HUSH: State.SYNC,
+        Signal.START: State.SYNC,
+    },
+    State.SYNC: {
+        Signal.SYNCED: State.HELLO,
+        Signal.STALL: State.SYNC,
+        Signal.START: State.SYNC,
+        Signal.SILENT: State.LOST,
+        Signal.FAULT: State.HALTED,
+    },
+    State.HELLO: {
+        Signal.GREETED: State.OPEN,
+        Signal.RESEND: State.SYNC,
+        Signal.DOUBT: State.SYNC,
+        Signal.STALL: State.SYNC,
+        Signal.START: State.SYNC,
+        Signal.FAULT: State.HALTED,
+    },
+    State.OPEN: {
+        Signal.RESEND: State.QUIET,
+        Signal.DOUBT: State.PROBING,
+        Signal.STALL: State.PROBING,
+        Signal.IMPOSSIBLE: State.LOST,
+        Signal.START: State.LOST,
+        Signal.UNCHECKED: State.LOST,
+        Signal.FAULT: State.HALTED,
+    },
+    State.PROBING: {
+        Signal.ANSWERED: State.OPEN,
+        Signal.RESEND: State.QUIET,
+        Signal.DOUBT: State.PROBING,
+        Signal.STALL: State.PROBING,
+        Signal.SILENT: State.LOST,
+        Signal.IMPOSSIBLE: State.LOST,
+        Signal.START: State.LOST,
+        Signal.UNCHECKED: State.LOST,
+        Signal.FAULT: State.HALTED,
+    },
+    State.QUIET: {
+        Signal.HUSH: State.REPEAT,
+        Signal.IMPOSSIBLE: State.LOST,
+        Signal.START: State.LOST,
+        Signal.UNCHECKED: State.LOST,
+        Signal.FAULT: State.HALTED,
+    },
+    State.REPEAT: {
+        Signal.CAUGHT_UP: State.OPEN,
+        Signal.RESEND: State.QUIET,
+        Signal.DOUBT: State.PROBING,
+        Signal.STALL: State.PROBING,
+        Signal.IMPOSSIBLE: State.LOST,
+        Signal.START: State.LOST,
+        Signal.UNCHECKED: State.LOST,
+        Signal.FAULT: State.HALTED,
+    },
+    State.HALTED: {},
+    State.LOST: {},
+}
