@@ -1,0 +1,48 @@
+"""Bead: a piece of plastic to lay down, before its place in the order, its speed and its travel are known."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from mdp.mesh import Floats
+from slicer.paths import Kind
+
+ROUND_SIDES = 1.0 - pi / 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Bead:
+    """points: (n, 2) mm, a closed bead repeats its first point. rank: beads of an island are printed by rising rank."""
+
+    kind: Kind
+    points: Floats
+    width_mm: float
+    rank: int
+    flow: float = 1.0
+
+    @property
+    def closed(self) -> bool:
+        """Whether the bead ends where it begins."""
+        return len(self.points) > 3 and bool((self.points[0] == self.points[-1]).all())
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the bead."""
+        return length_mm(self.points)
+
+
+def length_mm(points: Floats) -> float:
+    """Length of a polyline."""
+    steps = points[1:] - points[:-1]
+    return float(np.sqrt((steps * steps).sum(axis=1)).sum())
+
+
+def spacing_mm(width_mm: float, height_mm: float) -> float:
+    """Distance of neighbouring beads whose rounded sides leave no plastic over: cross-section / height."""
+    return width_mm - height_mm * ROUND_SIDES
+
+
+def width_for_mm(spacing: float, height_mm: float) -> float:
+    """Width of the bead that fills a strip of that width between two others: the inverse of spacing_mm."""
+    return spacing + height_mm * ROUND_SIDES

@@ -1,0 +1,135 @@
+"""Centrelines: one line of varying width down the middle of places too narrow for two.
+
+The chordal axis of Prasad (1997): in a constrained Delaunay triangulation of a narrow polygon most triangles have one
+side on the boundary; the middles of their two inner sides join to the axis, and the height over the boundary side is
+the local width. Triangles with three inner sides are forks, those with one are tips.
+"""
+
+from collections import defaultdict
+from dataclasses import dataclass
+from itertools import pairwise
+
+import manifold3d
+import numpy as np
+
+from mdp.mesh import Floats, Ints
+from slicer.chords import chains
+from slicer.halfedges import opposites
+from slicer.polygons import Polygons, contours
+
+SPUR = 1.0  # a branch shorter than this many widths is a corner of the boundary, not a limb
+EVEN = 1.2  # widths within one power of this factor are printed as one bead
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """points: (n, 2) mm; width_mm: mean width of the place along it; share: area of the place / area along the lines."""
+
+    points: Floats
+    width_mm: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Chain:
+    points: Floats
+    widths: Floats
+    ends: tuple[int, int]
+    place: int
+
+    @property
+    def reversed(self) -> "_Chain":
+        return _Chain(self.points[::-1], self.widths[::-1], self.ends[::-1], self.place)
+
+    @property
+    def steps(self) -> Floats:
+        lengths: Floats = np.hypot(*np.diff(self.points, axis=0).T)
+        return lengths
+
+
+def centrelines(polygons: Polygons, step_mm: float) -> list[Line]:
+    """Lines down the middle of narrow polygons, whose boundary is sampled at least every step_mm."""
+    loops = [_sampled(loop, step_mm) for loop in contours(polygons)]
+    if not loops:
+        return []
+    triangles = np.asarray(manifold3d.triangulate(loops), dtype=np.int32).reshape(-1, 3)
+    if not len(triangles):
+        return []
+    points, widths, starts, ends, places, areas = chains(np.concatenate(loops), triangles, opposites(triangles))
+    cuts = np.append(starts, len(points))
+    found = [
+        _Chain(points[a:b], widths[a:b], (int(ends[k, 0]), int(ends[k, 1])), int(places[k]))
+        for k, (a, b) in enumerate(pairwise(cuts))
+    ]
+    return _lines(_merged(_pruned(found)), areas)
+
+
+def _sampled(loop: Floats, step_mm: float) -> Floats:
+    """The loop with points added so that no edge is longer than the step."""
+    steps = np.roll(loop, -1, axis=0) - loop
+    counts = np.maximum(np.ceil(np.hypot(*steps.T) / step_mm), 1).astype(np.int64)
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    share = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
+    sampled: Floats = np.repeat(loop, counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0)
+    return sampled
+
+
+def _pruned(found: list[_Chain]) -> list[_Chain]:
+    """Without the branches that only run into a corner: from a fork to a tip (end -1) and short for the fork's width."""
+    fork_width: dict[int, float] = defaultdict(float)
+    for chain in found:
+        for end, width in zip(chain.ends, (chain.widths[0], chain.widths[-1]), strict=True):
+            fork_width[end] = max(fork_width[end], float(width))
+    kept = []
+    for chain in found:
+        tip = (chain.ends[0] < 0) != (chain.ends[1] < 0)
+        if not tip or chain.steps.sum() > SPUR * fork_width[max(chain.ends)]:
+            kept.append(chain)
+    return kept
+
+
+def _merged(found: list[_Chain]) -> list[_Chain]:
+    """Chains joined at forks of which only two branches are left."""
+    at: dict[int, list[int]] = defaultdict(list)
+    for k, chain in enumerate(found):
+        for end in chain.ends:
+            if end >= 0:
+                at[end].append(k)
+    alive: dict[int, _Chain] = dict(enumerate(found))
+    for fork, members in at.items():
+        if len(members) != 2 or members[0] == members[1]:
+            continue
+        first, second = alive[members[0]], alive[members[1]]
+        first = first if first.ends[1] == fork else first.reversed
+        second = second if second.ends[0] == fork else second.reversed
+        points, widths = (np.concatenate([getattr(first, x), getattr(second, x)[1:]]) for x in ("points", "widths"))
+        alive[members[0]] = _Chain(points, widths, (first.ends[0], second.ends[1]), first.place)
+        del alive[members[1]]
+        if second.ends[1] >= 0:
+            at[second.ends[1]] = [members[0] if k == members[1] else k for k in at[second.ends[1]]]
+    return list(alive.values())
+
+
+def _lines(found: list[_Chain], areas: Floats) -> list[Line]:
+    """Chains cut where the width changes."""
+    along = np.zeros(len(areas))
+    for chain in found:
+        along[chain.place] += float(chain.steps @ (0.5 * (chain.widths[1:] + chain.widths[:-1])))
+    lines = []
+    for chain in found:
+        share = float(areas[chain.place] / along[chain.place]) if along[chain.place] > 0 else 1.0
+        for a, b in _even(chain.widths):
+            steps = chain.steps[a:b]
+            middle = 0.5 * (chain.widths[a:b] + chain.widths[a + 1 : b + 1])
+            if steps.sum() > 0:
+                lines.append(Line(chain.points[a : b + 1], float(steps @ middle / steps.sum()), share))
+    return lines
+
+
+def _even(widths: Floats) -> list[tuple[int, int]]:
+    """Ranges of steps with nearly one width."""
+    middle = 0.5 * (widths[1:] + widths[:-1])
+    smooth = np.convolve(np.pad(middle, 2, mode="edge"), np.full(5, 0.2), mode="valid")
+    level: Ints = np.round(np.log(np.maximum(smooth, 1e-3)) / np.log(EVEN)).astype(np.int32)
+    cuts = [0, *(np.flatnonzero(np.diff(level)) + 1).tolist(), len(middle)]
+    return list(pairwise(cuts))

@@ -1,0 +1,72 @@
+"""Polygons: sets of closed contours in the plane with their booleans and offsets, all of it over manifold3d.CrossSection.
+
+Outer contours run counter-clockwise, holes clockwise. Only the Positive fill rule is used, so every input must be oriented.
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from manifold3d import CrossSection, FillRule, JoinType, OpType
+
+from mdp.mesh import Floats
+
+Polygons: TypeAlias = CrossSection
+
+RESOLUTION_MM = 0.0125  # PrusaSlicer's resolution of G-code; finer detail than this no printer shows
+CLOSING_MM = 0.049  # PrusaSlicer's slice closing radius: slits narrower than twice this are meshing faults
+MITRE = 2.0
+ARC_SEGMENTS = 32
+
+
+def cleaned(loops: Sequence[Floats]) -> Polygons:
+    """Loops of a section, (n, 2) mm each, as overlap-free polygons without detail and slits that cannot be printed."""
+    if not loops:
+        return Polygons()
+    whole = Polygons(list(loops), FillRule.Positive).simplify(RESOLUTION_MM)
+    return grown(grown(whole, CLOSING_MM), -CLOSING_MM)
+
+
+def grown(polygons: Polygons, distance_mm: float) -> Polygons:
+    """Every boundary moved outward (negative: inward) by the distance, corners mitred."""
+    return polygons.offset(distance_mm, JoinType.Miter, MITRE)
+
+
+def rounded(polygons: Polygons, distance_mm: float) -> Polygons:
+    """Every boundary moved outward (negative: inward) by the distance, corners round."""
+    return polygons.offset(distance_mm, JoinType.Round, MITRE, ARC_SEGMENTS)
+
+
+def opened(polygons: Polygons, radius_mm: float) -> Polygons:
+    """The polygons without what is narrower than twice the radius."""
+    core = grown(polygons, -radius_mm)
+    return core if core.is_empty() else grown(core, radius_mm) ^ polygons
+
+
+def united(several: Sequence[Polygons]) -> Polygons:
+    """What lies in any of several polygons."""
+    return Polygons.batch_boolean(list(several), OpType.Add) if several else Polygons()
+
+
+def contours(polygons: Polygons) -> list[Floats]:
+    """Contours as (n, 2) arrays, the first point not repeated."""
+    return [np.asarray(loop, dtype=np.float64) for loop in polygons.to_polygons() if len(loop) > 2]
+
+
+def closed(loop: Floats) -> Floats:
+    """The loop with its first point repeated at the end."""
+    return np.concatenate([loop, loop[:1]])
+
+
+def edges(polygons: Polygons) -> Floats:
+    """(n, 4) edges of all contours, x0 y0 x1 y1."""
+    loops = contours(polygons)
+    if not loops:
+        return np.zeros((0, 4))
+    return np.concatenate([np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops])
+
+
+def area_mm2(loop: Floats) -> float:
+    """Signed area of a loop by the shoelace formula, positive when counter-clockwise."""
+    x, y = (loop - loop[0]).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))

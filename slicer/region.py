@@ -1,0 +1,100 @@
+"""Regions: which places of each layer are solid skin and which are sparse infill."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from slicer.polygons import Polygons, grown, opened
+
+SPARSE_LEAST_MM2 = 25.0  # in line widths squared: a smaller island of infill costs more travel than plastic
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A layer's inside: top is skin with nothing above it, solid is all other skin, sparse takes the infill."""
+
+    top: Polygons
+    solid: Polygons
+    sparse: Polygons
+
+
+def regions(
+    sections: Sequence[Polygons],
+    insides: Sequence[Polygons],
+    beneath: Polygons | None,
+    top_layers: int,
+    bottom_layers: int,
+    density: float,
+    width_mm: float,
+) -> list[Region]:
+    """Regions of every layer from the sections and what the walls enclose.
+
+    A place is solid when one of the next top_layers sections above or bottom_layers below does not cover it. beneath:
+    plastic of earlier parts under the first layer, which is then solid throughout; None: the platform.
+    """
+    empty = Polygons()
+    on_plastic = beneath is not None
+    above = _common([*sections[1:], empty], top_layers) if top_layers else list(insides)
+    below = _common([*reversed(sections[:-1]), beneath if on_plastic else empty], bottom_layers, on_plastic)[::-1]
+    found = []
+    for i, inside in enumerate(insides):
+        if inside.is_empty():
+            found.append(Region(empty, empty, empty))
+            continue
+        whole = density >= 1.0 or (on_plastic and i == 0)
+        sparse = empty if whole else _sparse(inside, above[i], below[i] if bottom_layers else inside, width_mm)
+        next_section = sections[i + 1] if i + 1 < len(sections) else empty
+        found.append(_region(inside, sparse, next_section if top_layers else inside, width_mm))
+    return found
+
+
+def _sparse(inside: Polygons, above: Polygons, below: Polygons, width_mm: float) -> Polygons:
+    """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
+    covered = inside ^ above ^ below
+    if abs(covered.area() - inside.area()) < 1e-6:
+        return inside
+    skin = opened(inside - covered, 0.25 * width_mm)
+    sparse = opened(inside - grown(skin, width_mm), width_mm) if not skin.is_empty() else inside
+    least = SPARSE_LEAST_MM2 * width_mm**2
+    islands = sparse.decompose()
+    kept = [island for island in islands if island.area() >= least]
+    return sparse if len(kept) == len(islands) else Polygons.compose(kept) if kept else Polygons()
+
+
+def _region(inside: Polygons, sparse: Polygons, next_section: Polygons, width_mm: float) -> Region:
+    """Splits what is not sparse into what is bare above and the rest."""
+    if sparse.is_empty():
+        solid = inside
+    elif abs(sparse.area() - inside.area()) < 1e-6:
+        return Region(Polygons(), Polygons(), sparse)
+    else:
+        solid = inside - sparse
+    top = solid - next_section
+    top = top if top.is_empty() else opened(top, width_mm)
+    return Region(top, solid if top.is_empty() else opened(solid - top, 0.25 * width_mm), sparse)
+
+
+def _common(layers: Sequence[Polygons], count: int, last_repeats: bool = False) -> list[Polygons]:
+    """For each i the intersection of layers i .. i + count - 1; beyond the end nothing, or everything if last_repeats.
+
+    Running intersections of blocks from both sides (van Herk 1992): three booleans a layer, however many are common.
+    """
+    if count <= 0 or not layers:
+        return list(layers)
+    n = len(layers)
+    forward: list[Polygons] = []
+    for i in range(n):
+        forward.append(layers[i] if i % count == 0 else forward[-1] ^ layers[i])
+    backward: list[Polygons] = list(layers)
+    for i in range(n - 2, -1, -1):
+        if (i + 1) % count:
+            backward[i] = layers[i] ^ backward[i + 1]
+    common = []
+    for i in range(n):
+        end = i + count - 1
+        if end >= n and not last_repeats:
+            common.append(Polygons())
+        else:
+            end = min(end, n - 1)
+            same_block = i // count == end // count
+            common.append((forward[end] if i % count == 0 else backward[i]) if same_block else backward[i] ^ forward[end])
+    return common

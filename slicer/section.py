@@ -1,0 +1,95 @@
+"""Sections: the exact outlines of a closed mesh at many heights at once.
+
+Each face that a plane crosses gives one segment, from the edge on which the face's boundary goes down through the plane
+to the edge on which it goes up; the neighbour over the upward edge gives the next segment, so chains close by topology alone.
+A vertex exactly in a plane counts as above it: the section of a flat top is taken from the solid below.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats, Ints, Mesh
+from profiles.errors import SliceError
+from slicer.halfedges import opposites
+
+
+def sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
+    """For each cutting height (rising, mm) the loops of the section, (n, 2) mm, solid on the left of every loop.
+
+    Raises SliceError when the mesh is not closed.
+    """
+    across = opposites(mesh.faces)
+    open_edges = int((across < 0).sum())
+    if open_edges:
+        raise SliceError(f"the mesh is not closed: {open_edges} edges have a face on one side only")
+    points, ends, counts = _walk(mesh.vertices, mesh.faces, across, np.ascontiguousarray(cuts_mm, dtype=np.float64))
+    loops = np.split(points, ends[:-1]) if len(ends) else []
+    bounds = np.concatenate([[0], np.cumsum(counts)])
+    return [[loop for loop in loops[a:b] if len(loop) > 2] for a, b in pairwise(bounds)]
+
+
+@njit(cache=True)
+def _spans(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Ints, Ints]:
+    """Per face the first layer it crosses and the one after the last."""
+    first, last = np.empty(len(faces), np.int32), np.empty(len(faces), np.int32)
+    for f in range(len(faces)):
+        a, b, c = vertices[faces[f, 0], 2], vertices[faces[f, 1], 2], vertices[faces[f, 2], 2]
+        first[f] = np.searchsorted(cuts, min(a, b, c), side="right")
+        last[f] = np.searchsorted(cuts, max(a, b, c), side="right")
+    return first, last
+
+
+@njit(cache=True)
+def _by_layer(first: Ints, last: Ints, layers: int) -> tuple[NDArray[np.int64], Ints]:
+    """Faces listed layer after layer: (layers + 1,) offsets and the list."""
+    offsets = np.zeros(layers + 1, np.int64)
+    for f in range(len(first)):
+        for layer in range(first[f], last[f]):
+            offsets[layer + 1] += 1
+    offsets = np.cumsum(offsets)
+    listed = np.empty(offsets[-1], np.int32)
+    place = offsets.copy()
+    for f in range(len(first)):
+        for layer in range(first[f], last[f]):
+            listed[place[layer]] = f
+            place[layer] += 1
+    return offsets, listed
+
+
+@njit(cache=True)
+def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+    """Points of all loops, the end of each loop in them, the number of loops of each layer."""
+    first, last = _spans(vertices, faces, cuts)
+    offsets, listed = _by_layer(first, last, len(cuts))
+    points = np.empty((offsets[-1], 2))
+    ends = np.empty(offsets[-1], np.int64)
+    counts = np.zeros(len(cuts), np.int64)
+    seen = np.full(len(faces), -1, np.int32)
+    n = loop = 0
+    for layer in range(len(cuts)):
+        z = cuts[layer]
+        for at in range(offsets[layer], offsets[layer + 1]):
+            f = listed[at]
+            if seen[f] == layer:
+                continue
+            while seen[f] != layer:
+                seen[f] = layer
+                up = 0
+                for k in range(3):
+                    tail, head = faces[f, k], faces[f, (k + 1) % 3]
+                    below_tail, below_head = vertices[tail, 2] < z, vertices[head, 2] < z
+                    if below_head and not below_tail:
+                        share = (z - vertices[head, 2]) / (vertices[tail, 2] - vertices[head, 2])
+                        points[n, 0] = vertices[head, 0] + share * (vertices[tail, 0] - vertices[head, 0])
+                        points[n, 1] = vertices[head, 1] + share * (vertices[tail, 1] - vertices[head, 1])
+                        n += 1
+                    elif below_tail and not below_head:
+                        up = k
+                f = across[3 * f + up] // 3
+            ends[loop] = n
+            loop += 1
+            counts[layer] += 1
+    return points, ends[:loop], counts

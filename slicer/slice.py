@@ -1,0 +1,126 @@
+"""Slicing: one part of a decomposition becomes layers of paths in its own frame."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from profiles.errors import SliceError
+from profiles.process import Process
+from profiles.profile import Profile
+from slicer.bead import Bead, width_for_mm
+from slicer.brim import brim
+from slicer.centreline import Line, centrelines
+from slicer.heights import heights
+from slicer.infill import infill
+from slicer.interface import beneath, sections_of
+from slicer.order import ordered
+from slicer.paths import Kind, Layer, Path, SlicedPart
+from slicer.polygons import Polygons, cleaned, united
+from slicer.region import Region, regions
+from slicer.seam import seamed
+from slicer.section import sections
+from slicer.skin import angle_of_layer_deg, skin
+from slicer.speed import speeds_mm_s
+from slicer.support import support_beads, supports
+from slicer.walls import Walls, walls
+
+GAP_RANK = 1
+LEAST_GAP_FLOW, MOST_GAP_FLOW = 0.8, 1.3
+NO_APPROACH = np.zeros((0, 2))
+
+
+def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> SlicedPart:
+    """The part's layers from its base plane upward.
+
+    earlier, later: the parts printed before and after this one; the part with index 1 stands on the platform. The same
+    input gives the same paths. Raises SliceError when the part gives no bead at all.
+    """
+    process, mesh = profile.process, part.in_part_frame()
+    at = heights(float(mesh.bounds_mm[1, 2]), process, part.index == 1)
+    outlines = [cleaned(loops) for loops in sections(mesh, at.cut_mm)]
+    walled = [walls(s, process.walls, process.line_width_mm, h) for s, h in zip(outlines, at.height_mm, strict=True)]
+    below = beneath(part, earlier, outlines[0])
+    filled = regions(
+        outlines,
+        [w.inside for w in walled],
+        below,
+        process.top_layers,
+        process.bottom_layers,
+        process.infill_density,
+        process.line_width_mm,
+    )
+    props = supports(mesh, outlines, at, process, below, lambda: sections_of(later, part, at.cut_mm))
+    layers: list[Layer] = []
+    tip: Floats | None = None
+    for i, outline in enumerate(outlines):
+        height = float(at.height_mm[i])
+        beads = _beads(walled[i], filled[i], i, process, height) + support_beads(props.areas[i], process, height)
+        if i == 0 and part.index == 1:
+            beads += brim(united([outline, props.areas[0]]), process, height)
+        layer = _layer(beads, outline, i, part.index == 1, profile, float(at.tip_mm[i]), height, tip)
+        tip = layer.paths[-1].points[-1] if layer.paths else tip
+        layers.append(layer)
+    _check(part, mesh.bounds_mm, layers, process)
+    return SlicedPart(part.index, tuple(layers), props.unsupported_mm2)
+
+
+def _beads(around: Walls, region: Region, layer: int, process: Process, height_mm: float) -> list[Bead]:
+    """Everything a layer prints of the part itself."""
+    width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
+    angle = angle_of_layer_deg(process.infill_angle_deg, layer)
+    beads = [
+        Bead(Kind.INNER_WALL if level else Kind.OUTER_WALL, seamed(loop), width, -level)
+        for level, loops in enumerate(around.loops)
+        for loop in loops
+    ]
+    beads += [_gap(line, width, line.width_mm, height_mm) for line in centrelines(around.free, 0.5 * width)]
+    beads += [
+        _gap(line, width, width_for_mm(line.width_mm, height_mm), height_mm) for line in centrelines(around.narrow, 0.5 * width)
+    ]
+    beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
+    beads += skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
+    density, pattern = process.infill_density, process.infill_pattern
+    return beads + infill(region.sparse, pattern, density, process.infill_angle_deg, layer, width, height_mm, overlap)
+
+
+def _gap(line: Line, line_width_mm: float, wished_mm: float, height_mm: float) -> Bead:
+    """One bead along a centreline, not narrower than half a line and not wider than two."""
+    width = min(max(wished_mm, 0.5 * line_width_mm), 2.0 * line_width_mm)
+    return Bead(Kind.GAP, line.points, width, GAP_RANK, min(max(line.share, LEAST_GAP_FLOW), MOST_GAP_FLOW))
+
+
+def _layer(
+    beads: list[Bead],
+    outline: Polygons,
+    index: int,
+    on_platform: bool,
+    profile: Profile,
+    z_mm: float,
+    height_mm: float,
+    tip: Floats | None,
+) -> Layer:
+    """The beads in order, with speeds, flow and fan."""
+    process, material = profile.process, profile.material
+    placed = ordered(beads, outline, process.line_width_mm, tip, process.retract_travel_mm)
+    flow, fixed = material.flow, None
+    if index == 0:
+        fixed = process.first_layer_speed_mm_s if on_platform else process.interface_speed_mm_s
+        flow *= 1.0 if on_platform else process.interface_flow
+    speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)
+    paths = tuple(
+        Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, NO_APPROACH, p.retract)
+        for p, speed in zip(placed, speeds, strict=True)
+    )
+    return Layer(z_mm, height_mm, paths, 0.0 if index == 0 and on_platform else material.fan)
+
+
+def _check(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Process) -> None:
+    own = (path for layer in layers for path in layer.paths if path.kind not in (Kind.SKIRT, Kind.SUPPORT))
+    if next(own, None) is None:
+        x, y, z = bounds_mm[1] - bounds_mm[0]
+        raise SliceError(
+            f"part {part.index} gives no path at all: it measures {x:.3g} x {y:.3g} x {z:.3g} mm and no place of it is wider "
+            f"than half of process.line_width_mm ({0.5 * process.line_width_mm:g} mm is the least)"
+        )

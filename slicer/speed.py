@@ -1,0 +1,57 @@
+"""Speed: how fast each bead is laid down."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from profiles.profile import Profile
+from slicer.order import Placed
+from slicer.paths import Kind, bead_area_mm2
+
+
+def of_kind_mm_s(process: Process) -> dict[Kind, float]:
+    """The process's speed of every kind of bead; gaps are as delicate as outer walls."""
+    return {
+        Kind.OUTER_WALL: process.outer_wall_speed_mm_s,
+        Kind.INNER_WALL: process.inner_wall_speed_mm_s,
+        Kind.GAP: process.outer_wall_speed_mm_s,
+        Kind.INFILL: process.infill_speed_mm_s,
+        Kind.SKIN: process.skin_speed_mm_s,
+        Kind.TOP_SKIN: process.skin_speed_mm_s,
+        Kind.SKIRT: process.first_layer_speed_mm_s,
+        Kind.SUPPORT: process.support_speed_mm_s,
+    }
+
+
+def speeds_mm_s(placed: Sequence[Placed], profile: Profile, height_mm: float, fixed_mm_s: float | None, flow: float) -> Floats:
+    """(n,) speeds of a layer's beads; fixed_mm_s replaces the speeds by kind, flow multiplies every bead's flow.
+
+    Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
+    below least_speed_mm_s.
+    """
+    process, table = profile.process, of_kind_mm_s(profile.process)
+    wished = np.array([table[p.bead.kind] if fixed_mm_s is None else fixed_mm_s for p in placed])
+    areas = np.array([bead_area_mm2(p.bead.width_mm, height_mm) * p.bead.flow * flow for p in placed])
+    speeds = np.minimum(wished, profile.material.volumetric_limit_mm3_s / areas)
+    lengths = np.array([p.bead.length_mm for p in placed])
+    hops = [a.points[-1] - b.points[0] for a, b in pairwise(placed)]
+    travel_s = float(np.hypot(*np.array(hops).T).sum()) / process.travel_speed_mm_s if hops else 0.0
+    return _slowed(speeds, lengths, process.least_layer_time_s - travel_s, process.least_speed_mm_s)
+
+
+def _slowed(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float) -> Floats:
+    """Speeds by one factor slower so that the lengths take the time, none pushed below the least speed."""
+    floor = np.minimum(speeds, least_mm_s)
+    factor = 1.0
+    for _ in range(4):  # beads that reach the floor leave the rest of the waiting to the others
+        slowed = np.maximum(speeds * factor, floor)
+        free = slowed > floor
+        missing = time_s - float((lengths / slowed).sum())
+        busy = float((lengths[free] / slowed[free]).sum())
+        if missing <= 1e-9 or busy <= 0.0:
+            break
+        factor *= busy / (busy + missing)
+    return np.maximum(speeds * factor, floor)

@@ -1,0 +1,60 @@
+"""Walls: closed beads that follow the outline of a section, and what is too narrow for a pair of them.
+
+The outermost bead runs half its width inside the section, the next ones a bead spacing further in. Where less than two
+beads fit, no wall turns round; the place is handed out as narrow and gets one centred line (slicer/centreline.py).
+"""
+
+from dataclasses import dataclass
+
+from mdp.mesh import Floats
+from slicer.bead import spacing_mm
+from slicer.polygons import Polygons, contours, grown, opened
+
+SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
+LEAST_LINE = 0.5  # of the line width: narrower places stay empty, the nozzle cannot lay less
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """loops[k]: centrelines of wall k from outside; free: narrow places of the section itself; narrow: between walls.
+
+    inside: what the walls enclose, bounded half a spacing inside the innermost centreline.
+    """
+
+    loops: tuple[tuple[Floats, ...], ...]
+    free: Polygons
+    narrow: Polygons
+    inside: Polygons
+
+
+def walls(section: Polygons, count: int, width_mm: float, height_mm: float) -> Walls:
+    """Up to `count` walls of a section for beads of that width and height."""
+    spacing = spacing_mm(width_mm, height_mm)
+    area, levels = section, []
+    free, narrow = Polygons(), Polygons()
+    for level in range(count):
+        half = 0.5 * (width_mm if level == 0 else spacing)
+        line = grown(area, -half)
+        core = grown(line, -0.5 * spacing)
+        rest = _rest(area, core, half + 0.5 * spacing, width_mm)
+        if not rest.is_empty():
+            line = line ^ grown(core, 0.5 * spacing + SLACK_MM)
+            free, narrow = (rest, narrow) if level == 0 else (free, narrow + rest)
+        levels.append(tuple(contours(line)))
+        area = core
+        if core.is_empty():
+            break
+    core = grown(area, -spacing)
+    rest = _rest(area, core, spacing, width_mm)
+    if not rest.is_empty():
+        area = area ^ grown(core, spacing + SLACK_MM)
+        free, narrow = (rest, narrow) if count == 0 else (free, narrow + rest)
+    return Walls(tuple(levels), free, narrow, area)
+
+
+def _rest(area: Polygons, core: Polygons, distance_mm: float, width_mm: float) -> Polygons:
+    """What of the area the core does not reach over a distance, as far as a line fits into it."""
+    if area.is_empty():
+        return area
+    rest = area - grown(core, distance_mm + SLACK_MM)
+    return rest if rest.is_empty() else opened(rest, 0.5 * LEAST_LINE * width_mm)
