@@ -118,7 +118,7 @@ class Candidates:
 
 def evaluate(surface: Surface, limits: Bounds, search: Search, angle_deg: float, least_gain_mm2: float) -> Candidates:
     """All candidates of a solid by the sweep; gain is the risky area that a cut makes safe."""
-    swept = sweep(surface, limits.directions, search.offset_step_mm, threshold(angle_deg))
+    swept = sweep(surface, limits.directions, search.offset_step_mm, threshold(angle_deg), limits.least_height_mm)
     used = np.arange(swept.up_mm2.shape[1]) < swept.count[:, None]
     row, column = np.nonzero(used)
     offset = (swept.first[row] + column) * search.offset_step_mm

@@ -5,11 +5,11 @@ with 1 (risky areas) or with n . d: by the divergence theorem the n . d-weighted
 its first moment about c the volume above c. Faces wholly above an offset go into suffix sums, faces that cross sampled
 offsets are added where they cross. Cost: vertices + faces + crossings.
 
-Whether the solid below an offset hangs together with the platform is a union-find over the mesh edges in the order of the
-offsets. An edge that is the longest step of a neighbouring face (its ends are the face's lowest and highest vertex) is
-implied by the other two and left out. A lowest vertex around which solid lies beneath is the floor of a void or bowl, not
-a floating piece: it is joined to its anchor, the surface that a ray into the solid meets, which lies lower. Solids join
-only where surfaces join, so the count of pieces is exact for the solid, closed voids and handles included.
+Whether the solid below an offset hangs together with the platform: every vertex belongs to the basin of the lowest vertex
+that is reached from it by walking down, and two basins join at the first edge between them, in the order of the offsets.
+A lowest vertex around which solid lies beneath is the floor of a void or bowl, not a floating piece: it is joined to its
+anchor, the surface that a ray into the solid meets, which lies lower. Solids join only where surfaces join, so the count
+of pieces is exact for the solid, closed voids and handles included.
 """
 
 from dataclasses import dataclass
@@ -29,10 +29,10 @@ FRAGILE_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a 
 class Sweep:
     """Values for each of k directions (rows) and its offsets c = (first + column) * step; columns beyond count are unused.
 
-    up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along
-    the direction; section_mm2: cross-section; volume_mm3: volume above; lowest_mm: least z of what lies above;
-    fragile_mm: distance to the nearest surface that the plane would cut into a sliver; pieces: components of the solid
-    below that do not reach the platform.
+    up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along the
+    direction; section_mm2: cross-section; volume_mm3: volume above; lowest_mm: least z of what lies above, exact where it is
+    below the direction's watched height, some greater number elsewhere; fragile_mm: distance to the nearest surface that the
+    plane would cut into a sliver; pieces: components of the solid below that do not reach the platform.
     """
 
     first: Ints
@@ -55,14 +55,11 @@ class Surface:
 
     @cached_property
     def edges(self) -> Ints:
-        """(e, 4) int32: the two vertices of every edge and the two vertices opposite to it."""
-        faces = self.mesh.faces
-        starts, ends, opposite = (faces[:, order].reshape(-1) for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
-        low, high = np.minimum(starts, ends).astype(np.int64), np.maximum(starts, ends)
-        order = np.argsort(low * len(self.mesh.vertices) + high, kind="stable")
-        pairs = order.reshape(-1, 2)
-        table: Ints = np.stack([starts[pairs[:, 0]], ends[pairs[:, 0]], opposite[pairs[:, 0]], opposite[pairs[:, 1]]], axis=1)
-        return np.ascontiguousarray(table[np.argsort(table[:, 0], kind="stable")], dtype=np.int32)
+        """(e, 2) int32: the vertices of every edge, near edges near each other."""
+        starts, ends = self.mesh.faces.reshape(-1), self.mesh.faces[:, [1, 2, 0]].reshape(-1)
+        once = starts < ends
+        table: Ints = np.ascontiguousarray(np.stack([starts[once], ends[once]], axis=1))
+        return table
 
     @cached_property
     def vertex_normals(self) -> Floats:
@@ -84,8 +81,11 @@ class Surface:
         return anchors(self.mesh, -self.vertex_normals)
 
 
-def sweep(surface: Surface, directions: Floats, step_mm: float, risky_below: float) -> Sweep:
-    """Evaluate all offsets of (k, 3) unit directions; risky_below is overhang.threshold of the self-supporting angle."""
+def sweep(surface: Surface, directions: Floats, step_mm: float, risky_below: float, watched_mm: Floats | None = None) -> Sweep:
+    """Evaluate all offsets of (k, 3) unit directions; risky_below is overhang.threshold of the self-supporting angle.
+
+    watched_mm (k,): the height below which the least z of a part matters; absent: all heights.
+    """
     mesh = surface.mesh
     reach = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     columns = int(2.0 * reach / step_mm) + 3
@@ -99,6 +99,7 @@ def sweep(surface: Surface, directions: Floats, step_mm: float, risky_below: flo
         surface.vertex_normals,
         surface.anchors,
         np.ascontiguousarray(directions),
+        np.full(len(directions), np.inf) if watched_mm is None else watched_mm,
         step_mm,
         columns,
         risky_below,
@@ -108,7 +109,7 @@ def sweep(surface: Surface, directions: Floats, step_mm: float, risky_below: flo
 
 @njit(cache=True, parallel=True)
 def _sweep(  # type: ignore[no-untyped-def]
-    vertices, faces, areas, normals, risky, edges, vertex_normals, anchor, directions, step, columns, risky_below
+    vertices, faces, areas, normals, risky, edges, vertex_normals, anchor, directions, watched, step, columns, risky_below
 ):
     k = len(directions)
     first, count = np.zeros(k, np.int32), np.zeros(k, np.int32)
@@ -133,9 +134,10 @@ def _sweep(  # type: ignore[no-untyped-def]
         for v in range(len(vertices)):
             bins[v] = min(max(int(np.ceil(heights[v] / step)) - begin, 0), n)
         _sum_faces(
-            vertices, faces, areas, normals, risky, d, heights, bins, begin, n, step, risky_below,
-            up[row], residual[row], section[row], volume[row], lowest[row],
+            faces, areas, normals, risky, d, heights, bins, begin, n, step, risky_below,
+            up[row], residual[row], section[row], volume[row],
         )  # fmt: skip
+        _find_lowest(vertices, edges, heights, bins, begin, n, step, watched[row], lowest[row])
         _find_slivers(vertex_normals, d, heights, bins, begin, n, step, fragile[row])
         _count_pieces(vertices, faces, edges, vertex_normals, anchor, d, heights, bins, n, pieces[row])
     return first, count, up, residual, section, volume, lowest, fragile, pieces
@@ -143,63 +145,73 @@ def _sweep(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _sum_faces(  # type: ignore[no-untyped-def]
-    vertices, faces, areas, normals, risky, d, heights, bins, begin, n, step, risky_below,
-    up, residual, section, volume, lowest,
-):  # fmt: skip
-    """Areas, cross-section, volume and lowest point above each offset. bins[v]: how many offsets lie below vertex v."""
-    whole = np.zeros((4, n))
-    for v in range(len(vertices)):
-        b = bins[v]
-        if b > 0:
-            lowest[b - 1] = min(lowest[b - 1], vertices[v, 2])
+    faces, areas, normals, risky, d, heights, bins, begin, n, step, risky_below, up, residual, section, volume
+):
+    """Areas, cross-section and volume above each offset. bins[v]: how many offsets lie below vertex v."""
+    whole = np.zeros((n + 1, 4))
     for f in range(len(faces)):
         i, j, m = faces[f, 0], faces[f, 1], faces[f, 2]
-        if heights[i] > heights[j]:
-            i, j = j, i
-        if heights[j] > heights[m]:
-            j, m = m, j
-        if heights[i] > heights[j]:
-            i, j = j, i
+        a, b, c = heights[i], heights[j], heights[m]
+        h0, h2 = min(a, b, c), max(a, b, c)
+        h1 = max(min(a, b), min(max(a, b), c))
+        below, above = min(bins[i], bins[j], bins[m]), max(bins[i], bins[j], bins[m])
         area = areas[f]
         slope = normals[f, 0] * d[0] + normals[f, 1] * d[1] + normals[f, 2] * d[2]
         up_area = area if risky[f] else 0.0
         residual_area = area if slope < risky_below else 0.0
-        h0, h1, h2 = heights[i], heights[j], heights[m]
+        leaning = slope * area
         mean = (h0 + h1 + h2) / 3.0
-        below, above = bins[i], bins[m]
-        if below > 0:
-            whole[0, below - 1] += up_area
-            whole[1, below - 1] += residual_area
-            whole[2, below - 1] += slope * area
-            whole[3, below - 1] += slope * area * mean
+        whole[below, 0] += up_area
+        whole[below, 1] += residual_area
+        whole[below, 2] += leaning
+        whole[below, 3] += leaning * mean
+        if below == above:
+            continue
+        lower, upper = (h1 - h0) * (h2 - h0), (h2 - h1) * (h2 - h0)
+        lower = 1.0 / lower if lower > 0.0 else 0.0
+        upper = 1.0 / upper if upper > 0.0 else 0.0
         for column in range(below, above):
             c = (begin + column) * step
             if c < h1:
-                under = (c - h0) * (c - h0) / ((h1 - h0) * (h2 - h0))
+                under = (c - h0) * (c - h0) * lower
                 share = 1.0 - under
                 moment = mean - c + under * (c - h0) / 3.0
-                z = vertices[i, 2] + (vertices[j, 2] - vertices[i, 2]) * (c - h0) / (h1 - h0)
-            elif h2 > h1:
-                share = (h2 - c) * (h2 - c) / ((h2 - h1) * (h2 - h0))
-                moment = share * (h2 - c) / 3.0
-                z = vertices[j, 2] + (vertices[m, 2] - vertices[j, 2]) * (c - h1) / (h2 - h1)
             else:
-                share, moment, z = 0.0, 0.0, vertices[m, 2]
-            z_long = vertices[i, 2] + (vertices[m, 2] - vertices[i, 2]) * (c - h0) / (h2 - h0)
-            lowest[column] = min(lowest[column], z, z_long)
+                share = (h2 - c) * (h2 - c) * upper
+                moment = share * (h2 - c) / 3.0
             up[column] += up_area * share
             residual[column] += residual_area * share
-            section[column] += slope * area * share
-            volume[column] += slope * area * moment
+            section[column] += leaning * share
+            volume[column] += leaning * moment
     for column in range(n - 1, -1, -1):
         if column < n - 1:
             for kind in range(4):
-                whole[kind, column] += whole[kind, column + 1]
-            lowest[column] = min(lowest[column], lowest[column + 1])
-        up[column] += whole[0, column]
-        residual[column] += whole[1, column]
-        section[column] += whole[2, column]
-        volume[column] += whole[3, column] - (begin + column) * step * whole[2, column]
+                whole[column + 1, kind] += whole[column + 2, kind]
+        up[column] += whole[column + 1, 0]
+        residual[column] += whole[column + 1, 1]
+        section[column] += whole[column + 1, 2]
+        volume[column] += whole[column + 1, 3] - (begin + column) * step * whole[column + 1, 2]
+
+
+@njit(cache=True)
+def _find_lowest(vertices, edges, heights, bins, begin, n, step, watched, lowest):  # type: ignore[no-untyped-def]
+    """Least z above each offset, among vertices and edge crossings below the watched height."""
+    for v in range(len(vertices)):
+        b, z = bins[v], vertices[v, 2]
+        if z < watched and b > 0:
+            lowest[b - 1] = min(lowest[b - 1], z)
+    for e in range(len(edges)):
+        v, w = edges[e, 0], edges[e, 1]
+        if bins[v] == bins[w] or (vertices[v, 2] >= watched and vertices[w, 2] >= watched):
+            continue
+        if bins[v] > bins[w]:
+            v, w = w, v
+        rise = (vertices[w, 2] - vertices[v, 2]) / (heights[w] - heights[v])
+        for column in range(bins[v], bins[w]):
+            z = vertices[v, 2] + rise * ((begin + column) * step - heights[v])
+            lowest[column] = min(lowest[column], z)
+    for column in range(n - 2, -1, -1):
+        lowest[column] = min(lowest[column], lowest[column + 1])
 
 
 @njit(cache=True)
@@ -238,72 +250,95 @@ def _higher(heights, a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _basins(edges, heights):  # type: ignore[no-untyped-def]
+    """For every vertex the lowest vertex that walking down leads to; lowest ones lead to themselves."""
+    down = np.arange(len(heights), dtype=np.int32)
+    for e in range(len(edges)):
+        a, b = edges[e, 0], edges[e, 1]
+        if _higher(heights, a, b):
+            down[a] = b
+        else:
+            down[b] = a
+    for v in range(len(down)):
+        root = down[v]
+        while down[root] != root:
+            root = down[root]
+        w = v
+        while down[w] != root:
+            down[w], w = root, down[w]
+    return down
+
+
+@njit(cache=True)
 def _count_pieces(vertices, faces, edges, vertex_normals, anchor, d, heights, bins, n, pieces):  # type: ignore[no-untyped-def]
     """Components below each offset that do not reach the platform."""
+    basin = _basins(edges, heights)
     size = len(vertices)
-    joins = np.empty((len(edges) + size, 2), np.int32)
+    joins = np.empty((len(edges) + size, 3), np.int32)
     starts = np.zeros(n + 2, np.int32)
-    has_lower = np.zeros(size, np.bool_)
+    grounded_at = np.full(size, n + 1, np.int32)
     many = 0
     for e in range(len(edges)):
-        low, high = edges[e, 0], edges[e, 1]
-        if _higher(heights, low, high):
-            low, high = high, low
-        has_lower[high] = True
-        for side in (2, 3):
-            w = edges[e, side]
-            if _higher(heights, w, low) and _higher(heights, high, w):
-                low = -1
-                break
-        if low >= 0:
-            joins[many, 0], joins[many, 1] = high, low
-            starts[bins[high] + 1] += 1
+        a, b = basin[edges[e, 0]], basin[edges[e, 1]]
+        if a != b:
+            joins[many, 0], joins[many, 1] = a, b
+            joins[many, 2] = max(bins[edges[e, 0]], bins[edges[e, 1]])
             many += 1
     for v in range(size):
-        if has_lower[v] or anchor[v] < 0:
+        if vertices[v, 2] <= PLATFORM_TOLERANCE_MM:
+            grounded_at[basin[v]] = min(grounded_at[basin[v]], bins[v])
+        if basin[v] != v or anchor[v] < 0:
             continue
         if vertex_normals[v, 0] * d[0] + vertex_normals[v, 1] * d[1] + vertex_normals[v, 2] * d[2] <= 0.0:
             continue
-        f = anchor[v]
-        w = faces[f, 0]
+        w = faces[anchor[v], 0]
         for corner in (1, 2):
-            if _higher(heights, w, faces[f, corner]):
-                w = faces[f, corner]
-        if bins[w] <= bins[v]:
-            joins[many, 0], joins[many, 1] = v, w
-            starts[bins[v] + 1] += 1
+            if _higher(heights, w, faces[anchor[v], corner]):
+                w = faces[anchor[v], corner]
+        if bins[w] <= bins[v] and basin[w] != v:
+            joins[many, 0], joins[many, 1], joins[many, 2] = v, basin[w], bins[v]
             many += 1
+    for k in range(many):
+        starts[joins[k, 2] + 1] += 1
     for b in range(n + 1):
         starts[b + 1] += starts[b]
     order, place = np.empty(many, np.int32), starts.copy()
     for k in range(many):
-        b = bins[joins[k, 0]]
+        b = joins[k, 2]
         order[place[b]] = k
         place[b] += 1
-    _join(vertices, joins, order, starts, bins, n, pieces)
+    _join(basin, grounded_at, joins, order, starts, bins, n, pieces)
 
 
 @njit(cache=True)
-def _join(vertices, joins, order, starts, bins, n, pieces):  # type: ignore[no-untyped-def]
-    size = len(vertices)
-    parent, grounded = np.empty(size, np.int32), np.empty(size, np.bool_)
-    added = np.zeros(n + 1, np.int32)
+def _join(basin, grounded_at, joins, order, starts, bins, n, pieces):  # type: ignore[no-untyped-def]
+    """Join basins in the order of the offsets and count those that hang free."""
+    size = len(basin)
+    parent, grounded = np.arange(size, dtype=np.int32), np.zeros(size, np.bool_)
+    fresh, landing = np.zeros(n + 2, np.int32), np.full(n + 2, -1, np.int32)
+    following = np.full(size, -1, np.int32)
     for v in range(size):
-        parent[v] = v
-        grounded[v] = vertices[v, 2] <= PLATFORM_TOLERANCE_MM
-        if not grounded[v]:
-            added[bins[v]] += 1
+        if basin[v] == v:
+            fresh[bins[v]] += 1
+            at = min(grounded_at[v], n + 1)
+            following[v] = landing[at]
+            landing[at] = v
     floating = 0
     for b in range(n):
-        floating += added[b]
-        for place in range(starts[b], starts[b + 1]):
-            k = order[place]
+        floating += fresh[b]
+        for at in range(starts[b], starts[b + 1]):
+            k = order[at]
             a, c = _root(parent, joins[k, 0]), _root(parent, joins[k, 1])
             if a != c:
                 if not (grounded[a] and grounded[c]):
                     floating -= 1
-                if a < c:
-                    a, c = c, a
-                parent[a] = c
-                grounded[c] = grounded[a] or grounded[c]
+                parent[max(a, c)] = min(a, c)
+                grounded[min(a, c)] = grounded[a] or grounded[c]
+        v = landing[b]
+        while v >= 0:
+            root = _root(parent, v)
+            if not grounded[root]:
+                grounded[root] = True
+                floating -= 1
+            v = following[v]
         pieces[b] = floating

@@ -1,0 +1,99 @@
+"""Save: a decomposition as STL files, one coloured 3MF and JSON values."""
+
+import io
+import zipfile
+from typing import Any
+
+import numpy as np
+
+from mdp.decomposition import Decomposition
+from mdp.mesh import Mesh
+
+# Okabe and Ito's palette, told apart by colour-blind people too.
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#999999")
+_STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
+_TYPES = (
+    '<?xml version="1.0" encoding="UTF-8"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">'
+    '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+    '<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>'
+)
+_RELATIONS = (
+    '<?xml version="1.0" encoding="UTF-8"?><Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
+    '<Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>'
+    "</Relationships>"
+)
+_MODEL = (
+    '<?xml version="1.0" encoding="UTF-8"?><model unit="millimeter" xml:lang="en" '
+    'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
+)
+
+
+def part_file(index: int) -> str:
+    """File name of a part's STL."""
+    return f"part-{index:02d}.stl"
+
+
+def stl(mesh: Mesh) -> bytes:
+    """The mesh as binary STL."""
+    facets = np.zeros(len(mesh.faces), _STL)
+    facets["normal"] = mesh.normals
+    facets["corners"] = mesh.vertices[mesh.faces]
+    return b"tiltprint part".ljust(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
+
+
+def threemf(decomposition: Decomposition) -> bytes:
+    """All parts in place in one 3MF, each an object of its own colour, the same bytes every time."""
+    bases = "".join(
+        f'<base name="part {part.index}" displaycolor="{COLOURS[(part.index - 1) % len(COLOURS)]}FF"/>' for part in decomposition.parts
+    )
+    objects = "".join(_object(part.mesh, part.index) for part in decomposition.parts)
+    items = "".join(f'<item objectid="{part.index + 1}"/>' for part in decomposition.parts)
+    model = f'{_MODEL}<basematerials id="1">{bases}</basematerials>{objects}</resources><build>{items}</build></model>'
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in (("[Content_Types].xml", _TYPES), ("_rels/.rels", _RELATIONS), ("3D/3dmodel.model", model)):
+            entry = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, text)
+    return content.getvalue()
+
+
+def values(decomposition: Decomposition, read_s: float, total_s: float) -> dict[str, Any]:
+    """What `decompose --json` writes."""
+    mesh = decomposition.mesh
+    return {
+        "model": decomposition.name,
+        "faces": len(mesh.faces),
+        "beam_width": decomposition.beam_width,
+        "ranker": decomposition.ranker,
+        "seconds": {"read": round(read_s, 3), "search": round(decomposition.search_s, 3), "total": round(total_s, 3)},
+        "risky_area_mm2": decomposition.risky_area_mm2,
+        "residual_area_mm2": decomposition.residual_area_mm2,
+        "reduction": decomposition.reduction,
+        "volume_mm3": mesh.volume_mm3,
+        "candidates_evaluated": decomposition.candidates_evaluated,
+        "rounds": decomposition.rounds,
+        "parts": [
+            {
+                "index": part.index,
+                "direction": part.direction.tolist(),
+                "base": {"normal": part.base.normal.tolist(), "offset_mm": part.base.offset_mm},
+                "tilt_deg": part.pose.tilt_deg,
+                "turn_deg": part.pose.turn_deg,
+                "volume_mm3": part.volume_mm3,
+                "risky_area_mm2": part.risky_area_mm2,
+                "faces": len(part.mesh.faces),
+                "file": part_file(part.index),
+            }
+            for part in decomposition.parts
+        ],
+    }
+
+
+def _object(mesh: Mesh, index: int) -> str:
+    vertices = "".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in mesh.vertices.tolist())
+    triangles = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist())
+    return (
+        f'<object id="{index + 1}" name="part {index}" type="model" pid="1" pindex="{index - 1}"><mesh>'
+        f"<vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh></object>"
+    )
