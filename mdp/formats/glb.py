@@ -1,0 +1,124 @@
+"""GLB (binary glTF 2.0): the triangles of the scene, coordinates taken as mm with z up.
+
+The specification says metres with y up, but programs that print write their mm and their z unchanged, so nothing is turned
+or scaled here; a model in metres is caught by the check of its size, one that lies on its side can be turned when it is read.
+"""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mdp.mesh import Floats
+from mdp.surface import Surface, checked
+from profiles.errors import MeshError
+
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+TRIANGLES = 4  # primitive mode
+DEEPEST = 64  # nodes within nodes
+
+
+def read(path: Path) -> list[Surface]:
+    """One surface for every mesh primitive that the scene places.
+
+    Raises MeshError for a damaged file, compressed geometry, outside buffers and primitives that are not plain triangles.
+    """
+    document, binary = _chunks(path, path.read_bytes())
+    try:
+        surfaces: list[Surface] = []
+        for node in _roots(document):
+            surfaces += _placed(path, document, binary, node, np.eye(4), 0)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {error}).") from None
+    if not surfaces:
+        raise MeshError(f"{path}: its scene places no mesh.")
+    return surfaces
+
+
+def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
+    magic, version, length = struct.unpack("<III", content[:12]) if len(content) >= 20 else (0, 0, 0)
+    if magic != MAGIC or version != 2:
+        raise MeshError(f"{path}: is not a GLB file of version 2.")
+    if len(content) < length:
+        raise MeshError(f"{path}: is cut short: it holds {len(content)} of the {length} bytes that its header announces.")
+    chunks: dict[int, bytes] = {}
+    place = 12
+    while place + 8 <= length:
+        size, kind = struct.unpack("<II", content[place : place + 8])
+        chunks.setdefault(kind, content[place + 8 : place + 8 + size])
+        place += 8 + size
+    try:
+        return json.loads(chunks.get(JSON_CHUNK, b"")), chunks.get(BINARY_CHUNK, b"")
+    except ValueError as error:
+        raise MeshError(f"{path}: its glTF document is malformed ({error}).") from None
+
+
+def _roots(document: Any) -> list[int]:
+    if document.get("scenes"):
+        return list(document["scenes"][document.get("scene", 0)].get("nodes", []))
+    children = {child for node in document.get("nodes", []) for child in node.get("children", [])}
+    return [number for number in range(len(document.get("nodes", []))) if number not in children]
+
+
+def _placed(path: Path, document: Any, binary: bytes, number: int, parent: Floats, depth: int) -> list[Surface]:
+    if depth > DEEPEST:
+        raise MeshError(f"{path}: its nodes contain each other.")
+    node = document["nodes"][number]
+    matrix = parent @ _matrix(node)
+    surfaces = []
+    if "mesh" in node:
+        for primitive in document["meshes"][node["mesh"]]["primitives"]:
+            surfaces.append(_surface(path, document, binary, primitive, matrix))
+    for child in node.get("children", []):
+        surfaces += _placed(path, document, binary, child, matrix, depth + 1)
+    return surfaces
+
+
+def _matrix(node: Any) -> Floats:
+    """(4, 4) acting on column vectors: the node's matrix, or translation @ rotation (quaternion x y z w) @ scale."""
+    if "matrix" in node:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+    rotation = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.array(rotation) * np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)
+    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    return matrix
+
+
+def _surface(path: Path, document: Any, binary: bytes, primitive: Any, matrix: Floats) -> Surface:
+    if primitive.get("mode", TRIANGLES) != TRIANGLES or primitive.get("extensions", {}).keys() & {"KHR_draco_mesh_compression"}:
+        raise MeshError(f"{path}: holds lines, strips or compressed geometry; only plain triangles are read.")
+    vertices = _rows(path, document, binary, primitive["attributes"]["POSITION"], 3).astype(np.float64)
+    if "indices" in primitive:
+        faces = _rows(path, document, binary, primitive["indices"], 1).astype(np.int64).reshape(-1, 3)
+    else:
+        faces = np.arange(len(vertices)).reshape(-1, 3)
+    checked(path, vertices, faces)
+    if not np.array_equal(matrix, np.eye(4)):
+        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    return checked(path, vertices, faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces)
+
+
+def _rows(path: Path, document: Any, binary: bytes, number: int, width: int) -> Any:
+    """(n, width) values of an accessor, strides honoured."""
+    accessor = document["accessors"][number]
+    view = document["bufferViews"][accessor["bufferView"]]
+    if "sparse" in accessor or view.get("extensions") or document["buffers"][view["buffer"]].get("uri"):
+        raise MeshError(
+            f"{path}: holds sparse or compressed data or data in another file; only plain data inside the file is read."
+        )
+    kind = np.dtype(COMPONENTS[accessor["componentType"]])
+    count, stride = int(accessor["count"]), int(view.get("byteStride", 0)) or kind.itemsize * width
+    start = int(view.get("byteOffset", 0)) + int(accessor.get("byteOffset", 0))
+    end = start + stride * (count - 1) + kind.itemsize * width
+    if count < 1 or start < 0 or stride < 1 or end > len(binary):
+        raise MeshError(f"{path}: is damaged: an accessor of {count} rows lies outside the file's {len(binary)} bytes of data.")
+    return np.ndarray((count, width), kind, binary, start, (stride, kind.itemsize))

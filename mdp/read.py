@@ -1,0 +1,97 @@
+"""Read: a model file into one closed solid in mm that rests on the platform, centred about the turn axis."""
+
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from mdp.formats import READERS
+from mdp.mesh import Mesh
+from mdp.pose import about
+from mdp.repair import repaired
+from mdp.surface import Surface
+from profiles.errors import MeshError
+
+DEMO = "demo:"
+LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
+OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
+TYPICAL_MM = 100.0
+
+
+def locate(model: str) -> Path:
+    """The file of a MODEL argument: `demo:NAME` is a model that ships with the program, anything else a path.
+
+    Raises MeshError for an unknown demo, naming those there are.
+    """
+    if not model.startswith(DEMO):
+        return Path(model)
+    name = model.removeprefix(DEMO)
+    folder = resources.files("mdp").joinpath("demos")
+    found = (
+        {entry.name.removesuffix(".ply"): entry for entry in folder.iterdir() if entry.name.endswith(".ply")}
+        if folder.is_dir()
+        else {}
+    )
+    if name not in found:
+        raise MeshError(
+            f"{model}: there is no demo model {name!r}; allowed are {', '.join(sorted(found)) or 'none: none is installed'}."
+        )
+    return Path(str(found[name]))
+
+
+def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0)) -> tuple[Mesh, tuple[str, ...]]:
+    """The solid of a model file, and a short sentence for every repair that was made.
+
+    Scaled, then rotated about x, then y, then z, then moved so that its box rests on z = 0 and is centred in x and y.
+    Raises MeshError with one sentence: unreadable, damaged, open, flat, or of a size that no printer makes.
+    """
+    surfaces = _surfaces(path)
+    try:
+        _check_size(surfaces, scale)
+        if scale != 1.0:
+            surfaces = [Surface(surface.vertices * scale, surface.faces) for surface in surfaces]
+        solid, notes = repaired(surfaces)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}.") from None
+    return _resting(solid, rotate_deg), tuple(notes)
+
+
+def _surfaces(path: Path) -> list[Surface]:
+    reader = READERS.get(path.suffix.lower())
+    if path.is_dir():
+        raise MeshError(f"{path}: is a folder, not a model file.")
+    if not path.exists():
+        raise MeshError(f"{path}: there is no such file.")
+    if reader is None:
+        raise MeshError(f"{path}: the kind of file {path.suffix!r} is not read; allowed are {', '.join(READERS)}.")
+    try:
+        if path.stat().st_size == 0:
+            raise MeshError(f"{path}: is empty.")
+        return reader(path)
+    except OSError as error:
+        raise MeshError(f"{path}: cannot be read: {error.strerror or error}.") from None
+
+
+def _check_size(surfaces: list[Surface], scale: float) -> None:
+    """Refuses what is too small or too large, naming the scale of the unit that would bring it nearest to a common size."""
+    if not scale > 0 or not np.isfinite(scale):
+        raise MeshError(f"cannot be scaled by {scale:g}; process.scale must be above 0")
+    corners = np.concatenate([surface.vertices[surface.faces.ravel()] for surface in surfaces])
+    size_mm = scale * float(np.ptp(corners, axis=0).max())
+    if size_mm == 0.0 or LEAST_MM <= size_mm <= MOST_MM:
+        return
+    factor = min(OTHER_UNITS, key=lambda unit: abs(np.log(size_mm * unit / TYPICAL_MM)))
+    bound = f"less than {LEAST_MM:g} mm" if size_mm < LEAST_MM else f"more than {MOST_MM:g} mm"
+    raise MeshError(
+        f"its largest extent is {size_mm:.4g} mm, {bound}; "
+        f"if its coordinates are {OTHER_UNITS[factor]}, give --set process.scale={scale * factor:g}"
+    )
+
+
+def _resting(solid: Surface, rotate_deg: tuple[float, float, float]) -> Mesh:
+    vertices = solid.vertices
+    if any(rotate_deg):
+        about_x, about_y, about_z = (about(axis, np.radians(angle)) for axis, angle in zip(np.eye(3), rotate_deg, strict=True))
+        vertices = vertices @ np.round(about_z @ about_y @ about_x, 15).T  # rounded so that quarter turns are exact
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    return Mesh(vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]), solid.faces.astype(np.int32))

@@ -1,0 +1,104 @@
+"""Sheets: faces that are there more than once, and patches that hang loose on a solid."""
+
+import numpy as np
+
+from mdp.repair.edges import Edges, Flags, areas_of, components, edges_of
+from mdp.repair.weld import compact
+from mdp.surface import Indices, Surface
+
+LOOSE_SHARE = 0.2  # of the area; a larger loose patch may well be the model itself
+
+
+def single(surface: Surface) -> Surface:
+    """Every face once; of faces that lie on each other wound oppositely, both go or one stays, whichever leaves fewer edges odd.
+
+    Both go where two bodies touch in a common wall, one stays where a program wrote every face for both sides.
+    """
+    faces = surface.faces
+    group, first, even = _groups(faces)
+    if len(first) == len(faces):
+        return surface
+    forward, backward = np.bincount(group, even), np.bincount(group, ~even)
+    kept = np.where(forward >= backward, _first_where(group, even, len(first)), _first_where(group, ~even, len(first)))
+    opposed = (forward > 0) & (forward == backward)
+    order = np.argsort(kept)
+    chosen = kept[order][~_both_go(faces[kept[order]], opposed[order])]
+    return compact(Surface(surface.vertices, faces[chosen]))
+
+
+def cancelled(surface: Surface) -> Surface:
+    """The surface without pairs of faces that lie on each other wound oppositely: what was balanced stays balanced."""
+    group, first, even = _groups(surface.faces)
+    if len(first) == len(surface.faces):
+        return surface
+    order = np.lexsort((even, group))
+    starts = np.searchsorted(group[order], np.arange(len(first) + 1))
+    backward = np.bincount(group, ~even, minlength=len(first)).astype(np.int64)
+    rank = np.arange(len(order)) - starts[group[order]]  # backward ones come first in a group
+    pairs = np.minimum(backward, np.diff(starts) - backward)[group[order]]
+    goes = np.where(even[order], rank - backward[group[order]] < pairs, rank < pairs)
+    return compact(Surface(surface.vertices, surface.faces[np.sort(order[~goes])]))
+
+
+def _groups(faces: Indices) -> tuple[Indices, Indices, Flags]:
+    """Number of the corner set of every face, a face of each set, and whether each face winds upwards from its lowest corner."""
+    span = int(faces.max(initial=0)) + 1
+    low, middle, high = np.sort(faces, axis=1).T
+    key = (low * span + middle) * span + high if span < 2**21 else _rows(faces)
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    start, rows = faces.argmin(axis=1), np.arange(len(faces))
+    return group, first, faces[rows, (start + 1) % 3] < faces[rows, (start + 2) % 3]
+
+
+def _rows(faces: Indices) -> Indices:
+    _, number = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    return number.ravel()
+
+
+def _first_where(group: Indices, chosen: Flags, groups: int) -> Indices:
+    first = np.full(groups, len(group))
+    numbers = np.flatnonzero(chosen)[::-1]
+    first[group[numbers]] = numbers
+    return first
+
+
+def _both_go(faces: Indices, opposed: Flags) -> Flags:
+    """Which of the opposed faces to drop, patch by patch: where that makes more edges even than odd."""
+    if not opposed.any():
+        return opposed
+    edges = edges_of(faces)
+    twins = edges.twins // 3
+    twins = twins[opposed[twins[:, 0]] == opposed[twins[:, 1]]]
+    patch = components(len(faces), twins[:, 0], twins[:, 1])
+    flags: Flags = opposed & (_gains(edges, patch)[patch] > 0)
+    return flags
+
+
+def _gains(edges: Edges, patch: Indices) -> Indices:
+    """By patch, how many more edges are shared by an even number of faces when it is taken away."""
+    owner = np.repeat(patch, 3)
+    key, index = np.unique(owner * len(edges.counts) + edges.edge, return_inverse=True)
+    count, own = edges.counts[key % len(edges.counts)], np.bincount(index)
+    gains: Indices = np.bincount(key // len(edges.counts), count % 2 - (count - own) % 2, minlength=len(patch)).astype(np.int64)
+    return gains
+
+
+def without_loose(surface: Surface) -> Surface:
+    """The surface without the patches that hang on its outside or divide its inside.
+
+    Such a patch shares edges with two faces of the rest, which close without it. Taken away one after the other: those with an
+    open edge first, then the least area, since a wall across a solid has less than what it parts; never a large share of all.
+    """
+    while True:
+        edges = edges_of(surface.faces)
+        if not (edges.counts % 2 * (edges.counts > 2)).any():
+            return surface
+        twins = edges.twins // 3
+        patch = components(len(surface.faces), twins[:, 0], twins[:, 1])
+        area = np.bincount(patch, areas_of(surface.vertices, surface.faces), minlength=len(patch))
+        loose = np.flatnonzero((_gains(edges, patch) > 0) & (area <= LOOSE_SHARE * area.sum()))
+        if not len(loose):
+            return surface
+        open_edges = np.bincount(np.repeat(patch, 3), edges.counts[edges.edge] == 1, minlength=len(patch))
+        least = loose[np.lexsort((area[loose], open_edges[loose] == 0))[0]]
+        surface = compact(Surface(surface.vertices, surface.faces[patch != least]))

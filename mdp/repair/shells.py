@@ -1,0 +1,161 @@
+"""Shells: the closed pieces of a surface, turned outwards or kept as voids, and united where they overlap."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdp.mesh import Floats
+from mdp.repair.edges import components, edges_of, normals_of
+from mdp.repair.weld import compact
+from mdp.repair.winding import paired
+from mdp.surface import Indices, Surface, stacked
+from profiles.errors import MeshError
+
+NEGLIGIBLE = 1e-7  # of the volume of all shells: 0.1 mm across beside a 20 mm cube
+FLAT = 1e-9  # of the cube of a shell's diagonal
+SAMPLES = 24  # vertices of a shell that must all lie inside another for it to count as contained
+
+
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """One closed, consistently wound piece; faces index the vertices of the whole surface."""
+
+    vertices: Floats
+    faces: Indices
+    volume: float
+    low: Floats
+    high: Floats
+
+    def turned(self) -> "Shell":
+        """The same shell inside out."""
+        return Shell(self.vertices, self.faces[:, ::-1], -self.volume, self.low, self.high)
+
+    def contains(self, other: "Shell") -> bool:
+        """Whether the other shell lies inside this one, judged by its box and a sample of its vertices."""
+        if (other.low < self.low).any() or (other.high > self.high).any():
+            return False
+        corners = np.unique(other.faces)
+        sample = other.vertices[corners[np.linspace(0, len(corners) - 1, SAMPLES).astype(np.int64)]]
+        return all(abs(turns_around(p, self.vertices, self.faces)) > 0.5 for p in sample)
+
+
+def turns_around(position: Floats, vertices: Floats, faces: Indices) -> float:
+    """How often the closed faces wind around a point.
+
+    Sum of solid angles over 4 pi: A. van Oosterom, J. Strackee, The solid angle of a plane triangle (1983).
+    """
+    a, b, c = (vertices[faces[:, k]] - position for k in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    dots = la * lb * lc + np.einsum("ij,ij->i", a, b) * lc + np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb
+    return float(np.arctan2(np.einsum("ij,ij->i", a, np.cross(b, c)), dots).sum() / (2 * np.pi))
+
+
+def shells_of(surface: Surface) -> list[Shell]:
+    """The shells of a closed surface in the order of their first faces."""
+    pairs = paired(surface, edges_of(surface.faces)) // 3
+    label = components(len(surface.faces), pairs[:, 0], pairs[:, 1])
+    middle = surface.vertices.mean(axis=0)
+    signed = (
+        np.einsum("ij,ij->i", surface.vertices[surface.faces[:, 0]] - middle, normals_of(surface.vertices, surface.faces)) / 6.0
+    )
+    order = np.argsort(label, kind="stable")
+    shells = []
+    for numbers in np.split(order, np.flatnonzero(np.diff(label[order])) + 1):
+        corners = surface.vertices[surface.faces[numbers].ravel()]
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        shells.append(Shell(surface.vertices, surface.faces[numbers], float(signed[numbers].sum()), low, high))
+    return shells
+
+
+def without_specks(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
+    """The shells that enclose a volume worth printing, and a sentence about the others."""
+    total = sum(abs(shell.volume) for shell in shells)
+    kept = [
+        shell
+        for shell in shells
+        if abs(shell.volume) > max(NEGLIGIBLE * total, FLAT * float(np.linalg.norm(shell.high - shell.low)) ** 3)
+    ]
+    if not kept:
+        raise MeshError(f"encloses no volume: its {sum(len(shell.faces) for shell in shells)} faces are flat")
+    gone = len(shells) - len(kept)
+    return kept, [f"left out {gone} shell{'s' * (gone > 1)} with next to no volume"] if gone else []
+
+
+def outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
+    """Every shell wound so that it bounds solid: outwards, or inwards when it is a void in another.
+
+    An outermost shell that is inside out is turned together with all that it contains, since the windings of a file
+    are right relative to each other more often than not. A shell wound inwards that lies in no solid is turned too.
+    """
+    if all(shell.volume > 0 for shell in shells):
+        return shells, []
+    inside = {
+        i: [j for j, other in enumerate(shells) if j != i and abs(other.volume) > abs(shell.volume) and other.contains(shell)]
+        for i, shell in enumerate(shells)
+    }
+    turn = [shell.volume < 0 and not inside[i] for i, shell in enumerate(shells)]
+    turn = [turn[i] ^ bool(sum(turn[j] for j in inside[i] if not inside[j]) % 2) for i in range(len(shells))]
+    result = [shell.turned() if turn[i] else shell for i, shell in enumerate(shells)]
+    depth = [sum(1 if result[j].volume > 0 else -1 for j in inside[i]) for i in range(len(shells))]
+    stray = [result[i].volume < 0 and depth[i] <= 0 for i in range(len(shells))]
+    result = [shell.turned() if stray[i] else shell for i, shell in enumerate(result)]
+    count = sum(a ^ b for a, b in zip(turn, stray, strict=True))
+    return result, [f"turned {count} of {len(shells)} shells the right side out"] if count else []
+
+
+def united(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
+    """One surface of all shells, overlapping and touching bodies united; shells that stay apart keep their triangles."""
+    solid = [i for i, shell in enumerate(shells) if shell.volume > 0]
+    voids: dict[int, list[Shell]] = {i: [] for i in solid}
+    for hollow in (shell for shell in shells if shell.volume < 0):
+        around = [i for i in solid if shells[i].contains(hollow)]
+        voids[min(around, key=lambda i: shells[i].volume)].append(hollow)
+    bodies = [[shells[i], *voids[i]] for i in solid]
+    pieces: list[Surface] = []
+    fused = 0
+    for group in _groups([body[0] for body in bodies], reach):
+        plain = [_joined(bodies[i]) for i in group]
+        union = _union(plain) if len(group) > 1 else None
+        pieces += plain if union is None else [union]
+        fused += len(group) if union is not None else 0
+    joined = stacked(pieces)
+    return joined, [f"united {fused} bodies that overlap or touch"] if fused else []
+
+
+def _groups(outers: list[Shell], reach: float) -> list[list[int]]:
+    """Bodies whose boxes come within reach of each other, transitively."""
+    low, high = np.array([s.low for s in outers]), np.array([s.high for s in outers])
+    near = [(low <= high[i] + reach).all(axis=1) & (high >= low[i] - reach).all(axis=1) for i in range(len(outers))]
+    a, b = np.nonzero(np.array(near))
+    label = components(len(outers), a, b)
+    return [np.flatnonzero(label == first).tolist() for first in np.unique(label)]
+
+
+def _union(bodies: list[Surface]) -> Surface | None:
+    """The union of closed surfaces; None when they neither overlap nor touch."""
+    import manifold3d as m3
+
+    solids = [solid_of(body) for body in bodies]
+    union = m3.Manifold.batch_boolean(solids, m3.OpType.Add)
+    before = sum(solid.volume() for solid in solids)
+    if union.num_tri() == sum(s.num_tri() for s in solids) and abs(union.volume() - before) <= 1e-9 * before:
+        return None
+    if union.volume() > (1 + 1e-6) * before or union.volume() < max(solid.volume() for solid in solids) * (1 - 1e-6):
+        raise MeshError("has bodies that overlap in a way that cannot be united")
+    mesh = union.to_mesh64()
+    return Surface(np.asarray(mesh.vert_properties)[:, :3].copy(), np.asarray(mesh.tri_verts).astype(np.int64))
+
+
+def solid_of(surface: Surface) -> "m3.Manifold":  # noqa: F821
+    """The manifold3d solid of a closed surface; raises MeshError when it is not accepted."""
+    import manifold3d as m3
+
+    mesh = m3.Mesh64(np.ascontiguousarray(surface.vertices), np.ascontiguousarray(surface.faces).astype(np.uint64))
+    solid = m3.Manifold(mesh)
+    if solid.status() != m3.Error.NoError:
+        raise MeshError(f"cannot be made a valid solid ({solid.status().name})")
+    return solid
+
+
+def _joined(body: list[Shell]) -> Surface:
+    return compact(stacked([Surface(shell.vertices, shell.faces) for shell in body]))

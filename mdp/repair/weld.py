@@ -1,0 +1,55 @@
+"""Weld: coincident vertices become one, exactly first, then along open edges within a small distance."""
+
+import numpy as np
+
+from mdp.repair.edges import components, edges_of
+from mdp.surface import Indices, Surface
+
+SKEW = np.array([0.5773, 0.6841, 0.4459])  # a line that no common direction of a model is square to, to sort vertices along
+
+
+def welded(surface: Surface) -> Surface:
+    """The surface with one vertex for every position, in order of first use, and without the faces that collapse."""
+    vertices = surface.vertices + 0.0  # -0.0 and 0.0 are one place
+    order = np.lexsort(vertices.T)
+    fresh = np.ones(len(vertices), dtype=bool)
+    fresh[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
+    place = np.empty(len(vertices), dtype=np.int64)
+    place[order] = np.cumsum(fresh) - 1
+    return compact(Surface(vertices[order[fresh]], uncollapsed(place[surface.faces])))
+
+
+def welded_along_openings(surface: Surface, distance: float) -> Surface:
+    """The surface with the vertices of its open edges merged that lie within the distance of each other."""
+    edges = edges_of(surface.faces)
+    odd = edges.counts[edges.edge] % 2 == 1
+    rim = np.unique(np.concatenate([edges.starts[odd], edges.ends[odd]]))
+    rim = rim[np.argsort(surface.vertices[rim] @ SKEW, kind="stable")]
+    points = surface.vertices[rim]
+    along = points @ SKEW
+    near: list[tuple[Indices, Indices]] = []
+    for step in range(1, len(rim)):
+        close = np.flatnonzero(along[step:] - along[:-step] <= distance)
+        if not len(close):
+            break
+        close = close[np.linalg.norm(points[close + step] - points[close], axis=1) <= distance]
+        near.append((rim[close], rim[close + step]))
+    if not near:
+        return surface
+    merged = components(len(surface.vertices), *(np.concatenate(side) for side in zip(*near, strict=True)))
+    return compact(Surface(surface.vertices, uncollapsed(merged[surface.faces])))
+
+
+def uncollapsed(faces: Indices) -> Indices:
+    """The faces with three different corners."""
+    a, b, c = faces.T
+    return faces[(a != b) & (b != c) & (c != a)]
+
+
+def compact(surface: Surface) -> Surface:
+    """The surface without unused vertices, the others in order of first use."""
+    used, first, place = np.unique(surface.faces.ravel(), return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return Surface(surface.vertices[used[order]], rank[place].reshape(-1, 3))

@@ -1,0 +1,120 @@
+"""Winding: which half-edges belong together, and all faces of a patch wound the same way."""
+
+import numpy as np
+
+from mdp.mesh import Floats
+from mdp.repair.edges import Edges, components, edges_of, normals_of
+from mdp.repair.weld import compact
+from mdp.surface import Indices, Surface
+from profiles.errors import MeshError
+
+
+def paired(surface: Surface, edges: Edges) -> Indices:
+    """(k, 2) half-edges that belong together; where more than two faces meet in an edge, neighbours around it.
+
+    Oppositely wound neighbours come first, the nearest in angle before others, so that bodies that only touch stay apart.
+    """
+    order, runs = edges.by_edge
+    pairs = [edges.twins]
+    normals = normals_of(surface.vertices, surface.faces)
+    for number in np.flatnonzero(edges.counts > 2):
+        around = order[runs[number] : runs[number + 1]]
+        found = _matched(_angles(surface, edges, around), edges.forward[around], normals[around // 3])
+        pairs.append(around[found])
+    return np.concatenate(pairs)
+
+
+def _angles(surface: Surface, edges: Edges, around: Indices) -> Floats:
+    """(k,) directions of the faces about their common edge, radians."""
+    first = around[0]
+    start, end = surface.vertices[edges.starts[first]], surface.vertices[edges.ends[first]]
+    opposite = surface.vertices[surface.faces[around // 3, (around % 3 + 2) % 3]] - start
+    axis = (end - start) / (np.linalg.norm(end - start) or 1.0)
+    across = opposite - np.outer(opposite @ axis, axis)
+    x = across[np.argmax(np.linalg.norm(across, axis=1))]
+    y = np.cross(axis, x)
+    return np.arctan2(across @ y, across @ x)
+
+
+def _matched(angles: Floats, forward: object, normals: Floats) -> Indices:
+    """(k // 2, 2) pairs of neighbours around an edge."""
+    directions = np.asarray(forward)
+    ring = [int(k) for k in np.lexsort((directions, angles))]
+    pairs = []
+    while len(ring) >= 2:
+        following = ring[1:] + ring[:1]
+        gaps = [
+            (bool(directions[a] == directions[b]), float((angles[b] - angles[a]) % (2 * np.pi)), place)
+            for place, (a, b) in enumerate(zip(ring, following, strict=True))
+        ]
+        place = min(gaps)[2]
+        a, b = ring[place], following[place]
+        pairs.append((a, b))
+        ring = [k for k in ring if k not in (a, b)]
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def wound(surface: Surface) -> Surface:
+    """The surface with the faces of every patch wound consistently, as most of its area is.
+
+    Raises MeshError when a patch cannot be: a one-sided sheet.
+    """
+    edges = edges_of(surface.faces)
+    if not len(edges.unbalanced):
+        return surface
+    surface = Surface(surface.vertices, _turned(surface, edges, edges.twins, strict=True))
+    edges = edges_of(surface.faces)
+    if not (edges.counts > 2).any():
+        return surface
+    return Surface(surface.vertices, _turned(surface, edges, paired(surface, edges), strict=False))
+
+
+def _turned(surface: Surface, edges: Edges, pairs: Indices, strict: bool) -> Indices:
+    """Faces turned over where the pairs ask for it: components of the two-sheeted cover with nodes (face, kept or turned)."""
+    m = len(surface.faces)
+    a, b = pairs[:, 0] // 3, pairs[:, 1] // 3
+    clash = edges.forward[pairs[:, 0]] == edges.forward[pairs[:, 1]]
+    if not clash.any():
+        return surface.faces
+    cover = components(2 * m, np.concatenate([a, a + m]), np.concatenate([b + m * clash, b + m * ~clash]))
+    one_sided = cover[:m] == cover[m:]
+    if one_sided.any():
+        if strict:
+            face = int(np.flatnonzero(one_sided)[0])
+            where = surface.vertices[surface.faces[face]].mean(axis=0)
+            raise MeshError(
+                f"is not orientable: {int(one_sided.sum())} faces form a one-sided sheet, one of them near {point(where)}"
+            )
+        return surface.faces
+    area = np.linalg.norm(normals_of(surface.vertices, surface.faces), axis=1)
+    weight = np.bincount(cover[:m], area, minlength=2 * m) - np.bincount(cover[m:], area, minlength=2 * m)
+    turn = weight[cover[:m]] < 0
+    tie = (weight[cover[:m]] == 0) & (cover[:m] > cover[m:])
+    return np.where((turn | tie)[:, None], surface.faces[:, ::-1], surface.faces)
+
+
+def parted(surface: Surface) -> Surface:
+    """The closed surface with edges that more than two faces share split into edges of two faces each."""
+    edges = edges_of(surface.faces)
+    if not (edges.counts > 2).any():
+        return surface
+    pairs = paired(surface, edges)
+    same = edges.starts[pairs[:, 0]] == edges.starts[pairs[:, 1]]
+    one, other = pairs[:, 0], pairs[:, 1]
+    one_next, other_next = _next(one), _next(other)
+    corners = components(
+        surface.faces.size,
+        np.concatenate([one, one_next]),
+        np.concatenate([np.where(same, other, other_next), np.where(same, other_next, other)]),
+    )
+    kept, place = np.unique(corners, return_inverse=True)
+    return compact(Surface(surface.vertices[surface.faces.ravel()[kept]], place.reshape(-1, 3)))
+
+
+def _next(half_edges: Indices) -> Indices:
+    return half_edges - half_edges % 3 + (half_edges + 1) % 3
+
+
+def point(position: Floats) -> str:
+    """A position for a message."""
+    return "({:.4g}, {:.4g}, {:.4g})".format(*position)
