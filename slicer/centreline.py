@@ -6,6 +6,7 @@ the local width. Triangles with three inner sides are forks, those with one are 
 """
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,7 +16,6 @@ import numpy as np
 from mdp.mesh import Floats, Ints
 from slicer.chords import chains
 from slicer.halfedges import opposites
-from slicer.polygons import Polygons, contours
 
 SPUR = 1.0  # a branch shorter than this many widths is a corner of the boundary, not a limb
 EVEN = 1.2  # widths within one power of this factor are printed as one bead
@@ -47,9 +47,9 @@ class _Chain:
         return lengths
 
 
-def centrelines(polygons: Polygons, step_mm: float) -> list[Line]:
-    """Lines down the middle of narrow polygons, whose boundary is sampled at least every step_mm."""
-    loops = [_sampled(loop, step_mm) for loop in contours(polygons)]
+def centrelines(outlines: Sequence[Floats], step_mm: float) -> list[Line]:
+    """Lines down the middle of narrow polygons given by their contours, which are sampled at least every step_mm."""
+    loops = [_sampled(loop, step_mm) for loop in outlines]
     if not loops:
         return []
     triangles = np.asarray(manifold3d.triangulate(loops), dtype=np.int32).reshape(-1, 3)

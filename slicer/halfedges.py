@@ -16,7 +16,8 @@ def opposites(faces: Ints) -> Ints:
     heads = faces[:, [1, 2, 0]].ravel().astype(np.int64)
     span = int(tails.max(initial=0)) + 1
     keys = np.minimum(tails, heads) * span + np.maximum(tails, heads)
-    return _paired(np.argsort(keys, kind="stable"), keys, tails < heads)
+    paired: Ints = _paired(np.argsort(keys, kind="stable"), keys, tails < heads)
+    return paired
 
 
 @njit(cache=True)

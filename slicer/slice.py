@@ -9,9 +9,9 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import Bead, width_for_mm
+from slicer.bead import Bead
 from slicer.brim import brim
-from slicer.centreline import Line, centrelines
+from slicer.gap import gaps
 from slicer.heights import heights
 from slicer.infill import infill
 from slicer.interface import beneath, sections_of
@@ -26,8 +26,6 @@ from slicer.speed import speeds_mm_s
 from slicer.support import support_beads, supports
 from slicer.walls import Walls, walls
 
-GAP_RANK = 1
-LEAST_GAP_FLOW, MOST_GAP_FLOW = 0.8, 1.3
 NO_APPROACH = np.zeros((0, 2))
 
 
@@ -75,20 +73,11 @@ def _beads(around: Walls, region: Region, layer: int, process: Process, height_m
         for level, loops in enumerate(around.loops)
         for loop in loops
     ]
-    beads += [_gap(line, width, line.width_mm, height_mm) for line in centrelines(around.free, 0.5 * width)]
-    beads += [
-        _gap(line, width, width_for_mm(line.width_mm, height_mm), height_mm) for line in centrelines(around.narrow, 0.5 * width)
-    ]
+    beads += gaps(around.free, False, width, height_mm) + gaps(around.narrow, True, width, height_mm)
     beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
     beads += skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
     density, pattern = process.infill_density, process.infill_pattern
     return beads + infill(region.sparse, pattern, density, process.infill_angle_deg, layer, width, height_mm, overlap)
-
-
-def _gap(line: Line, line_width_mm: float, wished_mm: float, height_mm: float) -> Bead:
-    """One bead along a centreline, not narrower than half a line and not wider than two."""
-    width = min(max(wished_mm, 0.5 * line_width_mm), 2.0 * line_width_mm)
-    return Bead(Kind.GAP, line.points, width, GAP_RANK, min(max(line.share, LEAST_GAP_FLOW), MOST_GAP_FLOW))
 
 
 def _layer(

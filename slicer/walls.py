@@ -11,7 +11,7 @@ from slicer.bead import spacing_mm
 from slicer.polygons import Polygons, contours, grown, opened
 
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
-LEAST_LINE = 0.5  # of the line width: narrower places stay empty, the nozzle cannot lay less
+LEAST_LINE = 0.35  # of the line width: what is narrower stays empty; half a line is the narrowest bead, with less flow
 
 
 @dataclass(frozen=True, eq=False)
