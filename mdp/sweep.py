@@ -62,6 +62,12 @@ class Surface:
         return table
 
     @cached_property
+    def rising_edges(self) -> Ints:
+        """(e, 2) int32: the edges, those with the lowest end first."""
+        order = np.argsort(self.mesh.vertices[self.edges, 2].min(axis=1), kind="stable")
+        return self.edges[order]
+
+    @cached_property
     def vertex_normals(self) -> Floats:
         """(n, 3) unit angle-weighted normals; their sign tells on which side of a vertex the solid lies (Baerentzen, Aanaes)."""
         corners = self.mesh.vertices[self.mesh.faces]
@@ -96,6 +102,7 @@ def sweep(surface: Surface, directions: Floats, step_mm: float, risky_below: flo
         mesh.normals,
         surface.risky,
         surface.edges,
+        surface.rising_edges,
         surface.vertex_normals,
         surface.anchors,
         np.ascontiguousarray(directions),
@@ -109,7 +116,7 @@ def sweep(surface: Surface, directions: Floats, step_mm: float, risky_below: flo
 
 @njit(cache=True, parallel=True)
 def _sweep(  # type: ignore[no-untyped-def]
-    vertices, faces, areas, normals, risky, edges, vertex_normals, anchor, directions, watched, step, columns, risky_below
+    vertices, faces, areas, normals, risky, edges, rising, vertex_normals, anchor, directions, watched, step, columns, risky_below
 ):
     k = len(directions)
     first, count = np.zeros(k, np.int32), np.zeros(k, np.int32)
@@ -137,7 +144,7 @@ def _sweep(  # type: ignore[no-untyped-def]
             faces, areas, normals, risky, d, heights, bins, begin, n, step, risky_below,
             up[row], residual[row], section[row], volume[row],
         )  # fmt: skip
-        _find_lowest(vertices, edges, heights, bins, begin, n, step, watched[row], lowest[row])
+        _find_lowest(vertices, rising, heights, bins, begin, n, step, watched[row], lowest[row])
         _find_slivers(vertex_normals, d, heights, bins, begin, n, step, fragile[row])
         _count_pieces(vertices, faces, edges, vertex_normals, anchor, d, heights, bins, n, pieces[row])
     return first, count, up, residual, section, volume, lowest, fragile, pieces
@@ -148,7 +155,7 @@ def _sum_faces(  # type: ignore[no-untyped-def]
     faces, areas, normals, risky, d, heights, bins, begin, n, step, risky_below, up, residual, section, volume
 ):
     """Areas, cross-section and volume above each offset. bins[v]: how many offsets lie below vertex v."""
-    whole = np.zeros((n + 1, 4))
+    whole, crossing = np.zeros((n + 1, 4)), np.zeros((n, 4))
     for f in range(len(faces)):
         i, j, m = faces[f, 0], faces[f, 1], faces[f, 2]
         a, b, c = heights[i], heights[j], heights[m]
@@ -179,30 +186,32 @@ def _sum_faces(  # type: ignore[no-untyped-def]
             else:
                 share = (h2 - c) * (h2 - c) * upper
                 moment = share * (h2 - c) / 3.0
-            up[column] += up_area * share
-            residual[column] += residual_area * share
-            section[column] += leaning * share
-            volume[column] += leaning * moment
+            crossing[column, 0] += up_area * share
+            crossing[column, 1] += residual_area * share
+            crossing[column, 2] += leaning * share
+            crossing[column, 3] += leaning * moment
     for column in range(n - 1, -1, -1):
         if column < n - 1:
             for kind in range(4):
                 whole[column + 1, kind] += whole[column + 2, kind]
-        up[column] += whole[column + 1, 0]
-        residual[column] += whole[column + 1, 1]
-        section[column] += whole[column + 1, 2]
-        volume[column] += whole[column + 1, 3] - (begin + column) * step * whole[column + 1, 2]
+        up[column] = crossing[column, 0] + whole[column + 1, 0]
+        residual[column] = crossing[column, 1] + whole[column + 1, 1]
+        section[column] = crossing[column, 2] + whole[column + 1, 2]
+        volume[column] = crossing[column, 3] + whole[column + 1, 3] - (begin + column) * step * whole[column + 1, 2]
 
 
 @njit(cache=True)
 def _find_lowest(vertices, edges, heights, bins, begin, n, step, watched, lowest):  # type: ignore[no-untyped-def]
-    """Least z above each offset, among vertices and edge crossings below the watched height."""
+    """Least z above each offset, among vertices and crossings of edges, lowest first, below the watched height."""
     for v in range(len(vertices)):
         b, z = bins[v], vertices[v, 2]
         if z < watched and b > 0:
             lowest[b - 1] = min(lowest[b - 1], z)
     for e in range(len(edges)):
         v, w = edges[e, 0], edges[e, 1]
-        if bins[v] == bins[w] or (vertices[v, 2] >= watched and vertices[w, 2] >= watched):
+        if vertices[v, 2] >= watched and vertices[w, 2] >= watched:
+            break
+        if bins[v] == bins[w]:
             continue
         if bins[v] > bins[w]:
             v, w = w, v
@@ -255,10 +264,8 @@ def _basins(edges, heights):  # type: ignore[no-untyped-def]
     down = np.arange(len(heights), dtype=np.int32)
     for e in range(len(edges)):
         a, b = edges[e, 0], edges[e, 1]
-        if _higher(heights, a, b):
-            down[a] = b
-        else:
-            down[b] = a
+        upper = b + (a - b) * np.int32(heights[a] > heights[b])  # a < b decides ties; no branch to mispredict
+        down[upper] = a + b - upper
     for v in range(len(down)):
         root = down[v]
         while down[root] != root:
