@@ -1,12 +1,12 @@
 """Loading: a machine, a material and a process, shipped by name or from a file, with --set overrides."""
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from profiles.errors import ProfileError
 from profiles.machine import Frozen, Machine
@@ -15,7 +15,7 @@ from profiles.process import Process, Search
 
 KINDS = {"machine": "machines", "material": "materials", "process": "processes"}
 DEFAULTS = {"machine": "generic_ac", "material": "pla", "process": "standard"}
-SECTIONS: dict[str, type[BaseModel]] = {"machine": Machine, "material": Material, "process": Process, "search": Search}
+SECTIONS: dict[str, type[Frozen]] = {"machine": Machine, "material": Material, "process": Process, "search": Search}
 OF_KIND = {"machine": ("machine",), "material": ("material",), "process": ("process", "search")}
 
 
@@ -56,6 +56,48 @@ def load(
         raise ProfileError("; ".join(_sentences(error))) from None
     _check_together(profile)
     return profile
+
+
+def kind_of(name: str) -> str:
+    """The kind of a shipped profile or of a profile file: machine, material or process."""
+    for kind in KINDS:
+        if name in shipped(kind):
+            return kind
+    if Path(name).suffix != ".toml" and not Path(name).exists():
+        known = ", ".join(sorted(each for kind in KINDS for each in shipped(kind)))
+        raise ProfileError(f"profile {name!r} is not known: it must be one of {known}, or the path of a .toml file")
+    document = _parse(Path(name))
+    found = next((kind for kind in KINDS if kind in document), None)
+    if found is None:
+        raise ProfileError(f"{name}: no [machine], [material] or [process] table")
+    return found
+
+
+def load_one(name: str, settings: Iterable[str] = ()) -> dict[str, Frozen]:
+    """The sections of one profile by name, resolved and with settings applied; ProfileError when it is wrong."""
+    kind = kind_of(name)
+    tables: dict[str, Any] = {section: {} for section in OF_KIND[kind]} | _tables(kind, name)
+    for setting in settings:
+        _apply(tables, setting)
+    problems, models = [], {}
+    for section in OF_KIND[kind]:
+        try:
+            models[section] = SECTIONS[section].model_validate(tables[section])
+        except ValidationError as error:
+            problems += [f"{section}.{sentence}" for sentence in _sentences(error)]
+    if problems:
+        raise ProfileError("; ".join(problems))
+    return models
+
+
+def rows(prefix: str, model: Frozen) -> Iterator[tuple[str, Any, str]]:
+    """Every key of a model with its plain value and what it means, tables flattened with dots."""
+    for key, field in type(model).model_fields.items():
+        value = getattr(model, key)
+        if isinstance(value, Frozen):
+            yield from rows(f"{prefix}.{key}", value)
+        else:
+            yield f"{prefix}.{key}", model.model_dump(mode="json")[key], field.description or ""
 
 
 def check_file(path: Path) -> list[str]:

@@ -1,0 +1,207 @@
+"""The command line: parses, dispatches with explicit arguments, and turns every error into what a person can use.
+
+Exit codes: 0 done, 1 the user can fix it, 3 a bug (log file named), 130 interrupted. Heavy imports stay inside the commands.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer.exceptions import TyperException
+
+from profiles.errors import UserError
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="From a mesh to a finished multi-directional print on a 5-axis printer.",
+)
+profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check profiles of machines, materials and processes.")
+app.add_typer(profiles_app, name="profiles")
+
+Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF or GLB file, or demo:NAME")]
+ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model as above, or a G-code file")]
+MachineName = Annotated[str, typer.Option("--machine", metavar="NAME|FILE", help="machine profile")]
+MaterialName = Annotated[str, typer.Option("--material", metavar="NAME|FILE", help="material profile")]
+ProcessName = Annotated[str, typer.Option("--process", metavar="NAME|FILE", help="process profile")]
+Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
+JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
+BeamWidth = Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")]
+RankerName = Annotated[str, typer.Option("--ranker", metavar="classic", help="which candidates the beam follows")]
+Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
+
+
+@app.command()
+def decompose(
+    model: Model,
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="folder for part-NN.stl, 3MF, JSON")] = None,
+    beam_width: BeamWidth = None,
+    ranker: RankerName = "classic",
+    json: JsonFile = None,
+    png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the parts")] = None,
+    machine: MachineName = "generic_ac",
+    material: MaterialName = "pla",
+    process: ProcessName = "standard",
+    settings: Settings = None,
+) -> int:
+    """Cut a model into parts, each with its own printing direction."""
+    from machine.app import commands
+
+    profile = _profile(machine, material, process, settings, beam_width)
+    return commands.decompose(model, profile, ranker, out, json, png)
+
+
+@app.command()
+def export(
+    model: Model,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write")],
+    beam_width: BeamWidth = None,
+    ranker: RankerName = "classic",
+    json: JsonFile = None,
+    force: Force = False,
+    machine: MachineName = "generic_ac",
+    material: MaterialName = "pla",
+    process: ProcessName = "standard",
+    settings: Settings = None,
+) -> int:
+    """Write the G-code of a model, dry-run first."""
+    from machine.app import commands
+
+    profile = _profile(machine, material, process, settings, beam_width)
+    return commands.export(model, profile, ranker, out, json, force)
+
+
+@app.command()
+def simulate(
+    model: ModelOrGcode,
+    beam_width: BeamWidth = None,
+    ranker: RankerName = "classic",
+    json: JsonFile = None,
+    machine: MachineName = "generic_ac",
+    material: MaterialName = "pla",
+    process: ProcessName = "standard",
+    settings: Settings = None,
+) -> int:
+    """Dry-run a model or a G-code file; exit 1 when a finding is an error."""
+    from machine.app import commands
+
+    profile = _profile(machine, material, process, settings, beam_width)
+    return commands.simulate(model, profile, ranker, json)
+
+
+@app.command("print")
+def print_(
+    model: ModelOrGcode,
+    port: Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")],
+    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
+    beam_width: BeamWidth = None,
+    ranker: RankerName = "classic",
+    speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
+    force: Force = False,
+    machine: MachineName = "generic_ac",
+    material: MaterialName = "pla",
+    process: ProcessName = "standard",
+    settings: Settings = None,
+) -> int:
+    """Print a model or a G-code file over a serial port, or on the simulated printer."""
+    from machine.app import commands
+
+    profile = _profile(machine, material, process, settings, beam_width)
+    return commands.print_model(model, profile, ranker, port, baud, speed, force)
+
+
+@profiles_app.command("list")
+def profiles_list() -> int:
+    """The shipped profiles."""
+    from machine.app import profile_commands
+
+    return profile_commands.list_profiles()
+
+
+@profiles_app.command("show")
+def profiles_show(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="a shipped profile or a .toml file")],
+    json: Annotated[bool, typer.Option("--json", help="resolved values as JSON")] = False,
+    settings: Settings = None,
+) -> int:
+    """Resolved values of one profile, with what each key means."""
+    from machine.app import profile_commands
+
+    return profile_commands.show(name, json, settings or [])
+
+
+@profiles_app.command("check")
+def profiles_check(file: Annotated[Path, typer.Argument(metavar="FILE", help="a .toml profile")]) -> int:
+    """All problems of a profile file at once; exit 1 when there are any."""
+    from machine.app import profile_commands
+
+    return profile_commands.check(file)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"tiltprint {version('tiltprint')}")
+        raise typer.Exit(0)
+
+
+@app.callback()
+def _options(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version")] = False,
+) -> None:
+    del version
+
+
+def _profile(machine: str, material: str, process: str, settings: list[str] | None, beam_width: int | None):  # type: ignore[no-untyped-def]
+    from profiles.profile import load
+
+    beam = [] if beam_width is None else [f"search.beam_width={beam_width}"]
+    return load(machine, material, process, [*(settings or []), *beam])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    command = typer.main.get_command(app)
+    try:
+        code = command.main(given or ["--help"], prog_name="tiltprint", standalone_mode=False)
+    except TyperException as error:
+        return _complain(_usage(error))
+    except UserError as error:
+        return _complain(str(error))
+    except (KeyboardInterrupt, typer.Abort):
+        return _complain("interrupted", 130)
+    except BrokenPipeError:
+        return 0
+    except Exception as error:  # noqa: BLE001 - the one place where a bug becomes a message and a log file
+        from machine.app.crash import log_bug
+
+        return _complain(f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, given)}", 3)
+    return int(code or 0)
+
+
+def _usage(error: TyperException) -> str:
+    """A usage error as one sentence that names what is allowed."""
+    message = str(getattr(error, "format_message", lambda: str(error))()).strip().rstrip(".")
+    context = getattr(error, "ctx", None)
+    if context is None:
+        return message
+    if message.startswith("No such option"):
+        allowed = [option for parameter in context.command.params for option in parameter.opts if option.startswith("--")]
+        return f"{message}; {context.command_path} knows {', '.join(allowed)}"
+    if message.startswith("No such command"):
+        return f"{message}; allowed are {', '.join(context.command.commands)}"
+    return f"{message}; see {context.command_path} --help"
+
+
+def _complain(message: str, code: int = 1) -> int:
+    sys.stderr.write(f"tiltprint: {message}\n")
+    return code
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,114 @@
+"""Commands: what decompose, export, simulate and print do; each returns an exit code and never sees the parser."""
+
+from pathlib import Path
+
+from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
+from machine.app.pipeline import Program, build, decompose_model, warm
+from machine.app.printing import print_program
+from machine.app.progress import say
+from machine.app.report import parts_table, run_table, show
+from machine.dryrun.dryrun import dry_run, summary
+from mdp.save import part_file, stl, threemf, values
+from profiles.errors import GcodeError, MoveError
+from profiles.profile import Profile
+
+GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
+
+
+def decompose(model: str, profile: Profile, ranker: str, out: Path | None, json: Path | None, png: Path | None) -> int:
+    """Find the parts of a model and save what is asked for."""
+    if out is not None:
+        check_folder(out)
+    for file in (json, png):
+        _check(file)
+    found = decompose_model(model, profile, ranker)
+    told = values(found.decomposition, found.read_s, found.total_s)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        for part in found.decomposition.parts:
+            write_bytes(out / part_file(part.index), stl(part.mesh))
+        write_bytes(out / "decomposition.3mf", threemf(found.decomposition))
+        write_json(out / "decomposition.json", told)
+    if png is not None:
+        from machine.app.picture import parts_picture, write_png
+
+        write_png(png, parts_picture(found.decomposition, profile))
+    if json is not None:
+        write_json(json, told)
+    if json is None or str(json) != "-":
+        show(parts_table(found))
+    return 0
+
+
+def export(model: str, profile: Profile, ranker: str, out: Path, json: Path | None, force: bool) -> int:
+    """Write a model's G-code; refused when its dry run finds an error, unless forced."""
+    check_writable(out)
+    _check(json)
+    program = build(decompose_model(model, profile, ranker).decomposition, profile)
+    _refuse_errors(program, force)
+    write_lines(out, program.lines)
+    _tell(program, json)
+    return 0
+
+
+def simulate(model: str, profile: Profile, ranker: str, json: Path | None) -> int:
+    """Dry-run a model or a G-code file; 1 when a finding is an error."""
+    _check(json)
+    program = _program(model, profile, ranker)
+    _tell(program, json)
+    return 1 if _errors(program) else 0
+
+
+def print_model(model: str, profile: Profile, ranker: str, port: str, baud: int, sim_speed: float, force: bool) -> int:
+    """Dry-run, then stream a model or a G-code file to a printer."""
+    program = _program(model, profile, ranker)
+    _refuse_errors(program, force)
+    show(run_table(program.run))
+    return print_program(program, profile, port, baud, sim_speed)
+
+
+def _program(model: str, profile: Profile, ranker: str) -> Program:
+    if Path(model).suffix.lower() in GCODE_SUFFIXES:
+        lines = _gcode_lines(Path(model))
+        warm(profile)
+        return Program(lines, dry_run(lines, profile), None)
+    return build(decompose_model(model, profile, ranker).decomposition, profile)
+
+
+def _gcode_lines(path: Path) -> tuple[str, ...]:
+    try:
+        text = path.read_text(encoding="utf-8", errors="strict")
+    except OSError as error:
+        raise GcodeError(f"G-code file {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+    except UnicodeDecodeError as error:
+        raise GcodeError(f"G-code file {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
+    lines = tuple(text.splitlines())
+    if not any(line.strip() for line in lines):
+        raise GcodeError(f"G-code file {path} is empty")
+    return lines
+
+
+def _errors(program: Program) -> list[str]:
+    return [finding.message for finding in program.run.findings if finding.severity == "error"]
+
+
+def _refuse_errors(program: Program, force: bool) -> None:
+    errors = _errors(program)
+    if not errors:
+        return
+    if force:
+        say(f"the dry run found {len(errors)} errors; going on because of --force")
+        return
+    raise MoveError(f"the dry run found {len(errors)} errors, the first: {errors[0]} (simulate lists all, --force goes on)")
+
+
+def _check(file: Path | None) -> None:
+    if file is not None and str(file) != "-":
+        check_writable(file)
+
+
+def _tell(program: Program, json: Path | None) -> None:
+    if json is not None:
+        write_json(json, summary(program.run))
+    if json is None or str(json) != "-":
+        show(run_table(program.run))

@@ -1,0 +1,97 @@
+"""Printing: the stream to a printer, or to the simulated one on a pseudo-terminal, shown to the person watching."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import inf
+from types import FrameType
+
+from machine.app.pipeline import Program
+from machine.app.progress import Ticker
+from machine.app.report import duration, show
+from machine.link.progress import Progress
+from machine.link.simulator import SimulatedPrinter
+from machine.link.stream import Outcome, print_lines
+from profiles.errors import PrinterError
+from profiles.profile import Profile
+
+SIMULATED = "sim"
+
+
+def print_program(program: Program, profile: Profile, port: str, baud: int, sim_speed: float) -> int:
+    """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible."""
+    if sim_speed < 0:
+        raise PrinterError(f"--sim-speed is {sim_speed:g}: it must be 0 (as fast as possible) or above")
+    if port != SIMULATED:
+        show(_told(_stream(program, port, baud)))
+        return 0
+    with SimulatedPrinter(profile.machine, sim_speed or inf) as printer:
+        outcome = _stream(program, printer.path, baud)
+        record = printer.record
+    segments, volumes = record.deposited(profile.material.diameter_mm)
+    planned = float(program.run.segment_mm3.sum())
+    show(_told(outcome))
+    show(
+        f"simulated printer: {len(record.start)} moves in {duration(float(record.duration_s.sum()))}, {len(segments)} strokes laid "
+        f"{volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f}), heaters at {record.nozzle_target_c:g} and "
+        f"{record.bed_target_c:g} deg C at the end\n"
+    )
+    if record.clamped or record.unknown:
+        raise PrinterError(
+            f"the simulated printer met {record.clamped} coordinates out of limits and {record.unknown} unknown commands"
+        )
+    return 0
+
+
+def _stream(program: Program, port: str, baud: int) -> Outcome:
+    ticker = Ticker()
+    stop = threading.Event()
+    with _stopping(stop):
+        outcome = print_lines(program.lines, port, baud, lambda progress: ticker.tick(status(progress)), stop, program.run.time_s)
+    ticker.close()
+    if outcome.cancelled:
+        raise KeyboardInterrupt(
+            f"after {outcome.acknowledged} lines; heaters {'off' if outcome.heaters_off else 'not confirmed off'}"
+        )
+    return outcome
+
+
+@contextmanager
+def _stopping(stop: threading.Event) -> Iterator[None]:
+    """Ctrl-C and a termination request end the print safely instead of tearing it down; a second one interrupts at once."""
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        del number, frame
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    signals = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+    before = {number: signal.signal(number, ask) for number in signals}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def status(progress: Progress) -> str:
+    """One line that tells where a print stands."""
+    told = [f"{100 * progress.share:.0f} %" if progress.share is not None else f"line {progress.acknowledged}"]
+    if progress.part is not None:
+        told.append(f"part {progress.part}" + (f" of {progress.parts}" if progress.parts else ""))
+    if progress.layer is not None:
+        told.append(f"layer {progress.layer}")
+    nozzle, bed = progress.temperature.nozzle_c, progress.temperature.bed_c
+    if nozzle is not None:
+        told.append(f"nozzle {nozzle:.0f} C" + (f", bed {bed:.0f} C" if bed is not None else ""))
+    if progress.left_s is not None:
+        told.append(f"{duration(progress.left_s)} left")
+    return "printing: " + ", ".join(told)
+
+
+def _told(outcome: Outcome) -> str:
+    lines = f"printed: {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
+    warned = "".join(f"\nthe printer said: {warning}" for warning in outcome.warnings)
+    return f"{lines} ({outcome.firmware[:60]}){warned}\n"

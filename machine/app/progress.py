@@ -1,0 +1,62 @@
+"""Progress: what long work tells on stderr; a line that is rewritten on a terminal, plain lines elsewhere."""
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import monotonic, perf_counter
+
+PLAIN_EVERY_S = 5.0
+LIVE_EVERY_S = 0.1
+
+
+def say(text: str) -> None:
+    """One line on stderr."""
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
+
+
+class Ticker:
+    """A status that changes often: `tick` shows it at a bearable rate, `close` ends it."""
+
+    def __init__(self) -> None:
+        self.live = sys.stderr.isatty()
+        self.shown_at = monotonic()
+        self.open = False
+
+    def tick(self, text: str, at_once: bool = False) -> None:
+        """Show the text when enough time has passed, or at once."""
+        now = monotonic()
+        if not at_once and now - self.shown_at < (LIVE_EVERY_S if self.live else PLAIN_EVERY_S):
+            return
+        self.shown_at = now
+        if self.live:
+            sys.stderr.write(f"\r\x1b[2K{text}")
+            sys.stderr.flush()
+            self.open = True
+        else:
+            say(text)
+
+    def close(self) -> None:
+        """End the rewritten line."""
+        if self.open:
+            sys.stderr.write("\r\x1b[2K")
+            sys.stderr.flush()
+            self.open = False
+
+
+@contextmanager
+def announced(text: str, after_s: float) -> Iterator[None]:
+    """Say `text` once the work inside has taken after_s, and at its end how long it took."""
+    began = perf_counter()
+    timer = threading.Timer(after_s, say, (text,))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+    spent = perf_counter() - began
+    if spent > after_s:
+        say(f"{text.split(' (')[0]}: {spent:.1f} s")
