@@ -15,10 +15,11 @@ from profiles.machine import Machine
 LONGEST_LINE = 2000
 INCH_MM = 25.4
 DEFAULT_FEED = 1500.0
-BLOCK = re.compile(r"(?:[A-Z] *[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+) *)*")
-WORD = re.compile(r"([A-Z]) *([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
-FLAGS = re.compile(r"[GM][0-9]+(?:\.[0-9]+)?(?: *[A-Z] *(?:[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))?)*")
-FLAG = re.compile(r"([A-Z]) *([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))?")
+NUMBER = r"[-+]?(?:[0-9]{1,12}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})(?![0-9])"  # bounded: no infinity from a thousand digits
+BLOCK = re.compile(rf"(?:[A-Z] *{NUMBER} *)*")
+WORD = re.compile(rf"([A-Z]) *({NUMBER})")
+FLAGS = re.compile(rf"[GM][0-9]+(?:\.[0-9]+)?(?: *[A-Z] *(?:{NUMBER})?)*")
+FLAG = re.compile(rf"([A-Z]) *({NUMBER})?")
 MACRO = re.compile(r"[A-Z_][A-Z0-9_]+(?: .*)?")
 PAREN = re.compile(r"\([^)]*\)")
 E_AXIS = 5

@@ -137,9 +137,9 @@ def _lift_speed(profile: Profile) -> float:
 
 
 def _stroke(path: Path, height_mm: float, points: Floats, profile: Profile) -> Stroke:
-    """Filament by volume; the speed lowered to what the axes, the extruder and the hot end can do."""
+    """Filament by volume (the path's flow holds the material's); the speed lowered to what axes, extruder and hot end can do."""
     machine, material = profile.machine, profile.material
-    area = bead_area_mm2(path.width_mm, height_mm) * path.flow * material.flow
+    area = bead_area_mm2(path.width_mm, height_mm) * path.flow
     filament_area = pi * material.diameter_mm**2 / 4.0
     length = np.hypot(*np.diff(path.points, axis=0).T)
     fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s * filament_area) / area if area > 0 else inf

@@ -18,6 +18,7 @@ from profiles.errors import MoveError
 from profiles.machine import Machine
 
 STEP_DEG = 1.0
+MOST_STEPS = 1500
 PARKING_PLACES = 7
 
 
@@ -30,9 +31,9 @@ class SafePose:
 
 
 def poses_between(start: Pose, end: Pose, step_deg: float = STEP_DEG) -> list[Pose]:
-    """Poses from start to end, both included, with at most step_deg along the turn: both axes move in proportion."""
+    """Poses from start to end, both included, both axes in proportion, step_deg apart (farther when they would be too many)."""
     tilt, turn = end.tilt_deg - start.tilt_deg, end.turn_deg - start.turn_deg
-    count = max(1, ceil(hypot(tilt, turn) / step_deg))
+    count = min(max(1, ceil(hypot(tilt, turn) / step_deg)), MOST_STEPS)
     return [Pose(start.tilt_deg + tilt * k / count, start.turn_deg + turn * k / count) for k in range(count + 1)]
 
 
@@ -66,8 +67,8 @@ def safe_pose(machine: Machine, printed: Printed, at_mm: Floats, start: Pose, en
         if _clear_aside(machine, printed, np.array([*over, allowed]), at_mm, turning):
             return SafePose(allowed, over)
     raise MoveError(
-        f"part {part}: turning the table to {machine.tilt.letter}{end.tilt_deg:.3f} {machine.turn.letter}{end.turn_deg:.3f} needs "
-        f"the tip at Z {need:.1f} mm, allowed is at most {allowed:g} mm on {machine.name}, and no place aside is clear of the table"
+        f"part {part}: turning the table to {machine.tilt.letter}{end.tilt_deg:.3f} {machine.turn.letter}{end.turn_deg:.3f} "
+        f"needs the tip at Z {need:.1f} mm, {machine.name} allows at most {allowed:g} mm, and no place aside is clear of the table"
     )
 
 
@@ -81,19 +82,21 @@ def _aside(machine: Machine, at_mm: Floats) -> Iterator[tuple[float, float]]:
 
 
 def _clear_aside(machine: Machine, printed: Printed, stand: Floats, at_mm: Floats, turning: list[Pose]) -> bool:
-    """True when the way from above at_mm to `stand`, all poses there, and every way back in are clear of table and print."""
+    """True when the way from above at_mm to `stand`, and standing there through all poses, is clear of table and print."""
     above = np.array([at_mm[0], at_mm[1], stand[2]])
-    last = turning[-1]
-    if not _clear(machine, printed, last, stand, stand) or not _clear(machine, printed, turning[0], above, stand):
+    if not _clear(machine, printed, turning[-1], stand, stand, machine.clearance_mm):
         return False
-    return all(_clear(machine, printed, pose, stand, stand) for pose in turning)
+    if not _clear(machine, printed, turning[0], above, stand, 0.0):
+        return False
+    return all(_clear(machine, printed, pose, stand, stand, machine.clearance_mm) for pose in turning)
 
 
-def _clear(machine: Machine, printed: Printed, pose: Pose, start: Floats, end: Floats) -> bool:
+def _clear(machine: Machine, printed: Printed, pose: Pose, start: Floats, end: Floats, keep_mm: float) -> bool:
+    """True when each body keeps keep_mm, and what it must keep anyway, while the tip goes from start to end."""
     tried = directions(rotation(machine, pose) @ UP)
     reaches = [table_reach(machine, pose, tried), printed.reach(machine, pose, tried)]
     return all(
-        float(sweep_gaps(body, start[None], end[None], tried, reach)[0]) >= max(body.need_mm, machine.clearance_mm)
+        float(sweep_gaps(body, start[None], end[None], tried, reach)[0]) >= max(body.need_mm, keep_mm)
         for body in bodies(machine)
         for reach in reaches
     )
@@ -108,7 +111,7 @@ def approach_z(machine: Machine, printed: Printed, pose: Pose, safe: SafePose, t
         return safe.z_mm
     stand = np.array([*safe.over_mm, safe.z_mm])
     above = np.array([target_mm[0], target_mm[1], safe.z_mm])
-    if not _clear(machine, printed, pose, stand, above):
+    if not _clear(machine, printed, pose, stand, above, 0.0):
         raise MoveError(
             f"part {part}: the way from aside (X {stand[0]:.1f} Y {stand[1]:.1f}) to its first point at "
             f"{machine.tilt.letter}{pose.tilt_deg:.3f} is not clear at Z {safe.z_mm:g} mm, the greatest on {machine.name}"

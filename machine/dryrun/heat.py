@@ -22,9 +22,9 @@ def _cold(program: ParsedProgram) -> list[Finding]:
     hot = np.zeros(len(program.line), dtype=np.bool_)
     heating = [e for e in program.events if e.code in ("M104", "M109")]
     warm = False
-    for event, following in zip(heating, [*heating[1:], None], strict=True):
+    for event in heating:
         warm = event.value >= MELTING_C and (warm or event.code == "M109")
-        hot[event.row : following.row if following else None] = warm
+        hot[event.row :] = warm
     rows = (program.e_mm > 1e-9) & ~hot
     message = "{count} moves push filament through a nozzle that is not hot: M109 S must come first and stay on"
     return per_part(program, rows, program.e_mm, "error", "cold-extrusion", message)

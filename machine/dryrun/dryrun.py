@@ -1,8 +1,9 @@
-"""Run: a G-code text played through the machine's kinematics, without a machine."""
+"""Dryrun: a G-code text played through the machine's kinematics, without a machine."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     )
 
 
-def summary(run: DryRun) -> dict[str, object]:
+def summary(run: DryRun) -> dict[str, Any]:
     """The figures of `simulate --json` and `export --json`."""
     program = run.program
     travels = program.kind == MoveKind.TRAVEL

@@ -1,0 +1,71 @@
+"""A hand-made print of two parts: a post on the platform and an arm printed out of its side."""
+
+from functools import cache
+
+import manifold3d as m3
+import numpy as np
+
+from machine.gcode import write_gcode
+from machine.moves import MachineProgram
+from machine.plan import plan
+from mdp.clearance import allowed_poses
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Mesh
+from mdp.plane import PLATFORM, Plane
+from mdp.pose import Pose, level, rotation
+from profiles.machine import Machine
+from profiles.profile import Profile, load
+from slicer.paths import Kind, Layer, Path, SlicedPart
+from tests.shapes import from_manifold
+
+SIDE = Plane(np.array([1.0, 0.0, 0.0]), 5.0)
+NO_APPROACH = np.zeros((0, 2))
+
+
+def post_and_arm(machine: Machine, height: float = 60.0, reach: float = 10.0) -> Decomposition:
+    """A 10 x 10 post and an arm 10 x 10 that leaves its +x side at the top."""
+    post = m3.Manifold.cube((10.0, 10.0, height)).translate((-5.0, -5.0, 0.0))
+    arm = m3.Manifold.cube((reach, 10.0, 10.0)).translate((5.0, -5.0, height - 10.0))
+    meshes = [from_manifold(solid) for solid in (post, arm)]
+    poses = [level(machine), allowed_poses(machine, SIDE.normal, meshes[1].vertices)[0]]
+    parts = [
+        part(k + 1, mesh, base, poses[k], machine) for k, (mesh, base) in enumerate(zip(meshes, (PLATFORM, SIDE), strict=True))
+    ]
+    return Decomposition("post and arm", from_manifold(post + arm), tuple(parts), 2, "classic", 100.0, 0.0, 0, 1, 0.0)
+
+
+def part(index: int, mesh: Mesh, base: Plane, pose: Pose, machine: Machine) -> Part:
+    return Part(index, mesh, base, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
+
+
+def squares(piece: Part, profile: Profile, layers: int = 3) -> SlicedPart:
+    """Two squares a layer along the part's bounding box: the outer one reached with a retraction, the inner one without."""
+    process = profile.process
+    lo, hi = piece.in_part_frame().bounds_mm
+    made = []
+    for k in range(layers):
+        paths = []
+        for kind, inset in ((Kind.OUTER_WALL, 0.5), (Kind.INNER_WALL, 1.5)):
+            x0, y0, x1, y1 = lo[0] + inset * 0.45, lo[1] + inset * 0.45, hi[0] - inset * 0.45, hi[1] - inset * 0.45
+            ring = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]])
+            paths.append(Path(kind, ring, process.line_width_mm, 40.0, 1.0, NO_APPROACH, kind is Kind.OUTER_WALL))
+        made.append(Layer((k + 1) * 0.2, 0.2, tuple(paths), 0.0 if k == 0 else 1.0))
+    return SlicedPart(piece.index, tuple(made))
+
+
+@cache
+def printed(
+    machine: str = "generic_ac", layers: int = 3
+) -> tuple[Profile, Decomposition, tuple[SlicedPart, ...], MachineProgram]:
+    """Profile, decomposition, sliced parts and program of the post and the arm."""
+    profile = load(machine=machine)
+    decomposition = post_and_arm(profile.machine)
+    sliced = tuple(squares(piece, profile, layers) for piece in decomposition.parts)
+    return profile, decomposition, sliced, plan(decomposition, sliced, profile)
+
+
+@cache
+def text(machine: str = "generic_ac", layers: int = 3) -> tuple[str, ...]:
+    """The G-code of the post and the arm."""
+    profile, _, _, program = printed(machine, layers)
+    return tuple(write_gcode(program, profile))
