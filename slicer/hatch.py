@@ -8,7 +8,7 @@ from mdp.mesh import Floats
 from slicer.polygons import Polygons, edges
 from slicer.scanline import clipped, joined
 
-EDGE_MM = 1e-3  # outermost lines stay this far from the extreme points, where a line would only touch
+EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
 
 
 def hatched(area: Polygons, fence: Polygons, angle_deg: float, spacing_mm: float, reach_mm: float) -> list[Floats]:
@@ -34,8 +34,9 @@ def filled(area: Polygons, fence: Polygons, angle_deg: float, spacing_mm: float,
     if not len(sides):
         return []
     low, high = _extent(sides)
-    gaps = ceil((high - low - 2 * EDGE_MM) / spacing_mm - 0.01)
-    ends = (low + EDGE_MM, high - EDGE_MM) if gaps > 0 else (0.5 * (low + high),) * 2
+    edge = EDGE * spacing_mm
+    gaps = ceil((high - low - 2.0 * edge) / spacing_mm - 0.01)
+    ends = (low + edge, high - edge) if gaps > 0 else (0.5 * (low + high),) * 2
     heights = np.linspace(*ends, max(gaps, 0) + 1, dtype=np.float64)
     return _polylines(sides, _edges(fence, turn), heights, reach_mm, turn)
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Ints
 from slicer.bead import Bead
+from slicer.paths import Kind
 from slicer.polygons import Polygons, area_mm2, contours, edges, grown
 from slicer.scanline import crossed, inside
 
@@ -44,7 +45,9 @@ def ordered(
     placed = [beads[k].points[::-1] if flip else beads[k].points for k, flip in zip(order, flips, strict=True)]
     to = np.array([points[0] for points in placed])
     since = np.array([first, *(points[-1] for points in placed[:-1])])
-    retracts = _retracts(edges(grown(section, -INSET * width_mm)), since, to, retract_travel_mm)
+    props = np.array([beads[k].kind is Kind.SUPPORT for k in order])
+    among = np.concatenate([[False], props[1:] & props[:-1]])
+    retracts = _retracts(edges(grown(section, -INSET * width_mm)), since, to, among, retract_travel_mm)
     if tip is None:
         retracts[0] = True
     return [Placed(beads[k], points, bool(pull)) for k, points, pull in zip(order, placed, retracts, strict=True)]
@@ -108,11 +111,11 @@ def _sequence(
 
 
 @njit(cache=True)
-def _retracts(sides: Floats, since: Floats, to: Floats, least_mm: float) -> NDArray[np.bool_]:
-    """A travel retracts when it is long and does not stay inside the section."""
+def _retracts(sides: Floats, since: Floats, to: Floats, among: NDArray[np.bool_], least_mm: float) -> NDArray[np.bool_]:
+    """A travel retracts when it is long and does not stay inside the section or, among supports, outside of it."""
     out = np.zeros(len(to), np.bool_)
     for k in range(len(to)):
         x0, y0, x1, y1 = since[k, 0], since[k, 1], to[k, 0], to[k, 1]
         if np.hypot(x1 - x0, y1 - y0) >= least_mm:
-            out[k] = not inside(sides, x0, y0) or crossed(sides, x0, y0, x1, y1)
+            out[k] = crossed(sides, x0, y0, x1, y1) or not (among[k] or inside(sides, x0, y0))
     return out

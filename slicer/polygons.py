@@ -15,7 +15,7 @@ Polygons: TypeAlias = CrossSection
 
 RESOLUTION_MM = 0.0125  # PrusaSlicer's resolution of G-code; finer detail than this no printer shows
 CLOSING_MM = 0.049  # PrusaSlicer's slice closing radius: slits narrower than twice this are meshing faults
-MITRE = 2.0
+MITRE = 3.0  # times the distance: corners sharper than 39 degrees are cut off
 ARC_SEGMENTS = 32
 
 
