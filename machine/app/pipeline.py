@@ -21,7 +21,7 @@ from profiles.errors import ProfileError
 from profiles.profile import Profile
 from slicer.slice import slice_part
 
-COMPILING_AFTER_S = 1.5
+COMPILING_AFTER_S = 4.0  # loading the compiled ones takes less
 
 
 @dataclass(frozen=True, eq=False)
