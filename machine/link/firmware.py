@@ -138,6 +138,7 @@ class Firmware:
         self._queue.clear()
         self._half = self._scanned = b""
         self._wake_s = self._work = None
+        self._busy_s = inf
 
     def _read_urgent(self, data: bytes) -> None:
         """The emergency parser reads M112, M108 and M410 from the raw bytes, whatever waits before them."""
@@ -266,7 +267,7 @@ class Firmware:
     def _finish(self, label: str, answer: str | None = None) -> None:
         self._queue.popleft()
         self._taken += 1
-        self._busy_s = self.body.now_s + self._busy_every_s
+        self._busy_s = inf
         if answer is not None:
             self._said.append(answer)
         elif self._habits.advanced_ok:
@@ -276,6 +277,9 @@ class Firmware:
             self._said.append("ok")
 
     def _sleep(self, wake_s: float) -> None:
+        """Look again at wake_s; the first such wait of a line starts the clock of the busy messages."""
+        if self._busy_s == inf:
+            self._busy_s = self.body.now_s + self._busy_every_s
         if self._wake_s is None:
             self._wake_s = wake_s
 

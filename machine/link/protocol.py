@@ -222,10 +222,11 @@ class Protocol:
             text = f"the printer has been silent: line {self.acknowledged + 1} and {PROBES} questions remained without answer"
             self._turn(Signal.SILENT, now_s, SilenceError(text))
             return
-        self._probe = self._transmit("M105", now_s)
+        number = self._transmit("M105", now_s)
+        self._probe = self._probe or number
 
     def _enter_quiet(self, _now_s: float) -> None:
-        self._clean = 0
+        self._clean = self._probes = self._doubt = self._probe = 0
         self._alone = self.sent <= self._next_repeat
         self._ground()
 
@@ -260,7 +261,7 @@ class Protocol:
                 self._turn(Signal.HUSH, now_s)  # the ok that belongs to the Resend, and nothing else is on its way
         elif ok.temperature is not None:
             self._temperature_known = True
-            self._acknowledge(next((s.number for s in self._flight if s.asks_temperature), None), now_s)
+            self._acknowledge(self._answered_question(), now_s)
         elif self.advanced:
             if ok.line is None and ok.planner_free is not None and not unknown:
                 text = f"the printer ran part of a torn line after line {self.acknowledged}: what it did is not known"
@@ -271,6 +272,12 @@ class Protocol:
             self._swallow = False
         else:
             self._acknowledge_oldest(now_s)
+
+    def _answered_question(self) -> int | None:
+        """The line that an `ok T:` acknowledges: the oldest question; nothing but questions follows the first probe."""
+        number = next((s.number for s in self._flight if s.asks_temperature), None)
+        probing = self.state is State.PROBING and number is not None and number >= self._probe
+        return self.sent if probing else number
 
     def _learn(self, ok: Ok) -> None:
         self.advanced = True
@@ -294,7 +301,7 @@ class Protocol:
             self._clean += 1
         self.acknowledged = max(self.acknowledged, number)
         self._progress_s = now_s
-        self._waits = 0
+        self._waits = self._probes = 0
         if self._asked and number > self._asked:
             self._asked = 0
         if self.state is not State.OPEN:

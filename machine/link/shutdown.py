@@ -10,10 +10,10 @@ from machine.link.port import Port
 # inside the part.
 ORDERS = b"\nM108\nM410\nM104 S0\nM140 S0\nM107\nM105\n"
 AGAIN_S = 2.0  # noise may eat an order; without the proof they are given again this often
-PATIENCE_S = 20.0  # lines that the printer had already taken are run first
+SETTLE_S = 20.0  # lines that the printer had already taken are run first
 
 
-def heaters_off(port: Port, patience_s: float = PATIENCE_S) -> bool:
+def heaters_off(port: Port, patience_s: float = SETTLE_S) -> bool:
     """Stop the printer and switch the heaters off; True when its own report shows targets of 0.
 
     Raises PortError when the port is gone.

@@ -10,21 +10,25 @@ from machine.link.framing import command_of
 from machine.link.port import Port, open_port
 from machine.link.progress import Place, Progress
 from machine.link.protocol import Protocol, Timing
-from machine.link.shutdown import heaters_off
+from machine.link.shutdown import SETTLE_S, heaters_off
 from machine.link.states import State
-from profiles.errors import FirmwareError, PortError
+from profiles.errors import FirmwareError, PortError, SilenceError
 
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself
 REPORT_S = 2  # between reports of one that does
 WARNINGS = 20  # kept of the printer's own words that show a program it does not understand
 WARNS = ("nknown command", "cold extrusion", "too long extrusion")
-HALTED_PATIENCE_S = 1.0  # a halted firmware has switched its heaters off and is deaf; one attempt is enough
+# After an error the printer may be deaf: the orders are given, the proof is not awaited for long. A halted or restarted
+# firmware has switched its heaters off by itself.
+PATIENCE_S: dict[type[BaseException], float] = {FirmwareError: 1.0, SilenceError: 5.0}
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a print ended. heaters_off: proven by the printer's report; None when the program ran to its own end."""
+    """How a print ended. heaters_off, after a cancel: whether the printer's own report proves it; None when
+    the program ran to its own end, or when nothing of it had been sent.
+    """
 
     cancelled: bool
     sent: int
@@ -68,9 +72,10 @@ def print_lines(
             talk.feed(lines)
             talk.finish()
         except _StoppedError:
-            return replace(talk.outcome(cancelled=True), heaters_off=heaters_off(wire))
+            return replace(talk.outcome(cancelled=True), heaters_off=heaters_off(wire) if talk.greeted else None)
         except BaseException as error:
-            _leave(wire, error)
+            if talk.greeted:
+                _leave(wire, error)
             raise
         return talk.outcome(cancelled=False)
 
@@ -80,10 +85,7 @@ def _leave(wire: Port, error: BaseException) -> None:
     if isinstance(error, PortError):
         return
     try:
-        if isinstance(error, FirmwareError):
-            heaters_off(wire, HALTED_PATIENCE_S)
-        else:
-            heaters_off(wire)
+        heaters_off(wire, PATIENCE_S.get(type(error), SETTLE_S))
     except PortError:
         return
 
@@ -105,6 +107,7 @@ class _Talk:
         self._began_s = monotonic()
         self._protocol = Protocol(timing, self._began_s)
         self._place, self._temperature = Place(), Temperature()
+        self.greeted = False
         self._jobs = 0
         self._firmware = "unknown"
         self._warnings: list[str] = []
@@ -114,6 +117,7 @@ class _Talk:
         """Agree on line numbers and learn the printer's habits."""
         while self._protocol.state in (State.DRAIN, State.SYNC, State.HELLO):
             self._pump()
+        self.greeted = True
         if self._protocol.capabilities.get("AUTOREPORT_TEMP"):
             self._send(f"M155 S{REPORT_S}")
 
