@@ -1,8 +1,9 @@
 """The machine: linear axes, the tilt and turn axes of the table, the head's bodies, the table, its G-code blocks."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 Vector = tuple[float, float, float]
 Limits = tuple[float, float]
@@ -13,6 +14,14 @@ class Frozen(BaseModel):
     """A validated value: unknown keys are refused, nothing changes after loading."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_truth_as_number(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuses true and false where pydantic would read 1 and 0."""
+        if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
+            raise PydanticCustomError("truth_as_number", "true and false are no numbers")
+        return value
 
 
 def _ordered(limits: Limits, name: str) -> None:

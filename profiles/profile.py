@@ -12,10 +12,12 @@ from profiles.errors import ProfileError
 from profiles.machine import Frozen, Machine
 from profiles.material import Material
 from profiles.process import Process, Search
+from profiles.wording import sentences
 
 KINDS = {"machine": "machines", "material": "materials", "process": "processes"}
 DEFAULTS = {"machine": "generic_ac", "material": "pla", "process": "standard"}
 SECTIONS: dict[str, type[Frozen]] = {"machine": Machine, "material": Material, "process": Process, "search": Search}
+LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diameters
 OF_KIND = {"machine": ("machine",), "material": ("material",), "process": ("process", "search")}
 
 
@@ -53,8 +55,10 @@ def load(
     try:
         profile = Profile.model_validate(tables)
     except ValidationError as error:
-        raise ProfileError("; ".join(_sentences(error))) from None
-    _check_together(profile)
+        raise ProfileError("; ".join(sentences(error.errors(), Profile))) from None
+    problems = _check_together(profile)
+    if problems:
+        raise ProfileError("; ".join(problems))
     return profile
 
 
@@ -66,11 +70,7 @@ def kind_of(name: str) -> str:
     if Path(name).suffix != ".toml" and not Path(name).exists():
         known = ", ".join(sorted(each for kind in KINDS for each in shipped(kind)))
         raise ProfileError(f"profile {name!r} is not known: it must be one of {known}, or the path of a .toml file")
-    document = _parse(Path(name))
-    found = next((kind for kind in KINDS if kind in document), None)
-    if found is None:
-        raise ProfileError(f"{name}: no [machine], [material] or [process] table")
-    return found
+    return _kind_in(Path(name))
 
 
 def load_one(name: str, settings: Iterable[str] = ()) -> dict[str, Frozen]:
@@ -84,7 +84,7 @@ def load_one(name: str, settings: Iterable[str] = ()) -> dict[str, Frozen]:
         try:
             models[section] = SECTIONS[section].model_validate(tables[section])
         except ValidationError as error:
-            problems += [f"{section}.{sentence}" for sentence in _sentences(error)]
+            problems += sentences(error.errors(), SECTIONS[section], f"{section}.")
     if problems:
         raise ProfileError("; ".join(problems))
     return models
@@ -102,12 +102,8 @@ def rows(prefix: str, model: Frozen) -> Iterator[tuple[str, Any, str]]:
 
 def check_file(path: Path) -> list[str]:
     """All problems of a profile file, each one sentence; empty when it is fine."""
-    document = _parse(path)
-    kind = next((k for k in KINDS if k in document), None)
-    if kind is None:
-        return [f"{path}: no [machine], [material] or [process] table"]
     try:
-        tables = _inherit(kind, document, str(path), ())
+        tables = _tables(_kind_in(path), str(path))
     except ProfileError as error:
         return [str(error)]
     problems = []
@@ -115,39 +111,48 @@ def check_file(path: Path) -> list[str]:
         try:
             SECTIONS[section].model_validate(table)
         except ValidationError as error:
-            problems += [f"{section}.{sentence}" for sentence in _sentences(error)]
+            problems += sentences(error.errors(), SECTIONS[section], f"{section}.")
     return problems
 
 
-def _tables(kind: str, name: str) -> dict[str, Any]:
-    if name in shipped(kind):
-        source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
-        document = tomllib.loads(source.read_text(encoding="utf-8"))
-    elif Path(name).suffix == ".toml" or Path(name).exists():
-        document = _parse(Path(name))
-    else:
-        raise ProfileError(
-            f"{kind} profile {name!r} is not known: it must be one of {', '.join(shipped(kind))}, or the path of a .toml file"
-        )
-    return _inherit(kind, document, name, ())
+def _kind_in(path: Path) -> str:
+    """The kind of a profile file by its tables."""
+    document = _parse(path)
+    found = next((kind for kind, sections in OF_KIND.items() if any(section in document for section in sections)), None)
+    if found is None:
+        raise ProfileError(f"{path}: no [machine], [material], [process] or [search] table")
+    return found
 
 
-def _inherit(kind: str, document: dict[str, Any], name: str, seen: tuple[str, ...]) -> dict[str, Any]:
-    document = dict(document)
+def _tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The tables of a profile by shipped name or path, with those it inherits."""
+    document, place = _document(kind, name)
+    if place in seen:
+        raise ProfileError(f"{name} inherits itself by way of {', '.join(seen[seen.index(place) + 1 :]) or 'its own name'}")
     parent = document.pop("inherits", None)
-    allowed = OF_KIND[kind]
-    unknown = [key for key in document if key not in allowed]
-    if unknown:
-        raise ProfileError(f"{name}: table {unknown[0]!r} is not known: a {kind} profile holds {', '.join(allowed)}")
-    if kind not in document:
-        raise ProfileError(f"{name}: no [{kind}] table: this is not a {kind} profile")
+    unknown = [key for key in document if key not in OF_KIND[kind]]
+    if unknown or not document:
+        what = f"[{'], ['.join(unknown)}] cannot stand in a {kind} profile" if unknown else f"this is not a {kind} profile"
+        raise ProfileError(f"{name}: {what}: its tables are {' and '.join(f'[{section}]' for section in OF_KIND[kind])}")
     if parent is None:
         return document
-    if parent in seen or parent not in shipped(kind):
-        raise ProfileError(f"{name}: inherits {parent!r}: it must be one of {', '.join(shipped(kind))}, without a circle")
-    base = resources.files("profiles") / KINDS[kind] / f"{parent}.toml"
-    tables = _inherit(kind, tomllib.loads(base.read_text(encoding="utf-8")), parent, (*seen, parent))
-    return _merged(tables, document)
+    if not isinstance(parent, str):
+        raise ProfileError(f"{name}: inherits is {parent!r}: the name of one profile or the path of one .toml file is expected")
+    if Path(parent).suffix == ".toml":
+        parent = str(Path(name).parent / parent)
+    return _merged(_tables(kind, parent, (*seen, place)), document)
+
+
+def _document(kind: str, name: str) -> tuple[dict[str, Any], str]:
+    """A profile's own tables and where they stand: the shipped name or the file's full path."""
+    if name in shipped(kind):
+        source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
+        return tomllib.loads(source.read_text(encoding="utf-8")), name
+    if Path(name).suffix == ".toml" or Path(name).exists():
+        return _parse(Path(name)), str(Path(name).resolve())
+    raise ProfileError(
+        f"{kind} profile {name!r} is not known: it must be one of {', '.join(shipped(kind))}, or the path of a .toml file"
+    )
 
 
 def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
@@ -172,10 +177,9 @@ def _parse(path: Path) -> dict[str, Any]:
 def _apply(tables: dict[str, Any], setting: str) -> None:
     key, equals, text = setting.partition("=")
     steps = key.strip().split(".")
-    if not equals or len(steps) < 2 or steps[0] not in SECTIONS:
-        raise ProfileError(
-            f"--set {setting}: KEY=VALUE is expected, where KEY begins with {', '.join(f'{s}.' for s in SECTIONS)}"
-        )
+    if not equals or len(steps) < 2 or steps[0] not in SECTIONS or not all(steps):
+        begins = ", ".join(f"{section}." for section in SECTIONS)
+        raise ProfileError(f"--set {setting}: KEY=VALUE is expected, where KEY begins with one of {begins}")
     try:
         value = tomllib.loads(f"value = {text.strip()}")["value"]
     except tomllib.TOMLDecodeError:
@@ -187,36 +191,20 @@ def _apply(tables: dict[str, Any], setting: str) -> None:
     table[steps[-1]] = value
 
 
-def _sentences(error: ValidationError) -> list[str]:
-    return [_sentence(problem) for problem in error.errors()]
-
-
-def _sentence(problem: Any) -> str:
-    key = ".".join(str(step) for step in problem["loc"]) or "profile"
-    if problem["type"] == "extra_forbidden":
-        return f"{key} is not a key of a profile (tiltprint profiles show lists them)"
-    if problem["type"] == "missing":
-        return f"{key} is missing"
-    text = problem["msg"].removeprefix("Value error, ")
-    if problem["type"] == "value_error":
-        return f"{key}: {text}"
-    text = text[0].lower() + text[1:]
-    return f"{key} is {problem['input']!r}: {text.replace('input should', 'it must')}"
-
-
-def _check_together(profile: Profile) -> None:
-    """What no single file can know: material against machine."""
+def _check_together(profile: Profile) -> list[str]:
+    """What no single file can know: material and process against machine; every problem one sentence."""
     machine, material = profile.machine, profile.material
-    hottest = max(material.nozzle_c, material.first_layer_nozzle_c)
-    if hottest > machine.nozzle_limit_c:
-        raise ProfileError(f"material.nozzle_c is {hottest:g}: {machine.name} allows at most {machine.nozzle_limit_c:g} deg C")
+    width_mm, nozzle_mm = profile.process.line_width_mm, machine.head.nozzle_mm
+    problems = [
+        f"material.{key} is {getattr(material, key):g}: {machine.name} allows at most {machine.nozzle_limit_c:g} deg C"
+        for key in ("nozzle_c", "first_layer_nozzle_c")
+        if getattr(material, key) > machine.nozzle_limit_c
+    ]
     if material.bed_c > machine.bed_limit_c:
-        raise ProfileError(f"material.bed_c is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} deg C")
-    if (
-        profile.process.line_width_mm < 0.6 * machine.head.nozzle_mm
-        or profile.process.line_width_mm > 2.5 * machine.head.nozzle_mm
-    ):
-        raise ProfileError(
-            f"process.line_width_mm is {profile.process.line_width_mm:g}: a {machine.head.nozzle_mm:g} mm nozzle prints lines of "
-            f"{0.6 * machine.head.nozzle_mm:g} to {2.5 * machine.head.nozzle_mm:g} mm"
+        problems.append(f"material.bed_c is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} deg C")
+    if not LEAST_WIDTH * nozzle_mm <= width_mm <= MOST_WIDTH * nozzle_mm:
+        problems.append(
+            f"process.line_width_mm is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of "
+            f"{LEAST_WIDTH * nozzle_mm:g} to {MOST_WIDTH * nozzle_mm:g} mm"
         )
+    return problems

@@ -1,0 +1,139 @@
+"""Wording: what a key of a profile allows, and one sentence for each problem pydantic finds."""
+
+import json
+from collections.abc import Iterator
+from difflib import get_close_matches
+from types import UnionType
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+LONGEST_VALUE = 60
+
+
+def sentences(problems: list[Any], root: type[BaseModel], prefix: str = "") -> list[str]:
+    """One sentence for each problem of a ValidationError: key, value, what is allowed; keys are dotted after the prefix."""
+    found = dict.fromkeys(_sentence(problem, root, prefix) for problem in problems)
+    return list(found)
+
+
+def allowed(field: FieldInfo) -> str:
+    """What a field allows, in words: "a number from 0.02 to 2"."""
+    return _allowed(field.annotation, field.metadata)
+
+
+def keys(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, FieldInfo]]:
+    """Every dotted key of a model with its field, tables opened."""
+    for name, field in model.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            yield from keys(field.annotation, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", field
+
+
+def _sentence(problem: Any, root: type[BaseModel], prefix: str) -> str:
+    steps = tuple(problem["loc"])
+    key, text = prefix + ".".join(str(step) for step in steps), problem["msg"].removeprefix("Value error, ")
+    if problem["type"] == "value_error":
+        table = _table(root, steps)
+        dot = "." if key and table is not None and text.split(" ")[0].split(".")[0].rstrip(":") in table.model_fields else ": "
+        return f"{key}{dot}{text}" if key else text
+    if problem["type"] == "extra_forbidden":
+        near = _nearest(key, [name for name, _ in keys(root, prefix)])
+        return f"{key} is not a key of a profile" + (f": did you mean {near}?" if near else " (`profiles show` lists them)")
+    if problem["type"] == "missing" and not isinstance(steps[-1], int):
+        field = _field(root, steps)
+        return f"{key} is missing" + (f": {allowed(field)} is expected" if field else "")
+    field = _field(root, steps)
+    while steps and isinstance(steps[-1], int) and problem["type"] == "missing":
+        steps, key = steps[:-1], key.rpartition(".")[0]
+    expected = allowed(field) if field else "a table of keys"
+    return f"{key} is {_shown(problem['input'])}: it must be {expected}"
+
+
+def _nearest(key: str, known: list[str]) -> str | None:
+    """The known key most like a mistyped one: of the same table by its last word, else of any table."""
+    table, _, word = key.rpartition(".")
+    same = {name.rpartition(".")[2]: name for name in known if name.rpartition(".")[0] == table}
+    every = {name.rpartition(".")[2]: name for name in known}
+    return next((names[found[0]] for names in (same, every) if (found := get_close_matches(word, names, 1, 0.7))), None)
+
+
+def _field(root: type[BaseModel], steps: tuple[str | int, ...]) -> FieldInfo | None:
+    """The innermost field on the way of an error."""
+    model: type[BaseModel] | None = root
+    found = None
+    for step in steps:
+        if isinstance(step, int):
+            continue
+        if model is None or step not in model.model_fields:
+            return found
+        found = model.model_fields[step]
+        model = _model(found.annotation)
+    return found
+
+
+def _table(root: type[BaseModel], steps: tuple[str | int, ...]) -> type[BaseModel] | None:
+    field = _field(root, steps)
+    return root if field is None else _model(field.annotation)
+
+
+def _model(annotation: Any) -> type[BaseModel] | None:
+    candidates = (annotation, *get_args(annotation))
+    return next((each for each in candidates if isinstance(each, type) and issubclass(each, BaseModel)), None)
+
+
+def _allowed(annotation: Any, metadata: list[Any]) -> str:
+    origin, inner = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return ("one of " if len(inner) > 1 else "") + ", ".join(_shown(each) for each in inner)
+    if origin is UnionType:
+        return _allowed(inner[0], metadata)
+    if origin is tuple:
+        return f"a list of {('', '', 'two', 'three')[len(inner)]} numbers"
+    if origin is list:
+        return _list(inner[0], any(_bound(each, "min_length") for each in metadata))
+    if hasattr(annotation, "__metadata__"):
+        return _allowed(inner[0], [*annotation.__metadata__])
+    if annotation is bool:
+        return "true or false"
+    if annotation is str:
+        pattern = next((text for each in metadata for text in [_bound(each, "pattern")] if text), None)
+        return f"one letter of {pattern.strip('^[]$')}" if pattern else "a text"
+    if annotation in (int, float):
+        return ("a whole number" if annotation is int else "a number") + _range(metadata)
+    model = _model(annotation)
+    return f"a table with the keys {', '.join(model.model_fields)}" if model else "a table of keys"
+
+
+def _list(item: Any, needed: bool) -> str:
+    model = _model(item)
+    if model is not None:
+        return f"a list of tables with the keys {', '.join(model.model_fields)}"
+    return "a list of texts" if item is str else f"a list of{' one or more' if needed else ''} pairs of numbers"
+
+
+def _range(metadata: list[Any]) -> str:
+    bounds = {name: value for each in metadata for name in ("ge", "gt", "le", "lt") if (value := _bound(each, name)) is not None}
+    low = f" from {bounds['ge']:g}" if "ge" in bounds else f" above {bounds['gt']:g}" if "gt" in bounds else ""
+    high = f" to {bounds['le']:g}" if "le" in bounds else f" and below {bounds['lt']:g}" if "lt" in bounds else ""
+    return low + (f" and{high.replace(' to', ' up to')}" if low.startswith(" above") and high.startswith(" to") else high)
+
+
+def _bound(constraint: Any, name: str) -> Any:
+    """A bound of a constraint: annotated-types keep it as an attribute, pydantic's Field and general metadata below it."""
+    for each in (constraint, *getattr(constraint, "metadata", ())):
+        value = getattr(each, name, None)
+        if value is not None:
+            return value
+    return None
+
+
+def _shown(value: Any) -> str:
+    """A value as TOML shows it, cut when it is long."""
+    try:
+        text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError):
+        text = str(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."

@@ -1,0 +1,266 @@
+"""Profiles: what ships is valid, and every wrong one gets a sentence with key, value and what is allowed."""
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from profiles.errors import ProfileError
+from profiles.machine import Frozen
+from profiles.profile import DEFAULTS, KINDS, OF_KIND, SECTIONS, check_file, kind_of, load, load_one, rows, shipped
+from profiles.wording import allowed, keys
+
+ALL_KEYS = [(name, field) for section, model in SECTIONS.items() for name, field in keys(model, f"{section}.")]
+
+
+def refusal(*settings: str) -> str:
+    with pytest.raises(ProfileError) as caught:
+        load(settings=settings)
+    return str(caught.value)
+
+
+def written(folder: Path, text: str, name: str = "mine.toml") -> str:
+    (folder / name).write_text(text, encoding="utf-8")
+    return str(folder / name)
+
+
+def test_the_defaults_load() -> None:
+    assert load().process.layer_height_mm == 0.2
+    assert all(DEFAULTS[kind] in shipped(kind) for kind in KINDS)
+
+
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in KINDS for name in shipped(kind)])
+def test_every_shipped_profile_is_valid_and_of_its_kind(kind: str, name: str) -> None:
+    assert kind_of(name) == kind
+    assert tuple(load_one(name)) == OF_KIND[kind]
+
+
+@pytest.mark.parametrize("machine", shipped("machine"))
+@pytest.mark.parametrize("material", shipped("material"))
+def test_every_shipped_material_can_be_printed_on_every_shipped_machine(machine: str, material: str) -> None:
+    width = 1.1 * load_one(machine)["machine"].head.nozzle_mm  # type: ignore[attr-defined]
+    assert load(machine, material, settings=[f"process.line_width_mm={width}"]).material.name
+
+
+@pytest.mark.parametrize(("key", "field"), ALL_KEYS, ids=[name for name, _ in ALL_KEYS])
+def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: object) -> None:
+    assert len(field.description or "") > 5  # type: ignore[attr-defined]
+    assert re.match(r"(a|one|true|\")", allowed(field))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("process.layerheight_mm=0.2", "process.layerheight_mm is not a key of a profile: did you mean process.layer_height_mm?"),
+        ("process.beam_width=3", "process.beam_width is not a key of a profile: did you mean search.beam_width?"),
+        ("machine.tilt.colour=3", "machine.tilt.colour is not a key of a profile (`profiles show` lists them)"),
+        ("process.layer_height_mm=5", "process.layer_height_mm is 5: it must be a number from 0.02 to 2"),
+        ("process.layer_height_mm=nan", "process.layer_height_mm is nan: it must be a number from 0.02 to 2"),
+        ("process.scale=0", "process.scale is 0: it must be a number above 0 and up to 100000"),
+        ("search.least_volume_share=1", "search.least_volume_share is 1: it must be a number from 0 and below 1"),
+        ("process.walls=2.5", "process.walls is 2.5: it must be a whole number from 0 to 50"),
+        ("process.walls=true", "process.walls is true: it must be a whole number from 0 to 50"),
+        ("process.walls=many", 'process.walls is "many": it must be a whole number from 0 to 50'),
+        ("search.clearance=maybe", 'search.clearance is "maybe": it must be true or false'),
+        ("process.support=some", 'process.support is "some": it must be one of "none", "auto"'),
+        ("machine.name=5", "machine.name is 5: it must be a text"),
+        ("machine.tilt.letter=Q", 'machine.tilt.letter is "Q": it must be one letter of ABCUVWIJK'),
+        ("machine.tilt.sign=2", "machine.tilt.sign is 2: it must be one of -1, 1"),
+        ("machine.x.limits_mm=[1]", "machine.x.limits_mm is [1]: it must be a list of two numbers"),
+        ("machine.tool_mm=[1,2]", "machine.tool_mm is [1, 2]: it must be a list of three numbers"),
+        ("machine.x.limits_mm=[5,-5]", "machine.x.limits_mm is [5.0, -5.0]: the first number must be below the second"),
+        ("machine.tilt.limits_deg=[9,20]", "machine.tilt.zero_deg is 0: it must lie inside limits_deg [9.0, 20.0]"),
+        ("machine.tilt.axis=[0,0,0]", "machine.tilt.axis is [0.0, 0.0, 0.0]: a direction must not be zero"),
+        ("machine.tilt.axis=[0,0,1]", "machine.tilt.axis and turn.axis are parallel: the table could not be tilted to any side"),
+        ("machine.turn.axis=[1,0,1]", "machine.turn.axis is [1.0, 0.0, 1.0]: it must be vertical at tilt 0"),
+        ("machine.tilt.letter=C", "machine.tilt.letter and turn.letter are both C: they must differ"),
+        (
+            "machine.head.silhouette_mm=[[2,0],[1,3]]",
+            "machine.head.silhouette_mm: [1, 3] follows [2, 0]: radii must rise and heights must not fall",
+        ),
+        ("machine.head.silhouette_mm=[]", "machine.head.silhouette_mm is []: it must be a list of one or more pairs of numbers"),
+        ("machine.table=5", "machine.table is 5: it must be a table with the keys radius_mm, thickness_mm"),
+        (
+            'machine.head.boxes=[{name="fan",min_mm=[0,0,-1],max_mm=[1,1,1]}]',
+            "machine.head.boxes.0: box fan: min_mm z is -1: no body may hang below the tip",
+        ),
+        (
+            'machine.head.boxes=[{name="fan",min_mm=[0,0,0]}]',
+            "machine.head.boxes.0.max_mm is missing: a list of three numbers is expected",
+        ),
+        ("process.line_width_mm=0.2", "process.layer_height_mm is 0.2 mm: at most 0.9 of line_width_mm (0.18 mm) is allowed"),
+        ("process.interface_overlap_mm=0.2", "process.interface_overlap_mm is 0.2 mm: it must be below layer_height_mm (0.2 mm)"),
+        ("process.line_width_mm=2", "process.line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm"),
+        ("material.nozzle_c=400", "material.nozzle_c is 400: generic A/C table allows at most 300 deg C"),
+        ("material.bed_c=150", "material.bed_c is 150: generic A/C table allows at most 110 deg C"),
+    ],
+)
+def test_a_wrong_value_is_refused_with_key_value_and_what_is_allowed(setting: str, sentence: str) -> None:
+    assert refusal(setting) == sentence
+
+
+@pytest.mark.parametrize(
+    "setting", ["walls=3", "process", "process.walls", "process.=3", "process..walls=3", "printer.walls=3", "=3"]
+)
+def test_a_set_option_that_is_no_key_and_value_is_refused(setting: str) -> None:
+    expected = f"--set {setting}: KEY=VALUE is expected, where KEY begins with one of machine., material., process., search."
+    assert refusal(setting) == expected
+
+
+def test_all_problems_are_told_at_once() -> None:
+    text = refusal("process.walls=-1", "search.beam_width=0", "machine.x.speed_mm_s=0", "material.fan=2")
+    assert [problem.split(" ")[0] for problem in text.split("; ")] == [
+        "machine.x.speed_mm_s",
+        "material.fan",
+        "process.walls",
+        "search.beam_width",
+    ]
+    assert refusal("material.nozzle_c=400", "material.bed_c=150").count("allows at most") == 2
+
+
+def test_set_understands_numbers_lists_truths_and_texts() -> None:
+    profile = load(
+        settings=[
+            "process.walls = 5",
+            "process.layer_height_mm=0.25",
+            "machine.tilt.point_mm=[0, 0, -20.5]",
+            "search.clearance=false",
+            "process.infill_pattern=concentric",
+            'process.name="my own"',
+            "material.name=my own",
+        ]
+    )
+    assert (profile.process.walls, profile.process.layer_height_mm) == (5, 0.25)
+    assert profile.machine.tilt.point_mm == (0.0, 0.0, -20.5)
+    assert (profile.search.clearance, profile.process.infill_pattern) == (False, "concentric")
+    assert (profile.process.name, profile.material.name) == ("my own", "my own")
+
+
+@given(st.integers(0, 50), st.floats(0.11, 0.4))
+def test_what_is_set_is_what_is_loaded_and_the_last_setting_wins(walls: int, height: float) -> None:
+    process = load(settings=["process.walls=7", f"process.walls={walls}", f"process.layer_height_mm={height!r}"]).process
+    assert (process.walls, process.layer_height_mm) == (walls, height)
+
+
+@given(
+    st.sampled_from([key for key, _ in ALL_KEYS]),
+    st.text(max_size=20) | st.floats().map(repr) | st.lists(st.integers()).map(repr),
+)
+def test_any_value_of_any_key_is_taken_or_refused_in_a_sentence(key: str, value: str) -> None:
+    outcome = "taken"
+    try:
+        load(settings=[f"{key}={value}"])
+    except ProfileError as error:
+        outcome = str(error)
+    assert outcome == "taken" or outcome.startswith(f"{key.split('.')[0]}.")
+
+
+@given(st.text(max_size=30).filter(lambda text: not text.strip().startswith(tuple(SECTIONS))))
+def test_any_text_without_a_key_is_refused_as_a_setting(text: str) -> None:
+    assert refusal(text).startswith(f"--set {text}: KEY=VALUE is expected")
+
+
+def test_setting_one_key_leaves_all_others_alone() -> None:
+    one, other = load(), load(settings=["machine.tilt.speed_deg_s=11"])
+    changed = [a for a, b in zip(rows("machine", one.machine), rows("machine", other.machine), strict=True) if a != b]
+    assert [key for key, _, _ in changed] == ["machine.tilt.speed_deg_s"]
+
+
+def test_a_loaded_profile_does_not_change() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        load().process.walls = 3  # type: ignore[misc]
+
+
+def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
+    with pytest.raises(
+        ProfileError, match=r"^machine profile 'ender' is not known: it must be one of fractal5pro, generic_ac, or"
+    ):
+        load(machine="ender")
+    with pytest.raises(
+        ProfileError, match=r"^profile 'ender' is not known: it must be one of draft, .*, or the path of a \.toml file$"
+    ):
+        load_one("ender")
+
+
+def test_a_file_inherits_what_it_does_not_say(tmp_path: Path) -> None:
+    file = written(tmp_path, 'inherits = "draft"\n[process]\nname = "mine"\nwalls = 4\n[search]\nbeam_width = 9\n')
+    process = load(process=file).process
+    assert (process.name, process.walls, process.layer_height_mm) == ("mine", 4, 0.3)
+    assert load(process=file).search.beam_width == 9
+
+
+def test_a_file_inherits_from_a_file_beside_it(tmp_path: Path) -> None:
+    written(tmp_path, 'inherits = "pla"\n[material]\nfan = 0.25\nflow = 0.9\n', "base.toml")
+    material = load(material=written(tmp_path, 'inherits = "base.toml"\n[material]\nflow = 1.1\n')).material
+    assert (material.fan, material.flow, material.bed_c) == (0.25, 1.1, 60.0)
+
+
+def test_a_circle_of_files_is_refused(tmp_path: Path) -> None:
+    written(tmp_path, 'inherits = "mine.toml"\n[process]\nwalls = 1\n', "other.toml")
+    file = written(tmp_path, 'inherits = "other.toml"\n[process]\nwalls = 1\n')
+    with pytest.raises(ProfileError, match=r"mine\.toml inherits itself by way of .*other\.toml"):
+        load(process=file)
+    assert "inherits itself" in check_file(Path(file))[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            'inherits = "nix"\n[machine]\nname = "a"\n',
+            "machine profile 'nix' is not known: it must be one of fractal5pro, generic_ac",
+        ),
+        (
+            'inherits = ["generic_ac"]\n[machine]\nname = "a"\n',
+            "the name of one profile or the path of one .toml file is expected",
+        ),
+        (
+            '[machine]\nname = "a"\n[matrial]\n[proces]\n',
+            "[matrial], [proces] cannot stand in a machine profile: its tables are [machine]",
+        ),
+        ("[machine\n", "is not valid TOML"),
+        ("walls = 3\n", "no [machine], [material], [process] or [search] table"),
+    ],
+)
+def test_a_file_that_is_no_profile_is_refused(text: str, sentence: str, tmp_path: Path) -> None:
+    problems = check_file(Path(written(tmp_path, text)))
+    assert len(problems) == 1
+    assert sentence in problems[0]
+
+
+def test_a_profile_of_another_kind_is_refused_by_its_tables(tmp_path: Path) -> None:
+    file = written(tmp_path, '[material]\nname = "a"\n')
+    with pytest.raises(
+        ProfileError, match=r"\[material\] cannot stand in a process profile: its tables are \[process\] and \[search\]"
+    ):
+        load(process=file)
+
+
+def test_a_file_that_is_not_there_or_not_text_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ProfileError, match=r"gone\.toml cannot be read: no such file or directory$"):
+        load(machine=str(tmp_path / "gone.toml"))
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    assert "TOML in UTF-8 is expected" in check_file(tmp_path / "binary.toml")[0]
+
+
+def test_checking_a_file_tells_every_problem_of_every_table(tmp_path: Path) -> None:
+    text = 'inherits = "standard"\n[process]\nwalls = -1\ninfil_density = 0.5\n[search]\nbeam_width = 0\n'
+    assert check_file(Path(written(tmp_path, text))) == [
+        "process.walls is -1: it must be a whole number from 0 to 50",
+        "process.infil_density is not a key of a profile: did you mean process.infill_density?",
+        "search.beam_width is 0: it must be a whole number from 1 to 1000",
+    ]
+    assert check_file(Path(written(tmp_path, 'inherits = "standard"\n[search]\nbeam_width = 3\n'))) == []
+
+
+def test_a_bare_table_names_every_key_that_is_missing(tmp_path: Path) -> None:
+    problems = check_file(Path(written(tmp_path, '[material]\nname = "a"\n')))
+    needed = [key for key, field in keys(SECTIONS["material"], "material.") if field.is_required() and key != "material.name"]
+    assert [problem.split(" ")[0] for problem in problems] == needed
+    assert "material.fan is missing: a number from 0 to 1 is expected" in problems
+
+
+def test_the_models_refuse_unknown_keys() -> None:
+    assert all(issubclass(model, Frozen) and model.model_config["extra"] == "forbid" for model in SECTIONS.values())
