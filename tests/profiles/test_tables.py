@@ -1,0 +1,59 @@
+"""The page of profile keys is current and complete, and its recipes are right."""
+
+import re
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from machine.gcode import write_gcode
+from machine.kinematics.table import machine_points
+from machine.moves import MachineProgram
+from mdp.pose import Pose
+from profiles.errors import ProfileError
+from profiles.profile import SECTIONS, load
+from profiles.wording import keys
+from tools.profile_tables import PAGE, page, table
+
+TEXT = PAGE.read_text(encoding="utf-8")
+
+
+def test_the_tables_of_the_page_are_those_of_the_models() -> None:
+    assert page(TEXT) == TEXT
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_the_page_has_a_row_for_every_key(section: str) -> None:
+    rows = re.findall(rf"^\| `({section}\.[^`]*)` \|", TEXT, re.MULTILINE)
+    assert rows == [key for key, _ in keys(SECTIONS[section], f"{section}.")]
+
+
+def test_a_changed_row_is_made_good() -> None:
+    row = "| `process.walls` | number of walls | a whole number from 0 to 50 | `3` |"
+    assert row in table("process")
+    assert page(TEXT.replace(row, "| `process.walls` | legs |")) == TEXT
+
+
+def test_the_page_lists_the_placeholders_that_blocks_may_hold() -> None:
+    listed = {word for row in re.findall(r"^\| (`\{.*?) \|", TEXT, re.MULTILINE) for word in re.findall(r"\{(\w+)\}", row)}
+    with pytest.raises(ProfileError, match="placeholder") as caught:
+        write_gcode(MachineProgram("empty", ()), load(settings=['machine.gcode.start="{nothing}"']))
+    assert listed == set(str(caught.value).partition("allowed are ")[2].split(", "))
+
+
+@given(st.floats(-30, 30), st.floats(-60, 60), st.floats(20, 90))
+def test_the_recipe_of_the_page_finds_the_tilt_axis(y_mm: float, z_mm: float, angle_deg: float) -> None:
+    machine = load(settings=[f"machine.tilt.point_mm=[0,{y_mm!r},{z_mm!r}]"]).machine
+    _, y, z = machine_points(machine, Pose(angle_deg, 0.0), np.zeros((1, 3)))[0]
+    c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
+    found = ((1 - c) * y - s * z) / (2 * (1 - c)), (s * y + (1 - c) * z) / (2 * (1 - c))
+    assert found == pytest.approx((y_mm, z_mm), abs=1e-6)
+
+
+def test_positive_values_turn_the_table_as_the_page_says() -> None:
+    machine = load(settings=["machine.tilt.point_mm=[0,0,0]"]).machine
+    rear, right = np.array([[0.0, 10.0, 0.0]]), np.array([[10.0, 0.0, 0.0]])
+    assert machine_points(machine, Pose(10.0, 0.0), rear)[0, 2] > 0
+    assert machine_points(machine, Pose(0.0, 10.0), right)[0, 1] > 0
