@@ -13,8 +13,7 @@ import numpy as np
 from mdp.clearance import least_height_mm
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
-from mdp.plane import Plane
-from mdp.sweep import Surface, sweep
+from mdp.sweep import Remainder, gains, sweep
 from profiles.machine import Machine
 from profiles.process import Search
 
@@ -97,55 +96,65 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
-    """The feasible candidates of one solid, one array row each, and how many were refused for which reason."""
+class Worth:
+    """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be
+    cut is not known yet. direction is a row of Bounds.directions; evaluated counts all planes looked at."""
 
-    direction: Floats
+    direction: Ints
     offset_mm: Floats
     gain_mm2: Floats
     residual_mm2: Floats
+    evaluated: int
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """What the sweep says of some candidates, one array row each; reason is FEASIBLE or why not."""
+
+    reason: Ints
     volume_mm3: Floats
     section_mm2: Floats
     fragile_mm: Floats
-    above_platform_mm: Floats
-    evaluated: int
-    refused: Ints
-
-    def plane(self, row: int) -> Plane:
-        """The cutting plane of a row."""
-        return Plane(self.direction[row], float(self.offset_mm[row]))
 
 
-def evaluate(surface: Surface, limits: Bounds, search: Search, angle_deg: float, least_gain_mm2: float) -> Candidates:
-    """All candidates of a solid by the sweep; gain is the risky area that a cut makes safe."""
-    swept = sweep(surface, limits.directions, search.offset_step_mm, threshold(angle_deg), limits.least_height_mm)
-    used = np.arange(swept.up_mm2.shape[1]) < swept.count[:, None]
-    row, column = np.nonzero(used)
-    offset = (swept.first[row] + column) * search.offset_step_mm
-    gain = (swept.up_mm2 - swept.residual_mm2)[used]
-    reason = np.zeros(len(row), np.int32)
+def worth(remainder: Remainder, limits: Bounds, search: Search, angle_deg: float, least_gain_mm2: float) -> Worth:
+    """All candidates of a solid that are worth a cut; gain is the risky area that a cut makes safe."""
+    found = gains(remainder, limits.directions, search.offset_step_mm, threshold(angle_deg))
+    used = np.arange(found.up_mm2.shape[1]) < found.count[:, None]
+    gain = found.up_mm2 - found.residual_mm2
+    offset: Floats = (found.first[:, None] + np.arange(gain.shape[1])) * np.float64(search.offset_step_mm)
+    above = (offset >= limits.least_offset_mm[:, None]) & np.isfinite(limits.least_height_mm)[:, None]
+    kept = used & above & (gain >= least_gain_mm2)
+    direction = np.nonzero(kept)[0].astype(np.int32)
+    return Worth(direction, offset[kept], gain[kept], found.residual_mm2[kept], int(found.count.sum()))
+
+
+def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Checked:
+    """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut."""
+    rows, inverse = np.unique(direction, return_inverse=True)
+    found = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows])
+    at = (inverse, np.rint(offset_mm / search.offset_step_mm).astype(np.int64) - found.first[inverse])
+    reason = np.zeros(len(direction), np.int32)
     checks = {
-        Reason.PLATFORM: offset < limits.least_offset_mm[row],
-        Reason.FLOATING: swept.pieces[used] > 0,
-        Reason.REACH: ~np.isfinite(limits.least_height_mm[row]),
-        Reason.CLEARANCE: swept.lowest_mm[used] < limits.least_height_mm[row],
-        Reason.VOLUME: swept.volume_mm3[used] < limits.least_volume_mm3,
-        Reason.INTERFACE: swept.section_mm2[used] < limits.least_interface_mm2,
-        Reason.FRAGILE: swept.fragile_mm[used] < FRAGILE_MM,
-        Reason.GAIN: gain < least_gain_mm2,
+        Reason.PLATFORM: offset_mm < limits.least_offset_mm[direction],
+        Reason.FLOATING: found.pieces[at] > 0,
+        Reason.REACH: ~np.isfinite(limits.least_height_mm[direction]),
+        Reason.CLEARANCE: found.lowest_mm[at] < limits.least_height_mm[direction],
+        Reason.VOLUME: found.volume_mm3[at] < limits.least_volume_mm3,
+        Reason.INTERFACE: found.section_mm2[at] < limits.least_interface_mm2,
+        Reason.FRAGILE: found.fragile_mm[at] < FRAGILE_MM,
     }
     for why, out in checks.items():
         reason[out & (reason == 0)] = why
-    kept = reason == Reason.FEASIBLE
-    return Candidates(
-        direction=limits.directions[row[kept]],
-        offset_mm=offset[kept],
-        gain_mm2=gain[kept],
-        residual_mm2=swept.residual_mm2[used][kept],
-        volume_mm3=swept.volume_mm3[used][kept],
-        section_mm2=swept.section_mm2[used][kept],
-        fragile_mm=swept.fragile_mm[used][kept],
-        above_platform_mm=(offset - limits.least_offset_mm[row])[kept],
-        evaluated=len(row),
-        refused=np.bincount(reason, minlength=len(Reason)).astype(np.int32),
-    )
+    return Checked(reason, found.volume_mm3[at], found.section_mm2[at], found.fragile_mm[at])
+
+
+def refusals(remainder: Remainder, limits: Bounds, search: Search, angle_deg: float, least_gain_mm2: float) -> dict[Reason, int]:
+    """How many of all candidates of a solid each reason takes, for telling a person why nothing can be cut."""
+    found = gains(remainder, limits.directions, search.offset_step_mm, threshold(angle_deg))
+    direction, column = np.nonzero(np.arange(found.up_mm2.shape[1]) < found.count[:, None])
+    offset: Floats = (found.first[direction] + column) * np.float64(search.offset_step_mm)
+    reason = check(remainder, limits, search, direction.astype(np.int32), offset).reason
+    gain = (found.up_mm2 - found.residual_mm2)[direction, column]
+    reason[(reason == Reason.FEASIBLE) & (gain < least_gain_mm2)] = Reason.GAIN
+    return {why: int((reason == why).sum()) for why in Reason}

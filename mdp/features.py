@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdp.candidates import Candidates
 from mdp.mesh import Floats
+
+COLUMNS = ("M1", "M2", "M3", "M4", "M5", "M6")
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,30 @@ class Model:
     radius_mm: float
 
 
-def features(candidates: Candidates, model: Model, saved_mm2: float, residual_mm2: float) -> Floats:
-    """(n, 6) rows M1..M6; saved_mm2 and residual_mm2 are what the cuts so far have made safe and left risky."""
-    m1 = candidates.gain_mm2 / model.risky_mm2
-    m4 = np.clip(candidates.above_platform_mm / model.radius_mm, 0.0, 1.0)
-    m5 = np.clip(candidates.fragile_mm / model.radius_mm, 0.0, 1.0)
-    m6 = (residual_mm2 + candidates.residual_mm2) / model.risky_mm2
-    return np.stack([m1, m1 + saved_mm2 / model.risky_mm2, candidates.volume_mm3 / model.volume_mm3, m4, m5, m6], axis=1)
+@dataclass(frozen=True)
+class Plan:
+    """One candidate in numbers: its own gain, residual, volume and distances, and what the cuts before it saved and left."""
+
+    gain_mm2: float
+    residual_mm2: float
+    volume_mm3: float
+    above_platform_mm: float
+    fragile_mm: float
+    saved_before_mm2: float
+    residual_before_mm2: float
+
+
+def features(plans: list[Plan], model: Model) -> Floats:
+    """(n, 6) rows M1..M6."""
+    rows = [
+        (
+            plan.gain_mm2 / model.risky_mm2,
+            (plan.saved_before_mm2 + plan.gain_mm2) / model.risky_mm2,
+            plan.volume_mm3 / model.volume_mm3,
+            min(max(plan.above_platform_mm / model.radius_mm, 0.0), 1.0),
+            min(max(plan.fragile_mm / model.radius_mm, 0.0), 1.0),
+            (plan.residual_before_mm2 + plan.residual_mm2) / model.risky_mm2,
+        )
+        for plan in plans
+    ]
+    return np.array(rows, dtype=np.float64).reshape(-1, 6)

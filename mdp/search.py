@@ -1,7 +1,6 @@
-"""Search: beam-guided search for the cuts, after the 2020 paper, with progressive relaxation.
+"""Search: beam-guided search for the cuts, after the 2020 paper, with progressive relaxation (pool).
 
-Kept from the paper: candidates that leave (almost) nothing risky above the plane come first, delta is relaxed from 1e-4 by
-factors of 5 until the beam is full, near-equal planes of one parent take one place. Otherwise: the best node ever seen
+Otherwise than published: the best node ever seen
 is the result, the search goes on while any node has a useful child, a node that can no longer beat it is dropped (what a
 cut leaves risky above its plane is never repaired later, so that sum bounds all descendants), and two orders of the
 same cuts take one place.
@@ -14,9 +13,8 @@ from time import perf_counter
 
 import manifold3d as m3
 import numpy as np
-from numpy.typing import NDArray
 
-from mdp.candidates import REASONS, Bounds, Candidates, Reason, bounds, evaluate
+from mdp.candidates import REASONS, Bounds, Checked, bounds, check, refusals, worth
 from mdp.clearance import allowed_poses
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, Part
@@ -24,16 +22,13 @@ from mdp.features import Model, features
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import risky_above, risky_upright
 from mdp.plane import PLATFORM, Plane
+from mdp.pool import Entry, Standing, fill
 from mdp.pose import level, poses, rotation
 from mdp.ranker import RANKERS
 from mdp.sequence import least_rotation
-from mdp.sweep import Surface
+from mdp.sweep import Remainder
 from profiles.machine import Machine
 from profiles.profile import Profile
-
-FIRST_DELTA, DELTA_FACTOR = 1e-4, 5.0
-SAME_COSINE = 0.95
-POOL = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +50,15 @@ class Node:
     count_platform_faces: bool
 
     @cached_property
-    def surface(self) -> Surface:
+    def remainder(self) -> Remainder:
         """The remaining solid for the sweep."""
         mesh = mesh_of(self.solid)
-        return Surface(mesh, risky_upright(mesh, self.angle_deg, self.count_platform_faces))
+        return Remainder(mesh, risky_upright(mesh, self.angle_deg, self.count_platform_faces))
 
     @cached_property
     def risky_mm2(self) -> float:
         """Risky area of what remains when it is printed straight up."""
-        return float(self.surface.mesh.areas_mm2[self.surface.risky].sum())
+        return float(self.remainder.mesh.areas_mm2[self.remainder.risky].sum())
 
     @cached_property
     def residual_mm2(self) -> float:
@@ -76,7 +71,7 @@ class Node:
         return self.risky_mm2 + self.residual_mm2
 
     @cached_property
-    def signature(self) -> tuple[float, float, float]:
+    def signature(self) -> tuple[float, ...]:
         """Equal for two orders of the same cuts."""
         return (round(self.solid.volume(), 3), round(self.risky_mm2, 3), round(self.residual_mm2, 3))
 
@@ -119,69 +114,59 @@ class _Search:
     def __init__(self, mesh: Mesh, profile: Profile, ranker: str) -> None:
         self.settings, self.process = profile.search, profile.process
         self.machine = profile.machine if profile.search.clearance else _without_limits(profile.machine)
-        self.rank = RANKERS[ranker]
+        self.ranker = RANKERS[ranker]
         self.root = Node(solid_of(mesh), (), self.process.self_supporting_angle_deg, self.settings.count_platform_faces)
         radius = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius)
         self.limits: Bounds = bounds(mesh, self.machine, self.settings)
+        self.least_gain_mm2 = self.settings.least_gain * self.root.risky_mm2
         self.evaluated = 0
         self.stages = 0
-        self.refused: Ints = np.zeros(len(Reason), np.int32)
 
     def run(self, on_stage: Callable[[Progress], None] | None) -> Node:
+        """The best node found."""
         best, beam = self.root, [self.root]
-        least = self.settings.least_gain * self.model.risky_mm2
         seen = {self.root.signature}
         while beam and self.model.risky_mm2 > 0 and self.stages < self.settings.most_parts - 1:
             self.stages += 1
-            children = []
-            for node, candidates, row in self._ranked(beam, best):
-                child = self._child(node, candidates, row)
-                if child is None or child.signature in seen:
-                    continue
-                seen.add(child.signature)
-                children.append(child)
-                if len(children) == self.settings.beam_width:
-                    break
-            for child in children:
-                if child.cost_mm2 < best.cost_mm2 - 1e-9 * self.model.risky_mm2:
-                    best = child
-            beam = [child for child in children if child.residual_mm2 < best.cost_mm2 - least]
+            children = list(self._children(beam, best, seen))
+            best = min([best, *children], key=lambda node: node.cost_mm2)
+            beam = [child for child in children if child.residual_mm2 < best.cost_mm2 - self.least_gain_mm2]
             if on_stage is not None:
                 on_stage(Progress(self.stages, len(beam), best.cost_mm2 / self.model.risky_mm2))
         return best
 
-    def _ranked(self, beam: Sequence[Node], best: Node) -> Iterator[tuple[Node, Candidates, int]]:
-        """Candidates of all nodes of the beam, best first."""
-        tables, rows, owners = [], [], []
-        least = self.settings.least_gain * self.model.risky_mm2
-        for position, node in enumerate(beam):
-            table = evaluate(node.surface, self.limits, self.settings, self.process.self_supporting_angle_deg, least)
-            self.evaluated += table.evaluated
-            self.refused = self.refused + table.refused
-            saved = self.model.risky_mm2 - node.cost_mm2
-            tables.append(table)
-            rows.append(features(table, self.model, saved, node.residual_mm2))
-            owners.append(np.full(len(table.offset_mm), position))
-        metrics, owner = np.concatenate(rows), np.concatenate(owners)
-        residual = np.concatenate([table.residual_mm2 for table in tables]) / self.model.risky_mm2
-        place = np.concatenate([np.arange(len(table.offset_mm)) for table in tables])
-        alive = np.nonzero(metrics[:, 5] * self.model.risky_mm2 < best.cost_mm2 - least)[0]
-        pool = max(POOL, 5 * self.settings.beam_width)
-        chosen = _relaxed(metrics, residual, owner, place, tables, alive, pool)
-        for index in (chosen[k] for k in self.rank(metrics[chosen])):
-            yield beam[owner[index]], tables[owner[index]], int(place[index])
+    def _children(self, beam: Sequence[Node], best: Node, seen: set[tuple[float, ...]]) -> Iterator[Node]:
+        """Up to beam_width new nodes, no two of them the same solid."""
+        tables = [worth(node.remainder, self.limits, self.settings, self.root.angle_deg, self.least_gain_mm2) for node in beam]
+        self.evaluated += sum(table.evaluated for table in tables)
+        standings = [Standing(self.model.risky_mm2 - node.cost_mm2, node.residual_mm2) for node in beam]
 
-    def _child(self, node: Node, candidates: Candidates, row: int) -> Node | None:
+        def look(node: int, direction: Ints, offset_mm: Floats) -> Checked:
+            return check(beam[node].remainder, self.limits, self.settings, direction, offset_mm)
+
+        most = self.ranker.pool(self.settings.beam_width)
+        bound = best.cost_mm2 - self.least_gain_mm2
+        entries = fill(tables, standings, self.limits, self.model.risky_mm2, bound, most, look)
+        order = self.ranker.order(features([entry.plan for entry in entries], self.model))
+        made = 0
+        for entry in (entries[k] for k in order):
+            if made == self.settings.beam_width:
+                return
+            child = self._child(beam[entry.node], entry)
+            if child is not None and child.signature not in seen:
+                seen.add(child.signature)
+                made += 1
+                yield child
+
+    def _child(self, node: Node, entry: Entry) -> Node | None:
         """The node after a cut; None when the part has no pose at which the machine can print it."""
-        base = candidates.plane(row)
-        above, below = cut(node.solid, base)
+        above, below = cut(node.solid, entry.plane)
         if above.is_empty() or below.is_empty():
             return None
-        points = mesh_of(above).vertices
-        if self.settings.clearance and not allowed_poses(self.machine, base.normal, points):
+        if self.settings.clearance and not allowed_poses(self.machine, entry.plane.normal, mesh_of(above).vertices):
             return None
-        made = Cut(base, above, float(candidates.residual_mm2[row]))
+        made = Cut(entry.plane, above, entry.plan.residual_mm2)
         return Node(below, (*node.cuts, made), node.angle_deg, node.count_platform_faces)
 
     def notes(self, parts: int) -> tuple[str, ...]:
@@ -190,43 +175,9 @@ class _Search:
             return ("no face needs support: the model is printed straight up as one part",)
         if parts > 1:
             return ()
-        counts = [(int(self.refused[reason]), text) for reason, text in REASONS.items() if self.refused[reason] > 0]
-        reasons = "; ".join(f"{count} because {text}" for count, text in sorted(counts, reverse=True))
-        return (f"no feasible cut among {self.evaluated} candidates: {reasons or 'none remains'}",)
-
-
-def _relaxed(
-    metrics: Floats, residual: Floats, owner: Ints, place: Ints, tables: Sequence[Candidates], alive: NDArray[np.intp], pool: int
-) -> list[int]:
-    """Up to `pool` candidates: those that leave least risky first, within a round by accumulated reduction, then volume."""
-    order = alive[np.lexsort((place[alive], owner[alive], -metrics[alive, 2], -metrics[alive, 1]))]
-    chosen: list[int] = []
-    taken: dict[int, list[tuple[Floats, float]]] = {}
-    delta, best = FIRST_DELTA, -np.inf
-    waiting = order
-    while len(waiting) and len(chosen) < pool:
-        admitted = (residual[waiting] < delta) & (metrics[waiting, 1] >= best)
-        for index in waiting[admitted]:
-            table, row = tables[owner[index]], place[index]
-            near = taken.setdefault(int(owner[index]), [])
-            if any(_same(table.direction[row], float(table.offset_mm[row]), *other) for other in near):
-                continue
-            if len(chosen) == pool:
-                break
-            near.append((table.direction[row], float(table.offset_mm[row])))
-            chosen.append(int(index))
-        waiting = waiting[~admitted]
-        if delta > 1.0:
-            break
-        delta *= DELTA_FACTOR
-        best = max((metrics[k, 1] for k in chosen), default=-np.inf)
-    return chosen
-
-
-def _same(direction: Floats, offset_mm: float, other_direction: Floats, other_offset_mm: float) -> bool:
-    """Whether two planes of one parent are too alike to take two places (the authors' rule)."""
-    cosine = abs(float(direction @ other_direction))
-    return cosine > SAME_COSINE and abs(offset_mm - other_offset_mm) < 2.0 * cosine
+        counts = refusals(self.root.remainder, self.limits, self.settings, self.root.angle_deg, self.least_gain_mm2)
+        told = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
+        return (f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(told)}",)
 
 
 def _without_limits(machine: Machine) -> Machine:
@@ -237,13 +188,13 @@ def _without_limits(machine: Machine) -> Machine:
 
 def _parts(node: Node, machine: Machine, angle_deg: float, clearance: bool) -> tuple[Part, ...]:
     """Parts in print order: what remains first, then the cuts, last one first."""
-    solids = [(PLATFORM, node.surface.mesh), *((c.base, mesh_of(c.solid)) for c in reversed(node.cuts))]
+    solids = [(PLATFORM, node.remainder.mesh), *((c.base, mesh_of(c.solid)) for c in reversed(node.cuts))]
     options = [[level(machine)]]
     for base, mesh in solids[1:]:
         options.append(allowed_poses(machine, base.normal, mesh.vertices) if clearance else poses(machine, base.normal))
     parts = []
     for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options), strict=True)):
-        risky = risky_above(mesh, base, angle_deg) if position else node.surface.risky
+        risky = risky_above(mesh, base, angle_deg) if position else node.remainder.risky
         parts.append(
             Part(
                 index=position + 1,

@@ -1,4 +1,4 @@
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -123,4 +123,4 @@ def test_the_pose_sequence_turns_no_more_than_the_best_of_all_branches(angles: l
 
 
 def _total(poses: list[Pose]) -> float:
-    return sum(abs(a.tilt_deg - b.tilt_deg) + abs(a.turn_deg - b.turn_deg) for a, b in zip(poses, poses[1:], strict=False))
+    return sum(abs(a.tilt_deg - b.tilt_deg) + abs(a.turn_deg - b.turn_deg) for a, b in pairwise(poses))

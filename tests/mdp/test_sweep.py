@@ -8,7 +8,7 @@ from mdp.cut import cut, mesh_of, solid_of
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import facing_down, risky_upright, threshold
 from mdp.plane import Plane
-from mdp.sweep import Surface, Sweep, sweep
+from mdp.sweep import Gains, Remainder, Sweep, gains, sweep
 from tests import shapes
 
 STEP_MM = 1.3
@@ -16,7 +16,11 @@ UNIT = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.05, 1)).map(lam
 
 
 def _sweep_one(mesh: Mesh, direction: Floats) -> Sweep:
-    return sweep(Surface(mesh, risky_upright(mesh, 45.0)), direction[None], STEP_MM, threshold(45.0))
+    return sweep(Remainder(mesh, risky_upright(mesh, 45.0)), direction[None], STEP_MM)
+
+
+def _gains_one(mesh: Mesh, direction: Floats) -> Gains:
+    return gains(Remainder(mesh, risky_upright(mesh, 45.0)), direction[None], STEP_MM, threshold(45.0))
 
 
 def _floating(solid: m3.Manifold) -> int:
@@ -40,7 +44,7 @@ def _random_solid(seed: int) -> Mesh:
 @given(st.integers(0, 10_000), UNIT)
 def test_every_offset_equals_the_exact_cut(seed: int, direction: Floats) -> None:
     mesh = _random_solid(seed)
-    solid, swept = solid_of(mesh), _sweep_one(mesh, direction)
+    solid, swept, gained = solid_of(mesh), _sweep_one(mesh, direction), _gains_one(mesh, direction)
     platform_mm = float((mesh.vertices[mesh.vertices[:, 2] <= 0.3] @ direction).max())
     for column in range(swept.count[0]):
         plane = Plane(direction, (swept.first[0] + column) * STEP_MM)
@@ -52,7 +56,7 @@ def test_every_offset_equals_the_exact_cut(seed: int, direction: Floats) -> None
         down = facing_down(part, direction, 45.0) & surface
         assert swept.volume_mm3[0, column] == pytest.approx(above.volume(), abs=1e-9 * mesh.volume_mm3)
         assert swept.section_mm2[0, column] == pytest.approx(part.areas_mm2[~surface].sum(), abs=1e-7 * mesh.areas_mm2.sum())
-        assert swept.residual_mm2[0, column] == pytest.approx(part.areas_mm2[down].sum(), abs=1e-7 * mesh.areas_mm2.sum())
+        assert gained.residual_mm2[0, column] == pytest.approx(part.areas_mm2[down].sum(), abs=1e-7 * mesh.areas_mm2.sum())
         assert swept.lowest_mm[0, column] == pytest.approx(part.bounds_mm[0, 2], abs=1e-9)
         if plane.offset_mm > platform_mm:
             assert swept.pieces[0, column] == _floating(below)
@@ -69,15 +73,15 @@ def test_voids_and_bowls_are_not_taken_for_floating_pieces(name: str) -> None:
 
 
 def test_a_tees_bar_is_risky_upright_and_safe_from_the_side() -> None:
-    swept = _sweep_one(shapes.tee(), np.array([1.0, 0.0, 0.0]))
-    column = int(np.ceil(5.0 / STEP_MM)) - swept.first[0]
-    share = (20.0 - (swept.first[0] + column) * STEP_MM) * 10.0
-    assert swept.up_mm2[0, column] == pytest.approx(share)
-    assert swept.residual_mm2[0, column] == pytest.approx(0.0, abs=1e-9)
+    gained = _gains_one(shapes.tee(), np.array([1.0, 0.0, 0.0]))
+    column = int(np.ceil(5.0 / STEP_MM)) - gained.first[0]
+    share = (20.0 - (gained.first[0] + column) * STEP_MM) * 10.0
+    assert gained.up_mm2[0, column] == pytest.approx(share)
+    assert gained.residual_mm2[0, column] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_offsets_cover_the_whole_range_of_a_direction() -> None:
-    swept = sweep(Surface(shapes.box(), np.zeros(12, bool)), np.array([[0.0, 0.0, 1.0]]), 1.0, -1.0)
+    swept = sweep(Remainder(shapes.box(), np.zeros(12, bool)), np.array([[0.0, 0.0, 1.0]]), 1.0)
     assert (swept.first[0], swept.count[0]) == (1, 19)
 
 
@@ -87,12 +91,12 @@ def test_one_core_and_two_give_the_same_numbers() -> None:
     mesh = shapes.branch()
     directions = np.random.default_rng(3).normal(size=(50, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    surface = Surface(mesh, risky_upright(mesh, 45.0))
-    many = sweep(surface, directions, 1.0, threshold(45.0))
+    remainder = Remainder(mesh, risky_upright(mesh, 45.0))
+    many = [gains(remainder, directions, 1.0, threshold(45.0)), sweep(remainder, directions, 1.0)]
     numba.set_num_threads(1)
     try:
-        one = sweep(surface, directions, 1.0, threshold(45.0))
+        one = [gains(remainder, directions, 1.0, threshold(45.0)), sweep(remainder, directions, 1.0)]
     finally:
         numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-    for a, b in zip(vars(many).values(), vars(one).values(), strict=True):
-        assert np.array_equal(a, b)
+    for a, b in zip(many, one, strict=True):
+        assert all(np.array_equal(vars(a)[key], vars(b)[key]) for key in vars(a))
