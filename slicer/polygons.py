@@ -24,7 +24,7 @@ def cleaned(loops: Sequence[Floats]) -> Polygons:
     if not loops:
         return Polygons()
     whole = Polygons(list(loops), FillRule.Positive).simplify(RESOLUTION_MM)
-    return grown(grown(whole, CLOSING_MM), -CLOSING_MM)
+    return sealed(whole, CLOSING_MM)
 
 
 def grown(polygons: Polygons, distance_mm: float) -> Polygons:
@@ -41,6 +41,11 @@ def opened(polygons: Polygons, radius_mm: float) -> Polygons:
     """The polygons without what is narrower than twice the radius."""
     core = grown(polygons, -radius_mm)
     return core if core.is_empty() else grown(core, radius_mm) ^ polygons
+
+
+def sealed(polygons: Polygons, radius_mm: float) -> Polygons:
+    """The polygons and every slit in or between them that is narrower than twice the radius."""
+    return grown(grown(polygons, radius_mm), -radius_mm)
 
 
 def united(several: Sequence[Polygons]) -> Polygons:

@@ -50,10 +50,10 @@ def regions(
 def _sparse(inside: Polygons, above: Polygons, below: Polygons, width_mm: float) -> Polygons:
     """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
     covered = inside ^ above ^ below
-    if abs(covered.area() - inside.area()) < 1e-6:
-        return inside
-    skin = opened(inside - covered, 0.25 * width_mm)
-    sparse = opened(inside - grown(skin, width_mm), width_mm) if not skin.is_empty() else inside
+    sparse = inside
+    if inside.area() - covered.area() > 1e-6:
+        skin = opened(inside - covered, 0.25 * width_mm)
+        sparse = inside if skin.is_empty() else opened(inside - grown(skin, width_mm), width_mm)
     least = SPARSE_LEAST_MM2 * width_mm**2
     islands = sparse.decompose()
     kept = [island for island in islands if island.area() >= least]

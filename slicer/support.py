@@ -12,7 +12,7 @@ from slicer.hatch import hatched
 from slicer.heights import Heights
 from slicer.order import OUTSIDE
 from slicer.paths import Kind
-from slicer.polygons import RESOLUTION_MM, Polygons, closed, contours, grown, opened, united
+from slicer.polygons import RESOLUTION_MM, Polygons, closed, contours, grown, opened, sealed, united
 
 LEAST_MM2 = 1.0  # a column thinner than this falls over, and so small a place holds itself
 LEAST_LINES = 3  # an island with fewer lines gets its outline instead
@@ -79,7 +79,7 @@ def _rooted(columns: Sequence[Polygons], outlines: Sequence[Polygons], below: Po
             rooted.append(column)
         else:
             ground = rooted[-1] + outlines[i - 1] if i else below
-            rooted.append(column ^ grown(ground, RIM_MM))
+            rooted.append(column ^ sealed(ground, RIM_MM))
     return rooted
 
 

@@ -1,0 +1,94 @@
+"""Parts made by hand, and what the tests of the slicer ask of sliced parts."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import manifold3d as m3
+import numpy as np
+import pytest
+import shapely
+
+from mdp.decomposition import Part
+from mdp.mesh import Floats, Mesh
+from mdp.plane import PLATFORM, Plane
+from mdp.pose import level, poses, rotation, unit
+from profiles.profile import Profile, load
+from slicer.paths import Kind, SlicedPart
+from slicer.paths import Path as Stroke
+from slicer.polygons import Polygons, cleaned
+from slicer.section import sections
+from tests.shapes import from_manifold
+
+BARE = ("process.skirt_loops=0", "process.support=none")
+SOLID = (*BARE, "process.infill_density=1")
+
+
+def profile(*settings: str) -> Profile:
+    """The standard profiles with settings."""
+    return load(settings=settings)
+
+
+def whole(mesh: Mesh) -> Part:
+    """A mesh as the only part, standing on the platform."""
+    machine = profile().machine
+    return Part(1, mesh, PLATFORM, level(machine), rotation(machine, level(machine)), mesh.volume_mm3, 0.0)
+
+
+def cut(mesh: Mesh, *planes: tuple[Sequence[float], float]) -> list[Part]:
+    """The parts of a mesh cut by planes (normal, offset), the part above the first plane printed last."""
+    machine = profile().machine
+    rest = m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64)))
+    above = []
+    for normal, offset in planes:
+        top, rest = rest.split_by_plane(unit(normal), offset)
+        above.append((from_manifold(top), Plane(unit(normal), offset)))
+    parts = [whole(from_manifold(rest))]
+    for index, (piece, base) in enumerate(reversed(above), 2):
+        pose = poses(machine, base.normal)[0]
+        parts.append(Part(index, piece, base, pose, rotation(machine, pose), piece.volume_mm3, 0.0))
+    return parts
+
+
+def section_at(mesh: Mesh, z_mm: float) -> Polygons:
+    """The cleaned section at a height."""
+    return cleaned(sections(mesh, np.array([z_mm]))[0])
+
+
+def of_kind(sliced: SlicedPart, *kinds: Kind) -> list[Stroke]:
+    """All paths of some kinds."""
+    return [path for layer in sliced.layers for path in layer.paths if path.kind in kinds]
+
+
+def volume_mm3(sliced: SlicedPart, *kinds: Kind) -> float:
+    """Plastic of some kinds."""
+    return sum(layer.volume_mm3(path) for layer in sliced.layers for path in layer.paths if path.kind in kinds)
+
+
+def content(sliced: SlicedPart) -> bytes:
+    """Every number of a sliced part."""
+    rows = [(layer.z_mm, layer.height_mm, layer.fan) for layer in sliced.layers]
+    strokes = [p for layer in sliced.layers for p in layer.paths]
+    marks = [(p.kind.value, p.width_mm, p.speed_mm_s, p.flow, p.retract) for p in strokes]
+    return repr((rows, marks)).encode() + b"".join(p.points.tobytes() + p.approach.tobytes() for p in strokes)
+
+
+def shared(name: str, height_mm: float) -> Mesh:
+    """A real model from outside the project, scaled to a height; skips the test where it is not there."""
+    file = Path(__file__).resolve().parents[3] / "shared" / "meshes" / f"{name}.npz"
+    if not file.exists():
+        pytest.skip(f"{name} is not here")
+    with np.load(file) as arrays:
+        vertices, faces = np.asarray(arrays["vertices"], dtype=np.float64), arrays["faces"]
+    return Mesh(vertices * (height_mm / np.ptp(vertices[:, 2])), faces)
+
+
+def as_shapely(polygons: Polygons) -> shapely.Geometry:
+    """The same polygons as shapely's, holes by the even-odd rule."""
+    return shapely.build_area(shapely.MultiLineString([np.vstack([loop, loop[:1]]) for loop in polygons.to_polygons()]))
+
+
+def distances_mm(polygons: Polygons, points: Floats) -> Floats:
+    """Distance of each point to the polygons' boundary, positive inside, by shapely."""
+    area = as_shapely(polygons)
+    away = shapely.distance(area.boundary, shapely.points(points))
+    return np.where(shapely.contains_xy(area, points), away, -away)

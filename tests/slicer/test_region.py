@@ -1,0 +1,73 @@
+"""Skin lies where a layer is bare above or below, and nowhere else."""
+
+import pytest
+
+from slicer.polygons import Polygons, opened
+from slicer.region import _common, regions
+
+WIDTH = 0.45
+
+
+def square(side):
+    return Polygons.square((side, side), True)
+
+
+def areas(sections, beneath=None, top=2, bottom=2, density=0.2):
+    found = regions(sections, sections, beneath, top, bottom, density, WIDTH)
+    return [tuple(round(r.area(), 3) for r in (region.top, region.solid, region.sparse)) for region in found]
+
+
+def test_a_tower_is_solid_at_both_ends_and_sparse_between():
+    assert areas([square(10) for _ in range(7)]) == [
+        (0, 100, 0), (0, 100, 0), (0, 0, 100), (0, 0, 100), (0, 0, 100), (0, 100, 0), (100, 0, 0)
+    ]  # fmt: skip
+
+
+def test_a_step_is_top_skin_where_it_is_bare_and_solid_below_it():
+    found = areas([square(20)] * 4 + [square(10)] * 6, bottom=0)
+    assert found[3] == (300.0, pytest.approx(0, abs=25), pytest.approx(100, abs=25))
+    assert found[2][0] == 0
+    assert found[2][1] == pytest.approx(300, abs=25)
+    assert found[1] == (0, 0, 400)
+
+
+def test_an_overhang_gets_bottom_layers():
+    found = areas([square(10)] * 3 + [square(20)] * 5, top=0)
+    assert found[3][1] == pytest.approx(300 + 4 * 10 * WIDTH, abs=5)
+    assert found[5] == (0, 0, 400)
+
+
+def test_a_part_on_plastic_has_one_solid_interface_layer_and_no_bottom_skin():
+    assert areas([square(10)] * 6, beneath=square(10), top=1)[:3] == [(0, 100, 0), (0, 0, 100), (0, 0, 100)]
+
+
+def test_a_part_overhanging_the_plastic_beneath_gets_bottom_skin_there():
+    found = areas([square(20)] * 6, beneath=square(10), top=0)
+    assert found[1][1] == pytest.approx(300, abs=25)
+    assert found[2] == (0, 0, 400)
+
+
+def test_full_density_has_no_infill():
+    assert {row[2] for row in areas([square(10)] * 6, density=1.0)} == {0}
+
+
+def test_an_island_of_infill_too_small_to_bother_with_becomes_solid():
+    assert {row[2] for row in areas([square(2)] * 9)} == {0}
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 12, 1000])
+@pytest.mark.parametrize("last_repeats", [False, True])
+def test_running_intersections_agree_with_intersecting_one_by_one(count, last_repeats):
+    layers = [square(10).translate((k * 7 % 5, k * 3 % 4)) for k in range(11)]
+    for i, found in enumerate(_common(layers, count, last_repeats)):
+        window = layers[i : i + count]
+        expected = square(100)
+        for layer in window:
+            expected = expected ^ layer
+        whole = len(window) == count or last_repeats
+        assert found.area() == pytest.approx(expected.area() if whole else 0.0)
+
+
+def test_opening_drops_what_is_too_narrow_only():
+    shape = Polygons.square((10, 10)) + Polygons.square((10, 0.3)).translate((5, 5))
+    assert opened(shape, 0.2).area() == pytest.approx(100.0)

@@ -1,0 +1,149 @@
+"""Whole parts: plastic, places, frames, speeds, flow, determinism, errors."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from profiles.errors import SliceError
+from slicer.paths import Kind
+from slicer.polygons import grown
+from slicer.slice import slice_part
+from tests.shapes import ball, bowl, box, branch, hollow, standing
+from tests.slicer.hand import BARE, SOLID, content, cut, distances_mm, of_kind, profile, section_at, shared, volume_mm3, whole
+
+OWN = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
+ROUNDING = 0.5 * 0.2 * (1 - np.pi / 4)  # the round sides of outer beads leave this depth of the surface out, mm
+
+
+def cylinder():
+    return standing(m3.Manifold.cylinder(12, 9, 9, 96))
+
+
+def expected_mm3(mesh, sliced):
+    """The volume less what the round sides of the outermost beads leave out."""
+    return mesh.volume_mm3 - 0.2 * ROUNDING * sum(path.length_mm for path in of_kind(sliced, Kind.OUTER_WALL))
+
+
+@pytest.mark.parametrize("make", [box, cylinder, hollow, bowl, ball, branch])
+def test_a_solid_part_extrudes_its_volume(make):
+    sliced = slice_part(whole(make()), profile(*SOLID))
+    assert sliced.volume_mm3 == pytest.approx(make().volume_mm3, rel=0.015)
+    assert sliced.volume_mm3 == pytest.approx(expected_mm3(make(), sliced), rel=0.006)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(2.0, 30.0), st.floats(2.0, 30.0), st.floats(0.4, 3.0), st.floats(0, 90))
+def test_any_solid_block_extrudes_its_volume(x, y, z, turn):
+    mesh = standing(m3.Manifold.cube((x, y, z)).rotate((0, 0, turn)))
+    sliced = slice_part(whole(mesh), profile(*SOLID))
+    assert sliced.volume_mm3 == pytest.approx(expected_mm3(mesh, sliced), rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["org_kitten", "org_deer", "mec_bracket"])
+def test_a_solid_real_model_extrudes_its_volume(name):
+    mesh = shared(name, 30.0)
+    assert slice_part(whole(mesh), profile(*SOLID)).volume_mm3 == pytest.approx(mesh.volume_mm3, rel=0.02)
+
+
+@pytest.mark.parametrize("pattern", ["rectilinear", "grid", "triangles", "concentric"])
+def test_every_point_lies_inside_the_section(pattern):
+    mesh = branch()
+    sliced = slice_part(whole(mesh), profile(*BARE, f"process.infill_pattern={pattern}"))
+    for layer in sliced.layers[::17]:
+        allowed = grown(section_at(mesh, layer.z_mm - 0.5 * layer.height_mm), 0.01)
+        assert distances_mm(allowed, np.concatenate([p.points for p in layer.paths])).min() > 0.0
+
+
+def test_infill_is_as_dense_as_asked():
+    thick = standing(m3.Manifold.cube((60, 60, 4)))
+    settings_ = [(*BARE, f"process.infill_density={d}") for d in (0.0, 0.3)]
+    empty, filled = (slice_part(whole(thick), profile(*s)) for s in settings_)
+    layer = filled.layers[10]
+    sparse = sum(layer.volume_mm3(p) for p in layer.paths if p.kind is Kind.INFILL) / layer.height_mm
+    side = 60 - 2 * (0.225 + 2.5 * (0.45 - 0.2 * (1 - np.pi / 4)))
+    assert sparse == pytest.approx(0.3 * side**2, rel=0.03)
+    assert of_kind(empty, Kind.INFILL) == []
+
+
+def test_layers_stand_at_their_heights_from_the_platform():
+    sliced = slice_part(whole(box(5, 5, 1)), profile("process.first_layer_height_mm=0.3"))
+    assert [layer.z_mm for layer in sliced.layers] == pytest.approx([0.3, 0.5, 0.7, 0.9, 1.0])
+
+
+def test_a_part_on_plastic_is_pressed_in_solid_slow_and_rich():
+    base, arm = cut(branch(), ((np.sin(np.pi / 3), 0, 0.5), 14.0))
+    first = slice_part(arm, profile(), [base]).layers[0]
+    assert first.z_mm == pytest.approx(0.1)
+    assert {p.speed_mm_s for p in first.paths} == {25.0}
+    assert {p.flow for p in first.paths if p.kind is Kind.OUTER_WALL} == {1.05}
+    assert Kind.INFILL not in {p.kind for p in first.paths}
+    assert Kind.SKIRT not in {p.kind for p in first.paths}
+    assert first.fan == 1.0
+
+
+def test_a_part_in_its_own_frame_does_not_care_how_it_stood_in_the_workpiece():
+    base, arm = cut(branch(), ((np.sin(np.pi / 3), 0, 0.5), 14.0))
+    sliced = slice_part(arm, profile(*SOLID), [base])
+    pressed = 0.1 * section_at(arm.in_part_frame(), 0.05).area()
+    rich = 0.05 * sum(sliced.layers[0].volume_mm3(p) / 1.05 for p in sliced.layers[0].paths)
+    assert sliced.volume_mm3 == pytest.approx(arm.mesh.volume_mm3 + pressed + rich, rel=0.015)
+
+
+def test_first_layer_and_fan_of_part_one():
+    sliced = slice_part(whole(box(20, 20, 1)), profile("material.fan=0.7"))
+    assert [layer.fan for layer in sliced.layers] == [0.0, 0.7, 0.7, 0.7, 0.7]
+    assert {p.speed_mm_s for p in sliced.layers[0].paths} == {20.0}
+    assert {p.speed_mm_s for p in sliced.layers[2].paths if p.kind is Kind.OUTER_WALL} == {40.0}
+
+
+def test_material_flow_multiplies_all_plastic():
+    half, full = (slice_part(whole(box()), profile(f"material.flow={f}")).volume_mm3 for f in (0.5, 1.0))
+    assert half == pytest.approx(0.5 * full, rel=1e-9)
+
+
+def test_the_skirt_runs_once_around_the_first_layer_only():
+    sliced = slice_part(whole(box(10, 10, 2)), profile())
+    (skirt,) = of_kind(sliced, Kind.SKIRT)
+    assert skirt is sliced.layers[0].paths[0]
+    assert np.abs(skirt.points).max() == pytest.approx(5 + 4 + 0.225)
+
+
+def test_a_brim_replaces_the_skirt_and_touches_the_part():
+    sliced = slice_part(whole(box(10, 10, 2)), profile("process.brim_mm=4"))
+    sides = sorted(np.abs(p.points).max() for p in of_kind(sliced, Kind.SKIRT))
+    spacing = 0.45 - 0.2 * (1 - np.pi / 4)
+    assert sides == pytest.approx([5 + (k + 0.5) * spacing for k in range(10)])
+    assert volume_mm3(sliced, Kind.SKIRT) / 0.2 == pytest.approx(40 * 10 * spacing + np.pi * (10 * spacing) ** 2, rel=0.02)
+
+
+def test_a_part_lower_than_a_layer_is_printed_as_one():
+    sliced = slice_part(whole(box(10, 10, 0.12)), profile(*SOLID))
+    assert [(layer.z_mm, layer.height_mm) for layer in sliced.layers] == [(pytest.approx(0.12), pytest.approx(0.12))]
+    assert sliced.volume_mm3 == pytest.approx(12.0, rel=0.02)
+
+
+@pytest.mark.parametrize("walls", [0, 1, 50])
+def test_any_number_of_walls_fills_the_part(walls):
+    mesh = box(20, 20, 2)
+    assert slice_part(whole(mesh), profile(*SOLID, f"process.walls={walls}")).volume_mm3 == pytest.approx(800, rel=0.02)
+
+
+def test_the_same_part_gives_the_same_bytes():
+    first, second = (content(slice_part(whole(branch()), profile())) for _ in range(2))
+    assert first == second
+
+
+def test_every_path_has_length_and_width_and_speed():
+    for path in of_kind(slice_part(whole(branch()), profile()), *Kind):
+        assert path.length_mm > 0.1
+        assert 0.2 < path.width_mm < 0.91
+        assert 0 < path.speed_mm_s <= 80
+        assert path.points.shape[1] == path.approach.shape[1] == 2
+        assert (path.points[1:] != path.points[:-1]).any(axis=1).all()
+
+
+def test_a_part_thinner_than_any_line_is_refused_with_its_measures():
+    with pytest.raises(SliceError, match=r"part 1 gives no path at all: it measures 0.1 x 5 x 5 mm"):
+        slice_part(whole(box(0.1, 5, 5)), profile())
