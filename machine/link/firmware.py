@@ -18,7 +18,9 @@ from profiles.machine import Machine
 BUFSIZE = 4  # lines waiting, the one at work included
 MAX_CMD_SIZE = 96
 BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
+CHATTER_S = 3600.0  # of a longer wait only the last hour is talked through: a jump over years must not fill the memory
 DIGITS = re.compile(rb"\s*([-+]?\d+)")
+COMMAND = re.compile(r"([GMT])\s*0*(\d+(?:\.\d+)?)")
 URGENT = re.compile(rb"\s*(?:N\d+\s*)?M(112|108|410)(?!\d)")
 BANNER = "start\nMarlin bugfix-2.1.x (simulated)\necho: Last Updated: 2024-09-29 | Author: (none, default config)\n"
 
@@ -215,15 +217,16 @@ class Firmware:
         """Begin or go on with the oldest line of the queue."""
         body = self.body
         label, text = self._queue[0]
-        if text[:2] in ("G1", "G0") and not text[2:3].isdigit():
+        name, rest = _parted(text)
+        if name in ("G1", "G0"):
             if not body.motion.free(body.now_s):
                 self._sleep(body.motion.next_free_s())
                 return
-            move(body, words_of(text[2:]))
+            move(body, words_of(rest))
             self._finish(label)
             return
         if self._work is None:
-            answer = self._begin(text)
+            answer = self._begin(text, name, rest)
             if self.dead:
                 return
             if answer is None or isinstance(answer, str):
@@ -237,8 +240,7 @@ class Firmware:
         else:
             self._sleep(wake_s)
 
-    def _begin(self, text: str) -> Iterator[float] | str | None:
-        name, _, rest = text.partition(" ")
+    def _begin(self, text: str, name: str, rest: str) -> Iterator[float] | str | None:
         if name == "M112":
             self._kill()
             return None
@@ -250,7 +252,7 @@ class Firmware:
             self.body.unknown += 1
             self._said.append(f'echo:Unknown command: "{text}"')
             return None
-        return command(self.body, {} if name == "M117" else words_of(rest), text)
+        return command(self.body, {} if name == "M117" else words_of(rest), name + rest)
 
     def _introduce(self) -> None:
         habits = self._habits
@@ -291,7 +293,7 @@ class Firmware:
             due_s = min(busy_s, body.report_s)
             if due_s > to_s or due_s == inf:
                 break
-            body.now_s = max(body.now_s, due_s)
+            body.now_s = max(body.now_s, due_s, to_s - CHATTER_S)
             if due_s == busy_s:
                 self._said.append("echo:busy: processing")
                 self._busy_s = body.now_s + self._busy_every_s
@@ -299,3 +301,11 @@ class Firmware:
                 self._said.append(f" {body.temperatures()}")
                 body.report_s = body.now_s + body.report_every_s
         body.now_s = max(body.now_s, to_s)
+
+
+def _parted(text: str) -> tuple[str, str]:
+    """Name and rest of a command; leading zeros and a missing blank are allowed: "G01X5" is G1."""
+    if text[2:3] == " " and text[1:2].isdigit():
+        return text[:2], text[2:]
+    found = COMMAND.match(text)
+    return (f"{found[1]}{found[2]}", text[found.end() :]) if found else ("", text)

@@ -18,9 +18,9 @@ READ_BYTES = 4096
 WRITE_S = 10.0  # a printer whose buffers stay full for longer has stopped reading
 BAUDS = (1200, 4_000_000)  # slowest and fastest rate that an adapter is known to take
 
-# termios.error is no OSError (parity on a pty raises it); it is reached through pyserial, which exists on all systems.
+# termios.error is no OSError; pyserial lets it through when a setting is refused.
 _TROUBLE: tuple[type[Exception], ...] = (serial.SerialException, OSError, ValueError)
-if hasattr(serial, "serialposix") or os.name == "posix":
+if os.name == "posix":
     import termios
 
     _TROUBLE += (termios.error,)

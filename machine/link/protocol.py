@@ -3,7 +3,6 @@
 The caller owns port and clock: it writes what take() gives, hands what it reads to receive() and calls tick() now and then.
 """
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -19,33 +18,21 @@ from machine.link.events import (
     Wait,
     read_event,
 )
-from machine.link.framing import frame, name_of
 from machine.link.states import TABLE, Signal, State
+from machine.link.window import Window
 from profiles.errors import FirmwareError, LocalProtocolError, PrinterError, RemoteProtocolError, SilenceError
 
-RX_BYTES = 127  # an AVR's 128-byte receive ring holds one byte less; a fuller one loses bytes without a word
 HEARD_LIMIT = 4096  # a line without end is thrown away beyond this; Marlin's longest answer has 300 characters
-HISTORY = 512  # lines kept for a repeat: far more than any printer's buffers hold
 GREETING = 2  # M115 and M105 are lines 1 and 2; a later wish for one of them means that the printer restarted
 NEAR = 8  # one acknowledgement too many or few is usual after noise; a wish further back is asked for twice
 SYNC_TRIES = 6  # a board that resets on opening spends one or two of them in its boot loader
 PROBES = 4  # M105 in a row without any answer before the printer counts as gone
 ASKED_LIMIT = 10  # the same line asked for so often means that the cable is too noisy (OctoPrint's figure)
-CLEAN_LINES = 8  # after an error so many acknowledgements are awaited one by one before the window opens again
+CLEAN_LINES = 8  # acknowledgements awaited one by one before the window opens
+# After each error four times as many: when a line is refused the printer throws away what it has of the next one, and the rest of
+# that one may be run without check. A window of one line cannot be torn so, and costs a tenth of the speed.
+CAUTION_MOST = 8192
 QUIET_MOST_S = 2.0  # a printer that chatters on its own must not hold up a repeat for ever
-
-# Commands whose `ok` takes its time, with the most it may take, s. They are sent alone.
-BUDGET_S = {
-    "G4": 3600.0,
-    "G28": 600.0,
-    "G29": 1800.0,
-    "M109": 3600.0,
-    "M190": 3600.0,
-    "M191": 3600.0,
-    "M303": 3600.0,
-    "M400": 3600.0,
-    "M600": 86400.0,
-}
 
 
 @dataclass(frozen=True)
@@ -59,68 +46,37 @@ class Timing:
     quiet_s: float = 0.12  # of silence before a repeat: the lines still in the cable and the ring have been flushed then
 
 
-@dataclass(frozen=True, slots=True)
-class Sent:
-    """A line in flight."""
-
-    number: int
-    size: int
-    asks_temperature: bool
-    budget_s: float
-
-
 class Protocol:
-    """One conversation. `fault` is the error that ended it, None while it lasts."""
+    """One conversation. `fault` is the error that ended it, None while it lasts; `window` counts its lines."""
 
     def __init__(self, timing: Timing | None = None, now_s: float = 0.0) -> None:
         self.state = State.DRAIN
         self.fault: PrinterError | None = None
-        self.sent = 0
-        self.acknowledged = 0
+        self.window = Window()
         self.repeated = 0
         self.strays = 0
         self.advanced = False
         self.capabilities: dict[str, bool] = {}
         self._timing = timing or Timing()
         self._out = bytearray()
-        self._heard = b""
-        self._overflow = False
-        self._history: dict[int, bytes] = {}
-        self._flight: deque[Sent] = deque()
-        self._flight_bytes = 0
-        self._tries = 0
-        self._probes = 0
-        self._probe = 0
-        self._waits = 0
-        self._doubt = 0
-        self._next_repeat = 1
-        self._asked = 0
-        self._asked_times = 0
-        self._clean = 0
-        self._places = 1
-        self._busy_known = False
-        self._temperature_known = False
-        self._swallow = False
-        self._alone = False
-        self._unknown_echoed = False
+        self._heard, self._overflow = b"", False
+        self._tries = self._probes = self._first_probe = self._waits = self._doubt = 0
+        self._next_repeat = self._asked = self._asked_times = 0
+        self._clean, self._caution, self._places = 0, CLEAN_LINES, 1
+        self._busy_known = self._temperature_known = False
+        self._swallow = self._alone = self._unknown_echoed = False
         self._heard_s = self._progress_s = self._entered_s = now_s
 
     def room(self, command: str) -> bool:
         """Whether this command may be sent now."""
-        if self.state is not State.OPEN:
-            return False
-        flight = self._flight
-        if not flight:
-            return True
-        if self._clean < CLEAN_LINES or len(flight) >= self._window() or flight[-1].budget_s:
-            return False
-        return self._flight_bytes + len(command) + 16 <= RX_BYTES and not _budget_s(command)
+        return self.state is State.OPEN and self.window.room(command, self._lines())
 
     def send(self, command: str, now_s: float) -> int:
         """Number a command, keep it for repeats and queue its bytes; returns its line number."""
         if not self.room(command):
             raise LocalProtocolError(f"{command!r} was to be sent while the printer has no room for it")
-        return self._transmit(command, now_s)
+        self._launch(command, now_s)
+        return self.window.sent
 
     def take(self) -> bytes:
         """The bytes to write to the port now."""
@@ -155,35 +111,24 @@ class Protocol:
         elif state in (State.SYNC, State.HELLO):
             if now_s - self._progress_s >= timing.sync_s:
                 self._turn(Signal.STALL, now_s)
-        elif self._flight and now_s - self._progress_s >= self._patience_s():
+        elif self.window.flight and now_s - self._progress_s >= self._patience_s():
             self._turn(Signal.STALL, now_s)
 
     def _patience_s(self) -> float:
-        if self.state is State.PROBING and self._flight[0].budget_s:
-            return self._flight[0].budget_s
+        if self.state is State.PROBING and self.window.flight[0].budget_s:
+            return self.window.flight[0].budget_s
         return self._timing.stall_s if self._busy_known else self._timing.stall_mute_s
 
-    def _window(self) -> int:
+    def _lines(self) -> int:
         """Lines in flight: one until the printer tells numbers; one place stays free so that it sees an M112 at once."""
-        if not self.advanced:
+        if not self.advanced or self._clean < self._caution:
             return 1
         return max(1, self._places if self.capabilities.get("EMERGENCY_PARSER") else self._places - 1)
 
-    def _transmit(self, command: str, now_s: float) -> int:
-        number = self.sent + 1
-        framed = frame(number, command)
-        self.sent = number
-        self._history[number] = framed
-        self._history.pop(number - HISTORY, None)
-        self._launch(number, framed, command, now_s)
-        return number
-
-    def _launch(self, number: int, framed: bytes, command: str, now_s: float) -> None:
-        if not self._flight:
+    def _launch(self, command: str, now_s: float) -> None:
+        if not self.window.flight:
             self._progress_s = now_s
-        self._flight.append(Sent(number, len(framed), command == "M105", _budget_s(command)))
-        self._flight_bytes += len(framed)
-        self._out += framed
+        self._out += self.window.launch(command)
 
     def _turn(self, signal: Signal, now_s: float, error: PrinterError | None = None) -> None:
         """Follow the table, then do what belongs to entering the state."""
@@ -203,57 +148,55 @@ class Protocol:
             text = f"the printer did not answer {SYNC_TRIES} greetings: it may be off, or speak at another baud rate"
             self._turn(Signal.SILENT, now_s, SilenceError(text))
             return
-        self.sent = self.acknowledged = 0
-        self._ground()
-        self._history.clear()
+        self.window.reset()
         self._out += b"\n" + b"N0 M110 N0*125\n"  # the newline ends a half line of an earlier session
 
     def _enter_hello(self, now_s: float) -> None:
-        self._transmit("M115", now_s)
+        self._launch("M115", now_s)
 
     def _enter_open(self, _now_s: float) -> None:
-        self._probes = self._doubt = self._probe = 0
+        self._probes = self._doubt = self._first_probe = 0
 
     def _enter_probing(self, now_s: float) -> None:
         """Ask with a NEW number: Marlin swallows a repeat of its last line without a word."""
         self._probes += 1
         self._clean = 0
         if self._probes > PROBES:
-            text = f"the printer has been silent: line {self.acknowledged + 1} and {PROBES} questions remained without answer"
+            text = (
+                f"the printer has been silent: line {self.window.acknowledged + 1} and {PROBES} questions remained without answer"
+            )
             self._turn(Signal.SILENT, now_s, SilenceError(text))
             return
-        number = self._transmit("M105", now_s)
-        self._probe = self._probe or number
+        self._launch("M105", now_s)
+        self._first_probe = self._first_probe or self.window.sent
 
     def _enter_quiet(self, _now_s: float) -> None:
-        self._clean = self._probes = self._doubt = self._probe = 0
-        self._alone = self.sent <= self._next_repeat
-        self._ground()
+        self._clean = self._probes = self._doubt = self._first_probe = 0
+        self._caution = min(4 * self._caution, CAUTION_MOST)
+        self._alone = self.window.sent <= self._next_repeat
+        self.window.ground()
 
     def _enter_repeat(self, now_s: float) -> None:
         self._swallow = False
         self._repeat_next(now_s)
 
     def _repeat_next(self, now_s: float) -> None:
-        if self._next_repeat > self.sent:
+        if self._next_repeat > self.window.sent:
             self._turn(Signal.CAUGHT_UP, now_s)
             return
-        number = self._next_repeat
-        framed = self._history[number]
+        self._out += self.window.repeat(self._next_repeat)
+        self._progress_s = now_s
         self._next_repeat += 1
         self.repeated += 1
-        command = framed[framed.index(b" ") + 1 : framed.rindex(b"*")].decode("ascii")
-        self._launch(number, framed, command, now_s)
-
-    def _ground(self) -> None:
-        """Nothing is in flight any more."""
-        self._flight.clear()
-        self._flight_bytes = 0
 
     def _on_ok(self, ok: Ok, now_s: float) -> None:
         unknown, self._unknown_echoed = self._unknown_echoed, False
         if ok.line is not None:
             self._learn(ok)
+        elif ok.planner_free is not None and self.advanced and not unknown:
+            text = f"the printer ran part of a torn line after line {self.window.acknowledged}: what it did is not known"
+            self._turn(Signal.UNCHECKED, now_s, RemoteProtocolError(text))
+            return
         if self.state is State.SYNC:
             self._turn(Signal.SYNCED, now_s)
         elif self.state is State.QUIET:
@@ -263,11 +206,7 @@ class Protocol:
             self._temperature_known = True
             self._acknowledge(self._answered_question(), now_s)
         elif self.advanced:
-            if ok.line is None and ok.planner_free is not None and not unknown:
-                text = f"the printer ran part of a torn line after line {self.acknowledged}: what it did is not known"
-                self._turn(Signal.UNCHECKED, now_s, RemoteProtocolError(text))
-            else:
-                self._acknowledge(ok.line, now_s)
+            self._acknowledge(ok.line, now_s)
         elif self._swallow:
             self._swallow = False
         else:
@@ -275,9 +214,9 @@ class Protocol:
 
     def _answered_question(self) -> int | None:
         """The line that an `ok T:` acknowledges: the oldest question; nothing but questions follows the first probe."""
-        number = next((s.number for s in self._flight if s.asks_temperature), None)
-        probing = self.state is State.PROBING and number is not None and number >= self._probe
-        return self.sent if probing else number
+        number = self.window.question()
+        probing = self.state is State.PROBING and number is not None and number >= self._first_probe
+        return self.window.sent if probing else number
 
     def _learn(self, ok: Ok) -> None:
         self.advanced = True
@@ -285,21 +224,19 @@ class Protocol:
             self._places = max(self._places, min(ok.rx_free + 1, 16))  # B counts the line itself as still there
 
     def _acknowledge_oldest(self, now_s: float) -> None:
-        oldest = self._flight[0] if self._flight else None
+        flight = self.window.flight
+        oldest = flight[0] if flight else None
         if oldest is not None and oldest.asks_temperature and self._temperature_known:
             oldest = None  # its answer would have begun with `ok T:`
         self._acknowledge(None if oldest is None else oldest.number, now_s)
 
     def _acknowledge(self, number: int | None, now_s: float) -> None:
-        """This line and all before it have arrived."""
-        flight = self._flight
-        if number is None or not flight or not flight[0].number <= number <= flight[-1].number:
+        """This line and all before it have arrived; a line that is not in flight makes the answer a stray."""
+        count = self.window.acknowledge(number)
+        if number is None or not count:
             self.strays += 1
             return
-        while flight and flight[0].number <= number:
-            self._flight_bytes -= flight.popleft().size
-            self._clean += 1
-        self.acknowledged = max(self.acknowledged, number)
+        self._clean += count
         self._progress_s = now_s
         self._waits = self._probes = 0
         if self._asked and number > self._asked:
@@ -310,12 +247,12 @@ class Protocol:
     def _go_on(self, number: int, now_s: float) -> None:
         if self.state is State.HELLO:
             if number < GREETING:
-                self._transmit("M105", now_s)
+                self._launch("M105", now_s)
             else:
                 self._turn(Signal.GREETED, now_s)
-        elif self.state is State.PROBING and number >= self._probe:
+        elif self.state is State.PROBING and number >= self._first_probe:
             self._turn(Signal.ANSWERED, now_s)
-        elif self.state is State.REPEAT and not self._flight:
+        elif self.state is State.REPEAT and not self.window.flight:
             self._repeat_next(now_s)
 
     def _on_resend(self, resend: Resend, now_s: float) -> None:
@@ -323,7 +260,7 @@ class Protocol:
         if self.state is State.SYNC:
             return
         self._swallow = True
-        plausible = GREETING < number <= self.sent + 1 and number > self.acknowledged - NEAR
+        plausible = GREETING < number <= self.window.sent + 1 and number > self.window.acknowledged - NEAR
         if self.state is State.HELLO or (plausible and self.state is not State.QUIET):
             self._wanted(number, now_s)
         elif plausible:
@@ -342,15 +279,15 @@ class Protocol:
             self._turn(Signal.IMPOSSIBLE, now_s, RemoteProtocolError(text))
             return
         self._next_repeat = number
-        self.acknowledged = number - 1
+        self.window.acknowledged = number - 1
         self._turn(Signal.RESEND, now_s)
 
     def _absurd(self, number: int) -> PrinterError:
         if number <= GREETING:
-            return FirmwareError(f"the printer restarted without a word after line {self.acknowledged}: {RESTARTED}")
+            return FirmwareError(f"the printer restarted without a word after line {self.window.acknowledged}: {RESTARTED}")
         return RemoteProtocolError(
-            f"the printer asks for line {number}, although line {self.sent} is the last one sent "
-            f"and {self.acknowledged} are acknowledged"
+            f"the printer asks for line {number}, although line {self.window.sent} is the last one sent "
+            f"and {self.window.acknowledged} are acknowledged"
         )
 
     def _on_busy(self, _busy: Busy, now_s: float) -> None:
@@ -358,7 +295,7 @@ class Protocol:
         self._progress_s = now_s
 
     def _on_start(self, _start: Start, now_s: float) -> None:
-        text = f"the printer restarted in the middle of the print, after line {self.acknowledged}: {RESTARTED}"
+        text = f"the printer restarted in the middle of the print, after line {self.window.acknowledged}: {RESTARTED}"
         self._turn(Signal.START, now_s, FirmwareError(text))
 
     def _on_fault(self, fault: FirmwareFault, now_s: float) -> None:
@@ -366,7 +303,7 @@ class Protocol:
 
     def _on_wait(self, _wait: Wait, now_s: float) -> None:
         self._waits += 1
-        if self._waits >= 2 and self._flight:  # nothing to do twice in a row: our line was lost
+        if self._waits >= 2 and self.window.flight:  # nothing to do twice in a row: our line was lost
             self._waits = 0
             self._turn(Signal.STALL, now_s)
 
@@ -398,11 +335,3 @@ _ACTS: dict[type[Event], Callable[..., None]] = {
     Echo: Protocol._on_echo,
     Capability: Protocol._on_capability,
 }
-
-
-def _budget_s(command: str) -> float:
-    """The time budget of a slow command, 0 for a quick one."""
-    second = command[1] if len(command) > 1 else ""
-    if command[0] == "G" and second in "01":  # most lines of a program; none of these is slow
-        return 0.0
-    return BUDGET_S.get(name_of(command), 0.0)

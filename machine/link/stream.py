@@ -57,12 +57,15 @@ def print_lines(
     """Print a program: send every line's command, wait until the last one is done.
 
     A sequence is checked wholly before the port is opened, any other iterable line by line as it is reached; it is consumed
-    lazily. total_s is the expected duration, total the number of commands where `lines` does not tell.
+    lazily. A plain string is taken as its lines. total_s is the expected duration, total the number of commands where
+    `lines` does not tell.
 
     A set `stop` flag ends the print: feeding stops, moves are stopped, heaters and fan go off, nothing homes or turns; the
     Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises LocalProtocolError for a line that
     cannot be sent, PortError, FirmwareError, RemoteProtocolError or SilenceError (heaters off is tried first).
     """
+    if isinstance(lines, str):
+        lines = lines.splitlines()
     if isinstance(lines, Sequence):
         total = sum(1 for place, line in enumerate(lines, 1) if command_of(line, place))
     with open_port(port, baud) as wire:
@@ -133,7 +136,7 @@ class _Talk:
             self._send("M155 S0")
         self._send("M400")
         self._send("M105")
-        while self._protocol.acknowledged < self._protocol.sent or self._protocol.state is not State.OPEN:
+        while self._protocol.window.acknowledged < self._protocol.window.sent or self._protocol.state is not State.OPEN:
             self._pump()
         self._show(monotonic())
 
@@ -186,8 +189,8 @@ class _Talk:
             self._ask(now_s)
 
     def _ask(self, now_s: float) -> None:
-        self._asked_s = now_s
         if not self._protocol.capabilities.get("AUTOREPORT_TEMP") and self._protocol.room("M105"):
+            self._asked_s = now_s
             self._protocol.send("M105", now_s)
 
     def _note(self, event: Event) -> None:
@@ -202,7 +205,7 @@ class _Talk:
             self._warnings.append(event.text)
 
     def _acknowledged(self) -> int:
-        return max(0, self._jobs - (self._protocol.sent - self._protocol.acknowledged))
+        return max(0, self._jobs - (self._protocol.window.sent - self._protocol.window.acknowledged))
 
     def _show(self, now_s: float) -> None:
         self._shown_s = now_s

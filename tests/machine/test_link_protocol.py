@@ -23,8 +23,9 @@ from machine.link.events import (
     read_event,
 )
 from machine.link.framing import LINE_LIMIT, checksum, command_of, frame
-from machine.link.protocol import ASKED_LIMIT, HEARD_LIMIT, PROBES, RX_BYTES, SYNC_TRIES, Protocol, Timing
+from machine.link.protocol import ASKED_LIMIT, HEARD_LIMIT, PROBES, SYNC_TRIES, Protocol, Timing
 from machine.link.states import TABLE, Signal, State
+from machine.link.window import RX_BYTES
 from profiles.errors import FirmwareError, LocalProtocolError, RemoteProtocolError, SilenceError
 
 LINES: list[tuple[bytes, Event]] = [
@@ -232,7 +233,7 @@ def test_a_numbered_ok_acknowledges_all_lines_before_it_too() -> None:
     table = opened()
     table.send("G1 X1", "G1 X2", "G1 X3")
     table.say(b"ok N12 P15 B3\n")
-    assert table.protocol.acknowledged == 12
+    assert table.protocol.window.acknowledged == 12
 
 
 def test_slow_commands_travel_alone() -> None:
@@ -251,9 +252,9 @@ def test_a_resend_repeats_the_line_once_and_its_ok_acknowledges_nothing(size: in
     first = table.send("G1 X1")
     table.say(b"Error:checksum mismatch, Last Line: 10\nResend: 11\nok\n")
     assert table.wire() == first
-    assert table.protocol.acknowledged == 10
+    assert table.protocol.window.acknowledged == 10
     table.say(b"ok N11 P15 B3\n" if advanced else b"ok\n")
-    assert table.protocol.acknowledged == 11
+    assert table.protocol.window.acknowledged == 11
     assert table.protocol.state is State.OPEN
 
 
@@ -279,7 +280,7 @@ def test_a_resend_without_its_ok_goes_on_after_a_pause() -> None:
     table.wait(0.13)
     assert table.wire() == line
     table.say(b"ok\n")
-    assert table.protocol.acknowledged == 11
+    assert table.protocol.window.acknowledged == 11
 
 
 @pytest.mark.parametrize("advanced", [True, False])
@@ -291,7 +292,7 @@ def test_a_lost_ok_is_cleared_up_by_a_new_question_never_by_a_repeat(advanced: b
     table.wait(1.1)
     assert table.wire() == frame(12, "M105")
     table.say(b"ok T:20.00 /0.00\n")
-    assert (table.protocol.state, table.protocol.acknowledged) == (State.OPEN, 12)
+    assert (table.protocol.state, table.protocol.window.acknowledged) == (State.OPEN, 12)
 
 
 def test_a_question_answered_by_resend_shows_which_line_was_lost() -> None:
@@ -360,16 +361,16 @@ def test_surplus_oks_are_never_credited_forward(surplus: bytes) -> None:
     table.say(surplus)
     table.send("G1 X1", "G1 X2")
     table.say(surplus)
-    assert table.protocol.acknowledged == 10
+    assert table.protocol.window.acknowledged == 10
 
 
 def test_a_plain_ok_does_not_answer_the_question_for_the_temperature() -> None:
     table = opened(advanced=False)
     table.send("M105")
     table.say(b"ok\n")
-    assert table.protocol.acknowledged == 10
+    assert table.protocol.window.acknowledged == 10
     table.say(b"ok T:20.00 /0.00\n")
-    assert table.protocol.acknowledged == 11
+    assert table.protocol.window.acknowledged == 11
 
 
 def test_a_resend_of_a_handshake_line_twice_is_a_restart() -> None:
@@ -439,7 +440,7 @@ def test_a_torn_line_that_the_printer_did_not_understand_does_no_harm() -> None:
     table.send("G1 X1")
     table.say(b'echo:Unknown command: "11 G1 X1*97"\nok P15 B3\n')
     assert table.protocol.fault is None
-    assert table.protocol.acknowledged == 10
+    assert table.protocol.window.acknowledged == 10
 
 
 ACTS: dict[str, Callable[[Table, int], object]] = {
@@ -460,5 +461,5 @@ def test_no_conversation_breaks_the_counts(acts: list[tuple[str, int]]) -> None:
     for name, number in acts:
         ACTS[name](table, number)
         protocol = table.protocol
-        assert 0 <= protocol.acknowledged <= protocol.sent
+        assert 0 <= protocol.window.acknowledged <= protocol.window.sent
         assert (protocol.fault is None) == (protocol.state not in (State.HALTED, State.LOST))

@@ -209,6 +209,32 @@ def test_display_and_setup_commands_are_answered() -> None:
     assert answer(printer(), "M73 P1 R2\nM117 Hi X5\nM204 P500\nM84\nM18\nT0\nM400\n") == ["ok"] * 7
 
 
+def test_commands_may_be_written_with_zeros_and_without_blanks() -> None:
+    record = ran("G01X5\nG1Y6\nM0104S33\nG92.9 X0\n").record()
+    assert record.end[-1, :2].tolist() == [5.0, 6.0]
+    assert (record.nozzle_target_c, record.unknown) == (33.0, 1)
+
+
+@given(
+    st.lists(st.sampled_from(["G1", "G0", " X", "Y-", "E1", "9", ".", "-", "N", "*", ";", "\n", "M109", " S", "G4", "G28", "M1"]))
+)
+def test_no_text_breaks_the_firmware(pieces: list[str]) -> None:
+    firmware = printer()
+    answer(firmware, "".join(pieces) + "\n")
+    assert answer(firmware, "M105\n")[-1].startswith("ok T:")
+
+
+@given(st.binary(max_size=200))
+def test_no_bytes_break_the_firmware(data: bytes) -> None:
+    firmware = printer()
+    answer(firmware, data + b"\n")
+    assert answer(firmware, "M105\n")[-1].startswith("ok T:")
+
+
+def test_a_wait_of_years_is_over_at_once() -> None:
+    assert answer(printer(), "G4 S999999999\n")[-1] == "ok"
+
+
 def test_a_full_uart_ring_drops_bytes() -> None:
     firmware = printer(Habits(rx_ring=128))
     answer(firmware, b"G4 S50\n" * 4, until_s=0.1)
