@@ -10,7 +10,7 @@ from machine.app.raster import Image, View, draw, seen_from
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_above, risky_upright
-from mdp.pose import unit
+from mdp.pose import UP, unit
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -64,8 +64,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
     Returns (h, w, 3), uint8, frames of frame_pixels squared in rows.
     """
     parts, model = decomposition.parts, decomposition.mesh
-    axis = unit(machine.tilt.axis)
-    view = seen_from(float(np.degrees(np.arctan2(axis[1], axis[0]))) - 35.0, 14.0)
+    view = _along_the_tilt_axis(parts, machine)
     floor, nozzle = _floor(model), _nozzle(machine)
     span = 1.1 * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     frames = []
@@ -111,6 +110,15 @@ def _best_view(model: Mesh, risky: NDArray[np.bool_]) -> View:
     red = (model.areas_mm2 * risky) @ np.maximum(facing, 0.0)
     score = outline / outline.max() + 0.3 * red / max(red.max(), 1e-9) - 1e-4 * np.abs(azimuths + 60.0)
     return seen_from(float(azimuths[int(np.argmax(score))]), 9.0)
+
+
+def _along_the_tilt_axis(parts: tuple[Part, ...], machine: Machine) -> View:
+    """Nearly along the tilt axis, from the side to which most of the tilted tables show their upper faces."""
+    axis = unit(machine.tilt.axis)
+    across = np.cross(UP, axis)
+    shown = sum(float(np.sign(np.round(part.rotation @ UP @ across, 6))) for part in parts)
+    aside = 35.0 if shown > 0 else -35.0
+    return seen_from(float(np.degrees(np.arctan2(axis[1], axis[0]))) + aside, 14.0)
 
 
 def _floor(model: Mesh) -> Mesh:

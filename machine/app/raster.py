@@ -191,7 +191,7 @@ def _shade(screen: Any, lit: Any, face: Any, normals: Any, paint: Any, shadow: A
             p = b0 * lit[f, 0] + b1 * lit[f, 1] + b2 * lit[f, 2]
             key = max(np.dot(n, to_light), 0.0)
             if key > 0:
-                key *= _lit_share(shadow, p[0], p[1], p[2], bias * (1.0 + 1.5 * (1.0 - key)))
+                key *= _lit_share(shadow, p[0], p[1], p[2], bias * min(1.0 / max(key, 0.08), 8.0))
             bent[row, column] = axes @ n
             facing = max(bent[row, column, 2], 0.0)
             light = max(0.50 + 0.08 * n[2] + 0.34 * key + 0.20 * facing, paint[f, 3])
