@@ -10,6 +10,9 @@ import numpy as np
 from numba import njit
 
 from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.rays import first_hit
+
+UNKNOWN = -2
 
 
 @njit(cache=True, inline="always")
@@ -45,7 +48,9 @@ def _basins(edges, heights):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def count_pieces(vertices, faces, edges, vertex_normals, anchor, d, heights, bins, n, pieces):  # type: ignore[no-untyped-def]
+def count_pieces(  # type: ignore[no-untyped-def]
+    vertices, faces, edges, vertex_normals, anchor, order, low, high, d, heights, bins, n, pieces
+):
     """Components below each offset that do not reach the platform."""
     basin = _basins(edges, heights)
     size = len(vertices)
@@ -62,9 +67,14 @@ def count_pieces(vertices, faces, edges, vertex_normals, anchor, d, heights, bin
     for v in range(size):
         if vertices[v, 2] <= PLATFORM_TOLERANCE_MM:
             grounded_at[basin[v]] = min(grounded_at[basin[v]], bins[v])
-        if basin[v] != v or anchor[v] < 0:
+        if basin[v] != v:
             continue
         if vertex_normals[v, 0] * d[0] + vertex_normals[v, 1] * d[1] + vertex_normals[v, 2] * d[2] <= 0.0:
+            continue
+        if anchor[v] == UNKNOWN:
+            # Threads may look up the same vertex twice; the answer does not depend on the direction.
+            anchor[v] = first_hit(v, vertices, faces, order, low, high, -vertex_normals[v])
+        if anchor[v] < 0:
             continue
         w = faces[anchor[v], 0]
         for corner in (1, 2):
@@ -77,16 +87,16 @@ def count_pieces(vertices, faces, edges, vertex_normals, anchor, d, heights, bin
         starts[joins[k, 2] + 1] += 1
     for b in range(n + 1):
         starts[b + 1] += starts[b]
-    order, place = np.empty(many, np.int32), starts.copy()
+    sequence, place = np.empty(many, np.int32), starts.copy()
     for k in range(many):
         b = joins[k, 2]
-        order[place[b]] = k
+        sequence[place[b]] = k
         place[b] += 1
-    _join(basin, grounded_at, joins, order, starts, bins, n, pieces)
+    _join(basin, grounded_at, joins, sequence, starts, bins, n, pieces)
 
 
 @njit(cache=True)
-def _join(basin, grounded_at, joins, order, starts, bins, n, pieces):  # type: ignore[no-untyped-def]
+def _join(basin, grounded_at, joins, sequence, starts, bins, n, pieces):  # type: ignore[no-untyped-def]
     """Join basins in the order of the offsets and count those that hang free."""
     size = len(basin)
     parent, grounded = np.arange(size, dtype=np.int32), np.zeros(size, np.bool_)
@@ -102,7 +112,7 @@ def _join(basin, grounded_at, joins, order, starts, bins, n, pieces):  # type: i
     for b in range(n):
         floating += fresh[b]
         for at in range(starts[b], starts[b + 1]):
-            k = order[at]
+            k = sequence[at]
             a, c = _root(parent, joins[k, 0]), _root(parent, joins[k, 1])
             if a != c:
                 if not (grounded[a] and grounded[c]):

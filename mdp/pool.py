@@ -105,9 +105,12 @@ class _Rows:
 
 
 def _check_ahead(rows: _Rows, ahead: Ints, checked: dict[int, tuple[int, float, float]], check: Check) -> None:
-    """Check the next candidates of every node in one go, all their directions in parallel."""
+    """Check all candidates that share node and direction with the next ones, a node's directions in parallel."""
     for node in np.unique(rows.node[ahead]):
-        mine = ahead[rows.node[ahead] == node]
+        fresh = [index for index in ahead[rows.node[ahead] == node] if int(index) not in checked]
+        mine = np.nonzero((rows.node == node) & np.isin(rows.direction, rows.direction[fresh]))[0]
+        if len(mine) == 0:
+            continue
         found = check(int(node), rows.direction[mine], rows.offset[mine])
         for k, index in enumerate(mine):
             checked[int(index)] = (int(found.reason[k]), float(found.volume_mm3[k]), float(found.fragile_mm[k]))

@@ -1,10 +1,10 @@
-"""Rays: the first face that a ray meets, over a tree of boxes; and every vertex's anchor on the far side of the solid."""
+"""Rays: the first face that a ray from a vertex meets, over a tree of boxes."""
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
-from mdp.mesh import Floats, Ints, Mesh
+from mdp.mesh import Floats, Mesh
 
 LEAF_FACES = 4
 DEPTH = 64
@@ -31,13 +31,6 @@ class Tree:
             level //= 2
             self.low[level : 2 * level] = self.low[children].reshape(level, 2, 3).min(axis=1)
             self.high[level : 2 * level] = self.high[children].reshape(level, 2, 3).max(axis=1)
-
-
-def anchors(mesh: Mesh, inward: Floats) -> Ints:
-    """(n,) for every vertex the first face met from it along its `inward` vector (n, 3), its own faces left out; -1: none."""
-    tree = Tree(mesh)
-    hits: Ints = _first_hits(mesh.vertices, mesh.faces, tree.faces, tree.low, tree.high, tree.leaves, inward)
-    return hits
 
 
 def _morton(points: Floats) -> NDArray[np.uint64]:
@@ -82,37 +75,32 @@ def _distance(p, q, r, origin, ray):  # type: ignore[no-untyped-def]
     return t if t > 0.0 else np.inf
 
 
-@njit(cache=True, parallel=True)
-def _first_hits(vertices, faces, order, low, high, leaves, inward):  # type: ignore[no-untyped-def]
-    count = len(vertices)
-    hits = np.full(count, -1, dtype=np.int32)
-    for v in prange(count):
-        origin, ray = vertices[v], inward[v]
-        inverse = np.empty(3)
-        for axis in range(3):
-            inverse[axis] = 1.0 / ray[axis] if abs(ray[axis]) > 1e-300 else 1e300
-        stack = np.empty(DEPTH, dtype=np.int32)
-        stack[0] = 1
-        top = 1
-        reach = np.inf
-        while top > 0:
-            top -= 1
-            node = stack[top]
-            if not _enters(low, high, node, origin, inverse, reach):
+@njit(cache=True)
+def first_hit(v, vertices, faces, order, low, high, ray):  # type: ignore[no-untyped-def]
+    """The first face met from vertex v along `ray`, its own faces left out; -1: none. order, low, high: a Tree's arrays."""
+    leaves = len(low) // 2
+    origin, inverse = vertices[v], np.empty(3)
+    for axis in range(3):
+        inverse[axis] = 1.0 / ray[axis] if abs(ray[axis]) > 1e-300 else 1e300
+    stack = np.empty(DEPTH, dtype=np.int32)
+    stack[0] = 1
+    top, reach, hit = 1, np.inf, -1
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if not _enters(low, high, node, origin, inverse, reach):
+            continue
+        if node < leaves:
+            stack[top] = 2 * node
+            stack[top + 1] = 2 * node + 1
+            top += 2
+            continue
+        first = (node - leaves) * LEAF_FACES
+        for k in range(first, min(first + LEAF_FACES, len(order))):
+            f = order[k]
+            if v in (faces[f, 0], faces[f, 1], faces[f, 2]):
                 continue
-            if node < leaves:
-                stack[top] = 2 * node
-                stack[top + 1] = 2 * node + 1
-                top += 2
-                continue
-            first = (node - leaves) * LEAF_FACES
-            for k in range(first, min(first + LEAF_FACES, len(order))):
-                f = order[k]
-                i, j, m = faces[f, 0], faces[f, 1], faces[f, 2]
-                if v in (i, j, m):
-                    continue
-                t = _distance(vertices[i], vertices[j], vertices[m], origin, ray)
-                if t < reach:
-                    reach = t
-                    hits[v] = f
-    return hits
+            t = _distance(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], origin, ray)
+            if t < reach:
+                reach, hit = t, f
+    return hit

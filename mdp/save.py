@@ -44,7 +44,8 @@ def stl(mesh: Mesh) -> bytes:
 def threemf(decomposition: Decomposition) -> bytes:
     """All parts in place in one 3MF, each an object of its own colour, the same bytes every time."""
     bases = "".join(
-        f'<base name="part {part.index}" displaycolor="{COLOURS[(part.index - 1) % len(COLOURS)]}FF"/>' for part in decomposition.parts
+        f'<base name="part {part.index}" displaycolor="{COLOURS[(part.index - 1) % len(COLOURS)]}FF"/>'
+        for part in decomposition.parts
     )
     objects = "".join(_object(part.mesh, part.index) for part in decomposition.parts)
     items = "".join(f'<item objectid="{part.index + 1}"/>' for part in decomposition.parts)

@@ -17,8 +17,8 @@ from numba import njit, prange
 
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
-from mdp.pieces import count_pieces
-from mdp.rays import anchors
+from mdp.pieces import UNKNOWN, count_pieces
+from mdp.rays import Tree
 from mdp.sums import find_heights, find_lowest, find_slivers, sum_risks, sum_volumes
 
 
@@ -90,9 +90,14 @@ class Remainder:
         return total / np.where(lengths > 0, lengths, 1.0)
 
     @cached_property
+    def tree(self) -> Tree:
+        """Boxes over the faces, for rays."""
+        return Tree(self.mesh)
+
+    @cached_property
     def anchors(self) -> Ints:
-        """(n,) the face met from each vertex into the solid, -1 where none is."""
-        return anchors(self.mesh, -self.vertex_normals)
+        """(n,) the face met from each vertex into the solid, -1 where none is; the sweep looks them up when needed."""
+        return np.full(len(self.mesh.vertices), UNKNOWN, np.int32)
 
     def columns(self, step_mm: float) -> int:
         """Room for the offsets of any direction."""
@@ -114,7 +119,8 @@ def sweep(remainder: Remainder, directions: Floats, step_mm: float, watched_mm: 
     mesh = remainder.mesh
     surface = (mesh.vertices, mesh.faces, mesh.areas_mm2, mesh.normals, remainder.edges, remainder.rising_edges)
     watched = np.full(len(directions), np.inf) if watched_mm is None else watched_mm
-    solid = (remainder.vertex_normals, remainder.anchors, np.ascontiguousarray(directions), watched)
+    tree = (remainder.tree.faces, remainder.tree.low, remainder.tree.high)
+    solid = (remainder.vertex_normals, remainder.anchors, *tree, np.ascontiguousarray(directions), watched)
     return Sweep(*_sweep(*surface, *solid, step_mm, remainder.columns(step_mm)))
 
 
@@ -135,7 +141,7 @@ def _gains(vertices, faces, areas, normals, risky, directions, step, columns, ri
 
 @njit(cache=True, parallel=True)
 def _sweep(  # type: ignore[no-untyped-def]
-    vertices, faces, areas, normals, edges, rising, vertex_normals, anchor, directions, watched, step, columns
+    vertices, faces, areas, normals, edges, rising, vertex_normals, anchor, order, low, high, directions, watched, step, columns
 ):
     k = len(directions)
     first, count = np.zeros(k, np.int32), np.zeros(k, np.int32)
@@ -151,5 +157,5 @@ def _sweep(  # type: ignore[no-untyped-def]
             sum_volumes(faces, areas, normals, d, heights, bins, begin, n, step, section[row], volume[row])
             find_lowest(vertices, rising, heights, bins, begin, n, step, watched[row], lowest[row])
             find_slivers(vertex_normals, d, heights, bins, begin, n, step, fragile[row])
-            count_pieces(vertices, faces, edges, vertex_normals, anchor, d, heights, bins, n, pieces[row])
+            count_pieces(vertices, faces, edges, vertex_normals, anchor, order, low, high, d, heights, bins, n, pieces[row])
     return first, count, section, volume, lowest, fragile, pieces

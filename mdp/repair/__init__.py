@@ -1,19 +1,27 @@
 """Repair: surfaces as files give them into one closed, outward-wound solid, or a sentence why that cannot be."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from mdp.mesh import Floats
 from mdp.repair.edges import edges_of
 from mdp.repair.holes import without_holes
+from mdp.repair.overlap import disentangled, overlaps_itself
 from mdp.repair.sheets import cancelled, single, without_loose
-from mdp.repair.shells import outward, shells_of, solid_of, united, without_specks
+from mdp.repair.shells import outward, shells_of, solid_of, surface_of, united, volume_of, without_specks
 from mdp.repair.weld import compact, uncollapsed, welded, welded_along_openings
-from mdp.repair.winding import parted, point, wound
+from mdp.repair.winding import parted, point, with_single_edges, wound
 from mdp.surface import Surface, stacked
 from profiles.errors import MeshError
 
+if TYPE_CHECKING:
+    import manifold3d as m3
+
 WELD_SHARES = (1e-6, 1e-5, 1e-4)  # of the model's size: the rounding of ASCII files first, gaps of 0.01 mm in 100 mm last
 SHRINK = 0.01  # of the model's size: what a repair may take off its box
+SAME_VOLUME = 1e-5
+SHARED = 0.5  # of the volume: a body that counts half of itself twice is not understood
 
 
 def repaired(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
@@ -42,9 +50,34 @@ def repaired(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
     lost = np.abs(_bounds(solid) - before).max()
     if lost > SHRINK * size:
         raise MeshError(f"cannot be made a valid solid: the closed part of it lacks {lost:.3g} mm of its extent of {size:.4g} mm")
-    if solid_of(solid).volume() <= 0:
+    solid, whole = _understood(solid)
+    if whole.volume() <= 0:
         raise MeshError("encloses no volume")
-    return solid, notes
+    return (_once_through(solid, whole, notes) if overlaps_itself(whole) else solid), notes
+
+
+def _understood(solid: Surface) -> tuple[Surface, "m3.Manifold"]:
+    """The surface and its manifold3d solid, which must enclose the same volume.
+
+    An edge of four faces leaves open which of them go on in which; where manifold3d pairs them otherwise, the edge is made two.
+    """
+    for tried in (solid, with_single_edges(solid)):
+        whole = solid_of(tried)
+        if abs(whole.volume() - volume_of(tried)) <= SAME_VOLUME * abs(whole.volume()):
+            return tried, whole
+    raise MeshError(f"cannot be made a valid solid: its volume is {volume_of(solid):.5g} mm3 or {whole.volume():.5g} mm3")
+
+
+def _once_through(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> Surface:
+    """The solid without what it counts twice; as it is when that cannot be told apart."""
+    mended = disentangled(whole)
+    left = any(overlaps_itself(piece) for piece in mended.decompose())
+    shared_mm3 = whole.volume() - mended.volume()
+    if left or not 0 < shared_mm3 < SHARED * whole.volume():
+        notes.append("left a body that passes through itself as it is: some of its volume may count twice")
+        return solid
+    notes.append(f"united a body that passes through itself with itself: {shared_mm3:.3g} mm3 counted twice")
+    return surface_of(mended)
 
 
 def _bounds(surface: Surface) -> Floats:

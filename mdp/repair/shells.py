@@ -1,6 +1,7 @@
 """Shells: the closed pieces of a surface, turned outwards or kept as voids, and united where they overlap."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from mdp.repair.weld import compact
 from mdp.repair.winding import paired
 from mdp.surface import Indices, Surface, stacked
 from profiles.errors import MeshError
+
+if TYPE_CHECKING:
+    import manifold3d as m3
 
 NEGLIGIBLE = 1e-7  # of the volume of all shells: 0.1 mm across beside a 20 mm cube
 FLAT = 1e-9  # of the cube of a shell's diagonal
@@ -65,6 +69,14 @@ def shells_of(surface: Surface) -> list[Shell]:
         low, high = corners.min(axis=0), corners.max(axis=0)
         shells.append(Shell(surface.vertices, surface.faces[numbers], float(signed[numbers].sum()), low, high))
     return shells
+
+
+def volume_of(surface: Surface) -> float:
+    """Signed volume of a closed surface by the divergence theorem."""
+    middle = surface.vertices.mean(axis=0)
+    return float(
+        np.einsum("ij,ij->", surface.vertices[surface.faces[:, 0]] - middle, normals_of(surface.vertices, surface.faces)) / 6
+    )
 
 
 def without_specks(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
@@ -142,11 +154,16 @@ def _union(bodies: list[Surface]) -> Surface | None:
         return None
     if union.volume() > (1 + 1e-6) * before or union.volume() < max(solid.volume() for solid in solids) * (1 - 1e-6):
         raise MeshError("has bodies that overlap in a way that cannot be united")
-    mesh = union.to_mesh64()
+    return surface_of(union)
+
+
+def surface_of(solid: "m3.Manifold") -> Surface:
+    """The triangles of a manifold3d solid."""
+    mesh = solid.to_mesh64()
     return Surface(np.asarray(mesh.vert_properties)[:, :3].copy(), np.asarray(mesh.tri_verts).astype(np.int64))
 
 
-def solid_of(surface: Surface) -> "m3.Manifold":  # noqa: F821
+def solid_of(surface: Surface) -> "m3.Manifold":
     """The manifold3d solid of a closed surface; raises MeshError when it is not accepted."""
     import manifold3d as m3
 

@@ -94,21 +94,51 @@ def _turned(surface: Surface, edges: Edges, pairs: Indices, strict: bool) -> Ind
 
 
 def parted(surface: Surface) -> Surface:
-    """The closed surface with edges that more than two faces share split into edges of two faces each."""
+    """The closed surface with a copy of a vertex for every fan of faces that is connected over paired edges.
+
+    Edges that more than two faces share become edges of two faces each, except where the faces hang together at both
+    ends all the same.
+    """
     edges = edges_of(surface.faces)
     if not (edges.counts > 2).any():
         return surface
     pairs = paired(surface, edges)
-    same = edges.starts[pairs[:, 0]] == edges.starts[pairs[:, 1]]
     one, other = pairs[:, 0], pairs[:, 1]
-    one_next, other_next = _next(one), _next(other)
+    same = edges.starts[one] == edges.starts[other]
     corners = components(
         surface.faces.size,
-        np.concatenate([one, one_next]),
-        np.concatenate([np.where(same, other, other_next), np.where(same, other_next, other)]),
+        np.concatenate([one, _next(one)]),
+        np.concatenate([np.where(same, other, _next(other)), np.where(same, _next(other), other)]),
     )
     kept, place = np.unique(corners, return_inverse=True)
     return compact(Surface(surface.vertices[surface.faces.ravel()[kept]], place.reshape(-1, 3)))
+
+
+def with_single_edges(surface: Surface) -> Surface:
+    """The closed surface without edges that more than two faces share: all pairs but one of them get a vertex within the edge."""
+    while True:
+        edges = edges_of(surface.faces)
+        if not (edges.counts > 2).any():
+            return surface
+        pairs = paired(surface, edges)
+        shared = edges.edge[pairs[:, 0]]
+        touched: set[int] = set()
+        kept: set[int] = set()
+        for pair, edge in zip(pairs, shared, strict=True):
+            if edges.counts[edge] > 2 and edge in kept and not touched & set((pair // 3).tolist()):
+                touched |= set((pair // 3).tolist())
+                surface = _with_vertex_within(surface, edges, pair)
+            kept.add(edge)
+
+
+def _with_vertex_within(surface: Surface, edges: Edges, pair: Indices) -> Surface:
+    """The two faces of a pair of half-edges halved by a new vertex in the middle of their edge."""
+    middle = surface.vertices[[edges.starts[pair[0]], edges.ends[pair[0]]]].mean(axis=0)
+    faces = np.concatenate([surface.faces, surface.faces[pair // 3]])
+    for row, half_edge in enumerate(pair.tolist()):
+        faces[half_edge // 3, (half_edge + 1) % 3] = len(surface.vertices)
+        faces[len(surface.faces) + row, half_edge % 3] = len(surface.vertices)
+    return Surface(np.concatenate([surface.vertices, middle[None]]), faces)
 
 
 def _next(half_edges: Indices) -> Indices:
