@@ -142,7 +142,7 @@ def _ok(text: str) -> Event:
     if found := OK.fullmatch(text):
         line, planner, rx = found.groups()
         return Ok(_whole(line), _whole(planner), _whole(rx), None, text)
-    if text.startswith("ok T"):
+    if text.startswith(("ok T", "ok B:")):  # Klipper tells the bed first
         return Ok(temperature=_temperature(text), text=text)
     return Ok(text=text) if text.startswith("ok ") else Unknown(text)
 

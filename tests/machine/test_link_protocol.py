@@ -34,6 +34,8 @@ LINES: list[tuple[bytes, Event]] = [
     (b"ok P15 B3", Ok(None, 15, 3, None, "ok P15 B3")),
     (b"ok 7\r", Ok(7, text="ok 7")),
     (b"ok T:19.38 /0.00 @:0", Ok(temperature=Temperature(19.38, 0.0), text="ok T:19.38 /0.00 @:0")),
+    (b"ok B:20.5 /0.0 T0:19.5 /0.0", Ok(
+        temperature=Temperature(19.5, 0.0, 20.5, 0.0), text="ok B:20.5 /0.0 T0:19.5 /0.0")),
     (b" T:19.38 /0.00 B:20.00 /60.00 C:30.1 /0.0 @:0", Temperature(19.38, 0.0, 20.0, 60.0)),
     (b"T:210.00 E:0 B:60.0 W:?", Temperature(210.0, None, 60.0, None)),
     (b"Resend: 12", Resend(12)),

@@ -330,6 +330,26 @@ def test_a_cable_pulled_out_is_one_error_for_reading_and_writing() -> None:
     port.close()
 
 
+def test_a_cable_pulled_in_mid_print_ends_it_and_leaves_no_thread() -> None:
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    firmware = Firmware(MACHINE)
+
+    def serve() -> None:
+        while firmware._taken < 100:
+            firmware.receive(os.read(master, 4096))
+            os.write(master, firmware.advance())
+        os.close(master)
+
+    threads, server = threading.active_count(), threading.Thread(target=serve, daemon=True)
+    server.start()
+    with pytest.raises(PortError, match="was lost"):
+        print_lines(PROGRAM, os.ttyname(slave), 250000, timing=QUICK)
+    server.join(5)
+    os.close(slave)
+    assert threading.active_count() <= threads
+
+
 def test_a_printer_behind_a_socket_is_printed_on_too() -> None:
     firmware, server = Firmware(MACHINE), socket.create_server(("localhost", 0))
 
