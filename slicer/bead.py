@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from numba import njit
 
 from mdp.mesh import Floats
 from slicer.paths import Kind
@@ -34,8 +35,15 @@ class Bead:
 
 def length_mm(points: Floats) -> float:
     """Length of a polyline."""
-    steps = points[1:] - points[:-1]
-    return float(np.sqrt((steps * steps).sum(axis=1)).sum())
+    return float(_length(points))
+
+
+@njit(cache=True)
+def _length(points: Floats) -> float:
+    total = 0.0
+    for i in range(1, len(points)):
+        total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
+    return total
 
 
 def spacing_mm(width_mm: float, height_mm: float) -> float:

@@ -7,11 +7,13 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 from slicer.polygons import Polygons, edges, grown
-from slicer.scanline import clipped, inside
+from slicer.scanline import all_inside, clipped
 
 RISKY_MARGIN = 1e-4  # faces at exactly the self-supporting angle count as safe whatever the rounding, as in the search
+RIM_MM = 0.04  # neighbouring strips of a slope overlap by this so that they unite
 BRIDGE_MM = 6.0  # spans up to this between two banks print without support
 BRIDGE_TURNS = 8
+BRIDGE_LEAST = 4.0  # in line widths squared: smaller places fall out later anyway
 
 
 def contacts(
@@ -28,12 +30,12 @@ def contacts(
             continue
         bank = outlines[i - 1] if i else below
         hanging = (outlines[i] - bank) ^ grown(Polygons(triangles), 0.5 * RIM_MM)
-        kept = [part for part in hanging.decompose() if not _bridge(part, bank, width_mm)]
-        found[i] = Polygons.compose(kept) if kept else Polygons()
+        islands = hanging.decompose()
+        if any(island.area() >= BRIDGE_LEAST * width_mm**2 for island in islands):
+            banks = edges(grown(bank, 0.25 * width_mm))
+            islands = [island for island in islands if not _bridge(island, banks, width_mm)]
+        found[i] = Polygons.compose(islands) if islands else Polygons()
     return found
-
-
-RIM_MM = 0.04  # neighbouring strips of a slope overlap by this so that they unite
 
 
 def _risky(mesh: Mesh, cuts_mm: Floats, angle_deg: float) -> dict[int, list[Floats]]:
@@ -49,19 +51,19 @@ def _risky(mesh: Mesh, cuts_mm: Floats, angle_deg: float) -> dict[int, list[Floa
     return masks
 
 
-def _bridge(hanging: Polygons, bank: Polygons, width_mm: float) -> bool:
-    """Whether lines in some direction span the place from bank to bank and none is longer than BRIDGE_MM."""
-    if hanging.area() < 4.0 * width_mm**2 or bank.is_empty():
+def _bridge(hanging: Polygons, banks: Floats, width_mm: float) -> bool:
+    """Whether lines in some direction span the place from bank (edges) to bank and none is longer than BRIDGE_MM."""
+    if hanging.area() < BRIDGE_LEAST * width_mm**2 or not len(banks):
         return False
-    banks = edges(grown(bank, 0.25 * width_mm))
+    around = edges(hanging).reshape(-1, 2)
     for k in range(BRIDGE_TURNS):
         angle = np.pi * k / BRIDGE_TURNS
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        sides = np.ascontiguousarray((edges(hanging).reshape(-1, 2) @ turn).reshape(-1, 4))
+        sides = np.ascontiguousarray((around @ turn).reshape(-1, 4))
         rows = clipped(sides, np.arange(sides[:, 1].min() + 0.5 * width_mm, sides[:, 1].max(), width_mm))
         if not len(rows) or float((rows[:, 1] - rows[:, 0]).max()) > BRIDGE_MM:
             continue
         ends = np.concatenate([rows[:, [0, 2]], rows[:, [1, 2]]]) @ turn.T
-        if all(inside(banks, x, y) for x, y in ends):
+        if all_inside(banks, ends):
             return True
     return False

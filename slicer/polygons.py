@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 from manifold3d import CrossSection, FillRule, JoinType, OpType
+from numba import njit
 
 from mdp.mesh import Floats
 
@@ -68,10 +69,22 @@ def edges(polygons: Polygons) -> Floats:
     loops = contours(polygons)
     if not loops:
         return np.zeros((0, 4))
-    return np.concatenate([np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops])
+    points = np.concatenate(loops)
+    ends = np.cumsum([len(loop) for loop in loops])
+    following = np.arange(1, len(points) + 1)
+    following[ends - 1] = np.concatenate([[0], ends[:-1]])
+    return np.hstack([points, points[following]])
 
 
 def area_mm2(loop: Floats) -> float:
     """Signed area of a loop by the shoelace formula, positive when counter-clockwise."""
-    x, y = (loop - loop[0]).T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return float(_shoelace(loop))
+
+
+@njit(cache=True)
+def _shoelace(loop: Floats) -> float:
+    x0, y0 = loop[0]
+    doubled = 0.0
+    for i in range(1, len(loop) - 1):
+        doubled += (loop[i, 0] - x0) * (loop[i + 1, 1] - y0) - (loop[i + 1, 0] - x0) * (loop[i, 1] - y0)
+    return 0.5 * doubled

@@ -70,6 +70,15 @@ def inside(edges: Floats, x: float, y: float) -> bool:
 
 
 @njit(cache=True)
+def all_inside(edges: Floats, points: Floats) -> bool:
+    """Whether every point (n, 2) lies in the polygons of (n, 4) edges."""
+    k = 0
+    while k < len(points) and inside(edges, points[k, 0], points[k, 1]):
+        k += 1
+    return k == len(points)
+
+
+@njit(cache=True)
 def joined(rows: Floats, fence: Floats, reach_mm: float) -> tuple[Floats, NDArray[np.int64]]:
     """Clipped lines joined end to end where a neighbouring line begins within reach and no fence edge lies between.
 

@@ -102,7 +102,8 @@ def _printed(
         if i > 0:
             roots = list(outlines[max(i - gap - 1, 0) : i]) + ([below] if below is not None and i <= gap else [])
             footing = grown(united([printed[-1], *roots]), process.line_width_mm)
-            islands = [island for island in islands if not (island ^ footing).is_empty()]
+            if (free - footing).area() > 0.0:
+                islands = [island for island in islands if not (island ^ footing).is_empty()]
         printed.append(Polygons.compose(islands) if islands else Polygons())
     return tuple(printed)
 
