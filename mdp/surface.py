@@ -28,10 +28,9 @@ def checked(path: Path, vertices: Any, faces: Any) -> Surface:
 
     Raises MeshError for no faces, a coordinate that is not a number and an index out of range.
     """
-    surface = Surface(
-        np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3),
-        np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3),
-    )
+    with np.errstate(invalid="ignore"):  # a signalling NaN of the file is told below
+        places = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
+    surface = Surface(places, np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3))
     if not len(surface.faces):
         raise MeshError(f"{path}: holds no faces.")
     finite = np.isfinite(surface.vertices).all(axis=1)

@@ -96,12 +96,12 @@ def _matrix(node: Any) -> Floats:
 def _surface(path: Path, document: Any, binary: bytes, primitive: Any, matrix: Floats) -> Surface:
     if primitive.get("mode", TRIANGLES) != TRIANGLES or primitive.get("extensions", {}).keys() & {"KHR_draco_mesh_compression"}:
         raise MeshError(f"{path}: holds lines, strips or compressed geometry; only plain triangles are read.")
-    vertices = _rows(path, document, binary, primitive["attributes"]["POSITION"], 3).astype(np.float64)
+    vertices = _rows(path, document, binary, primitive["attributes"]["POSITION"], 3)
     if "indices" in primitive:
         faces = _rows(path, document, binary, primitive["indices"], 1).astype(np.int64).reshape(-1, 3)
     else:
         faces = np.arange(len(vertices)).reshape(-1, 3)
-    checked(path, vertices, faces)
+    vertices = checked(path, vertices, faces).vertices
     if not np.array_equal(matrix, np.eye(4)):
         vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
     return checked(path, vertices, faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces)

@@ -11,7 +11,7 @@ from profiles.errors import MeshError
 
 
 def triangulated(path: Path, vertices: Floats, polygons: list[list[int]] | Indices) -> Indices:
-    """(m, 3) triangles in the order of the polygons; raises MeshError for an index out of range.
+    """(m, 3) triangles in the order of the polygons; raises MeshError for too few corners and an index out of range.
 
     A convex polygon becomes a fan about its first corner, any other the triangulation of least area.
     """
@@ -25,6 +25,8 @@ def triangulated(path: Path, vertices: Floats, polygons: list[list[int]] | Indic
     triangles: list[Indices] = []
     for number, polygon in enumerate(polygons, 1):
         corners = np.array(polygon, dtype=np.int64)
+        if len(corners) < 3:
+            raise MeshError(f"{path}: face {number} of {len(polygons)} has {len(corners)} corners, at least 3 are needed.")
         if corners.min() < 0 or corners.max() >= len(vertices):
             raise MeshError(f"{path}: face {number} names vertex {corners.max()} (counted from 0) of {len(vertices)} vertices.")
         if len(corners) == 3:

@@ -1,5 +1,7 @@
 """3MF: the build items of the package with their transforms, components and unit, in mm (3MF Core Specification 1.3)."""
 
+import lzma
+import struct
 import zipfile
 import zlib
 from dataclasses import dataclass, field
@@ -17,6 +19,21 @@ CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 PRODUCTION_PATH = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}path"
 RELATION = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
 MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+DAMAGES: tuple[type[Exception], ...] = (
+    KeyError,
+    ElementTree.ParseError,
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+)
+DAMAGES += (
+    ValueError,
+    LookupError,
+    NotImplementedError,
+    RuntimeError,
+    struct.error,
+)  # unknown compression, a password, a mangled directory
 LARGEST_MODEL_BYTES = 2**30  # a zip of a few kB can unpack to more than any memory
 DEEPEST = 32  # components within components; a ring of them would never end
 
@@ -37,7 +54,7 @@ class Package:
                 if self.archive.getinfo(name).file_size > LARGEST_MODEL_BYTES:
                     raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes.")
                 self.parts[name] = ElementTree.fromstring(self.archive.read(name))
-            except (KeyError, ElementTree.ParseError, zipfile.BadZipFile, zlib.error) as error:
+            except DAMAGES as error:
                 raise MeshError(f"{self.path}: its part {name} is missing or malformed ({error}).") from None
         return self.parts[name]
 
@@ -49,7 +66,7 @@ def read(path: Path) -> list[Surface]:
     """
     try:
         archive = zipfile.ZipFile(path)
-    except zipfile.BadZipFile:
+    except (zipfile.BadZipFile, struct.error, ValueError, NotImplementedError):
         raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short.") from None
     with archive:
         package = Package(path, archive)

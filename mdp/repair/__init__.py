@@ -50,20 +50,22 @@ def repaired(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
     lost = np.abs(_bounds(solid) - before).max()
     if lost > SHRINK * size:
         raise MeshError(f"cannot be made a valid solid: the closed part of it lacks {lost:.3g} mm of its extent of {size:.4g} mm")
-    solid, whole = _understood(solid)
+    solid, whole = _understood(solid, notes)
     if whole.volume() <= 0:
         raise MeshError("encloses no volume")
     return (_once_through(solid, whole, notes) if overlaps_itself(whole) else solid), notes
 
 
-def _understood(solid: Surface) -> tuple[Surface, "m3.Manifold"]:
+def _understood(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manifold"]:
     """The surface and its manifold3d solid, which must enclose the same volume.
 
     An edge of four faces leaves open which of them go on in which; where manifold3d pairs them otherwise, the edge is made two.
     """
-    for tried in (solid, with_single_edges(solid)):
+    for change in (lambda surface: surface, with_single_edges):
+        tried = change(solid)
         whole = solid_of(tried)
         if abs(whole.volume() - volume_of(tried)) <= SAME_VOLUME * abs(whole.volume()):
+            _note(notes, (len(tried.faces) - len(solid.faces)) // 2, "parted {} edge{} that four faces share")
             return tried, whole
     raise MeshError(f"cannot be made a valid solid: its volume is {volume_of(solid):.5g} mm3 or {whole.volume():.5g} mm3")
 

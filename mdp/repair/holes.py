@@ -31,7 +31,7 @@ def without_holes(surface: Surface) -> tuple[Surface, list[str]]:
     for loop in loops:
         points = surface.vertices[loop]
         rim = float(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).sum())
-        if len(loop) > LONGEST:
+        if len(loop) > LONGEST or (len(loop) > 4 and rim > RIM_SHARE * size):
             raise _too_large(loops, surface, loop, rim)
         cap = loop[filled(points)] if len(loop) > 2 else np.zeros((0, 3), dtype=np.int64)
         cap_area = float(areas_of(surface.vertices, cap).sum())

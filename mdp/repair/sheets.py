@@ -7,6 +7,7 @@ from mdp.repair.weld import compact
 from mdp.surface import Indices, Surface
 
 LOOSE_SHARE = 0.2  # of the area; a larger loose patch may well be the model itself
+MOST_LOOSE = 300  # patches taken away; a surface with more of them is no solid with a blemish
 
 
 def single(surface: Surface) -> Surface:
@@ -89,7 +90,7 @@ def without_loose(surface: Surface) -> Surface:
     Such a patch shares edges with two faces of the rest, which close without it. Taken away one after the other: those with an
     open edge first, then the least area, since a wall across a solid has less than what it parts; never a large share of all.
     """
-    while True:
+    for _ in range(MOST_LOOSE):
         edges = edges_of(surface.faces)
         if not (edges.counts % 2 * (edges.counts > 2)).any():
             return surface
@@ -102,3 +103,4 @@ def without_loose(surface: Surface) -> Surface:
         open_edges = np.bincount(np.repeat(patch, 3), edges.counts[edges.edge] == 1, minlength=len(patch))
         least = loose[np.lexsort((area[loose], open_edges[loose] == 0))[0]]
         surface = compact(Surface(surface.vertices, surface.faces[patch != least]))
+    return surface

@@ -101,10 +101,7 @@ def outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
     """
     if all(shell.volume > 0 for shell in shells):
         return shells, []
-    inside = {
-        i: [j for j, other in enumerate(shells) if j != i and abs(other.volume) > abs(shell.volume) and other.contains(shell)]
-        for i, shell in enumerate(shells)
-    }
+    inside = _containers(shells)
     turn = [shell.volume < 0 and not inside[i] for i, shell in enumerate(shells)]
     turn = [turn[i] ^ bool(sum(turn[j] for j in inside[i] if not inside[j]) % 2) for i in range(len(shells))]
     result = [shell.turned() if turn[i] else shell for i, shell in enumerate(shells)]
@@ -113,6 +110,17 @@ def outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
     result = [shell.turned() if stray[i] else shell for i, shell in enumerate(result)]
     count = sum(a ^ b for a, b in zip(turn, stray, strict=True))
     return result, [f"turned {count} of {len(shells)} shells the right side out"] if count else []
+
+
+def _containers(shells: list[Shell]) -> list[list[int]]:
+    """For each shell the larger ones that contain it."""
+    low, high = np.array([shell.low for shell in shells]), np.array([shell.high for shell in shells])
+    size = np.array([abs(shell.volume) for shell in shells])
+    found = []
+    for shell in shells:
+        around = (low <= shell.low).all(axis=1) & (high >= shell.high).all(axis=1) & (size > abs(shell.volume))
+        found.append([j for j in np.flatnonzero(around).tolist() if shells[j].contains(shell)])
+    return found
 
 
 def united(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
@@ -137,8 +145,11 @@ def united(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
 def _groups(outers: list[Shell], reach: float) -> list[list[int]]:
     """Bodies whose boxes come within reach of each other, transitively."""
     low, high = np.array([s.low for s in outers]), np.array([s.high for s in outers])
-    near = [(low <= high[i] + reach).all(axis=1) & (high >= low[i] - reach).all(axis=1) for i in range(len(outers))]
-    a, b = np.nonzero(np.array(near))
+    near = [
+        np.flatnonzero((low <= high[i] + reach).all(axis=1) & (high >= low[i] - reach).all(axis=1)) for i in range(len(outers))
+    ]
+    a = np.repeat(np.arange(len(outers)), [len(others) for others in near])
+    b = np.concatenate(near)
     label = components(len(outers), a, b)
     return [np.flatnonzero(label == first).tolist() for first in np.unique(label)]
 

@@ -100,6 +100,17 @@ def test_bodies_that_touch_in_an_edge_are_closed_each():
     assert mesh.areas_mm2.sum() == pytest.approx(1200)
 
 
+def test_an_edge_of_four_faces_that_hang_together_elsewhere_gets_a_vertex_of_its_own():
+    arch = m3.Manifold.cube((30, 10, 10)) + m3.Manifold.cube((10, 10, 20)) + m3.Manifold.cube((10, 10, 20)).translate((20, 0, 0))
+    touching = (
+        arch + m3.Manifold.cube((10, 10, 10)).translate((10, 0, 20)) + m3.Manifold.cube((10, 10, 30)).translate((10, 10, 0))
+    )
+    mesh, _ = mended(from_manifold(touching))
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    assert set(np.unique(edges, axis=0, return_counts=True)[1].tolist()) == {2}
+    assert mesh.volume_mm3 == pytest.approx(3000 + 2000 + 1000 + 3000)
+
+
 def test_objects_of_a_file_that_are_open_each_close_together():
     lower, upper = without(box(), *range(6, 12)), without(box(), *range(6))
     mesh, notes = mended(lower, upper)
@@ -195,6 +206,20 @@ def test_a_gap_as_wide_as_rounding_is_closed_but_a_wide_one_is_not():
     assert "merged" in notes[0]
     with pytest.raises(MeshError, match="is not closed"):
         repaired([Surface(surface.vertices + np.random.default_rng(2).uniform(-0.2, 0.2, surface.vertices.shape), surface.faces)])
+
+
+@pytest.mark.parametrize("lean_deg", [0, 37, 90])
+def test_a_body_that_passes_through_itself_counts_once(lean_deg):
+    ring = m3.Manifold.extrude(m3.CrossSection.square((10, 10)), 180).refine(36)
+
+    def bent(points):  # once and a quarter around: the last quarter lies within the first
+        turn = points[:, 2] * np.radians(450) / 180
+        radius = 10 + points[:, 0]
+        return np.stack([radius * np.cos(turn), radius * np.sin(turn), -points[:, 1]], axis=1)
+
+    mesh, notes = mended(from_manifold(ring.warp_batch(bent).rotate((lean_deg, 0, 0))))
+    assert mesh.volume_mm3 == pytest.approx(np.pi * (20**2 - 10**2) * 10, rel=0.02)
+    assert notes[0].startswith("united a body that passes through itself with itself")
 
 
 def test_a_speck_is_left_out():
