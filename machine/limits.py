@@ -44,7 +44,7 @@ def place(program: MachineProgram, index: int) -> str:
     part = next((m for m in reversed(program.moves[: index + 1]) if isinstance(m, BeginPart)), None)
     layer = next((m for m in reversed(program.moves[: index + 1]) if isinstance(m, BeginLayer)), None)
     if part is None:
-        return "before part 1"
+        return "before the first part"
     if layer is None or layer.part != part.index:
         return f"part {part.index}, before its first layer"
     return f"part {part.index}, layer {layer.index}"

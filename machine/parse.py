@@ -3,77 +3,18 @@
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mdp.mesh import Floats
+from machine.parsed import Event, MoveKind, ParsedProgram
+from machine.words import BLOCK, FLAG, FLAGS, MACRO, PAREN, WORD, shown, unframed
 from profiles.errors import GcodeError
 from profiles.machine import Machine
 
 LONGEST_LINE = 2000
 INCH_MM = 25.4
 DEFAULT_FEED = 1500.0
-NUMBER = r"[-+]?(?:[0-9]{1,12}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})(?![0-9])"  # bounded: no infinity from a thousand digits
-BLOCK = re.compile(rf"(?:[A-Z] *{NUMBER} *)*")
-WORD = re.compile(rf"([A-Z]) *({NUMBER})")
-FLAGS = re.compile(rf"[GM][0-9]+(?:\.[0-9]+)?(?: *[A-Z] *(?:{NUMBER})?)*")
-FLAG = re.compile(rf"([A-Z]) *({NUMBER})?")
-MACRO = re.compile(r"[A-Z_][A-Z0-9_]+(?: .*)?")
-PAREN = re.compile(r"\([^)]*\)")
 E_AXIS = 5
-
-
-class MoveKind(IntEnum):
-    """What a straight move does; RETRACT: filament alone, back or forth; ROTATE: the table turns."""
-
-    TRAVEL = 0
-    EXTRUDE = 1
-    RETRACT = 2
-    ROTATE = 3
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that is not a move: code as written ("M104"), its S (or P) value, letters named; before row `row`."""
-
-    line: int
-    code: str
-    value: float
-    letters: str
-    row: int
-
-
-@dataclass(frozen=True, eq=False)
-class ParsedProgram:
-    """A G-code text as arrays with one row per move (n rows).
-
-    line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row
-    before where G28 or G92 set a position. e_mm: filament pushed by the move. filament_mm: running sum of e_mm. feed:
-    F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
-    type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
-    layers: number of layer changes. parts: numbers of the parts in order. unsupported: (line, part, mm2).
-    """
-
-    line: NDArray[np.int64]
-    start: Floats
-    end: Floats
-    e_mm: Floats
-    filament_mm: Floats
-    feed: Floats
-    kind: NDArray[np.int8]
-    part: NDArray[np.int64]
-    layer: NDArray[np.int64]
-    type: NDArray[np.int64]
-    types: tuple[str, ...]
-    width_mm: Floats
-    height_mm: Floats
-    events: tuple[Event, ...]
-    ignored: dict[str, tuple[int, int]]
-    layers: int
-    parts: tuple[int, ...]
-    unsupported: tuple[tuple[int, int, float], ...]
 
 
 @dataclass
@@ -96,7 +37,7 @@ class Reader:
     width: float = 0.0
     height: float = 0.0
     number: int = 0
-    types: list[str] = field(default_factory=lambda: [""])
+    types: dict[str, int] = field(default_factory=lambda: {"": 0})
     parts: list[int] = field(default_factory=list)
     rows: list[tuple[float, ...]] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
@@ -132,8 +73,8 @@ def _command(reader: Reader, text: str) -> None:
     code = text.upper()
     if "(" in code:
         code = PAREN.sub(" ", code).strip()
-    if code.startswith("N") or "*" in code:
-        code = _unframed(reader, code)
+    if code.startswith("N"):
+        code = unframed(reader.number, code)
     if not code or code == "%":
         return
     if BLOCK.fullmatch(code):
@@ -149,7 +90,7 @@ def _command(reader: Reader, text: str) -> None:
         elif letter == "F":
             reader.feed = value * reader.scale
         else:
-            raise GcodeError(f"line {reader.number}: {_shown(text)} begins with no command: G, M or T is expected")
+            raise GcodeError(f"line {reader.number}: {shown(text)} begins with no command: G, M or T is expected")
         return
     _irregular(reader, code, text)
 
@@ -163,26 +104,12 @@ def _irregular(reader: Reader, code: str, text: str) -> None:
             [(letter, float(value or 0.0)) for letter, value in FLAG.findall(code[head.end() :])] if FLAGS.fullmatch(code) else []
         )
         if name in ("G0", "G1", "G92"):
-            raise GcodeError(f"line {reader.number}: {_shown(text)} has a word without a number")
+            raise GcodeError(f"line {reader.number}: {shown(text)} has a word without a number")
         _dispatch(reader, name, words)
-    elif MACRO.fullmatch(code) and text.isprintable() and not code.startswith(("G0 ", "G1 ")):
+    elif MACRO.fullmatch(code) and text.isprintable():
         _ignore(reader, code.split()[0])
     else:
-        raise GcodeError(f"line {reader.number}: {_shown(text)} cannot be read as G-code")
-
-
-def _unframed(reader: Reader, code: str) -> str:
-    """Without N number and checksum; a wrong checksum is refused."""
-    body, star, given = code.partition("*")
-    if star:
-        total = 0
-        for byte in body.encode("utf-8", "replace"):
-            total ^= byte
-        if not given.strip().isdigit() or int(given) != total:
-            raise GcodeError(
-                f"line {reader.number}: {_shown(code)} has checksum {given.strip()[:8]!r}, its characters give {total}"
-            )
-    return re.sub(r"^N *[0-9]+ *", "", body.strip())
+        raise GcodeError(f"line {reader.number}: {shown(text)} cannot be read as G-code")
 
 
 def _straight(reader: Reader, words: list[tuple[str, float]]) -> None:
@@ -298,9 +225,7 @@ def _remark(reader: Reader, remark: str) -> None:
     if not colon:
         return
     if key == "TYPE":
-        if value not in reader.types:
-            reader.types.append(value)
-        reader.type = reader.types.index(value)
+        reader.type = reader.types.setdefault(value, len(reader.types))
     elif key in ("WIDTH", "HEIGHT"):
         setattr(reader, key.lower(), _positive(value))
     elif key == "PART":
@@ -311,7 +236,7 @@ def _remark(reader: Reader, remark: str) -> None:
 
 def _part(reader: Reader, value: str) -> None:
     number = value.split()[0] if value.split() else ""
-    if number.isdigit():
+    if re.fullmatch("[0-9]{1,6}", number):
         reader.part, reader.layer = int(number), 0
         reader.parts.append(reader.part)
 
@@ -323,10 +248,6 @@ def _positive(text: str) -> float:
 
 def _name(letter: str, value: float) -> str:
     return f"{letter}{value:g}"
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= 40 else text[:40] + "...")
 
 
 def _arrays(reader: Reader) -> ParsedProgram:

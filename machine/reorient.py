@@ -68,7 +68,7 @@ def safe_pose(machine: Machine, printed: Printed, at_mm: Floats, start: Pose, en
             return SafePose(allowed, over)
     raise MoveError(
         f"part {part}: turning the table to {machine.tilt.letter}{end.tilt_deg:.3f} {machine.turn.letter}{end.turn_deg:.3f} "
-        f"needs the tip at Z {need:.1f} mm, {machine.name} allows at most {allowed:g} mm, and no place aside is clear of the table"
+        f"needs the tip at Z {need:.1f} mm, {machine.name} allows at most {allowed:g} mm, and no place aside is clear"
     )
 
 

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.collide import Body, Printed, bodies, directions, hull, refined_gap, sweep_gaps, table_reach
+from machine.dryrun.contact import stretches
 from machine.dryrun.findings import Finding
-from machine.parse import MoveKind, ParsedProgram
+from machine.parsed import MoveKind, ParsedProgram
 from machine.reorient import poses_between
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
@@ -26,15 +27,9 @@ def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[n
 def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
     """Moves with the table at rest, one group for every stretch between turns."""
     found = []
-    turns = np.any(np.diff(program.end[:, 3:], axis=0, prepend=program.start[:1, 3:]) != 0, axis=1)
-    stretch = np.cumsum(turns)
-    for number in np.unique(stretch):
-        rows = np.flatnonzero((stretch == number) & (program.kind != MoveKind.ROTATE))
-        if not len(rows):
-            continue
-        pose = Pose(*(float(v) for v in program.end[rows[0], 3:]))
+    for stretch in stretches(program):
         for body in bodies(machine):
-            found += _body(program, rows, body, machine, pose)
+            found += _body(program, stretch.rows, body, machine, stretch.pose)
     return found
 
 

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, heat, motion
+from machine.dryrun import clearance, contact, heat, motion
 from machine.dryrun.findings import Finding
 from machine.dryrun.timeline import move_times
 from machine.kinematics.table import workpiece_path
 from machine.limits import axis_limits
-from machine.parse import MoveKind, ParsedProgram, parse_gcode
+from machine.parse import parse_gcode
+from machine.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.profile import Profile
 
@@ -67,6 +68,7 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     found = [
         *motion.findings(program, machine),
         *clearance.findings(program, segments, rows, machine),
+        *contact.findings(program, segments, rows, machine),
         *heat.findings(program, profile),
     ]
     found.sort(key=lambda finding: (finding.severity, finding.line))

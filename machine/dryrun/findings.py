@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.parse import ParsedProgram
+from machine.parsed import ParsedProgram
 
 Severity = Literal["error", "warning"]
 

@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_line, per_part
-from machine.parse import MoveKind, ParsedProgram
+from machine.parsed import MoveKind, ParsedProgram
 from profiles.profile import Profile
 
 MELTING_C = 150.0

@@ -5,7 +5,7 @@ import numpy as np
 from machine.dryrun.findings import Finding, at_line, per_part
 from machine.dryrun.timeline import axis_speeds, lengths
 from machine.limits import ROUNDING, axis_limits
-from machine.parse import MoveKind, ParsedProgram
+from machine.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.machine import Machine
 

@@ -3,7 +3,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import DryRun, dry_run, summary
@@ -41,6 +41,7 @@ def test_a_turn_takes_the_slower_rotary_axis_s_time() -> None:
     assert _times([[0, 0, 0, 60.0, 60.0]], 1000.0).sum() == pytest.approx(60 / 30 + 30 / 200)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.lists(st.floats(0.01, 30.0), min_size=1, max_size=40), st.floats(5, 200))
 def test_pieces_of_a_straight_line_take_as_long_as_the_line(pieces: list[float], speed: float) -> None:
     whole = _times([[sum(pieces) * 0.6, sum(pieces) * 0.8]], speed).sum()

@@ -2,7 +2,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.collide import Block, Ring, bodies, directions, hull, refined_gap, spread, sweep_gaps, table_reach
@@ -29,6 +29,7 @@ def _plate(machine: Machine, pose: Pose) -> np.ndarray:
     return machine_points(machine, pose, np.vstack([rim, rim - [0, 0, machine.table.thickness_mm]]))
 
 
+@settings(deadline=None)  # the first call compiles
 @given(TILT, st.floats(-180, 180))
 def test_the_reach_of_the_table_is_that_of_its_rims(tilt: float, turn: float) -> None:
     machine, pose = GENERIC.machine, Pose(tilt, turn)
@@ -36,6 +37,7 @@ def test_the_reach_of_the_table_is_that_of_its_rims(tilt: float, turn: float) ->
     assert table_reach(machine, pose, tried) == pytest.approx((_plate(machine, pose) @ tried.T).max(axis=0), abs=0.02)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(TILT, st.tuples(st.floats(-150, 150), st.floats(-150, 150), st.floats(-50, 150)))
 def test_a_gap_never_exceeds_the_distance_of_sampled_points(tilt: float, tip: tuple[float, float, float]) -> None:
     machine, pose = GENERIC.machine, Pose(tilt, 0.0)
@@ -47,6 +49,7 @@ def test_a_gap_never_exceeds_the_distance_of_sampled_points(tilt: float, tip: tu
     assert sweep_gaps(box, place, place, tried, table_reach(machine, pose, tried))[0] <= distance + 1e-9
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.floats(5, 85), st.floats(5, 60), st.floats(0, 50))
 def test_over_a_wide_table_a_body_is_clear_exactly_above_the_known_height(tilt: float, reach: float, height: float) -> None:
     body = Box(name="duct", min_mm=(-1.0, -1.0, height), max_mm=(1.0, reach, height + 10.0))
@@ -77,13 +80,15 @@ def test_beside_the_table_s_edge_the_head_may_go_below_its_plane() -> None:
 
 
 def test_a_turn_under_a_low_head_meets_the_rim_and_what_is_printed() -> None:
-    text = "G28\nG92 A0 C0\nM109 S210\nM83\n;WIDTH:0.4\nG0 Z40 F600\nG1 X40 E1 F600\nG1 X-40 E1\nG0 Z{z}\nG0 X0\nG0 A{a} F600\nM104 S0"
+    line = "G28\nG92 A0 C0\nM109 S210\nM83\n;WIDTH:0.4\nG0 Z40 F600\nG1 X40 E1 F600\nG1 X-40 E1\n"
+    text = line + "G0 Z{z}\nG0 X0\nG0 A{a} F600\nM104 S0"
     profile = _with(Head(nozzle_mm=0.4, silhouette_mm=[(0.5, 0.0)], boxes=[]), 10.0)
     low = dry_run(text.format(z=40.1, a=5).splitlines(), profile).findings
     assert [f.message.split(" at ")[0] for f in low] == ["nozzle tip runs into the print while the table turns,"]
     assert not dry_run(text.format(z=60, a=30).splitlines(), profile).findings
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.floats(0, 80), st.floats(5, 30), st.floats(0, 40))
 def test_refining_never_loses_to_the_tried_directions(tilt: float, radius: float, height: float) -> None:
     machine, pose = GENERIC.machine, Pose(tilt, 0.0)

@@ -4,14 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
 from machine.dryrun.timeline import lengths
 from machine.gcode import write_gcode
 from machine.moves import MachineProgram, Stroke
-from machine.parse import MoveKind, parse_gcode
+from machine.parse import parse_gcode
+from machine.parsed import MoveKind
 from machine.rows import rows
 from machine.settings import clock
 from profiles.errors import ProfileError
@@ -51,6 +52,7 @@ def test_read_back_every_move_is_where_the_program_had_it(machine: str) -> None:
     assert parsed.filament_mm[first:] == pytest.approx(wanted.end[moving, 5], abs=5.1e-6)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.lists(st.floats(1e-7, 3.0), min_size=1, max_size=200))
 def test_rounding_of_filament_never_drifts(filament: list[float]) -> None:
     profile = load()

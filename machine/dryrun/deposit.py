@@ -1,0 +1,172 @@
+"""Deposit: how much of the deposited plastic lies inside the model, or within a tolerance of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from machine.dryrun.dryrun import DryRun
+from mdp.mesh import Floats, Mesh
+from slicer.paths import Kind
+
+AROUND = (Kind.SKIRT.value, Kind.SUPPORT.value, "Support material interface", "Custom")
+PIECE_MM = 1.0
+ASIDE = np.array([3.1e-7, 1.7e-7])  # keeps upright rays off the edges of CAD faces
+
+
+@dataclass(frozen=True)
+class Share:
+    """Extruded length within tolerance of the model, of all that belongs to it."""
+
+    inside_mm: float
+    total_mm: float
+    farthest_mm: float
+
+    @property
+    def share(self) -> float:
+        """0..1; 1 when nothing was extruded."""
+        return self.inside_mm / self.total_mm if self.total_mm > 0 else 1.0
+
+
+def inside_share(run: DryRun, mesh: Mesh, tolerance_mm: float) -> Share:
+    """The share of extruded length, skirt and support aside, that lies in the solid or within tolerance_mm of it.
+
+    Judged by the midpoints of pieces of at most 1 mm. mesh: the closed model in the workpiece frame. farthest_mm: the
+    greatest distance of a midpoint outside the model, looked for up to four tolerances and at least 1 mm.
+    """
+    own = np.array([name not in AROUND for name in run.segment_type], dtype=np.bool_)
+    middles, lengths = _pieces(run.segments_mm[own])
+    outside = outside_mm(middles, mesh, max(4.0 * tolerance_mm, 1.0))
+    within = outside <= tolerance_mm
+    return Share(float(lengths[within].sum()), float(lengths.sum()), float(outside.max(initial=0.0)))
+
+
+def _pieces(segments: Floats) -> tuple[Floats, Floats]:
+    """Midpoints and lengths of (m, 2, 3) segments cut into pieces of at most PIECE_MM."""
+    steps = segments[:, 1] - segments[:, 0]
+    length = np.linalg.norm(steps, axis=1)
+    counts = np.maximum(np.ceil(length / PIECE_MM), 1).astype(np.int64)
+    which = np.repeat(np.arange(len(segments)), counts)
+    place = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+    middles: Floats = segments[which, 0] + ((place + 0.5) / counts[which])[:, None] * steps[which]
+    return middles, length[which] / counts[which]
+
+
+def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:
+    """(n,) distances of (n, 3) points from a closed mesh's solid: 0 inside, at most most_mm (farther is not looked for)."""
+    corners = mesh.vertices[mesh.faces]
+    column = float(np.sqrt(np.ptp(mesh.vertices[:, :2], axis=0).prod() / max(len(corners), 1)))
+    columns = _Cells.over(corners, max(column, float(np.ptp(mesh.vertices[:, :2], axis=0).max()) / 400.0), 0.0)
+    distances = np.zeros(len(points))
+    out = np.flatnonzero(_winding(points, corners, *columns.arrays, ASIDE) <= 0)
+    near = _Cells.over(corners, max(most_mm, column), most_mm)
+    distances[out] = _nearest(points[out], corners, *near.arrays, most_mm)
+    return distances
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """A lattice over x and y with the faces of each cell: those of cell k are faces[first[k] : first[k + 1]]."""
+
+    origin: Floats
+    size: float
+    shape: NDArray[np.int64]
+    first: NDArray[np.int64]
+    faces: NDArray[np.int64]
+
+    @classmethod
+    def over(cls, corners: Floats, size: float, grow: float) -> "_Cells":
+        """Cells of a size; a face belongs to those that its box, grown, touches."""
+        low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+        origin = low.min(axis=0) - 1e-3
+        shape = (np.floor((high.max(axis=0) + 1e-3 - origin) / size) + 1).astype(np.int64)
+        return cls(origin, size, shape, *_listed(low, high, origin, size, shape, grow))
+
+    @property
+    def arrays(self) -> tuple[Floats, float, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """What the kernels take."""
+        return self.origin, self.size, self.shape, self.first, self.faces
+
+
+def _listed(
+    low: Floats, high: Floats, origin: Floats, size: float, shape: NDArray[np.int64], grow: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For every cell the faces whose boxes, grown, touch it."""
+    a = np.clip(np.floor((low - grow - origin) / size), 0, shape - 1).astype(np.int64)
+    b = np.clip(np.floor((high + grow - origin) / size), 0, shape - 1).astype(np.int64)
+    wide = b - a + 1
+    counts = wide[:, 0] * wide[:, 1]
+    face = np.repeat(np.arange(len(low)), counts)
+    step = np.arange(len(face)) - np.repeat(np.cumsum(counts) - counts, counts)
+    cell = (a[face, 0] + step % wide[face, 0]) * shape[1] + a[face, 1] + step // wide[face, 0]
+    order = np.argsort(cell, kind="stable")
+    return np.searchsorted(cell[order], np.arange(shape.prod() + 1)), face[order]
+
+
+@njit(cache=True)
+def _winding(points, corners, origin, size, shape, first, faces, aside):  # type: ignore[no-untyped-def]
+    """(n,) how often the surface winds about each point: signed crossings of the ray straight up."""
+    winding = np.zeros(len(points), np.int64)
+    for i in range(len(points)):
+        x, y, z = points[i, 0] + aside[0], points[i, 1] + aside[1], points[i, 2]
+        cx, cy = int(np.floor((x - origin[0]) / size)), int(np.floor((y - origin[1]) / size))
+        if cx < 0 or cy < 0 or cx >= shape[0] or cy >= shape[1]:
+            continue
+        cell = cx * shape[1] + cy
+        for k in range(first[cell], first[cell + 1]):
+            a, b, c = corners[faces[k], 0], corners[faces[k], 1], corners[faces[k], 2]
+            u = (b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)
+            v = (c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)
+            w = (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)
+            hit = (u > 0 and v > 0 and w > 0) or (u < 0 and v < 0 and w < 0)
+            if hit and (u * a[2] + v * b[2] + w * c[2]) / (u + v + w) > z:
+                winding[i] += 1 if u > 0 else -1
+    return winding
+
+
+@njit(cache=True)
+def _nearest(points, corners, origin, size, shape, first, faces, most):  # type: ignore[no-untyped-def]
+    """(n,) distance of each point to the nearest face, at most `most`."""
+    distances = np.full(len(points), most)
+    for i in range(len(points)):
+        p = points[i]
+        cx = min(max(int(np.floor((p[0] - origin[0]) / size)), 0), shape[0] - 1)
+        cy = min(max(int(np.floor((p[1] - origin[1]) / size)), 0), shape[1] - 1)
+        cell = cx * shape[1] + cy
+        for k in range(first[cell], first[cell + 1]):
+            d = _to_triangle(p, corners[faces[k], 0], corners[faces[k], 1], corners[faces[k], 2])
+            distances[i] = min(distances[i], d)
+    return distances
+
+
+@njit(cache=True)
+def _to_triangle(p, a, b, c):  # type: ignore[no-untyped-def]
+    """Distance of a point from a triangle: inside its prism the height, else the nearest edge."""
+    ab, ac, ap = b - a, c - a, p - a
+    n = _cross(ab, ac)
+    nn = _dot(n, n)
+    if nn > 1e-24:
+        v, w = _dot(_cross(ap, ac), n), _dot(_cross(ab, ap), n)
+        if v >= 0 and w >= 0 and v + w <= nn:
+            return abs(_dot(ap, n)) / np.sqrt(nn)
+    return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
+
+
+@njit(cache=True)
+def _to_edge(p, a, b):  # type: ignore[no-untyped-def]
+    d, ap = b - a, p - a
+    length2 = _dot(d, d)
+    t = min(max(_dot(ap, d) / length2, 0.0), 1.0) if length2 > 0 else 0.0
+    rest = ap - t * d
+    return np.sqrt(_dot(rest, rest))
+
+
+@njit(cache=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True)
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
