@@ -60,7 +60,7 @@ def command_of(line: str, place: int) -> str:
         raise LocalProtocolError(f"line {place} ({command[:40]!r}) holds a '*': checksums are added by the sender")
     if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
         raise LocalProtocolError(f"line {place} holds {name_of(command)}, which {reason}: remove it from the program")
-    if len(command) > LINE_LIMIT - 6 and len(command) + len(str(place)) + 6 > LINE_LIMIT:
+    if len(command) > LINE_LIMIT - 6 and len(command) + len(str(place + 3)) + 6 > LINE_LIMIT:
         raise LocalProtocolError(
             f"line {place} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
             f"{LINE_LIMIT} are allowed"

@@ -10,6 +10,7 @@ from machine.link.port import Port
 # inside the part.
 ORDERS = b"\nM108\nM410\nM104 S0\nM140 S0\nM107\nM105\n"
 AGAIN_S = 2.0  # noise may eat an order; without the proof they are given again this often
+OLD_WORDS_S = 1.0  # a report from before the orders proves nothing; a printer that never falls silent is not waited for
 SETTLE_S = 20.0  # lines that the printer had already taken are run first
 
 
@@ -20,6 +21,8 @@ def heaters_off(port: Port, patience_s: float = SETTLE_S) -> bool:
     """
     port.discard()
     began_s = monotonic()
+    while port.read() and monotonic() - began_s < OLD_WORDS_S:
+        pass
     next_s, heard = began_s, b""
     while (now_s := monotonic()) - began_s < patience_s:
         if now_s >= next_s:

@@ -12,7 +12,7 @@ from machine.link.progress import Place, Progress
 from machine.link.protocol import Protocol, Timing
 from machine.link.shutdown import SETTLE_S, heaters_off
 from machine.link.states import State
-from profiles.errors import FirmwareError, PortError, SilenceError
+from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
 
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself
@@ -21,7 +21,7 @@ WARNINGS = 20  # kept of the printer's own words that show a program it does not
 WARNS = ("nknown command", "cold extrusion", "too long extrusion")
 # After an error the printer may be deaf: the orders are given, the proof is not awaited for long. A halted or restarted
 # firmware has switched its heaters off by itself.
-PATIENCE_S: dict[type[BaseException], float] = {FirmwareError: 1.0, SilenceError: 5.0}
+PATIENCE_S: dict[type[PrinterError], float] = {FirmwareError: 1.0, SilenceError: 5.0}
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,8 @@ def print_lines(
 
     A set `stop` flag ends the print: feeding stops, moves are stopped, heaters and fan go off, nothing homes or turns; the
     Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises LocalProtocolError for a line that
-    cannot be sent, PortError, FirmwareError, RemoteProtocolError or SilenceError (heaters off is tried first).
+    cannot be sent, PortError, FirmwareError, RemoteProtocolError or SilenceError; the heaters are switched off first and
+    the message says whether the printer confirmed it.
     """
     if isinstance(lines, str):
         lines = lines.splitlines()
@@ -76,21 +77,24 @@ def print_lines(
             talk.finish()
         except _StoppedError:
             return replace(talk.outcome(cancelled=True), heaters_off=heaters_off(wire) if talk.greeted else None)
-        except BaseException as error:
+        except PrinterError as error:
+            if not talk.greeted:
+                raise
+            raise type(error)(f"{error}; {_left(wire, error)}") from None
+        except BaseException:
             if talk.greeted:
-                _leave(wire, error)
+                heaters_off(wire)
             raise
         return talk.outcome(cancelled=False)
 
 
-def _leave(wire: Port, error: BaseException) -> None:
-    """Heaters off before the error goes its way; a port that is gone cannot be told anything."""
-    if isinstance(error, PortError):
-        return
+def _left(wire: Port, error: PrinterError) -> str:
+    """Heaters off before an error goes its way; words on whether the printer proved it."""
     try:
-        heaters_off(wire, PATIENCE_S.get(type(error), SETTLE_S))
+        proven = not isinstance(error, PortError) and heaters_off(wire, PATIENCE_S.get(type(error), SETTLE_S))
     except PortError:
-        return
+        proven = False
+    return "the printer reports its heaters off" if proven else "its heaters may still be on, look at the printer"
 
 
 class _Talk:

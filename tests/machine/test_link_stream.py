@@ -114,7 +114,7 @@ def test_a_line_that_cannot_be_sent_is_refused_before_anything_is_sent(bad: str)
 
 def test_a_bad_line_of_a_stream_stops_the_print_with_heaters_off() -> None:
     with SimulatedPrinter(MACHINE) as printer:
-        with pytest.raises(LocalProtocolError, match="line 4"):
+        with pytest.raises(LocalProtocolError, match=r"line 4 .*; the printer reports its heaters off"):
             print_lines(iter([*HEAT, "M117 ö"]), printer.path, 250000, timing=QUICK)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
 
@@ -343,7 +343,7 @@ def test_a_cable_pulled_in_mid_print_ends_it_and_leaves_no_thread() -> None:
 
     threads, server = threading.active_count(), threading.Thread(target=serve, daemon=True)
     server.start()
-    with pytest.raises(PortError, match="was lost"):
+    with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
         print_lines(PROGRAM, os.ttyname(slave), 250000, timing=QUICK)
     server.join(5)
     os.close(slave)
