@@ -5,6 +5,7 @@ Exit codes: 0 done, 1 the user can fix it, 3 a bug (log file named), 130 interru
 
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -168,9 +169,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     command = typer.main.get_command(app)
     try:
-        code = command.main(given or ["--help"], prog_name="tiltprint", standalone_mode=False)
+        with command.make_context("tiltprint", given or ["--help"]) as context:
+            code = command.invoke(context)
+    except typer.Exit as done:
+        return done.exit_code
     except TyperException as error:
-        return _complain(_usage(error))
+        return _complain(_usage(error, given))
     except UserError as error:
         return _complain(str(error))
     except (KeyboardInterrupt, typer.Abort):
@@ -184,7 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(code or 0)
 
 
-def _usage(error: TyperException) -> str:
+def _usage(error: TyperException, given: Sequence[str]) -> str:
     """A usage error as one sentence that names what is allowed."""
     message = str(getattr(error, "format_message", lambda: str(error))()).strip().rstrip(".")
     context = getattr(error, "ctx", None)
@@ -195,6 +199,8 @@ def _usage(error: TyperException) -> str:
         return f"{message}; {context.command_path} knows {', '.join(allowed)}"
     if message.startswith("No such command"):
         return f"{message}; allowed are {', '.join(context.command.commands)}"
+    for option, value in pairwise(given):
+        message = message.replace(f"Invalid value for '{option}': Input", f"{option} is {value!r}: it")
     return f"{message}; see {context.command_path} --help"
 
 

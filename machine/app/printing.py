@@ -8,7 +8,7 @@ from math import inf
 from types import FrameType
 
 from machine.app.pipeline import Program
-from machine.app.progress import Ticker
+from machine.app.progress import Ticker, say
 from machine.app.report import duration, show
 from machine.link.progress import Progress
 from machine.link.simulator import SimulatedPrinter
@@ -24,19 +24,17 @@ def print_program(program: Program, profile: Profile, port: str, baud: int, sim_
     if sim_speed < 0:
         raise PrinterError(f"--sim-speed is {sim_speed:g}: it must be 0 (as fast as possible) or above")
     if port != SIMULATED:
-        show(_told(_stream(program, port, baud)))
-        return 0
+        return _ended(_stream(program, port, baud))
     with SimulatedPrinter(profile.machine, sim_speed or inf) as printer:
         outcome = _stream(program, printer.path, baud)
         record = printer.record
+    if outcome.cancelled:
+        return _ended(outcome)
     segments, volumes = record.deposited(profile.material.diameter_mm)
     planned = float(program.run.segment_mm3.sum())
-    show(_told(outcome))
-    show(
-        f"simulated printer: {len(record.start)} moves in {duration(float(record.duration_s.sum()))}, {len(segments)} strokes laid "
-        f"{volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f}), heaters at {record.nozzle_target_c:g} and "
-        f"{record.bed_target_c:g} deg C at the end\n"
-    )
+    laid = f"{len(segments)} strokes laid {volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f})"
+    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C at the end"
+    show(f"simulated printer: {len(record.start)} moves in {duration(float(record.duration_s.sum()))}, {laid}, {heaters}\n")
     if record.clamped or record.unknown:
         raise PrinterError(
             f"the simulated printer met {record.clamped} coordinates out of limits and {record.unknown} unknown commands"
@@ -50,10 +48,6 @@ def _stream(program: Program, port: str, baud: int) -> Outcome:
     with _stopping(stop):
         outcome = print_lines(program.lines, port, baud, lambda progress: ticker.tick(status(progress)), stop, program.run.time_s)
     ticker.close()
-    if outcome.cancelled:
-        raise KeyboardInterrupt(
-            f"after {outcome.acknowledged} lines; heaters {'off' if outcome.heaters_off else 'not confirmed off'}"
-        )
     return outcome
 
 
@@ -91,7 +85,14 @@ def status(progress: Progress) -> str:
     return "printing: " + ", ".join(told)
 
 
-def _told(outcome: Outcome) -> str:
-    lines = f"printed: {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
-    warned = "".join(f"\nthe printer said: {warning}" for warning in outcome.warnings)
-    return f"{lines} ({outcome.firmware[:60]}){warned}\n"
+def _ended(outcome: Outcome) -> int:
+    """Tell how the print ended; 130 when a person stopped it."""
+    for warning in outcome.warnings:
+        say(f"the printer said: {warning}")
+    if outcome.cancelled:
+        heaters = "heaters off" if outcome.heaters_off else "the printer did not confirm that its heaters are off: look at it"
+        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
+        return 130
+    told = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
+    show(f"{told} ({outcome.firmware[:60]})\n")
+    return 0

@@ -33,7 +33,7 @@ def check(file: Path) -> int:
     """Print every problem of a profile file; 1 when there are any."""
     problems = check_file(file)
     for problem in problems:
-        sys.stderr.write(f"{file}: {problem}\n")
+        sys.stderr.write(f"tiltprint: {file}: {problem}\n")
     if not problems:
         sys.stdout.write(f"{file}: no problem found\n")
     return 1 if problems else 0

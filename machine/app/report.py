@@ -43,7 +43,8 @@ def run_table(run: DryRun) -> str:
     values = summary(run)
     low, high = values["bounds_mm"] or ([0.0] * 3, [0.0] * 3)
     lines = [
-        f"time {duration(values['time_s'])}, filament {values['filament_mm'] / 1000:.2f} m, {values['extruded_mm3'] / 1000:.2f} cm3",
+        f"time {duration(values['time_s'])}, filament {values['filament_mm'] / 1000:.2f} m, "
+        f"{values['extruded_mm3'] / 1000:.2f} cm3",
         f"{values['parts']} parts, {values['layers']} layers, {values['reorientations']} reorientations, "
         f"{values['retractions']} retractions, {values['travel_mm'] / 1000:.2f} m travel",
         "plastic from " + ", ".join(f"{a:.1f}" for a in low) + " to " + ", ".join(f"{b:.1f}" for b in high) + " mm (workpiece)",

@@ -1,0 +1,149 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from machine.app.cli import main
+
+FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "process.first_layer_height_mm=0.3"]
+FAST += ["--set", "process.line_width_mm=0.6", "--set", "process.scale=0.6"]
+
+WRONG = [
+    (["decompose", "nowhere.stl"], "nowhere.stl"),
+    (["decompose", "."], "folder"),
+    (["decompose", "demo:unicorn"], "figure"),
+    (["decompose", "demo:tree", "--nonsense"], "--beam-width"),
+    (["decompose", "demo:tree", "--machine", "lathe"], "generic_ac"),
+    (["decompose", "demo:tree", "--set", "process.wals=2"], "process.wals"),
+    (["decompose", "demo:tree", "--set", "process.walls=-2"], "process.walls"),
+    (["decompose", "demo:tree", "--set", "walls"], "KEY=VALUE"),
+    (["decompose", "demo:tree", "--beam-width", "0"], "beam_width"),
+    (["decompose", "demo:tree", "--beam-width", "many"], "many"),
+    (["decompose", "demo:tree", "--ranker", "oracle"], "classic"),
+    (["export", "demo:tree"], "--out"),
+    (["export", "demo:tree", "-o", "/nowhere/x.gcode"], "/nowhere"),
+    (["export", "demo:tree", "-o", "."], "folder"),
+    (["print", "demo:tree"], "--port"),
+    (["print", "empty.gcode", "--port", "sim"], "empty.gcode"),
+    (["simulate", "rubbish.gcode"], "rubbish.gcode"),
+    (["profiles", "show", "unicorn"], "generic_ac"),
+    (["profiles", "check", "nowhere.toml"], "nowhere.toml"),
+    (["fly"], "decompose"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty.gcode").write_text("")
+    (tmp_path / "rubbish.gcode").write_bytes(bytes(range(256)))
+    return tmp_path
+
+
+@pytest.mark.parametrize(("arguments", "named"), WRONG, ids=lambda value: " ".join(value) if isinstance(value, list) else value)
+def test_wrong_input_is_one_sentence_naming_what_is_allowed(
+    folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], named: str
+) -> None:
+    before = sorted(folder.iterdir())
+    assert main(arguments) == 1
+    message = capsys.readouterr().err
+    assert named in message
+    assert message.startswith("tiltprint: ")
+    assert message.count("\n") == 1
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_bug_ends_with_exit_3_and_a_log_file(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def broken() -> int:
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr("machine.app.profile_commands.list_profiles", broken)
+    assert main(["profiles", "list"]) == 3
+    log = Path(capsys.readouterr().err.strip().rsplit(" ", 1)[1])
+    assert "ZeroDivisionError: planted" in log.read_text()
+    log.unlink()
+
+
+def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
+    assert main(["decompose", "demo:bracket", *FAST, "-o", "parts", "--json", "out.json", "--png", "parts.png"]) == 0
+    told = json.loads(Path("out.json").read_text())
+    assert set(told) == {
+        "model", "faces", "beam_width", "ranker", "seconds", "risky_area_mm2", "residual_area_mm2", "reduction", "volume_mm3",
+        "candidates_evaluated", "rounds", "parts",
+    }  # fmt: skip
+    assert set(told["parts"][0]) == {
+        "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "faces", "file",
+    }  # fmt: skip
+    assert sum(part["volume_mm3"] for part in told["parts"]) == pytest.approx(told["volume_mm3"], rel=1e-6)
+    files = {part["file"] for part in told["parts"]} | {"decomposition.3mf", "decomposition.json"}
+    assert {file.name for file in Path("parts").iterdir()} == files
+    assert Path("parts.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Path) -> None:
+    for name in ("a.gcode", "b.gcode"):
+        assert main(["export", "demo:bracket", *FAST, "-o", name, "--json", "a.json"]) == 0
+    assert Path("a.gcode").read_bytes() == Path("b.gcode").read_bytes()
+    assert main(["simulate", "a.gcode", *FAST, "--json", "again.json"]) == 0
+    first, again = (json.loads(Path(name).read_text()) for name in ("a.json", "again.json"))
+    assert set(first) == {
+        "time_s", "filament_mm", "extruded_mm3", "travel_mm", "layers", "parts", "reorientations", "retractions", "bounds_mm",
+        "axes", "findings",
+    }  # fmt: skip
+    assert first == again
+
+
+def test_profiles_show_and_check_agree(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["profiles", "show", "generic_ac", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["machine"]["tilt"]["letter"] == "A"
+    Path("mine.toml").write_text('inherits = "generic_ac"\n[machine.tilt]\nlimits_deg = [50.0, -50.0]\n')
+    assert main(["profiles", "check", "mine.toml"]) == 1
+    assert "limits_deg" in capsys.readouterr().err
+
+
+def _program(folder: Path) -> Path:
+    """Three hours of careful strokes over a hot bed."""
+    lines = ["G21", "G90", "M83", "G28 X Y Z", "G92 A0 C0", "M140 S60", "M190 S60", "M104 S210", "M109 S210", "G0 Z0.2 F600"]
+    lines += [f"G1 X{40 * (k % 2)} E1.0 F60" for k in range(1, 200)]
+    file = folder / "long.gcode"
+    file.write_text("\n".join([*lines, "M104 S0", "M140 S0"]) + "\n")
+    return file
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_print_ends_with_heaters_off_and_exit_130(folder: Path, number: int) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "machine.app.cli",
+        "print",
+        str(_program(folder)),
+        "--port",
+        "sim",
+        "--sim-speed",
+        "20",
+        "--force",
+    ]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2])
+    assert process.stderr is not None
+    _wait_for(process, "printing:")
+    os.kill(process.pid, number)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "heaters off" in message
+
+
+def _wait_for(process: "subprocess.Popen[str]", word: str) -> None:
+    assert process.stderr is not None
+    for _ in range(100):
+        line = process.stderr.readline()
+        if word in line:
+            return
+        if not line:
+            time.sleep(0.1)
+    pytest.fail(f"{word!r} was never said")
