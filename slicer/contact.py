@@ -1,41 +1,57 @@
 """Contacts: the places of each layer that hang over nothing and are too flat to carry themselves."""
 
 from collections.abc import Sequence
-from math import radians, sin
+from dataclasses import dataclass
+from math import inf, radians, sin
 
 import numpy as np
 
 from mdp.mesh import Floats, Mesh
+from profiles.process import Process
+from slicer.bridge import LEAST, LONGEST_MM, Bridge, bridge
 from slicer.polygons import Polygons, edges, grown
-from slicer.scanline import all_inside, clipped
 
 RISKY_MARGIN = 1e-4  # faces at exactly the self-supporting angle count as safe whatever the rounding, as in the search
 RIM_MM = 0.04  # neighbouring strips of a slope overlap by this so that they unite
-BRIDGE_MM = 6.0  # spans up to this between two banks print without support
-BRIDGE_TURNS = 8
-BRIDGE_LEAST = 4.0  # in line widths squared: smaller places fall out later anyway
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Of one layer: hanging wants support, bridges carry themselves."""
+
+    hanging: Polygons
+    bridges: tuple[Bridge, ...]
 
 
 def contacts(
-    mesh: Mesh, outlines: Sequence[Polygons], cuts_mm: Floats, angle_deg: float, below: Polygons | None, width_mm: float
-) -> list[Polygons]:
-    """For every layer the part of its outline above a risky face, without short bridges; empty where there is none.
+    mesh: Mesh, outlines: Sequence[Polygons], cuts_mm: Floats, process: Process, below: Polygons | None
+) -> list[Contact]:
+    """For every layer the part of its outline above a risky face.
 
-    mesh and cuts_mm: part frame. below: plastic under the first layer, None: the platform, on which it may lie.
+    mesh and cuts_mm: part frame. below: plastic under the first layer, None: the platform, on which it may lie. Without
+    support every span from bank to bank is a bridge, however long.
     """
-    masks = _risky(mesh, cuts_mm, angle_deg)
-    found = [Polygons()] * len(outlines)
-    for i, triangles in masks.items():
+    longest_mm = inf if process.support == "none" else LONGEST_MM
+    found = [Contact(Polygons(), ())] * len(outlines)
+    for i, triangles in _risky(mesh, cuts_mm, process.self_supporting_angle_deg).items():
         if i == 0 and below is None:
             continue
-        bank = outlines[i - 1] if i else below
+        bank = outlines[i - 1] if i else grown(below, RIM_MM)
         hanging = (outlines[i] - bank) ^ grown(Polygons(triangles), 0.5 * RIM_MM)
-        islands = hanging.decompose()
-        if any(island.area() >= BRIDGE_LEAST * width_mm**2 for island in islands):
-            banks = edges(grown(bank, 0.25 * width_mm))
-            islands = [island for island in islands if not _bridge(island, banks, width_mm)]
-        found[i] = Polygons.compose(islands) if islands else Polygons()
+        if not hanging.is_empty():
+            found[i] = _contact(hanging, bank, process.line_width_mm, longest_mm)
     return found
+
+
+def _contact(hanging: Polygons, bank: Polygons, width_mm: float, longest_mm: float) -> Contact:
+    """Sorts the connected pieces of a hanging place."""
+    islands = hanging.decompose()
+    if all(island.area() < LEAST * width_mm**2 for island in islands):
+        return Contact(hanging, ())
+    banks = edges(grown(bank, 0.25 * width_mm))
+    spans = [bridge(island, banks, width_mm, longest_mm) for island in islands]
+    rest = [island for island, span in zip(islands, spans, strict=True) if span is None]
+    return Contact(Polygons.compose(rest) if rest else Polygons(), tuple(span for span in spans if span is not None))
 
 
 def _risky(mesh: Mesh, cuts_mm: Floats, angle_deg: float) -> dict[int, list[Floats]]:
@@ -49,21 +65,3 @@ def _risky(mesh: Mesh, cuts_mm: Floats, angle_deg: float) -> dict[int, list[Floa
         for layer in range(a, b + 1):
             masks.setdefault(layer, []).append(corner)
     return masks
-
-
-def _bridge(hanging: Polygons, banks: Floats, width_mm: float) -> bool:
-    """Whether lines in some direction span the place from bank (edges) to bank and none is longer than BRIDGE_MM."""
-    if hanging.area() < BRIDGE_LEAST * width_mm**2 or not len(banks):
-        return False
-    around = edges(hanging).reshape(-1, 2)
-    for k in range(BRIDGE_TURNS):
-        angle = np.pi * k / BRIDGE_TURNS
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        sides = np.ascontiguousarray((around @ turn).reshape(-1, 4))
-        rows = clipped(sides, np.arange(sides[:, 1].min() + 0.5 * width_mm, sides[:, 1].max(), width_mm))
-        if not len(rows) or float((rows[:, 1] - rows[:, 0]).max()) > BRIDGE_MM:
-            continue
-        ends = np.concatenate([rows[:, [0, 2]], rows[:, [1, 2]]]) @ turn.T
-        if all_inside(banks, ends):
-            return True
-    return False

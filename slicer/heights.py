@@ -6,9 +6,11 @@ from math import floor
 import numpy as np
 
 from mdp.mesh import Floats
+from profiles.errors import SliceError
 from profiles.process import Process
 
 LEAST_SHARE = 0.25  # a layer thinner than this share of the layer height does not come out of the nozzle evenly
+MOST_LAYERS = 50_000  # ten metres of 0.2 mm; beyond that a unit or the scale is wrong
 MOST_SHARE = 0.9  # of the line width: a higher bead does not stick, the bound of the process profile
 
 
@@ -27,9 +29,15 @@ def heights(top_mm: float, process: Process, on_platform: bool) -> Heights:
     A part on plastic begins pressed into it by the interface overlap: the tip of layer i = 1, 2, ... is at
     i * height - overlap. Each section is taken in the middle of what its layer fills above the base plane. The last
     layer meets the top: it is lower, or the one below is stretched when less than a quarter layer remains.
+    Raises SliceError for a part that is too high to be meant.
     """
     overlap = 0.0 if on_platform else process.interface_overlap_mm
     first = process.first_layer_height_mm if on_platform else process.layer_height_mm
+    if top_mm > MOST_LAYERS * process.layer_height_mm:
+        raise SliceError(
+            f"a part {top_mm:.6g} mm high needs {top_mm / process.layer_height_mm:.0f} layers of process.layer_height_mm "
+            f"{process.layer_height_mm:g} mm: at most {MOST_LAYERS} are allowed"
+        )
     thick = _thicknesses(top_mm + overlap, first, process.layer_height_mm, MOST_SHARE * process.line_width_mm)
     tip = np.cumsum(thick) - overlap
     bottom = np.maximum(tip - thick, 0.0)

@@ -10,7 +10,9 @@ from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import Bead
+from slicer.bridge import Bridge
 from slicer.brim import brim
+from slicer.contact import contacts
 from slicer.gap import gaps
 from slicer.heights import heights
 from slicer.infill import infill
@@ -49,22 +51,27 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
         process.infill_density,
         process.line_width_mm,
     )
-    props = supports(mesh, outlines, at, process, below, lambda: sections_of(later, part, at.cut_mm))
+    over = contacts(mesh, outlines, at.cut_mm, process, below)
+    props = supports([c.hanging for c in over], outlines, process, below, lambda: sections_of(later, part, at.cut_mm))
     layers: list[Layer] = []
     tip: Floats | None = None
     for i, outline in enumerate(outlines):
         height = float(at.height_mm[i])
-        beads = _beads(walled[i], filled[i], i, process, height) + support_beads(props.areas[i], process, height)
+        beads = _beads(walled[i], filled[i], over[i].bridges, i, process, height)
+        beads += support_beads(props.areas[i], process, height)
         if i == 0 and part.index == 1:
             beads += brim(united([outline, props.areas[0]]), process, height)
         layer = _layer(beads, outline, i, part.index == 1, profile, float(at.tip_mm[i]), height, tip)
-        tip = layer.paths[-1].points[-1] if layer.paths else tip
-        layers.append(layer)
+        if layer.paths:
+            tip = layer.paths[-1].points[-1]
+            layers.append(layer)
     _check(part, mesh.bounds_mm, layers, process)
     return SlicedPart(part.index, tuple(layers), props.unsupported_mm2)
 
 
-def _beads(around: Walls, region: Region, layer: int, process: Process, height_mm: float) -> list[Bead]:
+def _beads(
+    around: Walls, region: Region, bridges: Sequence[Bridge], layer: int, process: Process, height_mm: float
+) -> list[Bead]:
     """Everything a layer prints of the part itself."""
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
     angle = angle_of_layer_deg(process.infill_angle_deg, layer)
@@ -74,7 +81,11 @@ def _beads(around: Walls, region: Region, layer: int, process: Process, height_m
         for loop in loops
     ]
     beads += gaps(around.free, False, width, height_mm) + gaps(around.narrow, True, width, height_mm)
-    beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
+    solid = region.solid
+    for bridge in bridges:
+        beads += skin(solid ^ bridge.area, Kind.SKIN, bridge.angle_deg, width, height_mm, overlap)
+        solid = solid - bridge.area
+    beads += skin(solid, Kind.SKIN, angle, width, height_mm, overlap)
     beads += skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
     density, pattern = process.infill_density, process.infill_pattern
     return beads + infill(region.sparse, pattern, density, process.infill_angle_deg, layer, width, height_mm, overlap)

@@ -4,12 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
 
-from mdp.mesh import Mesh
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
-from slicer.contact import RIM_MM, contacts
+from slicer.contact import RIM_MM
 from slicer.hatch import hatched
-from slicer.heights import Heights
 from slicer.order import OUTSIDE
 from slicer.paths import Kind
 from slicer.polygons import RESOLUTION_MM, Polygons, closed, contours, grown, opened, sealed, united
@@ -27,26 +25,19 @@ class Supports:
 
 
 def supports(
-    mesh: Mesh,
+    hanging: Sequence[Polygons],
     outlines: Sequence[Polygons],
-    at: Heights,
     process: Process,
     below: Polygons | None,
     later: Callable[[], Sequence[Polygons]],
 ) -> Supports:
-    """Support of a part in its frame.
+    """Support below the hanging places of each layer.
 
     A column goes straight down to the part itself, to `below` (plastic of earlier parts just under the base plane) or to
     the platform (below is None). It must not stand where a later part will be: later() gives their sections per layer.
     """
-    empty = Polygons()
-    none = Supports((empty,) * len(outlines), 0.0)
-    if process.support == "none":
-        return none
-    width = process.line_width_mm
-    hanging = contacts(mesh, outlines, at.cut_mm, process.self_supporting_angle_deg, below, width)
-    if all(place.is_empty() for place in hanging):
-        return none
+    if process.support == "none" or all(place.is_empty() for place in hanging):
+        return Supports((Polygons(),) * len(outlines), 0.0)
     blocked = [s if s.is_empty() else grown(s, process.support_distance_mm) for s in later()]
     columns = _columns(hanging, outlines, blocked)
     if below is not None or any(not b.is_empty() for b in blocked):

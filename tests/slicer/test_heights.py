@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from profiles.errors import SliceError
 from profiles.process import Process
 from slicer.heights import heights
 
@@ -33,6 +34,11 @@ def test_a_remainder_that_would_make_a_layer_too_high_is_shared():
 
 def test_a_part_lower_than_one_layer_is_one_layer():
     assert heights(0.12, PROCESS, True).height_mm == pytest.approx([0.12])
+
+
+def test_a_part_too_high_to_be_meant_is_refused():
+    with pytest.raises(SliceError, match=r"needs 100000 layers of process.layer_height_mm 0\.2 mm: at most 50000"):
+        heights(20000.0, PROCESS, True)
 
 
 @given(st.floats(0.1, 30.0), st.floats(0.05, 0.4), st.booleans())

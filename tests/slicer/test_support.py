@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from mdp.decomposition import Part
+from mdp.pose import UP, about
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from tests.shapes import branch, from_manifold, standing, tee
@@ -79,6 +80,23 @@ def test_flatter_faces_are_supported(angle):
 def test_a_short_bridge_needs_no_support_and_a_long_one_does():
     assert of_kind(slice_part(whole(table(5)), profile()), Kind.SUPPORT) == []
     assert len(of_kind(slice_part(whole(table(12)), profile()), Kind.SUPPORT)) > 10
+
+
+@pytest.mark.parametrize(("turn", "expected"), [(0, 0), (90, 90), (30, 30)])
+def test_the_lines_of_a_bridge_run_from_bank_to_bank(turn, expected):
+    spanned = table(5).moved(about(UP, np.radians(turn)))
+    layer = slice_part(whole(spanned), profile()).layers[50]
+    along = max((p for p in layer.paths if p.kind is Kind.SKIN), key=lambda p: p.length_mm).points
+    steps = np.diff(along, axis=0)
+    longest = steps[np.argmax(np.hypot(*steps.T))]
+    assert np.degrees(np.arctan2(*longest[::-1])) % 180 == pytest.approx(expected, abs=0.1)
+
+
+def test_a_widening_part_on_plastic_hangs_nowhere_at_its_base():
+    base, top = cut(funnel(30.0), ((0, 0, 1), 3.0))
+    sliced = slice_part(top, profile(), [base])
+    assert sliced.unsupported_mm2 == 0.0
+    assert of_kind(sliced, Kind.SUPPORT) == []
 
 
 def test_a_tiny_overhang_needs_no_support():
