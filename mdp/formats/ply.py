@@ -65,10 +65,12 @@ def read(path: Path) -> list[Surface]:
                 columns[element.name], place = _ascii_rows(words, place, element)
         except (ValueError, IndexError, OverflowError):
             raise MeshError(f"{path}: is cut short or malformed in its {element.count} rows of `{element.name}`.") from None
-    vertex, face = columns.get("vertex", {}), columns.get("face", {})
-    polygons = face.get("vertex_indices", face.get("vertex_index"))
-    if polygons is None or not {"x", "y", "z"} <= set(vertex):
-        raise MeshError(f"{path}: needs the elements `vertex` with x, y, z and `face` with vertex_indices.")
+    plain = {(table.name, column.name) for table in elements for column in table.properties if not column.length}
+    listed = {(table.name, column.name) for table in elements for column in table.properties if column.length}
+    corners = next((name for name in ("vertex_indices", "vertex_index") if ("face", name) in listed), None)
+    if corners is None or not {("vertex", axis) for axis in "xyz"} <= plain:
+        raise MeshError(f"{path}: needs the elements `vertex` with x, y, z and `face` with a list vertex_indices.")
+    vertex, polygons = columns["vertex"], columns["face"][corners]
     vertices = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
     return [checked(path, vertices, triangulated(path, vertices, polygons))]
 

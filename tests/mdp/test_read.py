@@ -240,6 +240,11 @@ def test_absurd_counts_are_refused_before_anything_is_allocated(tmp_path):
     assert "of the 4294967295 facets" in refusal(save(tmp_path / "a.stl", bytes(huge)))
 
 
+def test_a_ply_without_a_list_of_corners_is_refused(tmp_path):
+    content = files.ply(tee()).replace(b"property list uchar int vertex_indices", b"property int vertex_indices")
+    assert "`face` with a list vertex_indices" in refusal(save(tmp_path / "a.ply", content))
+
+
 def test_a_3mf_that_contains_itself_is_refused(tmp_path):
     ring = '<components><component objectid="1"/></components>'
     assert "contain each other" in refusal(files.threemf(tmp_path / "a.3mf", {1: ring}, '<item objectid="1"/>'))
