@@ -27,7 +27,7 @@ from profiles.errors import FirmwareError, LocalProtocolError, PortError, Printe
 from profiles.profile import load
 
 MACHINE = load().machine
-QUICK = Timing(stall_s=0.12, stall_mute_s=0.12, sync_s=0.5, drain_s=0.05, quiet_s=0.03)
+QUICK = Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=0.5, drain_s=0.05, quiet_s=0.03)
 PLAIN = Habits(advanced_ok=False)
 HEAT = ["M140 S60", "M104 S200", "M109 S200"]
 OFF = ["M104 S0", "M140 S0"]
