@@ -8,6 +8,7 @@ the local width. Triangles with three inner sides are forks, those with one are 
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import manifold3d
@@ -41,10 +42,14 @@ class _Chain:
     def reversed(self) -> "_Chain":
         return _Chain(self.points[::-1], self.widths[::-1], self.ends[::-1], self.place)
 
-    @property
+    @cached_property
     def steps(self) -> Floats:
         lengths: Floats = np.hypot(*np.diff(self.points, axis=0).T)
         return lengths
+
+    @cached_property
+    def length_mm(self) -> float:
+        return float(self.steps.sum())
 
 
 def centrelines(outlines: Sequence[Floats], step_mm: float) -> list[Line]:
@@ -75,15 +80,22 @@ def _sampled(loop: Floats, step_mm: float) -> Floats:
 
 
 def _pruned(found: list[_Chain]) -> list[_Chain]:
-    """Without the branches that only run into a corner: from a fork to a tip (end -1) and short for the fork's width."""
+    """Without the branches that only run into a corner: from a fork to a tip (end -1) and short for the fork's width.
+
+    A place that has no other branches keeps its longest.
+    """
     fork_width: dict[int, float] = defaultdict(float)
     for chain in found:
         for end, width in zip(chain.ends, (chain.widths[0], chain.widths[-1]), strict=True):
             fork_width[end] = max(fork_width[end], float(width))
+    longest: dict[int, _Chain] = {}
+    for chain in found:
+        if chain.place not in longest or chain.length_mm > longest[chain.place].length_mm:
+            longest[chain.place] = chain
     kept = []
     for chain in found:
-        tip = (chain.ends[0] < 0) != (chain.ends[1] < 0)
-        if not tip or chain.steps.sum() > SPUR * fork_width[max(chain.ends)]:
+        corner = (chain.ends[0] < 0) != (chain.ends[1] < 0) and chain.length_mm <= SPUR * fork_width[max(chain.ends)]
+        if not corner or chain is longest[chain.place]:
             kept.append(chain)
     return kept
 

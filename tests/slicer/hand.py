@@ -84,7 +84,8 @@ def shared(name: str, height_mm: float) -> Mesh:
 
 def as_shapely(polygons: Polygons) -> shapely.Geometry:
     """The same polygons as shapely's, holes by the even-odd rule."""
-    return shapely.build_area(shapely.MultiLineString([np.vstack([loop, loop[:1]]) for loop in polygons.to_polygons()]))
+    rings = shapely.MultiLineString([np.vstack([loop, loop[:1]]) for loop in polygons.to_polygons()])
+    return shapely.build_area(shapely.node(rings))
 
 
 def distances_mm(polygons: Polygons, points: Floats) -> Floats:
