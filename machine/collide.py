@@ -17,6 +17,7 @@ from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine, Vector
 
 FIELD = 120
+FAR_MM = 1e9
 REFINEMENTS = 40
 
 
@@ -108,7 +109,7 @@ class Printed:
     def reach(self, machine: Machine, pose: Pose, tried: Floats) -> Floats:
         """(k,) greatest d . x over what is printed at a pose, in the frame of X Y Z."""
         if not len(self.points_mm):
-            return np.full(len(tried), -np.inf)
+            return np.full(len(tried), -FAR_MM)
         reach: Floats = (machine_points(machine, pose, self.points_mm) @ tried.T).max(axis=0) + self.bead_mm
         return reach
 
@@ -129,10 +130,17 @@ def together(pieces: list[Printed]) -> Printed:
 
 def sweep_gaps(body: Body, start: Floats, end: Floats, tried: Floats, reach: Floats) -> Floats:
     """(n,) lower bounds of the distance of a body from an obstacle while the tip goes from (n, 3) start to (n, 3) end."""
-    with np.errstate(invalid="ignore"):
-        offset = body.least(tried) - reach
-    ends = np.minimum(start @ tried.T, end @ tried.T)
-    best: Floats = (ends + offset).max(axis=1)
+    return gaps_of(body, swept(start, end, tried), tried, reach)
+
+
+def swept(start: Floats, end: Floats, tried: Floats) -> Floats:
+    """(k, n) least d . tip along each of n straight moves, for (k, 3) directions."""
+    return np.minimum(tried @ start.T, tried @ end.T)
+
+
+def gaps_of(body: Body, least: Floats, tried: Floats, reach: Floats) -> Floats:
+    """(n,) greatest gap of a body over the tried directions: `least` from swept(), `reach` that of the obstacle."""
+    best: Floats = (least + (body.least(tried) - reach)[:, None]).max(axis=0)
     return best
 
 

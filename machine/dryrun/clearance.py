@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.collide import Body, Printed, bodies, directions, hull, refined_gap, sweep_gaps, table_reach
+from machine.collide import Body, Printed, bodies, directions, gaps_of, hull, refined_gap, sweep_gaps, swept, table_reach
 from machine.dryrun.contact import stretches
-from machine.dryrun.findings import Finding
+from machine.dryrun.findings import MOST, Finding, cut_short
 from machine.parsed import MoveKind, ParsedProgram
 from machine.reorient import poses_between
 from mdp.mesh import Floats
@@ -15,6 +15,7 @@ from profiles.machine import Machine
 STEP_DEG = 0.5
 ROUNDING_MM = 2e-3  # three coordinates rounded to a thousandth
 CONFIRMED = 12
+MOST_TURNS = 2000
 
 
 def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
@@ -25,26 +26,30 @@ def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[n
 
 
 def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
-    """Moves with the table at rest, one group for every stretch between turns."""
-    found = []
+    """Moves with the table at rest, one group for every stretch between turns: two directions settle almost every move."""
+    found: list[Finding] = []
     for stretch in stretches(program):
+        if len(found) >= MOST:
+            return [*found, cut_short(program, int(stretch.rows[0]), "straight moves")]
+        tried = np.array([rotation(machine, stretch.pose) @ UP, UP])
+        least = swept(program.start[stretch.rows, :3], program.end[stretch.rows, :3], tried)
+        reach = table_reach(machine, stretch.pose, tried)
         for body in bodies(machine):
-            found += _body(program, stretch.rows, body, machine, stretch.pose)
+            close = gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM
+            if close.any():
+                found += _body(program, stretch.rows[close], body, machine, stretch.pose)
     return found
 
 
 def _body(program: ParsedProgram, rows: NDArray[np.int64], body: Body, machine: Machine, pose: Pose) -> list[Finding]:
-    """One body in one pose: two directions settle almost every move, all the others and a search the rest."""
+    """One body in one pose: the moves that two directions left open, by all directions and a search."""
     start, end = program.start[rows, :3], program.end[rows, :3]
     need = body.need_mm - ROUNDING_MM
-    normal = rotation(machine, pose) @ UP
-    close = np.arange(len(rows))
-    gaps = np.full(len(rows), np.inf)
-    for tried in (np.array([normal, UP]), directions(normal)):
-        gaps[close] = sweep_gaps(body, start[close], end[close], tried, table_reach(machine, pose, tried))
-        close = close[gaps[close] < need]
-        if not len(close):
-            return []
+    tried = directions(rotation(machine, pose) @ UP)
+    gaps = sweep_gaps(body, start, end, tried, table_reach(machine, pose, tried))
+    close = np.flatnonzero(gaps < need)
+    if not len(close):
+        return []
     worst = _confirmed(start, end, close, gaps, need, body, machine, pose)
     close = close[gaps[close] < need]
     if not len(close):
@@ -69,10 +74,17 @@ def _confirmed(
 
 
 def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
+    """Every turn of the table; of a program that turns all the time (curved layers) an even choice, which is said."""
     found = []
-    printed = hull(np.zeros((0, 3)), 0.0)
-    done = 0
-    for row in np.flatnonzero(program.kind == MoveKind.ROTATE):
+    printed, done = hull(np.zeros((0, 3)), 0.0), 0
+    rows = np.flatnonzero(program.kind == MoveKind.ROTATE)
+    if len(rows) > MOST_TURNS:
+        message = f"the table turns {len(rows)} times: only {MOST_TURNS} of the turns were tested for collisions"
+        found.append(Finding("warning", "not-tested", int(program.line[rows[0]]), int(program.part[rows[0]]), 0, message))
+        rows = rows[np.linspace(0, len(rows) - 1, MOST_TURNS).astype(np.int64)]
+    for row in rows:
+        if len(found) >= MOST:
+            return [*found, cut_short(program, int(row), "turns")]
         before = int(np.searchsorted(deposited_row, row))
         if before > done:
             new = deposited[done:before].reshape(-1, 3)
@@ -90,12 +102,9 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
     tips = start[:3] + share * (end[:3] - start[:3])
     least: dict[tuple[str, str], tuple[float, Pose]] = {}
     for pose, tip in zip(poses, tips, strict=True):
-        tried = directions(rotation(machine, pose) @ UP)
-        for name, reach in (("the table", table_reach(machine, pose, tried)), ("the print", printed.reach(machine, pose, tried))):
-            for body in bodies(machine):
-                gap = float(sweep_gaps(body, tip[None], tip[None], tried, reach)[0])
-                if gap < body.need_mm - ROUNDING_MM and gap < least.get((body.name, name), (np.inf, pose))[0]:
-                    least[body.name, name] = (gap, pose)
+        for meeting, gap in _meetings(machine, printed, pose, tip).items():
+            if gap < least.get(meeting, (np.inf, pose))[0]:
+                least[meeting] = (gap, pose)
     return [
         Finding(
             "error", "collision", int(program.line[row]), int(program.part[row]), int(program.layer[row]),
@@ -104,3 +113,19 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
         )
         for (body, name), (gap, pose) in least.items()
     ]  # fmt: skip
+
+
+def _meetings(machine: Machine, printed: Printed, pose: Pose, tip: Floats) -> dict[tuple[str, str], float]:
+    """The gaps that are too small in one pose: (body, obstacle) -> mm. Most often all stands below the tip, seen by UP alone."""
+    normal = rotation(machine, pose) @ UP
+    found: dict[tuple[str, str], float] = {}
+    for tried in (UP[None], directions(normal)):
+        found = {}
+        for name, reach in (("the table", table_reach(machine, pose, tried)), ("the print", printed.reach(machine, pose, tried))):
+            for body in bodies(machine):
+                gap = float(sweep_gaps(body, tip[None], tip[None], tried, reach)[0])
+                if gap < body.need_mm - ROUNDING_MM:
+                    found[body.name, name] = min(gap, found.get((body.name, name), np.inf))
+        if not found:
+            break
+    return found

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from machine.dryrun.findings import Finding
+from machine.dryrun.findings import MOST, Finding, cut_short
 from machine.kinematics.table import machine_points
 from machine.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
@@ -32,12 +32,11 @@ class Stretch:
 def stretches(program: ParsedProgram) -> list[Stretch]:
     """The straight moves between turns of the table."""
     turned = np.any(np.diff(program.end[:, 3:], axis=0, prepend=program.start[:1, 3:]) != 0, axis=1)
-    number = np.cumsum(turned)
-    found = []
-    for k in np.unique(number):
-        rows = np.flatnonzero((number == k) & (program.kind != MoveKind.ROTATE))
-        if len(rows):
-            found.append(Stretch(rows, Pose(*(float(v) for v in program.end[rows[0], 3:]))))
+    found: list[Finding] = []
+    for rows in np.split(np.arange(len(turned)), np.flatnonzero(turned)):
+        straight = rows[program.kind[rows] != MoveKind.ROTATE]
+        if len(straight):
+            found.append(Stretch(straight, Pose(*(float(v) for v in program.end[straight[0], 3:]))))
     return found
 
 
@@ -45,6 +44,8 @@ def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[n
     """Where the head runs deeper than a bead's width into earlier plastic; deposited: (m, 2, 3) segments, workpiece frame."""
     found = []
     for stretch in stretches(program):
+        if len(found) >= MOST:
+            return [*found, cut_short(program, int(stretch.rows[0]), "moves over earlier plastic")]
         before = int(np.searchsorted(deposited_row, stretch.rows[0]))
         if before:
             width = float(program.width_mm[deposited_row[:before]].max()) or machine.head.nozzle_mm

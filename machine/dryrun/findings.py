@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from machine.parsed import ParsedProgram
 
 Severity = Literal["error", "warning"]
+MOST = 20
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,12 @@ def per_part(
         text = message.format(value=f"{worst:.3f}".rstrip("0").rstrip("."), count=len(mine))
         found.append(Finding(severity, code, int(program.line[mine[0]]), int(part), int(program.layer[mine[0]]), text))
     return found
+
+
+def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:
+    """Said when a test stops at row `row`, because MOST findings of its kind are enough to refuse a program."""
+    message = f"after {MOST} findings the other {what} were not tested"
+    return Finding("warning", "not-tested", int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
 
 
 def at_line(program: ParsedProgram, row: int, line: int, severity: Severity, code: str, message: str) -> Finding:

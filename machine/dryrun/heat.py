@@ -10,6 +10,7 @@ from profiles.profile import Profile
 
 MELTING_C = 150.0
 SLACK = 1.005
+ROUNDING_MM = 3e-3  # both ends are written to a thousandth, and a point dropped for that gives its filament to the next
 
 
 def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
@@ -44,13 +45,12 @@ def _flow(program: ParsedProgram, profile: Profile) -> list[Finding]:
     """Plastic per second at the asked speed, against what the hot end melts."""
     material = profile.material
     rows = program.kind == MoveKind.EXTRUDE
-    length = np.linalg.norm(program.end[:, :3] - program.start[:, :3], axis=1)
+    length = np.linalg.norm(program.end[:, :3] - program.start[:, :3], axis=1) + ROUNDING_MM
     area = pi * material.diameter_mm**2 / 4.0
-    flow = program.e_mm * area / np.maximum(length, 1e-9) * program.feed / 60.0
+    flow = program.e_mm * area / length * program.feed / 60.0
     most = material.volumetric_limit_mm3_s
-    rounding = 1e-5 * area / np.maximum(length, 1e-9) * program.feed / 60.0  # E is written to 1e-5 mm
     message = f"{{value}} mm3/s are asked for, {material.name} allows {most:g} mm3/s (moves: {{count}})"
-    return per_part(program, rows & (flow > most * SLACK + 2.0 * rounding), flow, "warning", "flow", message)
+    return per_part(program, rows & (flow > most * SLACK), flow, "warning", "flow", message)
 
 
 def _profile(program: ParsedProgram, profile: Profile) -> list[Finding]:

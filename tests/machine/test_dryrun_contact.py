@@ -43,3 +43,11 @@ def test_a_box_of_the_head_counts_where_it_is() -> None:
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
 def test_our_own_program_touches_nothing(machine: str) -> None:
     assert not [f for f in dry_run(text(machine), printed(machine)[0]).findings if f.code == "contact"]
+
+
+def test_a_program_full_of_collisions_is_tested_until_twenty_are_found() -> None:
+    moves = "G0 X-20\nG0 Z58\n" + "".join(f"G0 X20\nG0 X-20\nG0 C{91 + k % 2} F600\n" for k in range(60))
+    machine = load().machine.model_copy(update={"head": HEAD})
+    found = dry_run((WALL + moves).splitlines(), load().model_copy(update={"machine": machine})).findings
+    assert sum(f.code == "contact" for f in found) == 20
+    assert "after 20 findings the other moves over earlier plastic were not tested" in [f.message for f in found]

@@ -130,7 +130,7 @@ def test_what_cannot_be_read_is_refused_with_its_line(line: str, message: str | 
 
 
 def test_a_long_line_of_blanks_is_refused_at_once() -> None:
-    with pytest.raises(GcodeError, match="line 1: .* cannot be read"):
+    with pytest.raises(GcodeError, match=r"line 1: .* cannot be read"):
         _read("G28" + "  X" * 600 + " !")
 
 
