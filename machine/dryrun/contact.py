@@ -32,7 +32,7 @@ class Stretch:
 def stretches(program: ParsedProgram) -> list[Stretch]:
     """The straight moves between turns of the table."""
     turned = np.any(np.diff(program.end[:, 3:], axis=0, prepend=program.start[:1, 3:]) != 0, axis=1)
-    found: list[Finding] = []
+    found = []
     for rows in np.split(np.arange(len(turned)), np.flatnonzero(turned)):
         straight = rows[program.kind[rows] != MoveKind.ROTATE]
         if len(straight):
@@ -42,7 +42,7 @@ def stretches(program: ParsedProgram) -> list[Stretch]:
 
 def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
     """Where the head runs deeper than a bead's width into earlier plastic; deposited: (m, 2, 3) segments, workpiece frame."""
-    found = []
+    found: list[Finding] = []
     for stretch in stretches(program):
         if len(found) >= MOST:
             return [*found, cut_short(program, int(stretch.rows[0]), "moves over earlier plastic")]
