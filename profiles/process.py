@@ -41,8 +41,8 @@ class Process(Frozen):
     skirt_loops: int = Field(1, ge=0, le=20, description="loops around part 1's first layer, not touching it")
     skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from part 1, mm")
     brim_mm: float = Field(0.0, ge=0, le=50, description="width of the brim around part 1's first layer, mm; 0: none")
-    interface_overlap_mm: float = Field(
-        0.1, ge=0, le=1, description="how deep a part's first layer is pressed into the part it stands on, mm"
+    interface_overlap: float = Field(
+        0.5, ge=0, le=0.9, description="how deep a part's first layer is pressed into the part it stands on, share of its height"
     )
     interface_flow: float = Field(
         1.05, ge=0.5, le=1.5, description="factor on extruded volume of a part's first layer on plastic"
@@ -68,11 +68,6 @@ class Process(Frozen):
                     f"{key} is {getattr(self, key):g} mm: at most 0.9 of line_width_mm "
                     f"({0.9 * self.line_width_mm:g} mm) is allowed"
                 )
-        if self.interface_overlap_mm >= self.layer_height_mm:
-            raise ValueError(
-                f"interface_overlap_mm is {self.interface_overlap_mm:g} mm: it must be below layer_height_mm "
-                f"({self.layer_height_mm:g} mm)"
-            )
         return self
 
 

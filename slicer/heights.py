@@ -31,7 +31,7 @@ def heights(top_mm: float, process: Process, on_platform: bool) -> Heights:
     layer meets the top: it is lower, or the one below is stretched when less than a quarter layer remains.
     Raises SliceError for a part that is too high to be meant.
     """
-    overlap = 0.0 if on_platform else process.interface_overlap_mm
+    overlap = 0.0 if on_platform else process.interface_overlap * process.layer_height_mm
     first = process.first_layer_height_mm if on_platform else process.layer_height_mm
     if top_mm > MOST_LAYERS * process.layer_height_mm:
         raise SliceError(

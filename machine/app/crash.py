@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib.metadata import distributions
 from pathlib import Path
 
-TOLD = {"tiltprint", "numpy", "numba", "manifold3d", "trimesh", "pyserial", "pydantic", "typer"}
+TOLD = {"tiltprint", "numpy", "numba", "manifold3d", "pyserial", "pydantic", "typer"}
 
 
 def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:

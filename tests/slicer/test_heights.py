@@ -43,7 +43,7 @@ def test_a_part_too_high_to_be_meant_is_refused():
 
 @given(st.floats(0.1, 30.0), st.floats(0.05, 0.4), st.booleans())
 def test_the_top_is_met_and_no_layer_is_too_high_or_too_thin(top, layer, on_platform):
-    process = Process(name="test", layer_height_mm=layer, first_layer_height_mm=0.3, interface_overlap_mm=0.04)
+    process = Process(name="test", layer_height_mm=layer, first_layer_height_mm=0.3, interface_overlap=0.04 / layer)
     at = heights(top, process, on_platform)
     assert at.tip_mm[-1] == pytest.approx(top)
     assert at.height_mm.max() <= 0.9 * 0.45 + 1e-9
