@@ -33,11 +33,11 @@ def checked(path: Path, vertices: Any, faces: Any) -> Surface:
     surface = Surface(places, np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3))
     if not len(surface.faces):
         raise MeshError(f"{path}: holds no faces.")
-    finite = np.isfinite(surface.vertices).all(axis=1)
+    finite = np.atleast_1d(np.isfinite(surface.vertices).all(axis=1))
     if not finite.all():
         worst = int(np.flatnonzero(~finite)[0])
         raise MeshError(f"{path}: vertex {worst + 1} of {len(finite)} has a coordinate that is not a finite number.")
-    inside = ((surface.faces >= 0) & (surface.faces < len(surface.vertices))).all(axis=1)
+    inside = np.atleast_1d(((surface.faces >= 0) & (surface.faces < len(surface.vertices))).all(axis=1))
     if not inside.all():
         worst = int(np.flatnonzero(~inside)[0])
         raise MeshError(

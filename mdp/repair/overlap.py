@@ -22,7 +22,7 @@ def overlaps_itself(solid: "m3.Manifold") -> bool:
     # Odd fractions of the height, since models are made in steps that even ones would hit.
     heights = (low + (np.arange(1, SECTIONS + 1) - 0.0137) * (high - low) / (SECTIONS + 1)).tolist()
     wound = sum(section_area(vertices, faces, height) for height in heights)
-    return wound - sum(solid.slice(height).area() for height in heights) > EXCESS * wound
+    return bool(wound - sum(solid.slice(height).area() for height in heights) > EXCESS * wound)
 
 
 def section_area(vertices: Floats, faces: np.ndarray[tuple[int, int], np.dtype[np.int64]], height: float) -> float:

@@ -43,7 +43,8 @@ def welded_along_openings(surface: Surface, distance: float) -> Surface:
 def uncollapsed(faces: Indices) -> Indices:
     """The faces with three different corners."""
     a, b, c = faces.T
-    return faces[(a != b) & (b != c) & (c != a)]
+    kept: Indices = faces[(a != b) & (b != c) & (c != a)]
+    return kept
 
 
 def compact(surface: Surface) -> Surface:

@@ -33,7 +33,8 @@ def _angles(surface: Surface, edges: Edges, around: Indices) -> Floats:
     across = opposite - np.outer(opposite @ axis, axis)
     x = across[np.argmax(np.linalg.norm(across, axis=1))]
     y = np.cross(axis, x)
-    return np.arctan2(across @ y, across @ x)
+    directions: Floats = np.arctan2(across @ y, across @ x)
+    return directions
 
 
 def _matched(angles: Floats, forward: object, normals: Floats) -> Indices:
