@@ -77,12 +77,17 @@ class Search(Frozen):
     directions: int = Field(600, ge=1, le=100000, description="directions sampled on the Gaussian sphere")
     least_elevation_deg: float = Field(10.0, ge=0, le=89, description="least angle of a direction above the platform, deg")
     offset_step_mm: float = Field(1.0, gt=0, le=100, description="distance of the sampled planes of a direction, mm")
+    method: Literal["best", "published"] = Field(
+        "best", description="published: the authors' stop rule and bookkeeping, for comparisons; best: ours"
+    )
     beam_width: int = Field(2, ge=1, le=1000, description="how many decompositions are followed at a time")
     least_volume_share: float = Field(
         0.02, ge=0, lt=1, description="criterion IV: a part has at least this share of the model's volume (published: 0.1)"
     )
     least_interface_mm2: float = Field(4.0, ge=0, le=1e6, description="least area a part stands on, mm2")
     most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
+    time_limit_s: float | None = Field(None, ge=0, description="the search ends after this time with the best so far, s")
+    polish: bool = Field(True, description="true: the planes found are moved off the grid as far as that helps")
     least_gain: float = Field(0.005, ge=0, le=1, description="a cut must make at least this share of the model's risky area safe")
     platform_radius_mm: float | None = Field(
         None, gt=0, description="criterion III: radius of the disc that every plane must clear; absent: the model's footprint"
