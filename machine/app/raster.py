@@ -116,6 +116,12 @@ def _to_screen(corners: Floats, axes: Floats, scale: float, middle: Floats, widt
     return np.stack([0.5 * width + scale * seen[..., 0], 0.5 * height - scale * seen[..., 1], seen[..., 2]], axis=-1)
 
 
+@numba.njit(cache=True, inline="always")
+def _dot(a: Any, b: Any) -> float:
+    """Written out: numba's own would need scipy."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 @numba.njit(cache=True)
 def _blend(faces: Any, around: Any, first: Any, normals: Any, areas: Any, crease: float) -> Any:
     out = np.zeros((len(faces), 3, 3))
@@ -123,9 +129,9 @@ def _blend(faces: Any, around: Any, first: Any, normals: Any, areas: Any, crease
         for k in range(3):
             v = faces[f, k]
             for g in around[first[v] : first[v + 1]]:
-                if np.dot(normals[g], normals[f]) >= crease or g == f:
+                if _dot(normals[g], normals[f]) >= crease or g == f:
                     out[f, k] += areas[g] * normals[g]
-            length = np.sqrt(np.dot(out[f, k], out[f, k]))
+            length = np.sqrt(_dot(out[f, k], out[f, k]))
             out[f, k] = out[f, k] / length if length > 0 else normals[f]
     return out
 
@@ -187,12 +193,13 @@ def _shade(screen: Any, lit: Any, face: Any, normals: Any, paint: Any, shadow: A
             b2 = ((x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)) / twice_area
             b0 = 1.0 - b1 - b2
             n = b0 * normals[f, 0] + b1 * normals[f, 1] + b2 * normals[f, 2]
-            n /= max(np.sqrt(np.dot(n, n)), 1e-12)
+            n /= max(np.sqrt(_dot(n, n)), 1e-12)
             p = b0 * lit[f, 0] + b1 * lit[f, 1] + b2 * lit[f, 2]
-            key = max(np.dot(n, to_light), 0.0)
+            key = max(_dot(n, to_light), 0.0)
             if key > 0:
                 key *= _lit_share(shadow, p[0], p[1], p[2], bias * min(1.0 / max(key, 0.08), 8.0))
-            bent[row, column] = axes @ n
+            for k in range(3):
+                bent[row, column, k] = _dot(axes[k], n)
             facing = max(bent[row, column, 2], 0.0)
             light = max(0.50 + 0.08 * n[2] + 0.34 * key + 0.20 * facing, paint[f, 3])
             gloss = 28.0 * key * max(bent[row, column, 2] * 0.6 + bent[row, column, 1] * 0.8, 0.0) ** 24
@@ -219,7 +226,7 @@ def _draw_edges(colour: Any, face: Any, group: Any, depth: Any, bent: Any, axes:
                     step = abs(depth[row, column] - depth[r, c])
                     if group[f] != group[g] or step > pixel_mm * (4.0 + 2.0 * slope):
                         strength = 0.50
-                    elif np.dot(n, m) < 0.80:
+                    elif _dot(n, m) < 0.80:
                         strength = 0.68
                 else:
                     strength = 0.55
