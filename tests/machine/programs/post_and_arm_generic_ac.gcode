@@ -8,13 +8,12 @@ G21
 G90
 M83
 M140 S60
-M104 S210
+M104 S215
 G28 X Y Z
 G92 A0 C0
 M190 S60
-M109 S210
-G92 E0
 M109 S215
+G92 E0
 G0 Z10.000 F600
 G0 X-4.775 Y-4.775 F9000
 ;TYPE:Custom
@@ -213,11 +212,11 @@ M73 P100 R0
 ; machine.gcode.start[1] = G90
 ; machine.gcode.start[2] = M83
 ; machine.gcode.start[3] = M140 S{bed_c}
-; machine.gcode.start[4] = M104 S{nozzle_c}
+; machine.gcode.start[4] = M104 S{first_layer_nozzle_c}
 ; machine.gcode.start[5] = G28 X Y Z
 ; machine.gcode.start[6] = G92 {tilt}0 {turn}0
 ; machine.gcode.start[7] = M190 S{bed_c}
-; machine.gcode.start[8] = M109 S{nozzle_c}
+; machine.gcode.start[8] = M109 S{first_layer_nozzle_c}
 ; machine.gcode.start[9] = G92 E0
 ; machine.gcode.end[0] = M104 S0
 ; machine.gcode.end[1] = M140 S0
@@ -258,7 +257,7 @@ M73 P100 R0
 ; process.skirt_loops = 1
 ; process.skirt_distance_mm = 4.0
 ; process.brim_mm = 0.0
-; process.interface_overlap_mm = 0.1
+; process.interface_overlap = 0.5
 ; process.interface_flow = 1.05
 ; process.interface_speed_mm_s = 25.0
 ; process.outer_wall_speed_mm_s = 40.0
@@ -275,10 +274,13 @@ M73 P100 R0
 ; search.directions = 600
 ; search.least_elevation_deg = 10.0
 ; search.offset_step_mm = 1.0
+; search.method = best
 ; search.beam_width = 2
 ; search.least_volume_share = 0.02
 ; search.least_interface_mm2 = 4.0
 ; search.most_parts = 12
+; search.time_limit_s = None
+; search.polish = True
 ; search.least_gain = 0.005
 ; search.platform_radius_mm = None
 ; search.count_platform_faces = False
