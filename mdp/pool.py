@@ -1,11 +1,11 @@
-"""Pool: the candidates of all nodes of the beam in the order of the 2020 paper, each checked when its turn comes.
+"""Pool: the candidates of several nodes in the order of the 2020 paper, each checked when its turn comes.
 
 Candidates that leave (almost) nothing risky above their plane come first, then delta is relaxed from 1e-4 by factors of 5;
 within a round the larger accumulated reduction comes first, and from the second round on only candidates that reduce at
 least as much as the best so far are taken. Near-equal planes of one parent take one place.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,106 +17,119 @@ from mdp.plane import Plane
 
 FIRST_DELTA, DELTA_FACTOR, LAST_DELTA = 1e-4, 5.0, 1e3
 SAME_COSINE = 0.95
-LOOK_AHEAD = 256
+LOOK_AHEAD = 128
 EQUAL = 1e-9  # shares of the risky area that differ less are equal but for rounding
+UNKNOWN = -1
 
-Check = Callable[[int, Ints, Floats], Checked]
+
+class Table:
+    """The candidates of one node that are worth a cut; whether they can be cut is looked up direction by direction."""
+
+    def __init__(
+        self, worth: Worth, limits: Bounds, saved_mm2: float, residual_mm2: float, check: Callable[[Ints, Floats], Checked]
+    ) -> None:
+        self.worth, self.limits = worth, limits
+        self.saved_mm2, self.residual_mm2 = saved_mm2, residual_mm2
+        self._check = check
+        self.reason = np.full(len(worth.gain_mm2), UNKNOWN, np.int32)
+        self._volume_mm3, self._fragile_mm = np.zeros(len(worth.gain_mm2)), np.zeros(len(worth.gain_mm2))
+
+    def look(self, rows: Ints) -> None:
+        """Check these rows and all others of the same directions, where that is not known."""
+        fresh = rows[self.reason[rows] == UNKNOWN]
+        if len(fresh) == 0:
+            return
+        mine = np.nonzero(np.isin(self.worth.direction, self.worth.direction[fresh]))[0]
+        found = self._check(self.worth.direction[mine], self.worth.offset_mm[mine])
+        self.reason[mine], self._volume_mm3[mine], self._fragile_mm[mine] = found.reason, found.volume_mm3, found.fragile_mm
+
+    def plane(self, row: int) -> Plane:
+        """The plane of a row."""
+        return Plane(self.limits.directions[self.worth.direction[row]], float(self.worth.offset_mm[row]))
+
+    def plan(self, row: int) -> Plan:
+        """The numbers of a checked row."""
+        worth = self.worth
+        return Plan(
+            gain_mm2=float(worth.gain_mm2[row]),
+            residual_mm2=float(worth.residual_mm2[row]),
+            volume_mm3=float(self._volume_mm3[row]),
+            above_platform_mm=float(worth.offset_mm[row] - self.limits.least_offset_mm[worth.direction[row]]),
+            fragile_mm=float(self._fragile_mm[row]),
+            saved_before_mm2=self.saved_mm2,
+            residual_before_mm2=self.residual_mm2,
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A feasible candidate: the beam's node it belongs to, its plane, its numbers, and the round that let it in."""
+    """A feasible candidate: the table and row it comes from, and the round of relaxation that let it in."""
 
-    node: int
-    plane: Plane
-    plan: Plan
+    table: int
+    row: int
     round: int
 
 
-@dataclass(frozen=True)
-class Standing:
-    """What the cuts of a node have saved and left risky so far."""
+def entries(tables: Sequence[Table], risky_mm2: float, bound_mm2: float, least_reduction: float = 0.0) -> Iterator[Entry]:
+    """Feasible candidates, best first; those that would leave bound_mm2 or more for ever are left out.
 
-    saved_mm2: float
-    residual_mm2: float
-
-
-def fill(
-    tables: Sequence[Worth],
-    standings: Sequence[Standing],
-    limits: Bounds,
-    risky_mm2: float,
-    bound_mm2: float,
-    most: int,
-    check: Check,
-) -> list[Entry]:
-    """Up to `most` entries, best first. bound_mm2: nodes that leave more residual than this can no longer win."""
-    rows = _Rows(tables, standings, risky_mm2)
-    chosen: list[Entry] = []
-    checked: dict[int, tuple[int, float, float]] = {}
-    near: dict[int, list[tuple[Floats, float]]] = {}
+    risky_mm2: the model's risky area, which delta and the reductions are shares of. least_reduction: accumulated reduction
+    that a candidate must exceed.
+    """
+    side = _side_by_side(tables, risky_mm2)
+    waiting = side.order[(side.residual_sum_mm2 < bound_mm2)[side.order] & (side.reduction > least_reduction)[side.order]]
+    near: list[list[tuple[Floats, float]]] = [[] for _ in tables]
     best, delta, number = -np.inf, FIRST_DELTA, 0
-    waiting = rows.order[rows.residual_sum[rows.order] * risky_mm2 < bound_mm2]
-    while len(waiting) and len(chosen) < most and delta <= LAST_DELTA:
-        admitted = rows.residual[waiting] < delta
-        turn = waiting[admitted & (rows.reduction[waiting] >= best)]
+    while len(waiting) and delta <= LAST_DELTA:
+        admitted = side.residual[waiting] < delta
+        turn = waiting[admitted & (side.reduction[waiting] >= best)]
         for place, index in enumerate(turn):
-            if len(chosen) == most:
-                break
-            direction, offset = limits.directions[rows.direction[index]], float(rows.offset[index])
-            others = near.setdefault(int(rows.node[index]), [])
-            if any(_same(direction, offset, *other) for other in others):
+            table, row = int(side.table[index]), int(side.row[index])
+            plane = tables[table].plane(row)
+            if any(_same(plane, *other) for other in near[table]):
                 continue
-            if index not in checked:
-                _check_ahead(rows, turn[place : place + LOOK_AHEAD], checked, check)
-            reason, volume, fragile = checked[index]
-            if reason != Reason.FEASIBLE:
-                continue
-            others.append((direction, offset))
-            above = offset - float(limits.least_offset_mm[rows.direction[index]])
-            standing = standings[rows.node[index]]
-            numbers = (float(rows.gain[index]), float(rows.residual[index]) * risky_mm2, volume, above, fragile)
-            plan = Plan(*numbers, standing.saved_mm2, standing.residual_mm2)
-            chosen.append(Entry(int(rows.node[index]), Plane(direction, offset), plan, number))
-        best = max((rows.share(entry) for entry in chosen), default=-np.inf)
+            if tables[table].reason[row] == UNKNOWN:
+                _look_ahead(tables, side, turn[place : place + LOOK_AHEAD])
+            if tables[table].reason[row] == Reason.FEASIBLE:
+                near[table].append((plane.normal, plane.offset_mm))
+                best = max(best, float(side.reduction[index]))
+                yield Entry(table, row, number)
         waiting = waiting[~admitted]
         delta, number = delta * DELTA_FACTOR, number + 1
-    return chosen
 
 
-class _Rows:
-    """The candidates of all nodes side by side, and their order by reduction, larger parts first among equals."""
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """The candidates of all tables side by side, and their order by reduction, larger parts first among equals."""
 
-    def __init__(self, tables: Sequence[Worth], standings: Sequence[Standing], risky_mm2: float) -> None:
-        self.risky_mm2 = risky_mm2
-        self.node = np.concatenate([np.full(len(table.gain_mm2), k) for k, table in enumerate(tables)])
-        self.direction = np.concatenate([table.direction for table in tables])
-        self.offset = np.concatenate([table.offset_mm for table in tables])
-        self.gain = np.concatenate([table.gain_mm2 for table in tables])
-        self.residual = np.concatenate([table.residual_mm2 for table in tables]) / risky_mm2
-        saved, left = (np.array([getattr(s, key) for s in standings]) for key in ("saved_mm2", "residual_mm2"))
-        self.reduction = np.round((self.gain + saved[self.node]) / risky_mm2 / EQUAL) * EQUAL
-        self.residual_sum = self.residual + left[self.node] / risky_mm2
-        self.order = np.lexsort((self.direction, self.node, self.offset, -self.reduction))
-
-    def share(self, entry: Entry) -> float:
-        """Accumulated reduction of an entry, as the rows hold it."""
-        return round((entry.plan.gain_mm2 + entry.plan.saved_before_mm2) / self.risky_mm2 / EQUAL) * EQUAL
+    table: Ints
+    row: Ints
+    reduction: Floats
+    residual: Floats
+    residual_sum_mm2: Floats
+    order: Ints
 
 
-def _check_ahead(rows: _Rows, ahead: Ints, checked: dict[int, tuple[int, float, float]], check: Check) -> None:
-    """Check all candidates that share node and direction with the next ones, a node's directions in parallel."""
-    for node in np.unique(rows.node[ahead]):
-        fresh = [index for index in ahead[rows.node[ahead] == node] if int(index) not in checked]
-        mine = np.nonzero((rows.node == node) & np.isin(rows.direction, rows.direction[fresh]))[0]
-        if len(mine) == 0:
-            continue
-        found = check(int(node), rows.direction[mine], rows.offset[mine])
-        for k, index in enumerate(mine):
-            checked[int(index)] = (int(found.reason[k]), float(found.volume_mm3[k]), float(found.fragile_mm[k]))
+def _side_by_side(tables: Sequence[Table], risky_mm2: float) -> _Side:
+    table = np.concatenate([np.full(len(t.reason), k, np.int32) for k, t in enumerate(tables)])
+    row = np.concatenate([np.arange(len(t.reason), dtype=np.int32) for t in tables])
+    direction = np.concatenate([t.worth.direction for t in tables])
+    offset = np.concatenate([t.worth.offset_mm for t in tables])
+    saved = np.concatenate([t.worth.gain_mm2 + t.saved_mm2 for t in tables])
+    residual = np.concatenate([t.worth.residual_mm2 for t in tables])
+    residual_sum = np.concatenate([t.worth.residual_mm2 + t.residual_mm2 for t in tables])
+    reduction = np.round(saved / risky_mm2 / EQUAL) * EQUAL
+    order = np.lexsort((direction, table, offset, -reduction)).astype(np.int32)
+    return _Side(table, row, reduction, residual / risky_mm2, residual_sum, order)
 
 
-def _same(direction: Floats, offset_mm: float, other_direction: Floats, other_offset_mm: float) -> bool:
+def _look_ahead(tables: Sequence[Table], side: _Side, ahead: Ints) -> None:
+    """Check the next candidates of every table in one go, all their directions in parallel."""
+    for table in np.unique(side.table[ahead]):
+        tables[table].look(side.row[ahead[side.table[ahead] == table]])
+
+
+def _same(plane: Plane, other_direction: Floats, other_offset_mm: float) -> bool:
     """Whether two planes of one parent are too alike to take two places (the authors' rule)."""
-    cosine = abs(float(direction @ other_direction))
-    return cosine > SAME_COSINE and abs(offset_mm - other_offset_mm) < 2.0 * cosine
+    cosine = abs(float(plane.normal @ other_direction))
+    return cosine > SAME_COSINE and abs(plane.offset_mm - other_offset_mm) < 2.0 * cosine

@@ -1,29 +1,27 @@
-"""Ranker: which b of B candidate cuts the beam follows."""
+"""Ranker: which of the candidate cuts the beam follows."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from typing import Protocol
 
-import numpy as np
-
-from mdp.mesh import Floats, Ints
-
-
-@dataclass(frozen=True)
-class Ranker:
-    """pool(b) is how many candidates B it wants to choose from; order(rows) ranks their (B, 6) features M1..M6, best first."""
-
-    pool: Callable[[int], int]
-    order: Callable[[Floats], Ints]
+from mdp.features import Model, Plan
+from mdp.pool import Entry
 
 
-def _as_they_come(rows: Floats) -> Ints:
-    return np.arange(len(rows), dtype=np.int32)
+class Ranker(Protocol):
+    """Brings candidates, given in the classic order, into the order in which the beam takes them."""
+
+    def ordered(self, pool: Iterable[Entry], plan: Callable[[Entry], Plan], model: Model) -> Iterator[Entry]:
+        """The candidates, best first; plan gives the numbers of one."""
+        ...
 
 
-def _just_enough(beam_width: int) -> int:
-    return 2 * beam_width + 4  # some turn out to be twins
+class ByReduction:
+    """The classic ranking of the 2020 paper: as they come."""
+
+    def ordered(self, pool: Iterable[Entry], plan: Callable[[Entry], Plan], model: Model) -> Iterator[Entry]:
+        """The candidates as they come."""
+        del plan, model
+        return iter(pool)
 
 
-BY_REDUCTION = Ranker(_just_enough, _as_they_come)
-
-RANKERS: dict[str, Ranker] = {"classic": BY_REDUCTION}
+RANKERS: dict[str, Ranker] = {"classic": ByReduction()}

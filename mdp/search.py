@@ -6,7 +6,7 @@ cut leaves risky above its plane is never repaired later, so that sum bounds all
 same cuts take one place.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -18,17 +18,20 @@ from mdp.candidates import REASONS, Bounds, Checked, bounds, check, refusals, wo
 from mdp.clearance import allowed_poses
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, Part
-from mdp.features import Model, features
+from mdp.features import Model
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import risky_above, risky_upright
 from mdp.plane import PLATFORM, Plane
-from mdp.pool import Entry, Standing, fill
+from mdp.pool import Table, entries
 from mdp.pose import level, poses, rotation
 from mdp.ranker import RANKERS
 from mdp.sequence import least_rotation
 from mdp.sweep import Remainder
 from profiles.machine import Machine
 from profiles.profile import Profile
+
+PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4}
+LADDER = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,7 @@ def decompose(
     """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible."""
     began = perf_counter()
     search = _Search(mesh, profile, ranker)
-    best = search.run(on_stage)
+    best = search.run_published(on_stage) if profile.search.method == "published" else search.run(on_stage)
     parts = _parts(best, search.machine, profile.process.self_supporting_angle_deg, profile.search.clearance)
     return Decomposition(
         name=name,
@@ -109,10 +112,12 @@ def decompose(
 
 
 class _Search:
-    """One search: fixed settings, and the counts that grow while it runs."""
+    """One search: fixed settings, and what it remembers while it runs."""
 
     def __init__(self, mesh: Mesh, profile: Profile, ranker: str) -> None:
         self.settings, self.process = profile.search, profile.process
+        if profile.search.method == "published":
+            self.settings = profile.search.model_copy(update=PUBLISHED)
         self.machine = profile.machine if profile.search.clearance else _without_limits(profile.machine)
         self.ranker = RANKERS[ranker]
         self.root = Node(solid_of(mesh), (), self.process.self_supporting_angle_deg, self.settings.count_platform_faces)
@@ -122,52 +127,94 @@ class _Search:
         self.least_gain_mm2 = self.settings.least_gain * self.root.risky_mm2
         self.evaluated = 0
         self.stages = 0
+        self.best = self.root
+        self._children: dict[tuple[int, int], Node | None] = {}
 
     def run(self, on_stage: Callable[[Progress], None] | None) -> Node:
-        """The best node found."""
-        best, beam = self.root, [self.root]
-        seen = {self.root.signature}
-        while beam and self.model.risky_mm2 > 0 and self.stages < self.settings.most_parts - 1:
+        """The best node found.
+
+        Beams of the ladder's widths run side by side, a wider one keeping all that the narrower ones keep: so a wider beam
+        never ends worse, and no more than beam_width nodes are followed in all.
+        """
+        widths = [*(width for width in LADDER if width < self.settings.beam_width), self.settings.beam_width]
+        beams = {width: [self.root] for width in widths}
+        seen = {width: {self.root.signature} for width in widths}
+        while beams[widths[-1]] and self.model.risky_mm2 > 0 and self.stages < self.settings.most_parts - 1:
             self.stages += 1
-            children = list(self._children(beam, best, seen))
-            best = min([best, *children], key=lambda node: node.cost_mm2)
-            beam = [child for child in children if child.residual_mm2 < best.cost_mm2 - self.least_gain_mm2]
+            tables = {id(node): self._table(node) for node in beams[widths[-1]]}
+            self._children.clear()
+            following: list[Node] = []
+            for width in widths:
+                following = self._next(beams[width], tables, following, width, seen[width])
+                beams[width] = following
+            self.best = min([self.best, *following], key=lambda node: node.cost_mm2)
+            if on_stage is not None:
+                on_stage(Progress(self.stages, len(following), self.best.cost_mm2 / self.model.risky_mm2))
+        return self.best
+
+    def run_published(self, on_stage: Callable[[Progress], None] | None) -> Node:
+        """The authors' loop: ends as soon as the beam's best does not rise, keeps twins, and stops looking at candidates once
+        one of a good parent is useless."""
+        beam = [self.root]
+        while self.model.risky_mm2 > 0:
+            self.stages += 1
+            tables = [self._table(node) for node in beam]
+            useless = max(table.saved_mm2 for table in tables) / self.model.risky_mm2
+            self._children.clear()
+            children: list[Node] = []
+            for entry in entries(tables, self.model.risky_mm2, np.inf, useless):
+                child = self._child(beam[entry.table], tables[entry.table], entry.row)
+                children += [child] if child is not None else []
+                if len(children) == self.settings.beam_width:
+                    break
+            best = min(children, key=lambda node: node.cost_mm2, default=self.best)
+            if best.cost_mm2 >= self.best.cost_mm2:
+                break
+            self.best, beam = best, children
             if on_stage is not None:
                 on_stage(Progress(self.stages, len(beam), best.cost_mm2 / self.model.risky_mm2))
-        return best
+        return self.best
 
-    def _children(self, beam: Sequence[Node], best: Node, seen: set[tuple[float, ...]]) -> Iterator[Node]:
-        """Up to beam_width new nodes, no two of them the same solid."""
-        tables = [worth(node.remainder, self.limits, self.settings, self.root.angle_deg, self.least_gain_mm2) for node in beam]
-        self.evaluated += sum(table.evaluated for table in tables)
-        standings = [Standing(self.model.risky_mm2 - node.cost_mm2, node.residual_mm2) for node in beam]
+    def _table(self, node: Node) -> Table:
+        found = worth(node.remainder, self.limits, self.settings, self.root.angle_deg, self.least_gain_mm2)
+        self.evaluated += found.evaluated
 
-        def look(node: int, direction: Ints, offset_mm: Floats) -> Checked:
-            return check(beam[node].remainder, self.limits, self.settings, direction, offset_mm)
+        def look(direction: Ints, offset_mm: Floats) -> Checked:
+            return check(node.remainder, self.limits, self.settings, direction, offset_mm)
 
-        most = self.ranker.pool(self.settings.beam_width)
-        bound = best.cost_mm2 - self.least_gain_mm2
-        entries = fill(tables, standings, self.limits, self.model.risky_mm2, bound, most, look)
-        order = self.ranker.order(features([entry.plan for entry in entries], self.model))
-        made = 0
-        for entry in (entries[k] for k in order):
-            if made == self.settings.beam_width:
-                return
-            child = self._child(beam[entry.node], entry)
+        return Table(found, self.limits, self.model.risky_mm2 - node.cost_mm2, node.residual_mm2, look)
+
+    def _next(
+        self, beam: Sequence[Node], tables: dict[int, Table], kept: Sequence[Node], width: int, seen: set[tuple[float, ...]]
+    ) -> list[Node]:
+        """The beam after one more cut: what the narrower beams keep, then the best children, no two of them the same solid."""
+        following = list(kept)
+        seen.update(node.signature for node in kept)
+        mine = [tables[id(node)] for node in beam]
+        pool = entries(mine, self.model.risky_mm2, self.best.cost_mm2 - self.least_gain_mm2) if mine else iter(())
+        for entry in self.ranker.ordered(pool, lambda entry: mine[entry.table].plan(entry.row), self.model):
+            if len(following) >= width:
+                break
+            child = self._child(beam[entry.table], mine[entry.table], entry.row)
             if child is not None and child.signature not in seen:
                 seen.add(child.signature)
-                made += 1
-                yield child
+                following.append(child)
+        return following
 
-    def _child(self, node: Node, entry: Entry) -> Node | None:
+    def _child(self, node: Node, table: Table, row: int) -> Node | None:
         """The node after a cut; None when the part has no pose at which the machine can print it."""
-        above, below = cut(node.solid, entry.plane)
+        key = (id(node), row)
+        if key not in self._children:
+            self._children[key] = self._made(node, table.plane(row), float(table.worth.residual_mm2[row]))
+        return self._children[key]
+
+    def _made(self, node: Node, plane: Plane, residual_mm2: float) -> Node | None:
+        above, below = cut(node.solid, plane)
         if above.is_empty() or below.is_empty():
             return None
-        if self.settings.clearance and not allowed_poses(self.machine, entry.plane.normal, mesh_of(above).vertices):
+        if self.settings.clearance and not allowed_poses(self.machine, plane.normal, mesh_of(above).vertices):
             return None
-        made = Cut(entry.plane, above, entry.plan.residual_mm2)
-        return Node(below, (*node.cuts, made), node.angle_deg, node.count_platform_faces)
+        return Node(below, (*node.cuts, Cut(plane, above, residual_mm2)), node.angle_deg, node.count_platform_faces)
 
     def notes(self, parts: int) -> tuple[str, ...]:
         """What a person should know of the outcome."""

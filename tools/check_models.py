@@ -29,7 +29,8 @@ def main() -> None:
     options.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     given = options.parse_args()
     profile = load(machine=given.machine, settings=given.set)
-    print("| model | parts | volume error | reduction | inside | recorded / planned | errors | s |\n|---|---|---|---|---|---|---|---|")
+    print("| model | parts | volume error | reduction | inside | recorded / planned | errors | s |")
+    print("|---|---|---|---|---|---|---|---|")
     for file in sorted(given.folder.iterdir()):
         if file.suffix.lower() in SUFFIXES:
             print(row(file, profile), flush=True)
@@ -48,8 +49,8 @@ def row(file: Path, profile: Profile) -> str:
     error = abs(sum(part.volume_mm3 for part in found.parts) / found.mesh.volume_mm3 - 1.0)
     errors = sum(finding.severity == "error" for finding in program.run.findings)
     laid = volumes.sum() / program.run.segment_mm3.sum()
-    spent = perf_counter() - began
-    return f"| {file.name} | {len(found.parts)} | {error:.1e} | {found.reduction:.3f} | {share:.4f} | {laid:.5f} | {errors} | {spent:.0f} |"
+    told = [file.name, len(found.parts), f"{error:.1e}", f"{found.reduction:.3f}", f"{share:.4f}", f"{laid:.5f}", errors]
+    return "| " + " | ".join(str(cell) for cell in [*told, round(perf_counter() - began)]) + " |"
 
 
 if __name__ == "__main__":

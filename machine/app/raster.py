@@ -119,7 +119,7 @@ def _to_screen(corners: Floats, axes: Floats, scale: float, middle: Floats, widt
 @numba.njit(cache=True, inline="always")
 def _dot(a: Any, b: Any) -> float:
     """Written out: numba's own would need scipy."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @numba.njit(cache=True)
