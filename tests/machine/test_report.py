@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+
+from machine.app.pipeline import Decomposed
+from machine.app.report import duration, in_words, parts_table, table
+from mdp.cut import cut, mesh_of, solid_of
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Mesh
+from mdp.orientation import best_orientation
+from mdp.plane import PLATFORM, Plane
+from mdp.pose import Pose, about
+from tests.shapes import box, hollow, tee
+
+
+def part(index: int, mesh: Mesh, base: Plane, pose: Pose, risky_mm2: float = 0.0) -> Part:
+    return Part(index, mesh, base, pose, np.eye(3), mesh.volume_mm3, risky_mm2)
+
+
+def tee_in_parts() -> Decomposed:
+    """A tee with its arms cut off sideways, 300 mm2 of underside that hang printed straight up; 30 of them stay risky."""
+    right, left = Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0)
+    one, rest = cut(solid_of(tee()), left)
+    other, stem = cut(rest, right)
+    parts = (
+        part(1, mesh_of(stem), PLATFORM, Pose(0.0, 0.0)),
+        part(2, mesh_of(other), right, Pose(90.0, 90.0), 30.0),
+        part(3, mesh_of(one), left, Pose(90.0, -90.0)),
+    )
+    return Decomposed(Decomposition("tee.stl", tee(), parts, 2, "classic", 300.0, 30.0, 1234, 2, 0.25), 0.1, 0.5)
+
+
+def test_the_parts_of_a_tee_stand_in_print_order_with_what_they_save() -> None:
+    lines = parts_table(tee_in_parts()).splitlines()
+    assert lines == [
+        "part  tilt deg  turn deg  base mm  volume mm3   share  risky before  after mm2",
+        "1          0.0       0.0      0.0        4000  57.1 %           0.0        0.0",
+        "2         90.0      90.0      5.0        1500  21.4 %         150.0       30.0",
+        "3         90.0     -90.0      5.0        1500  21.4 %         150.0        0.0",
+        "",
+        "risky area                 mm2     less",
+        "straight up              300.0",
+        "best single orientation    0.0  100.0 %  turned 90 about x",
+        "in 3 parts                30.0   90.0 %",
+        "1234 candidates in 0.2 s",
+    ]
+
+
+def test_the_table_fits_a_terminal_of_80_columns() -> None:
+    assert max(len(line) for line in parts_table(tee_in_parts()).splitlines()) <= 80
+
+
+def alone(mesh: Mesh, risky_mm2: float) -> Decomposed:
+    whole = (part(1, mesh, PLATFORM, Pose(0.0, 0.0), risky_mm2),)
+    return Decomposed(Decomposition("m.stl", mesh, whole, 2, "classic", risky_mm2, risky_mm2, 0, 0, 0.0), 0.0, 0.0)
+
+
+def test_the_areas_follow_the_self_supporting_angle() -> None:
+    leaning = box(10, 10, 40).moved(about(np.array([0.0, 1.0, 0.0]), np.radians(30)), (0, 0, 5))
+    before = [float(parts_table(alone(leaning, 400.0), angle).splitlines()[1].split()[-2]) for angle in (25.0, 35.0)]
+    assert before == [pytest.approx(400 + 100, abs=0.2), pytest.approx(100, abs=0.2)]
+
+
+def test_the_authors_terms_count_what_stands_on_the_platform() -> None:
+    lines = parts_table(tee_in_parts(), count_platform_faces=True).splitlines()
+    assert lines[1].split()[-2] == "100.0"
+    assert lines[7].split()[3] == "700.0"
+
+
+def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:
+    lines = parts_table(alone(box(), 0.0)).splitlines()
+    assert lines[-2].split() == ["in", "1", "part", "0.0", "0.0", "%"]
+    assert lines[-3].endswith("as it stands")
+
+
+def test_a_rotation_is_told_as_the_setting_takes_it() -> None:
+    upside_down = tee().moved(np.diag([1.0, -1.0, -1.0]))
+    assert in_words(best_orientation(upside_down, 45.0)) == "as it stands"
+    oblique = tee().moved(about(np.array([0.0, 1.0, 0.0]), np.radians(30)))
+    assert in_words(best_orientation(oblique, 45.0)) == "turned 90 about x"
+    assert "rests nowhere" in in_words(best_orientation(hollow(), 45.0, resting=False))
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(3975.4, "1h 6m 15s"), (61, "1m 1s"), (0.4, "0s")])
+def test_a_duration_is_hours_minutes_seconds(seconds: float, told: str) -> None:
+    assert duration(seconds) == told
+
+
+def test_a_table_aligns_words_left_and_numbers_right() -> None:
+    assert table([["part", "mm"], ["1", "10.5"]]) == "part    mm\n1     10.5\n"
