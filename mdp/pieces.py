@@ -1,9 +1,11 @@
 """Pieces: whether the solid below each offset of a direction hangs together with the platform.
 
-Every vertex belongs to the basin of the lowest vertex that is reached from it by walking down, and two basins join at the
-first edge between them, in the order of the offsets. A lowest vertex around which solid lies beneath is the floor of a void
-or bowl, not a floating piece: it is joined to its anchor, the surface that a ray into the solid meets, which lies lower.
-Solids join only where surfaces join, so the count of pieces is exact for the solid, closed voids and handles included.
+The surface below a rising plane gains a component at a vertex without a lower neighbour and components join only at a vertex
+whose lower neighbours form several runs around it (PL Morse theory, ties of height broken by number); all other vertices are
+regular and need no look. A component is named after the lowest vertex that walking down leads to: its basin. A lowest vertex
+around which solid lies beneath is the floor of a void or bowl, not a floating piece: it is joined to its anchor, the surface
+that a ray into the solid meets, which lies lower. Solids join only where surfaces join, so the count of pieces is exact for the
+solid, closed voids and handles included.
 """
 
 import numpy as np
@@ -11,119 +13,199 @@ from numba import njit
 
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.rays import first_hit
+from mdp.sums import column_over
 
 UNKNOWN = -2
 
 
+@njit(cache=True)
+def find_critical(cosines, flatness, heights, links, found):  # type: ignore[no-untyped-def]
+    """Vertices that are not regular, or have no single ring of neighbours; returns how many. cosines: of vertex normals and d."""
+    starts, neighbours = links
+    many = 0
+    for v in range(len(heights)):
+        if abs(cosines[v]) >= flatness[v]:
+            turns = 0
+            last = before(heights, neighbours[starts[v + 1] - 1], v, False) if starts[v] < starts[v + 1] else False
+            for at in range(starts[v], starts[v + 1]):
+                lower = before(heights, neighbours[at], v, False)
+                turns += int(lower != last)
+                last = lower
+            if turns != 2 or flatness[v] < 0.0:
+                found[many] = v
+                many += 1
+    return many
+
+
 @njit(cache=True, inline="always")
-def _root(parent, v):  # type: ignore[no-untyped-def]
+def before(heights, a, b, up):  # type: ignore[no-untyped-def]
+    """Whether a comes before b: strictly lower, ties by number; the reverse for a sweep from the top (up)."""
+    lower = heights[a] < heights[b] or (heights[a] == heights[b] and a < b)
+    return lower != up
+
+
+@njit(cache=True)
+def walk(v, heights, links, label, path, up):  # type: ignore[no-untyped-def]
+    """The basin of a vertex; labels all vertices on the way. The vertices at which basins begin are labelled already."""
+    starts, neighbours = links
+    length = 0
+    while label[v] < 0:
+        path[length] = v
+        length += 1
+        for at in range(starts[v], starts[v + 1]):
+            if before(heights, neighbours[at], v, up):
+                v = int(neighbours[at])
+                break
+    for k in range(length):
+        label[path[k]] = label[v]
+    return label[v]
+
+
+@njit(cache=True)
+def begin_basins(found, many, heights, links, label, up):  # type: ignore[no-untyped-def]
+    """Number the vertices at which basins begin; returns them."""
+    starts, neighbours = links
+    seeds = np.empty(many, np.int32)
+    size = 0
+    for k in range(many):
+        v = found[k]
+        first = starts[v] < starts[v + 1]
+        for at in range(starts[v], starts[v + 1]):
+            first = first and not before(heights, neighbours[at], v, up)
+        if first:
+            label[v], seeds[size] = size, v
+            size += 1
+    return seeds[:size]
+
+
+@njit(cache=True)
+def saddle_joins(found, many, heights, links, label, path, up):  # type: ignore[no-untyped-def]
+    """(j, 3): two basins that meet, and the vertex at which they do."""
+    starts, neighbours = links
+    room = 0
+    for k in range(many):
+        room += starts[found[k] + 1] - starts[found[k]]
+    joins = np.empty((room, 3), np.int32)
+    size = 0
+    for k in range(many):
+        v, last = found[k], -1
+        for at in range(starts[v], starts[v + 1]):
+            if before(heights, neighbours[at], v, up):
+                basin = walk(int(neighbours[at]), heights, links, label, path, up)
+                if last >= 0 and basin != last:
+                    joins[size, 0], joins[size, 1], joins[size, 2] = last, basin, v
+                    size += 1
+                last = basin
+    return joins[:size]
+
+
+@njit(cache=True)
+def anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, up):  # type: ignore[no-untyped-def]
+    """(j, 3): the basin of a void's first vertex, that of the surface which the ray from it meets, and the vertex."""
+    vertices, faces, vertex_normals = surface
+    low, high = tree
+    joins = np.empty((len(seeds), 3), np.int32)
+    size = 0
+    for basin in range(len(seeds)):
+        v = seeds[basin]
+        if cosines[v] == 0.0 or (cosines[v] < 0.0) != up:
+            continue
+        if anchor[v] == UNKNOWN:
+            # Threads may look up the same vertex twice; the answer does not depend on the direction.
+            anchor[v] = first_hit(v, vertices, faces, low, high, -vertex_normals[v])
+        if anchor[v] < 0:
+            continue
+        w = faces[anchor[v], 0]
+        for corner in (1, 2):
+            if before(heights, faces[anchor[v], corner], w, up):
+                w = faces[anchor[v], corner]
+        if before(heights, w, v, up):
+            joins[size, 0], joins[size, 2] = basin, v
+            joins[size, 1] = walk(int(w), heights, links, label, path, up)
+            size += 1
+    return joins[:size]
+
+
+@njit(cache=True, inline="always")
+def root(parent, v):  # type: ignore[no-untyped-def]
+    """The basin that stands for all that v has been joined with."""
     while parent[v] != v:
         parent[v] = parent[parent[v]]
         v = parent[v]
     return v
 
 
-@njit(cache=True, inline="always")
-def _higher(heights, a, b):  # type: ignore[no-untyped-def]
-    """Strict order of the vertices: by height, ties by number."""
-    return heights[a] > heights[b] or (heights[a] == heights[b] and a > b)
+@njit(cache=True)
+def _stands_on(v, vertices, heights, links):  # type: ignore[no-untyped-def]
+    """Whether a neighbour further down stands on the platform too: then v's component stands there already."""
+    starts, neighbours = links
+    for at in range(starts[v], starts[v + 1]):
+        w = neighbours[at]
+        if vertices[w, 2] <= PLATFORM_TOLERANCE_MM and before(heights, w, v, False):
+            return True
+    return False
 
 
 @njit(cache=True)
-def _basins(edges, heights):  # type: ignore[no-untyped-def]
-    """For every vertex the lowest vertex that walking down leads to; lowest ones lead to themselves."""
-    down = np.arange(len(heights), dtype=np.int32)
-    for e in range(len(edges)):
-        a, b = edges[e, 0], edges[e, 1]
-        upper = b + (a - b) * np.int32(heights[a] > heights[b])  # a < b decides ties; no branch to mispredict
-        down[upper] = a + b - upper
-    for v in range(len(down)):
-        root = down[v]
-        while down[root] != root:
-            root = down[root]
-        w = v
-        while down[w] != root:
-            down[w], w = root, down[w]
-    return down
-
-
-@njit(cache=True)
-def count_pieces(  # type: ignore[no-untyped-def]
-    vertices, faces, edges, vertex_normals, anchor, order, low, high, d, heights, bins, n, pieces
-):
+def count_pieces(surface, standing, links, found, many, tree, anchor, cosines, heights, n, pieces):  # type: ignore[no-untyped-def]
     """Components below each offset that do not reach the platform."""
-    basin = _basins(edges, heights)
-    size = len(vertices)
-    joins = np.empty((len(edges) + size, 3), np.int32)
-    starts = np.zeros(n + 2, np.int32)
-    grounded_at = np.full(size, n + 1, np.int32)
-    many = 0
-    for e in range(len(edges)):
-        a, b = basin[edges[e, 0]], basin[edges[e, 1]]
-        if a != b:
-            joins[many, 0], joins[many, 1] = a, b
-            joins[many, 2] = max(bins[edges[e, 0]], bins[edges[e, 1]])
-            many += 1
-    for v in range(size):
-        if vertices[v, 2] <= PLATFORM_TOLERANCE_MM:
-            grounded_at[basin[v]] = min(grounded_at[basin[v]], bins[v])
-        if basin[v] != v:
-            continue
-        if vertex_normals[v, 0] * d[0] + vertex_normals[v, 1] * d[1] + vertex_normals[v, 2] * d[2] <= 0.0:
-            continue
-        if anchor[v] == UNKNOWN:
-            # Threads may look up the same vertex twice; the answer does not depend on the direction.
-            anchor[v] = first_hit(v, vertices, faces, order, low, high, -vertex_normals[v])
-        if anchor[v] < 0:
-            continue
-        w = faces[anchor[v], 0]
-        for corner in (1, 2):
-            if _higher(heights, w, faces[anchor[v], corner]):
-                w = faces[anchor[v], corner]
-        if bins[w] <= bins[v] and basin[w] != v:
-            joins[many, 0], joins[many, 1], joins[many, 2] = v, basin[w], bins[v]
-            many += 1
-    for k in range(many):
-        starts[joins[k, 2] + 1] += 1
-    for b in range(n + 1):
-        starts[b + 1] += starts[b]
-    sequence, place = np.empty(many, np.int32), starts.copy()
-    for k in range(many):
-        b = joins[k, 2]
-        sequence[place[b]] = k
-        place[b] += 1
-    _join(basin, grounded_at, joins, sequence, starts, bins, n, pieces)
+    label, path = np.full(len(heights), -1, np.int32), np.empty(len(heights), np.int32)
+    seeds = begin_basins(found, many, heights, links, label, False)
+    saddles = saddle_joins(found, many, heights, links, label, path, False)
+    anchored = anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, False)
+    size = len(seeds)
+    begun, grounded_at = np.empty(size, np.int32), np.full(size, n + 1, np.int32)
+    for basin in range(size):
+        begun[basin] = min(column_over(heights[seeds[basin]]), n)
+    for k in range(len(standing)):
+        v = int(standing[k])
+        if not _stands_on(v, surface[0], heights, links):
+            basin = walk(v, heights, links, label, path, False)
+            grounded_at[basin] = min(grounded_at[basin], min(column_over(heights[v]), n))
+    joins = np.concatenate((saddles, anchored))
+    columns = np.empty(len(joins), np.int32)
+    for k in range(len(joins)):
+        columns[k] = min(column_over(heights[joins[k, 2]]), n)
+    _count(begun, grounded_at, joins, columns, n, pieces)
 
 
 @njit(cache=True)
-def _join(basin, grounded_at, joins, sequence, starts, bins, n, pieces):  # type: ignore[no-untyped-def]
+def by_column(columns, n):  # type: ignore[no-untyped-def]
+    """Indices in the order of their columns, and where each column's begin."""
+    starts = np.zeros(n + 3, np.int32)
+    for k in range(len(columns)):
+        starts[columns[k] + 1] += 1
+    for b in range(n + 2):
+        starts[b + 1] += starts[b]
+    sequence, place = np.empty(len(columns), np.int32), starts.copy()
+    for k in range(len(columns)):
+        sequence[place[columns[k]]] = k
+        place[columns[k]] += 1
+    return sequence, starts
+
+
+@njit(cache=True)
+def _count(begun, grounded_at, joins, columns, n, pieces):  # type: ignore[no-untyped-def]
     """Join basins in the order of the offsets and count those that hang free."""
-    size = len(basin)
-    parent, grounded = np.arange(size, dtype=np.int32), np.zeros(size, np.bool_)
-    fresh, landing = np.zeros(n + 2, np.int32), np.full(n + 2, -1, np.int32)
-    following = np.full(size, -1, np.int32)
-    for v in range(size):
-        if basin[v] == v:
-            fresh[bins[v]] += 1
-            at = min(grounded_at[v], n + 1)
-            following[v] = landing[at]
-            landing[at] = v
+    size = len(begun)
+    parent, grounded = np.arange(size), np.zeros(size, np.bool_)
+    _, birth = by_column(begun, n)
+    landed, landing = by_column(grounded_at, n + 1)
+    joined, joining = by_column(columns, n)
     floating = 0
     for b in range(n):
-        floating += fresh[b]
-        for at in range(starts[b], starts[b + 1]):
-            k = sequence[at]
-            a, c = _root(parent, joins[k, 0]), _root(parent, joins[k, 1])
-            if a != c:
-                if not (grounded[a] and grounded[c]):
+        floating += birth[b + 1] - birth[b]
+        for at in range(joining[b], joining[b + 1]):
+            k = joined[at]
+            p, q = root(parent, joins[k, 0]), root(parent, joins[k, 1])
+            if p != q:
+                if not (grounded[p] and grounded[q]):
                     floating -= 1
-                parent[max(a, c)] = min(a, c)
-                grounded[min(a, c)] = grounded[a] or grounded[c]
-        v = landing[b]
-        while v >= 0:
-            root = _root(parent, v)
-            if not grounded[root]:
-                grounded[root] = True
+                parent[max(p, q)] = min(p, q)
+                grounded[min(p, q)] = grounded[p] or grounded[q]
+        for at in range(landing[b], landing[b + 1]):
+            here = root(parent, landed[at])
+            if not grounded[here]:
+                grounded[here] = True
                 floating -= 1
-            v = following[v]
         pieces[b] = floating

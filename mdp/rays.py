@@ -2,47 +2,37 @@
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Mesh
 
 LEAF_FACES = 4
 DEPTH = 64
 
 
 class Tree:
-    """Boxes over faces in Morton order: node k has the children 2k and 2k + 1, the leaves hold LEAF_FACES faces each."""
+    """Boxes over faces in spatial order: node k has the children 2k and 2k + 1, the leaves hold LEAF_FACES faces each."""
 
     def __init__(self, mesh: Mesh) -> None:
-        corners = mesh.vertices[mesh.faces]
-        order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
-        self.faces = order.astype(np.int32)
         self.leaves = 1
-        while self.leaves * LEAF_FACES < len(order):
+        while self.leaves * LEAF_FACES < len(mesh.faces):
             self.leaves *= 2
-        self.low = np.full((2 * self.leaves, 3), np.inf)
-        self.high = np.full((2 * self.leaves, 3), -np.inf)
-        leaf = self.leaves + np.arange(len(order)) // LEAF_FACES
-        np.minimum.at(self.low, leaf, corners.min(axis=1)[order])
-        np.maximum.at(self.high, leaf, corners.max(axis=1)[order])
-        level = self.leaves
-        while level > 1:
-            children = slice(level, 2 * level)
-            level //= 2
-            self.low[level : 2 * level] = self.low[children].reshape(level, 2, 3).min(axis=1)
-            self.high[level : 2 * level] = self.high[children].reshape(level, 2, 3).max(axis=1)
+        self.low, self.high = _boxes(mesh.vertices, mesh.faces, self.leaves)
 
 
-def _morton(points: Floats) -> NDArray[np.uint64]:
-    """Position along a space-filling curve: near points get near numbers."""
-    low = points.min(axis=0)
-    scale = 1023.0 / max(float((points.max(axis=0) - low).max()), 1e-12)
-    cells = ((points - low) * scale).astype(np.uint64)
-    code = np.zeros(len(points), dtype=np.uint64)
-    for bit in range(10):
+@njit(cache=True)
+def _boxes(vertices, faces, leaves):  # type: ignore[no-untyped-def]
+    low, high = np.full((2 * leaves, 3), np.inf), np.full((2 * leaves, 3), -np.inf)
+    for f in range(len(faces)):
+        leaf = leaves + f // LEAF_FACES
+        for corner in range(3):
+            for axis in range(3):
+                x = vertices[faces[f, corner], axis]
+                low[leaf, axis], high[leaf, axis] = min(low[leaf, axis], x), max(high[leaf, axis], x)
+    for node in range(leaves - 1, 0, -1):
         for axis in range(3):
-            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return code
+            low[node, axis] = min(low[2 * node, axis], low[2 * node + 1, axis])
+            high[node, axis] = max(high[2 * node, axis], high[2 * node + 1, axis])
+    return low, high
 
 
 @njit(cache=True, inline="always")
@@ -76,8 +66,8 @@ def _distance(p, q, r, origin, ray):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def first_hit(v, vertices, faces, order, low, high, ray):  # type: ignore[no-untyped-def]
-    """The first face met from vertex v along `ray`, its own faces left out; -1: none. order, low, high: a Tree's arrays."""
+def first_hit(v, vertices, faces, low, high, ray):  # type: ignore[no-untyped-def]
+    """The first face met from vertex v along `ray`, its own faces left out; -1: none. low, high: a Tree's boxes."""
     leaves = len(low) // 2
     origin, inverse = vertices[v], np.empty(3)
     for axis in range(3):
@@ -96,8 +86,7 @@ def first_hit(v, vertices, faces, order, low, high, ray):  # type: ignore[no-unt
             top += 2
             continue
         first = (node - leaves) * LEAF_FACES
-        for k in range(first, min(first + LEAF_FACES, len(order))):
-            f = order[k]
+        for f in range(first, min(first + LEAF_FACES, len(faces))):
             if v in (faces[f, 0], faces[f, 1], faces[f, 2]):
                 continue
             t = _distance(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], origin, ray)

@@ -1,143 +1,222 @@
 """Sums: what a direction's offsets add up to, face by face (numba kernels of the sweep).
 
-bins[v] is the number of offsets strictly below vertex v; offset column c lies at (begin + c) * step.
+Heights are in steps above the direction's first offset: offset column c lies at height c, column c is below a vertex at height t
+when c < t. Faces are taken in blocks: what every face needs is worked out in plain loops over the block, which the compiler turns
+into vector instructions, then added to the columns one face after the other. No flag allows the compiler to change a
+result, so all processors and numbers of threads give the same numbers.
 """
 
 import numpy as np
 from numba import njit
 
-FRAGILE_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a sliver when the plane comes too near
+BLOCK = 128
+AHEAD = 3  # columns of a face that are worked out for the whole block; the few faces that cross more are finished singly
+THIRD = 1.0 / 3.0
+EXACT = {"nnan", "ninf", "nsz"}
 
 
-@njit(cache=True)
-def find_heights(vertices, d, step, heights, bins):  # type: ignore[no-untyped-def]
-    """Fill heights and bins of all vertices; returns the first offset's number and the count of offsets in between."""
-    least, most = np.inf, -np.inf
-    for v in range(len(vertices)):
-        h = vertices[v, 0] * d[0] + vertices[v, 1] * d[1] + vertices[v, 2] * d[2]
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def find_heights(x, y, z, d, step, heights):  # type: ignore[no-untyped-def]
+    """Fill the heights of all vertices; returns the first offset's number and the count of offsets in between."""
+    d0, d1, d2 = d[0], d[1], d[2]
+    least, most = 1e300, -1e300
+    for v in range(len(x)):
+        h = (x[v] * d0 + y[v] * d1 + z[v] * d2) / step
         heights[v] = h
         least, most = min(least, h), max(most, h)
-    begin = int(np.floor(least / step)) + 1
-    n = max(int(np.ceil(most / step)) - begin, 0)
-    for v in range(len(vertices)):
-        bins[v] = min(max(int(np.ceil(heights[v] / step)) - begin, 0), n)
-    return begin, n
+    begin = int(np.floor(least)) + 1
+    for v in range(len(x)):
+        heights[v] -= begin
+    return begin, max(int(np.ceil(most)) - begin, 0)
 
 
 @njit(cache=True, inline="always")
-def _sorted(a, b, c):  # type: ignore[no-untyped-def]
-    return min(a, b, c), max(min(a, b), min(max(a, b), c)), max(a, b, c)
+def column_over(height):  # type: ignore[no-untyped-def]
+    """The number of offsets strictly below a height: the first column that is not below it."""
+    return max(int(np.ceil(height)), 0)
+
+
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def _sorted_heights(a, b, c, heights, low, middle, high):  # type: ignore[no-untyped-def]
+    for k in range(len(low)):
+        p, q, r = heights[a[k]], heights[b[k]], heights[c[k]]
+        least, most = min(p, q), max(p, q)
+        low[k], high[k] = min(least, r), max(most, r)
+        middle[k] = max(least, min(most, r))
+
+
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def dot(x, y, z, d0, d1, d2, out):  # type: ignore[no-untyped-def]
+    """Products of (n,) vectors given by their coordinates with one vector."""
+    for k in range(len(out)):
+        out[k] = x[k] * d0 + y[k] * d1 + z[k] * d2
+
+
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def _ramps(low, middle, high, rise, fall, column, crossed):  # type: ignore[no-untyped-def]
+    """The first column each face crosses and how many, and the two factors of its share above an offset."""
+    for k in range(len(low)):
+        extent = high[k] - low[k]
+        lower, upper = (middle[k] - low[k]) * extent, (high[k] - middle[k]) * extent
+        rise[k] = 1.0 / lower if lower > 0.0 else 0.0
+        fall[k] = 1.0 / upper if upper > 0.0 else 0.0
+        first = max(np.ceil(low[k]), 0.0)
+        column[k] = np.int32(first)
+        crossed[k] = np.int32(max(np.ceil(high[k]), 0.0)) - np.int32(first)
 
 
 @njit(cache=True, inline="always")
-def _inverse(x):  # type: ignore[no-untyped-def]
-    return 1.0 / x if x > 0.0 else 0.0
+def _share(c, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
+    """Share of a face above an offset that it crosses."""
+    return 1.0 - (c - low) * (c - low) * rise if c < middle else (high - c) * (high - c) * fall
+
+
+@njit(cache=True, inline="always")
+def _moment(c, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
+    """First moment about an offset of the share of a face above it."""
+    mean, up, down = (low + middle + high) * THIRD, c - low, high - c
+    return mean - c + up * up * rise * up * THIRD if c < middle else down * down * fall * down * THIRD
+
+
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def _weigh(ahead, low, middle, high, rise, fall, weight, area, moment):  # type: ignore[no-untyped-def]
+    for k in range(len(low)):
+        c = max(np.ceil(low[k]), 0.0) + ahead
+        inside = weight[k] if c < high[k] else 0.0
+        area[k] = inside * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+        moment[k] = inside * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
+
+
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def _add_volumes(column, crossed, low, middle, high, rise, fall, weight, parts, sums):  # type: ignore[no-untyped-def]
+    for k in range(len(low)):
+        b = np.uint32(column[k])
+        sums[b, 0] += weight[k]
+        sums[b, 1] += weight[k] * ((low[k] + middle[k] + high[k]) * THIRD)
+        sums[b, 2] += parts[0, k]
+        sums[b, 3] += parts[1, k]
+        sums[b + 1, 2] += parts[2, k]
+        sums[b + 1, 3] += parts[3, k]
+        sums[b + 2, 2] += parts[4, k]
+        sums[b + 2, 3] += parts[5, k]
+        for ahead in range(AHEAD, crossed[k]):
+            c = float(b) + ahead
+            sums[b + ahead, 2] += weight[k] * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+            sums[b + ahead, 3] += weight[k] * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
 @njit(cache=True)
-def sum_risks(faces, areas, normals, risky, d, heights, bins, begin, n, step, risky_below, up, residual):  # type: ignore[no-untyped-def]
-    """Risky areas above each offset: printed straight up, and along d. Only the faces that are risky either way count."""
-    whole, crossing = np.zeros((n + 1, 2)), np.zeros((n, 2))
-    for f in range(len(faces)):
-        slope = normals[f, 0] * d[0] + normals[f, 1] * d[1] + normals[f, 2] * d[2]
-        if not risky[f] and slope >= risky_below:
-            continue
-        i, j, m = faces[f, 0], faces[f, 1], faces[f, 2]
-        h0, h1, h2 = _sorted(heights[i], heights[j], heights[m])
-        below, above = min(bins[i], bins[j], bins[m]), max(bins[i], bins[j], bins[m])
-        up_area = areas[f] if risky[f] else 0.0
-        residual_area = areas[f] if slope < risky_below else 0.0
-        whole[below, 0] += up_area
-        whole[below, 1] += residual_area
-        if below == above:
-            continue
-        lower, upper = _inverse((h1 - h0) * (h2 - h0)), _inverse((h2 - h1) * (h2 - h0))
-        for column in range(below, above):
-            c = (begin + column) * step
-            share = 1.0 - (c - h0) * (c - h0) * lower if c < h1 else (h2 - c) * (h2 - c) * upper
-            crossing[column, 0] += up_area * share
-            crossing[column, 1] += residual_area * share
-    for column in range(n - 1, -1, -1):
-        if column < n - 1:
-            for kind in range(2):
-                whole[column + 1, kind] += whole[column + 2, kind]
-        up[column] = crossing[column, 0] + whole[column + 1, 0]
-        residual[column] = crossing[column, 1] + whole[column + 1, 1]
-
-
-@njit(cache=True)
-def sum_volumes(faces, areas, normals, d, heights, bins, begin, n, step, section, volume):  # type: ignore[no-untyped-def]
+def sum_volumes(corners, vectors, d, heights, n, step, section, volume):  # type: ignore[no-untyped-def]
     """Cross-section at and volume above each offset, by the divergence theorem."""
-    whole, crossing = np.zeros((n + 1, 2)), np.zeros((n, 2))
-    for f in range(len(faces)):
-        i, j, m = faces[f, 0], faces[f, 1], faces[f, 2]
-        h0, h1, h2 = _sorted(heights[i], heights[j], heights[m])
-        below, above = min(bins[i], bins[j], bins[m]), max(bins[i], bins[j], bins[m])
-        leaning = areas[f] * (normals[f, 0] * d[0] + normals[f, 1] * d[1] + normals[f, 2] * d[2])
-        mean = (h0 + h1 + h2) / 3.0
-        whole[below, 0] += leaning
-        whole[below, 1] += leaning * mean
-        if below == above:
-            continue
-        lower, upper = _inverse((h1 - h0) * (h2 - h0)), _inverse((h2 - h1) * (h2 - h0))
-        for column in range(below, above):
-            c = (begin + column) * step
-            if c < h1:
-                under = (c - h0) * (c - h0) * lower
-                share = 1.0 - under
-                moment = mean - c + under * (c - h0) / 3.0
-            else:
-                share = (h2 - c) * (h2 - c) * upper
-                moment = share * (h2 - c) / 3.0
-            crossing[column, 0] += leaning * share
-            crossing[column, 1] += leaning * moment
+    sums = np.zeros((n + AHEAD + 1, 4))
+    rows, parts, ints = np.empty((6, BLOCK)), np.empty((2 * AHEAD, BLOCK)), np.empty((2, BLOCK), np.int32)
+    for begin in range(0, corners.shape[1], BLOCK):
+        end = min(begin + BLOCK, corners.shape[1])
+        size = end - begin
+        low, middle, high = rows[0, :size], rows[1, :size], rows[2, :size]
+        rise, fall, weight = rows[3, :size], rows[4, :size], rows[5, :size]
+        _sorted_heights(corners[0, begin:end], corners[1, begin:end], corners[2, begin:end], heights, low, middle, high)
+        dot(vectors[0, begin:end], vectors[1, begin:end], vectors[2, begin:end], d[0], d[1], d[2], weight)
+        _ramps(low, middle, high, rise, fall, ints[0, :size], ints[1, :size])
+        for ahead in range(AHEAD):
+            _weigh(float(ahead), low, middle, high, rise, fall, weight, parts[2 * ahead, :size], parts[2 * ahead + 1, :size])
+        _add_volumes(ints[0, :size], ints[1, :size], low, middle, high, rise, fall, weight, parts, sums)
+    whole, first_moment = 0.0, 0.0
     for column in range(n - 1, -1, -1):
-        if column < n - 1:
-            for kind in range(2):
-                whole[column + 1, kind] += whole[column + 2, kind]
-        section[column] = crossing[column, 0] + whole[column + 1, 0]
-        volume[column] = crossing[column, 1] + whole[column + 1, 1] - (begin + column) * step * whole[column + 1, 0]
+        whole += sums[column + 1, 0]
+        first_moment += sums[column + 1, 1]
+        section[column] = sums[column, 2] + whole
+        volume[column] = (sums[column, 3] + first_moment - column * whole) * step
 
 
 @njit(cache=True)
-def find_lowest(vertices, edges, heights, bins, begin, n, step, watched, lowest):  # type: ignore[no-untyped-def]
+def _select(normals, risky, d, risky_below, chosen, kind):  # type: ignore[no-untyped-def]
+    """The faces that are risky either way, with 1: upright only, 2: along d only, 3: both; returns how many."""
+    slopes = np.empty(BLOCK)
+    many = 0
+    for begin in range(0, normals.shape[1], BLOCK):
+        end = min(begin + BLOCK, normals.shape[1])
+        dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], d[0], d[1], d[2], slopes[: end - begin])
+        for f in range(begin, end):
+            code = np.int8(risky[f]) + 2 * np.int8(slopes[f - begin] < risky_below)
+            chosen[many], kind[many] = f, code
+            many += int(code > 0)
+    return many
+
+
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def _pick(chosen, a, b, c, areas, p, q, r, weight):  # type: ignore[no-untyped-def]
+    for k in range(len(chosen)):
+        f = chosen[k]
+        p[k], q[k], r[k] = a[f], b[f], c[f]
+    for k in range(len(chosen)):
+        weight[k] = areas[chosen[k]]
+
+
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def _cover(ahead, low, middle, high, rise, fall, weight, area):  # type: ignore[no-untyped-def]
+    for k in range(len(low)):
+        c = max(np.ceil(low[k]), 0.0) + ahead
+        inside = weight[k] if c < high[k] else 0.0
+        area[k] = inside * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+
+
+@njit(cache=True, error_model="numpy", fastmath=EXACT)
+def _add_areas(kind, column, crossed, low, middle, high, rise, fall, weight, parts, sums):  # type: ignore[no-untyped-def]
+    for k in range(len(low)):
+        b, which = np.uint32(column[k]), np.uint32(kind[k])
+        sums[which, b, 0] += weight[k]
+        sums[which, b, 1] += parts[0, k]
+        sums[which, b + 1, 1] += parts[1, k]
+        sums[which, b + 2, 1] += parts[2, k]
+        for ahead in range(AHEAD, crossed[k]):
+            c = float(b) + ahead
+            sums[which, b + ahead, 1] += weight[k] * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+
+
+@njit(cache=True)
+def sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, up, residual):  # type: ignore[no-untyped-def]
+    """Risky areas above each offset: printed straight up, and along d. Only the faces that are risky either way count."""
+    sums = np.zeros((4, n + AHEAD + 1, 2))
+    chosen, kind = np.empty(len(areas) + 1, np.uint32), np.empty(len(areas) + 1, np.int8)
+    many = _select(normals, risky, d, risky_below, chosen, kind)
+    rows, parts, ints = np.empty((6, BLOCK)), np.empty((AHEAD, BLOCK)), np.empty((2, BLOCK), np.int32)
+    picked = np.empty((3, BLOCK), np.uint32)
+    for begin in range(0, many, BLOCK):
+        end = min(begin + BLOCK, many)
+        size = end - begin
+        low, middle, high = rows[0, :size], rows[1, :size], rows[2, :size]
+        rise, fall, weight = rows[3, :size], rows[4, :size], rows[5, :size]
+        a, b, c = picked[0, :size], picked[1, :size], picked[2, :size]
+        _pick(chosen[begin:end], corners[0], corners[1], corners[2], areas, a, b, c, weight)
+        _sorted_heights(a, b, c, heights, low, middle, high)
+        _ramps(low, middle, high, rise, fall, ints[0, :size], ints[1, :size])
+        for ahead in range(AHEAD):
+            _cover(float(ahead), low, middle, high, rise, fall, weight, parts[ahead, :size])
+        _add_areas(kind[begin:end], ints[0, :size], ints[1, :size], low, middle, high, rise, fall, weight, parts, sums)
+    whole = np.zeros(4)
+    for column in range(n - 1, -1, -1):
+        for which in range(1, 4):
+            whole[which] += sums[which, column + 1, 0]
+        both = sums[3, column, 1] + whole[3]
+        up[column] = sums[1, column, 1] + whole[1] + both
+        residual[column] = sums[2, column, 1] + whole[2] + both
+
+
+@njit(cache=True)
+def find_lowest(z, edges, heights, n, watched, lowest):  # type: ignore[no-untyped-def]
     """Least z above each offset, among vertices and crossings of edges, lowest first, below the watched height."""
-    for v in range(len(vertices)):
-        b, z = bins[v], vertices[v, 2]
-        if z < watched and b > 0:
-            lowest[b - 1] = min(lowest[b - 1], z)
-    for e in range(len(edges)):
-        v, w = edges[e, 0], edges[e, 1]
-        if vertices[v, 2] >= watched and vertices[w, 2] >= watched:
+    known = 0  # columns before it have their least z: that of a vertex above them met earlier
+    for e in range(edges.shape[1]):
+        v, w = edges[0, e], edges[1, e]
+        if known >= n or z[v] >= watched:
             break
-        if bins[v] == bins[w]:
-            continue
-        if bins[v] > bins[w]:
-            v, w = w, v
-        rise = (vertices[w, 2] - vertices[v, 2]) / (heights[w] - heights[v])
-        for column in range(bins[v], bins[w]):
-            z = vertices[v, 2] + rise * ((begin + column) * step - heights[v])
-            lowest[column] = min(lowest[column], z)
+        if heights[v] > known:
+            known = column_over(heights[v])
+            lowest[known - 1] = min(lowest[known - 1], z[v])
+        if heights[w] > known:
+            rise = (z[w] - z[v]) / (heights[w] - heights[v])
+            for column in range(known, column_over(heights[w])):
+                lowest[column] = min(lowest[column], z[v] + rise * (column - heights[v]))
     for column in range(n - 2, -1, -1):
         lowest[column] = min(lowest[column], lowest[column + 1])
-
-
-@njit(cache=True)
-def find_slivers(vertex_normals, d, heights, bins, begin, n, step, fragile):  # type: ignore[no-untyped-def]
-    """Distance from each offset up to the next surface facing along d and down to the next one facing against it."""
-    above, below = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
-    for v in range(len(heights)):
-        cosine = vertex_normals[v, 0] * d[0] + vertex_normals[v, 1] * d[1] + vertex_normals[v, 2] * d[2]
-        b = bins[v]
-        if cosine > FRAGILE_COSINE and b > 0:
-            above[b - 1] = min(above[b - 1], heights[v])
-        elif cosine < -FRAGILE_COSINE:
-            below[b] = max(below[b], heights[v])
-    nearest = np.inf
-    for column in range(n - 1, -1, -1):
-        nearest = min(nearest, above[column])
-        fragile[column] = nearest - (begin + column) * step
-    nearest = -np.inf
-    for column in range(n):
-        nearest = max(nearest, below[column])
-        fragile[column] = min(fragile[column], (begin + column) * step - nearest)

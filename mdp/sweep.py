@@ -15,11 +15,13 @@ from functools import cached_property
 import numpy as np
 from numba import njit, prange
 
+from mdp.facets import Facets, facets
+from mdp.fragile import find_slivers
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
-from mdp.pieces import UNKNOWN, count_pieces
+from mdp.pieces import UNKNOWN, count_pieces, find_critical
 from mdp.rays import Tree
-from mdp.sums import find_heights, find_lowest, find_slivers, sum_risks, sum_volumes
+from mdp.sums import dot, find_heights, find_lowest, sum_risks, sum_volumes
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,37 +64,14 @@ class Remainder:
     risky: Mask
 
     @cached_property
-    def edges(self) -> Ints:
-        """(e, 2) int32: the vertices of every edge, near edges near each other, the smaller number first."""
-        starts, ends = self.mesh.faces.reshape(-1), self.mesh.faces[:, [1, 2, 0]].reshape(-1)
-        once = starts < ends
-        table: Ints = np.ascontiguousarray(np.stack([starts[once], ends[once]], axis=1))
-        return table
-
-    @cached_property
-    def rising_edges(self) -> Ints:
-        """(e, 2) int32: the edges, those with the lowest end first."""
-        order = np.argsort(self.mesh.vertices[self.edges, 2].min(axis=1), kind="stable")
-        return self.edges[order]
-
-    @cached_property
-    def vertex_normals(self) -> Floats:
-        """(n, 3) unit angle-weighted normals; their sign tells on which side of a vertex the solid lies (Baerentzen, Aanaes)."""
-        corners = self.mesh.vertices[self.mesh.faces]
-        total = np.zeros((len(self.mesh.vertices), 3))
-        for k in range(3):
-            a = corners[:, (k + 1) % 3] - corners[:, k]
-            b = corners[:, (k + 2) % 3] - corners[:, k]
-            angle = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
-            for axis in range(3):
-                total[:, axis] += np.bincount(self.mesh.faces[:, k], angle * self.mesh.normals[:, axis], len(total))
-        lengths = np.linalg.norm(total, axis=1, keepdims=True)
-        return total / np.where(lengths > 0, lengths, 1.0)
+    def facets(self) -> Facets:
+        """The surface laid out for sweeping."""
+        return facets(self.mesh, self.risky)
 
     @cached_property
     def tree(self) -> Tree:
         """Boxes over the faces, for rays."""
-        return Tree(self.mesh)
+        return Tree(self.facets.mesh)
 
     @cached_property
     def anchors(self) -> Ints:
@@ -106,9 +85,9 @@ class Remainder:
 
 def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below: float) -> Gains:
     """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle."""
-    mesh = remainder.mesh
-    surface = (mesh.vertices, mesh.faces, mesh.areas_mm2, mesh.normals, remainder.risky)
-    return Gains(*_gains(*surface, np.ascontiguousarray(directions), step_mm, remainder.columns(step_mm), risky_below))
+    laid = remainder.facets
+    surface = (laid.points, laid.corners, laid.normals, laid.mesh.areas_mm2, laid.risky)
+    return Gains(*_gains(surface, np.ascontiguousarray(directions), step_mm, remainder.columns(step_mm), risky_below))
 
 
 def sweep(remainder: Remainder, directions: Floats, step_mm: float, watched_mm: Floats | None = None) -> Sweep:
@@ -116,46 +95,48 @@ def sweep(remainder: Remainder, directions: Floats, step_mm: float, watched_mm: 
 
     watched_mm (k,): the height below which the least z of a part matters; absent: all heights.
     """
-    mesh = remainder.mesh
-    surface = (mesh.vertices, mesh.faces, mesh.areas_mm2, mesh.normals, remainder.edges, remainder.rising_edges)
-    watched = np.full(len(directions), np.inf) if watched_mm is None else watched_mm
-    tree = (remainder.tree.faces, remainder.tree.low, remainder.tree.high)
-    solid = (remainder.vertex_normals, remainder.anchors, *tree, np.ascontiguousarray(directions), watched)
-    return Sweep(*_sweep(*surface, *solid, step_mm, remainder.columns(step_mm)))
+    laid = remainder.facets
+    rows = (laid.points, laid.corners, laid.vectors_mm2, laid.rising_edges, laid.vertex_normal_rows, laid.flatness)
+    surface = (laid.mesh.vertices, laid.mesh.faces, laid.vertex_normals)
+    solid = (surface, laid.standing, laid.links, (remainder.tree.low, remainder.tree.high), remainder.anchors)
+    watched = np.full(len(directions), np.inf) if watched_mm is None else np.ascontiguousarray(watched_mm)
+    return Sweep(*_sweep(rows, solid, np.ascontiguousarray(directions), watched, step_mm, remainder.columns(step_mm)))
 
 
 @njit(cache=True, parallel=True)
-def _gains(vertices, faces, areas, normals, risky, directions, step, columns, risky_below):  # type: ignore[no-untyped-def]
+def _gains(surface, directions, step, columns, risky_below):  # type: ignore[no-untyped-def]
+    points, corners, normals, areas, risky = surface
     k = len(directions)
     first, count = np.zeros(k, np.int32), np.zeros(k, np.int32)
     up, residual = np.zeros((k, columns)), np.zeros((k, columns))
     for row in prange(k):
-        d = directions[row]
-        heights, bins = np.empty(len(vertices)), np.empty(len(vertices), np.int32)
-        begin, n = find_heights(vertices, d, step, heights, bins)
+        d, heights = directions[row], np.empty(points.shape[1])
+        begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
         first[row], count[row] = begin, n
         if n > 0:
-            sum_risks(faces, areas, normals, risky, d, heights, bins, begin, n, step, risky_below, up[row], residual[row])
+            sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, up[row], residual[row])
     return first, count, up, residual
 
 
 @njit(cache=True, parallel=True)
-def _sweep(  # type: ignore[no-untyped-def]
-    vertices, faces, areas, normals, edges, rising, vertex_normals, anchor, order, low, high, directions, watched, step, columns
-):
+def _sweep(rows, solid, directions, watched, step, columns):  # type: ignore[no-untyped-def]
+    points, corners, vectors, edges, vertex_normals, flatness = rows
+    surface, standing, links, tree, anchor = solid
     k = len(directions)
     first, count = np.zeros(k, np.int32), np.zeros(k, np.int32)
     section, volume = np.zeros((k, columns)), np.zeros((k, columns))
     lowest, fragile = np.full((k, columns), np.inf), np.full((k, columns), np.inf)
     pieces = np.zeros((k, columns), np.int32)
     for row in prange(k):
-        d = directions[row]
-        heights, bins = np.empty(len(vertices)), np.empty(len(vertices), np.int32)
-        begin, n = find_heights(vertices, d, step, heights, bins)
+        d, heights = directions[row], np.empty(points.shape[1])
+        cosines, found = np.empty(points.shape[1]), np.empty(points.shape[1], np.int32)
+        begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
         first[row], count[row] = begin, n
         if n > 0:
-            sum_volumes(faces, areas, normals, d, heights, bins, begin, n, step, section[row], volume[row])
-            find_lowest(vertices, rising, heights, bins, begin, n, step, watched[row], lowest[row])
-            find_slivers(vertex_normals, d, heights, bins, begin, n, step, fragile[row])
-            count_pieces(vertices, faces, edges, vertex_normals, anchor, order, low, high, d, heights, bins, n, pieces[row])
+            sum_volumes(corners, vectors, d, heights, n, step, section[row], volume[row])
+            find_lowest(points[2], edges, heights, n, watched[row], lowest[row])
+            dot(vertex_normals[0], vertex_normals[1], vertex_normals[2], d[0], d[1], d[2], cosines)
+            find_slivers(cosines, heights, n, step, fragile[row])
+            many = find_critical(cosines, flatness, heights, links, found)
+            count_pieces(surface, standing, links, found, many, tree, anchor, cosines, heights, n, pieces[row])
     return first, count, section, volume, lowest, fragile, pieces

@@ -1,0 +1,193 @@
+"""Facets: a solid's surface laid out for sweeping: structure of arrays, near faces and vertices near in memory.
+
+What a sweep reads in a row lies in a row: a face's corner numbers, its normal and its area vector each as three long arrays, and
+around every vertex its neighbours in cyclic order.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats, Ints, Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
+
+LEAST_ALTITUDE = 1e-8  # of a triangle, as a share of the largest coordinate: below, rounding may decide which corner is higher
+DOUBT = 1e-6  # margin of a cosine
+SCATTERED = 0.1  # mean spread of a face's corner numbers, as a share of all, above which the surface is put in order
+
+Indices = NDArray[np.uint32]
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Made once a solid. mesh has its vertices and faces in spatial order; risky (m,) tells which faces are risky upright."""
+
+    mesh: Mesh
+    risky: Mask
+
+    @cached_property
+    def points(self) -> Floats:
+        """(3, n) coordinates."""
+        return np.ascontiguousarray(self.mesh.vertices.T)
+
+    @cached_property
+    def corners(self) -> Indices:
+        """(3, m) vertices of the faces."""
+        return np.ascontiguousarray(self.mesh.faces.T.astype(np.uint32))
+
+    @cached_property
+    def normals(self) -> Floats:
+        """(3, m) unit normals."""
+        return np.ascontiguousarray(self.mesh.normals.T)
+
+    @cached_property
+    def vectors_mm2(self) -> Floats:
+        """(3, m) normals times areas."""
+        return np.ascontiguousarray((self.mesh.normals * self.mesh.areas_mm2[:, None]).T)
+
+    @cached_property
+    def links(self) -> tuple[Ints, Ints]:
+        """(n + 1,) starts and (3 m,) neighbours in cyclic order: those of vertex v are neighbours[starts[v] : starts[v + 1]]."""
+        starts, neighbours, _ = _links(self.mesh.faces, len(self.mesh.vertices))
+        return starts, neighbours
+
+    @cached_property
+    def flatness(self) -> Floats:
+        """(n,) least cosine between a vertex' normal m and those of its faces, 0 where in doubt, -1 where it has no single ring.
+
+        A vertex with |d . m| below it is regular for the direction d: around it the surface is a graph over the plane across m
+        whose slope cannot outweigh d's part in that plane.
+        """
+        _, _, single = _links(self.mesh.faces, len(self.mesh.vertices))
+        least_mm = LEAST_ALTITUDE * float(np.abs(self.mesh.bounds_mm).max())
+        flat: Floats = _flatness(self.mesh.vertices, self.mesh.faces, self.mesh.normals, self.vertex_normals, least_mm)
+        return np.where(single, flat, -1.0)
+
+    @cached_property
+    def rising_edges(self) -> Indices:
+        """(2, e) the edges, each with its lower end first, those with the lowest lower end first."""
+        faces, z = self.mesh.faces, self.points[2]
+        starts, ends = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
+        once = (z[starts] < z[ends]) | ((z[starts] == z[ends]) & (starts < ends))
+        starts, ends = starts[once], ends[once]
+        order = np.argsort(z[starts], kind="stable")
+        return np.ascontiguousarray(np.stack([starts[order], ends[order]]).astype(np.uint32))
+
+    @cached_property
+    def standing(self) -> Ints:
+        """Vertices on the platform."""
+        return np.flatnonzero(self.points[2] <= PLATFORM_TOLERANCE_MM).astype(np.int32)
+
+    @cached_property
+    def vertex_normals(self) -> Floats:
+        """(n, 3) unit angle-weighted normals; their sign tells on which side of a vertex the solid lies (Baerentzen, Aanaes)."""
+        normals: Floats = _vertex_normals(self.mesh.vertices, self.mesh.faces, self.mesh.normals)
+        return normals
+
+    @cached_property
+    def vertex_normal_rows(self) -> Floats:
+        """(3, n) vertex_normals."""
+        return np.ascontiguousarray(self.vertex_normals.T)
+
+
+def facets(mesh: Mesh, risky: Mask) -> Facets:
+    """The surface laid out; a mesh whose faces jump about in memory is put along a space-filling curve first."""
+    spread = float((mesh.faces.max(axis=1) - mesh.faces.min(axis=1)).mean())
+    if spread <= SCATTERED * len(mesh.vertices) or len(mesh.faces) < 1000:
+        return Facets(mesh, risky)
+    order = np.argsort(morton(mesh.vertices), kind="stable")
+    number = np.empty(len(order), np.int32)
+    number[order] = np.arange(len(order), dtype=np.int32)
+    faces = number[mesh.faces]
+    turn = np.argsort(faces.min(axis=1), kind="stable")
+    return Facets(Mesh(mesh.vertices[order], faces[turn]), risky[turn])
+
+
+def morton(points: Floats) -> NDArray[np.uint64]:
+    """Position along a space-filling curve: near points get near numbers."""
+    low = points.min(axis=0)
+    scale = 1023.0 / max(float((points.max(axis=0) - low).max()), 1e-12)
+    cells = ((points - low) * scale).astype(np.uint64)
+    code = np.zeros(len(points), dtype=np.uint64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
+    return code
+
+
+@njit(cache=True)
+def _links(faces, size):  # type: ignore[no-untyped-def]
+    """Neighbours of every vertex, in cyclic order where they form a single ring, and whether they do."""
+    starts = np.zeros(size + 1, np.int32)
+    for f in range(len(faces)):
+        for k in range(3):
+            starts[faces[f, k] + 1] += 1
+    for v in range(size):
+        starts[v + 1] += starts[v]
+    place = starts[:-1].copy()
+    first, second = np.empty(3 * len(faces), np.int32), np.empty(3 * len(faces), np.int32)
+    for f in range(len(faces)):
+        for k in range(3):
+            v = faces[f, k]
+            first[place[v]], second[place[v]] = faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]
+            place[v] += 1
+    single = np.empty(size, np.bool_)
+    for v in range(size):
+        begin, end = starts[v], starts[v + 1]
+        for at in range(begin, end - 1):
+            for k in range(at + 1, end):
+                if first[k] == second[at]:
+                    first[at + 1], first[k] = first[k], first[at + 1]
+                    second[at + 1], second[k] = second[k], second[at + 1]
+                    break
+        single[v] = end > begin and second[end - 1] == first[begin]
+        for at in range(begin, end - 1):
+            single[v] = single[v] and second[at] == first[at + 1]
+    return starts, first, single
+
+
+@njit(cache=True, error_model="numpy")
+def _flatness(vertices, faces, normals, vertex_normals, least):  # type: ignore[no-untyped-def]
+    flat = np.ones(len(vertices))
+    for f in range(len(faces)):
+        altitude = _altitude(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]])
+        for k in range(3):
+            v = faces[f, k]
+            cosine = 0.0
+            for axis in range(3):
+                cosine += normals[f, axis] * vertex_normals[v, axis]
+            flat[v] = min(flat[v], max(cosine - DOUBT, 0.0) if altitude > least else 0.0)
+    return flat
+
+
+@njit(cache=True, error_model="numpy")
+def _altitude(p, q, r):  # type: ignore[no-untyped-def]
+    """Least altitude of a triangle."""
+    ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    bx, by, bz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    cx, cy, cz = bx - ax, by - ay, bz - az
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    longest = max(ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, cx * cx + cy * cy + cz * cz)
+    return np.sqrt((x * x + y * y + z * z) / longest) if longest > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _vertex_normals(vertices, faces, normals):  # type: ignore[no-untyped-def]
+    total = np.zeros((len(vertices), 3))
+    for f in range(len(faces)):
+        for k in range(3):
+            o, p, q = faces[f, k], faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]
+            ax, ay, az = vertices[p, 0] - vertices[o, 0], vertices[p, 1] - vertices[o, 1], vertices[p, 2] - vertices[o, 2]
+            bx, by, bz = vertices[q, 0] - vertices[o, 0], vertices[q, 1] - vertices[o, 1], vertices[q, 2] - vertices[o, 2]
+            x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            angle = np.arctan2(np.sqrt(x * x + y * y + z * z), ax * bx + ay * by + az * bz)
+            for axis in range(3):
+                total[o, axis] += angle * normals[f, axis]
+    for v in range(len(total)):
+        length = np.sqrt(total[v, 0] ** 2 + total[v, 1] ** 2 + total[v, 2] ** 2)
+        for axis in range(3):
+            total[v, axis] /= length if length > 0.0 else 1.0
+    return total
