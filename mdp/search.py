@@ -1,17 +1,14 @@
 """Search: beam-guided search for the cuts, after the 2020 paper, with progressive relaxation (pool).
 
-Otherwise than published: the best node ever seen
-is the result, the search goes on while any node has a useful child, a node that can no longer beat it is dropped (what a
-cut leaves risky above its plane is never repaired later, so that sum bounds all descendants), and two orders of the
-same cuts take one place.
+Otherwise than published: the best node ever seen is the result, the search goes on while any node has a useful child, a
+candidate that can no longer beat it is dropped (what a cut leaves risky above its plane is never repaired later, so that sum
+bounds all descendants), two orders of the same cuts take one place, and a wider beam holds the narrower ones.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from time import perf_counter
 
-import manifold3d as m3
 import numpy as np
 
 from mdp.candidates import REASONS, Bounds, Checked, bounds, check, refusals, worth
@@ -20,63 +17,18 @@ from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, Part
 from mdp.features import Model
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import risky_above, risky_upright
+from mdp.node import Cut, Node
+from mdp.overhang import risky_above
 from mdp.plane import PLATFORM, Plane
 from mdp.pool import Table, entries
 from mdp.pose import level, poses, rotation
 from mdp.ranker import RANKERS
 from mdp.sequence import least_rotation
-from mdp.sweep import Remainder
 from profiles.machine import Machine
 from profiles.profile import Profile
 
 PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4}
 LADDER = (1, 2, 5, 10, 20, 50, 100, 200, 500)
-
-
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """A part cut off: the solid above its base plane, and the area that stays risky on it."""
-
-    base: Plane
-    solid: m3.Manifold
-    residual_mm2: float
-
-
-@dataclass(frozen=True, eq=False)
-class Node:
-    """What remains after some cuts, and how good that is."""
-
-    solid: m3.Manifold
-    cuts: tuple[Cut, ...]
-    angle_deg: float
-    count_platform_faces: bool
-
-    @cached_property
-    def remainder(self) -> Remainder:
-        """The remaining solid for the sweep."""
-        mesh = mesh_of(self.solid)
-        return Remainder(mesh, risky_upright(mesh, self.angle_deg, self.count_platform_faces))
-
-    @cached_property
-    def risky_mm2(self) -> float:
-        """Risky area of what remains when it is printed straight up."""
-        return float(self.remainder.mesh.areas_mm2[self.remainder.risky].sum())
-
-    @cached_property
-    def residual_mm2(self) -> float:
-        """Area left risky on the parts cut off so far: a lower bound of the cost of every descendant."""
-        return sum(c.residual_mm2 for c in self.cuts)
-
-    @property
-    def cost_mm2(self) -> float:
-        """J of the paper when the search stops here."""
-        return self.risky_mm2 + self.residual_mm2
-
-    @cached_property
-    def signature(self) -> tuple[float, ...]:
-        """Equal for two orders of the same cuts."""
-        return (round(self.solid.volume(), 3), round(self.risky_mm2, 3), round(self.residual_mm2, 3))
 
 
 @dataclass(frozen=True)
@@ -127,8 +79,14 @@ class _Search:
         self.least_gain_mm2 = self.settings.least_gain * self.root.risky_mm2
         self.evaluated = 0
         self.stages = 0
+        self.began = perf_counter()
         self.best = self.root
         self._children: dict[tuple[int, int], Node | None] = {}
+
+    def _late(self) -> bool:
+        """Whether the time limit is reached."""
+        limit = self.settings.time_limit_s
+        return limit is not None and perf_counter() - self.began >= limit
 
     def run(self, on_stage: Callable[[Progress], None] | None) -> Node:
         """The best node found.
@@ -139,7 +97,7 @@ class _Search:
         widths = [*(width for width in LADDER if width < self.settings.beam_width), self.settings.beam_width]
         beams = {width: [self.root] for width in widths}
         seen = {width: {self.root.signature} for width in widths}
-        while beams[widths[-1]] and self.model.risky_mm2 > 0 and self.stages < self.settings.most_parts - 1:
+        while beams[widths[-1]] and self._goes_on():
             self.stages += 1
             tables = {id(node): self._table(node) for node in beams[widths[-1]]}
             self._children.clear()
@@ -152,11 +110,14 @@ class _Search:
                 on_stage(Progress(self.stages, len(following), self.best.cost_mm2 / self.model.risky_mm2))
         return self.best
 
+    def _goes_on(self) -> bool:
+        return self.model.risky_mm2 > 0 and self.stages < self.settings.most_parts - 1 and not self._late()
+
     def run_published(self, on_stage: Callable[[Progress], None] | None) -> Node:
         """The authors' loop: ends as soon as the beam's best does not rise, keeps twins, and stops looking at candidates once
         one of a good parent is useless."""
         beam = [self.root]
-        while self.model.risky_mm2 > 0:
+        while self._goes_on():
             self.stages += 1
             tables = [self._table(node) for node in beam]
             useless = max(table.saved_mm2 for table in tables) / self.model.risky_mm2
@@ -209,6 +170,7 @@ class _Search:
         return self._children[key]
 
     def _made(self, node: Node, plane: Plane, residual_mm2: float) -> Node | None:
+        """The node after a cut; None when nothing is cut off or no pose serves the part."""
         above, below = cut(node.solid, plane)
         if above.is_empty() or below.is_empty():
             return None
@@ -220,6 +182,8 @@ class _Search:
         """What a person should know of the outcome."""
         if self.model.risky_mm2 <= 0:
             return ("no face needs support: the model is printed straight up as one part",)
+        if self._late():
+            return (f"search.time_limit_s = {self.settings.time_limit_s:g} ended the search; the best so far is used",)
         if parts > 1:
             return ()
         counts = refusals(self.root.remainder, self.limits, self.settings, self.root.angle_deg, self.least_gain_mm2)

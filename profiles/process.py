@@ -87,7 +87,6 @@ class Search(Frozen):
     least_interface_mm2: float = Field(4.0, ge=0, le=1e6, description="least area a part stands on, mm2")
     most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
     time_limit_s: float | None = Field(None, ge=0, description="the search ends after this time with the best so far, s")
-    polish: bool = Field(True, description="true: the planes found are moved off the grid as far as that helps")
     least_gain: float = Field(0.005, ge=0, le=1, description="a cut must make at least this share of the model's risky area safe")
     platform_radius_mm: float | None = Field(
         None, gt=0, description="criterion III: radius of the disc that every plane must clear; absent: the model's footprint"

@@ -84,6 +84,26 @@ def test_a_wider_beam_is_never_worse_on_a_tee() -> None:
     assert wide <= narrow + 1e-9
 
 
+@pytest.mark.parametrize("name", ["tee", "branch"])
+def test_each_width_of_the_ladder_is_at_least_as_good_as_the_one_before(name: str) -> None:
+    mesh = getattr(shapes, name)()
+    left = [_decomposed(mesh, f"search.beam_width={width}").residual_area_mm2 for width in (1, 2, 5)]
+    assert left == sorted(left, reverse=True)
+
+
+def test_the_published_search_keeps_to_its_volume_floor() -> None:
+    mesh = shapes.branch()
+    found = _decomposed(mesh, "search.method=published", "search.clearance=false")
+    assert len(found.parts) > 1
+    assert all(part.volume_mm3 >= 0.1 * mesh.volume_mm3 for part in found.parts[1:])
+
+
+def test_a_time_limit_of_nothing_leaves_one_part_and_says_so() -> None:
+    found = _decomposed(shapes.tee(), "search.time_limit_s=0")
+    assert len(found.parts) == 1
+    assert found.notes == ("search.time_limit_s = 0 ended the search; the best so far is used",)
+
+
 def test_swapped_parts_are_refused() -> None:
     found = _decomposed(shapes.branch())
     swapped = [found.parts[1], found.parts[0]]
