@@ -9,12 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
+import manifold3d as m3
 import numpy as np
 
 from mdp.candidates import REASONS, Bounds, Checked, bounds, check, refusals, worth
 from mdp.clearance import allowed_poses
 from mdp.cut import cut, mesh_of, solid_of
-from mdp.decomposition import Decomposition, Part
+from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, Part
 from mdp.features import Model
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.node import Cut, Node
@@ -28,6 +29,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4}
+MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 LADDER = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
@@ -48,9 +50,10 @@ def decompose(
     search = _Search(mesh, profile, ranker)
     best = search.run_published(on_stage) if profile.search.method == "published" else search.run(on_stage)
     parts = _parts(best, search.machine, profile.process.self_supporting_angle_deg, profile.search.clearance)
+    whole, notes = counted_once(mesh, parts)
     return Decomposition(
         name=name,
-        mesh=mesh,
+        mesh=whole,
         parts=parts,
         beam_width=profile.search.beam_width,
         ranker=ranker,
@@ -59,8 +62,20 @@ def decompose(
         candidates_evaluated=search.evaluated,
         rounds=search.stages,
         search_s=perf_counter() - began,
-        notes=search.notes(len(parts)),
+        notes=(*notes, *search.notes(len(parts))),
     )
+
+
+def counted_once(mesh: Mesh, parts: Sequence[Part]) -> tuple[Mesh, tuple[str, ...]]:
+    """The model that the parts make up: the mesh itself, unless small folds of it pass through themselves.
+
+    Its volume counts such places twice, a cut counts them once; then the model is what the parts are together.
+    """
+    twice = mesh.volume_mm3 - sum(part.volume_mm3 for part in parts)
+    if abs(twice) <= VOLUME_TOLERANCE * mesh.volume_mm3 or abs(twice) > MOST_FOLDED * mesh.volume_mm3:
+        return mesh, ()
+    together = mesh_of(m3.Manifold.batch_boolean([solid_of(part.mesh) for part in parts], m3.OpType.Add))
+    return together, (f"the surface passes through itself: {abs(twice):.3g} mm3 that it winds around twice are counted once",)
 
 
 class _Search:

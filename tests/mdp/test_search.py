@@ -10,7 +10,7 @@ from mdp.clearance import least_tip_height_mm
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.pose import Pose, rotation
-from mdp.search import decompose
+from mdp.search import counted_once, decompose
 from mdp.sequence import least_rotation
 from profiles.errors import DecompositionError
 from profiles.profile import load
@@ -102,6 +102,14 @@ def test_a_time_limit_of_nothing_leaves_one_part_and_says_so() -> None:
     found = _decomposed(shapes.tee(), "search.time_limit_s=0")
     assert len(found.parts) == 1
     assert found.notes == ("search.time_limit_s = 0 ended the search; the best so far is used",)
+
+
+def test_space_that_a_fold_winds_around_twice_is_counted_once() -> None:
+    parts = _decomposed(shapes.tee()).parts
+    folded = shapes.tee(arm=40.004)  # as if its volume counted 0.4 mm3 twice
+    whole, notes = counted_once(folded, parts)
+    assert whole.volume_mm3 == pytest.approx(sum(part.volume_mm3 for part in parts), rel=1e-9)
+    assert notes == ("the surface passes through itself: 0.4 mm3 that it winds around twice are counted once",)
 
 
 def test_swapped_parts_are_refused() -> None:
