@@ -54,12 +54,11 @@ def _before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -> flo
 def _compared(decomposition: Decomposition, angle_deg: float, count_platform_faces: bool) -> str:
     """Straight up, in the best single orientation, in parts: risky area and how much less that is."""
     best = best_orientation(decomposition.mesh, angle_deg)
-    parts = f"in {len(decomposition.parts)} parts" if len(decomposition.parts) > 1 else "in 1 part"
     single = best.risky_mm2 + (best.base_mm2 if count_platform_faces else 0.0)
     told = [
         ("straight up", decomposition.risky_area_mm2, ""),
         ("best single orientation", single, f"  {in_words(best)}"),
-        (parts, decomposition.residual_area_mm2, ""),
+        (f"in {_count(len(decomposition.parts), 'parts')}", decomposition.residual_area_mm2, ""),
     ]
     rows = [["risky area", "mm2", "less"]]
     for name, area, _ in told:
@@ -88,19 +87,25 @@ def _number(area_mm2: float) -> str:
 def run_table(run: DryRun) -> str:
     """What a dry run found."""
     values = summary(run)
-    low, high = values["bounds_mm"] or ([0.0] * 3, [0.0] * 3)
     lines = [
         f"time {duration(values['time_s'])}, filament {values['filament_mm'] / 1000:.2f} m, "
         f"{values['extruded_mm3'] / 1000:.2f} cm3",
-        f"{values['parts']} parts, {values['layers']} layers, {values['reorientations']} reorientations, "
-        f"{values['retractions']} retractions, {values['travel_mm'] / 1000:.2f} m travel",
-        "plastic from " + ", ".join(f"{a:.1f}" for a in low) + " to " + ", ".join(f"{b:.1f}" for b in high) + " mm (workpiece)",
-        "axes " + ", ".join(f"{axis} {least:.1f}..{most:.1f}" for axis, (least, most) in values["axes"].items()),
+        ", ".join(_count(values[key], key) for key in ("parts", "layers", "reorientations", "retractions"))
+        + f", {values['travel_mm'] / 1000:.2f} m travel",
     ]
+    if values["bounds_mm"]:
+        low, high = (", ".join(f"{value:.1f}" for value in corner) for corner in values["bounds_mm"])
+        lines.append(f"plastic from {low} to {high} mm (workpiece)")
+    moved = [f"{axis} {reach[0]:.1f}..{reach[1]:.1f}" for axis, reach in values["axes"].items() if reach]
+    lines.append("axes " + ", ".join(moved) if moved else "nothing moves")
     for finding in values["findings"]:
         where = f" (line {finding['line']})" if finding["line"] else ""
         lines.append(f"{finding['severity']}: {finding['message']}{where}")
     return "\n".join(lines) + "\n"
+
+
+def _count(number: int, things: str) -> str:
+    return f"{number} {things if number != 1 else things.removesuffix('s')}"
 
 
 def show(text: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, contact, heat, motion
+from machine.dryrun import clearance, contact, heat, motion, plate
 from machine.dryrun.findings import Finding
 from machine.dryrun.timeline import move_times
 from machine.kinematics.table import workpiece_path
@@ -69,9 +69,10 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
         *motion.findings(program, machine),
         *clearance.findings(program, segments, rows, machine),
         *contact.findings(program, segments, rows, machine),
+        *plate.findings(program, segments, rows, profile),
         *heat.findings(program, profile),
     ]
-    found.sort(key=lambda finding: (finding.severity, finding.line))
+    found = sorted(dict.fromkeys(found), key=lambda finding: (finding.severity, finding.line))
     return DryRun(
         program=program,
         times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine),

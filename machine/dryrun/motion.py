@@ -65,6 +65,10 @@ def _homing(program: ParsedProgram, machine: Machine) -> list[Finding]:
         if abs(tilt - machine.tilt.zero_deg) > LEVEL_DEG and not any(e.line < event.line for e in later):
             message = f"homing while the table stands at {machine.tilt.letter}{tilt:.3f}: it must be level"
             found.append(at_line(program, event.row, event.line, "error", "homing-tilted", message))
+        printed = program.kind[: event.row] == MoveKind.EXTRUDE
+        if printed.any() and (not set(event.letters) & set("XYZ") or "Z" in event.letters):
+            message = "Z is homed after plastic was laid: the tip may run into the print unless the machine homes upwards"
+            found.append(at_line(program, event.row, event.line, "warning", "homing-over-print", message))
     return found
 
 

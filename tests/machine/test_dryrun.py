@@ -90,11 +90,31 @@ def _codes(text: str) -> list[str]:
         ("G0 A60 F600", "collision", 6),
         ("M777", "ignored", 6),
         (";UNSUPPORTED:12.5", "unsupported", 6),
+        ("G0 X101 F3000\nG0 Z0.2 F600\nG1 X110 E0.1", "off-plate", 8),
+        ("G1 X5 E0.1 F600\nG28", "homing-over-print", 7),
     ],
 )
 def test_a_planted_fault_is_found_by_its_own_code_and_line(moves: str, code: str, line: int) -> None:
     found = dry_run((BEGIN + moves + END).splitlines(), CLEAN).findings
     assert {(finding.code, finding.line) for finding in found} == {(code, line)}
+
+
+@pytest.mark.parametrize("moves", ["G0 X90 F3000\nG0 Z0.2 F600\nG1 X99 E0.1", "G0 X101 F3000\nG0 Z5 F600\nG1 X110 E0.1"])
+def test_plastic_on_the_plate_or_high_above_its_rim_is_no_fault(moves: str) -> None:
+    assert _codes(BEGIN + moves + END) == []
+
+
+def test_a_purge_beside_the_plate_is_no_fault() -> None:
+    assert _codes(BEGIN + ";TYPE:Custom\nG0 X101 F3000\nG0 Z0.2 F600\nG1 X110 E0.1" + END) == []
+
+
+def test_homing_across_after_a_print_is_no_fault() -> None:
+    assert _codes(BEGIN + "G1 X5 E0.1 F600\nG28 X Y" + END) == []
+
+
+def test_the_same_fault_of_several_bodies_is_told_once() -> None:
+    messages = [finding.message for finding in dry_run((BEGIN + "G0 Z-50" + END).splitlines(), CLEAN).findings]
+    assert len(messages) == len(set(messages)) > 1
 
 
 def test_moves_before_homing_are_found() -> None:

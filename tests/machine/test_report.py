@@ -2,13 +2,15 @@ import numpy as np
 import pytest
 
 from machine.app.pipeline import Decomposed
-from machine.app.report import duration, in_words, parts_table, table
+from machine.app.report import duration, in_words, parts_table, run_table, table
+from machine.dryrun.dryrun import dry_run
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
 from mdp.orientation import best_orientation
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, about
+from profiles.profile import load
 from tests.shapes import box, hollow, tee
 
 
@@ -78,6 +80,27 @@ def test_a_rotation_is_told_as_the_setting_takes_it() -> None:
     oblique = tee().moved(about(np.array([0.0, 1.0, 0.0]), np.radians(30)))
     assert in_words(best_orientation(oblique, 45.0)) == "turned 90 about x"
     assert "rests nowhere" in in_words(best_orientation(hollow(), 45.0, resting=False))
+
+
+def run_lines(moves: str) -> list[str]:
+    lines = ["G28", "G92 A0 C0", "M109 S210", "M83", *moves.split("\n"), "M104 S0"] if moves else ["M105"]
+    profile = load()
+    machine = profile.machine.model_copy(update={"uncalibrated": []})
+    return run_table(dry_run(lines, profile.model_copy(update={"machine": machine}))).splitlines()
+
+
+def test_a_run_is_told_in_four_lines_and_its_findings() -> None:
+    assert run_lines(";PART:1 of 1\n;LAYER_CHANGE\nG0 Z10 F600\nG1 X30 E1\nG1 E-1\nM777") == [
+        "time 4s, filament 0.00 m, 0.00 cm3",
+        "1 part, 1 layer, 0 reorientations, 1 retraction, 0.01 m travel",
+        "plastic from 0.0, 0.0, 10.0 to 30.0, 0.0, 10.0 mm (workpiece)",
+        "axes X 0.0..30.0, Y 0.0..0.0, Z 10.0..10.0, A 0.0..0.0, C 0.0..0.0",
+        "warning: M777 is not known to the dry run and was ignored (1 times) (line 10)",
+    ]
+
+
+def test_a_program_without_a_move_says_so() -> None:
+    assert run_lines("")[2] == "nothing moves"
 
 
 @pytest.mark.parametrize(("seconds", "told"), [(3975.4, "1h 6m 15s"), (61, "1m 1s"), (0.4, "0s")])
