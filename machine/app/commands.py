@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
-from machine.app.pipeline import Program, build, decompose_model, warm
+from machine.app.pipeline import Program, build, decompose_model
 from machine.app.printing import print_program
 from machine.app.progress import say
 from machine.app.report import parts_table, run_table, show
+from machine.app.warmup import warm
 from machine.dryrun.dryrun import dry_run, summary
 from mdp.save import part_file, stl, threemf, values
 from profiles.errors import GcodeError, MoveError

@@ -4,15 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-import manifold3d as m3
-
-from machine.app.progress import Ticker, announced, say
+from machine.app.progress import Ticker, say
+from machine.app.warmup import warm
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode import write_gcode
 from machine.plan import plan
-from mdp.cut import mesh_of
 from mdp.decomposition import Decomposition
-from mdp.mesh import Mesh
 from mdp.ranker import RANKERS
 from mdp.read import locate, read_mesh
 from mdp.search import Progress
@@ -20,8 +17,6 @@ from mdp.search import decompose as search_parts
 from profiles.errors import ProfileError
 from profiles.profile import Profile
 from slicer.slice import slice_part
-
-COMPILING_AFTER_S = 4.0  # loading the compiled ones takes less
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,17 +81,3 @@ def build(decomposition: Decomposition, profile: Profile) -> Program:
     run = dry_run(lines, profile)
     ticker.close()
     return Program(lines, run, decomposition)
-
-
-def warm(profile: Profile) -> None:
-    """Load the compiled kernels with a tiny model; the first run ever compiles them, which is said."""
-    bar = m3.Manifold.cube((30.0, 4.0, 4.0), True).translate((0.0, 0.0, 28.0))
-    tiny = m3.Manifold.cube((4.0, 4.0, 30.0), True).translate((0.0, 0.0, 15.0)) + bar
-    few = profile.search.model_copy(update={"directions": 8, "beam_width": 1, "most_parts": 2})
-    coarse = profile.process.model_copy(update={"layer_height_mm": 0.3, "line_width_mm": 0.6, "first_layer_height_mm": 0.3})
-    with announced("compiling the kernels (only the first run does)", COMPILING_AFTER_S):
-        small: Mesh = mesh_of(tiny)
-        quick = profile.model_copy(update={"search": few, "process": coarse})
-        found = search_parts(small, "warm", quick)
-        sliced = [slice_part(part, quick) for part in found.parts]
-        dry_run(list(write_gcode(plan(found, sliced, quick), quick)), quick)

@@ -1,10 +1,7 @@
 """Progress: what long work tells on stderr; a line that is rewritten on a terminal, plain lines elsewhere."""
 
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from time import monotonic, perf_counter
+from time import monotonic
 
 PLAIN_EVERY_S = 5.0
 LIVE_EVERY_S = 0.1
@@ -43,20 +40,3 @@ class Ticker:
             sys.stderr.write("\r\x1b[2K")
             sys.stderr.flush()
             self.open = False
-
-
-@contextmanager
-def announced(text: str, after_s: float) -> Iterator[None]:
-    """Say `text` once the work inside has taken after_s, and at its end how long it took."""
-    began = perf_counter()
-    timer = threading.Timer(after_s, say, (text,))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-        timer.join()
-    spent = perf_counter() - began
-    if spent > after_s:
-        say(f"{text.split(' (')[0]}: {spent:.1f} s")
