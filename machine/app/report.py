@@ -63,7 +63,7 @@ def _compared(decomposition: Decomposition, angle_deg: float, count_platform_fac
     rows = [["risky area", "mm2", "less"]]
     for name, area, _ in told:
         less = 1.0 - area / decomposition.risky_area_mm2 if decomposition.risky_area_mm2 > 0 else 0.0
-        rows.append([name, _number(area), f"{100 * less:.1f} %"])
+        rows.append([name, _number(area), f"{round(100 * less, 1) + 0.0:.1f} %"])
     rows[1][2] = ""
     head, *lines = table(rows).splitlines()
     return "\n".join([head, *(line + note for line, (_, _, note) in zip(lines, told, strict=True))]) + "\n"

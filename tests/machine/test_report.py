@@ -74,6 +74,12 @@ def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:
     assert lines[-3].endswith("as it stands")
 
 
+def test_a_rounding_error_is_no_negative_share() -> None:
+    lines = parts_table(alone(hollow(), 100.0 - 1e-9)).splitlines()
+    assert [line.split()[-2:] for line in lines[-2:-1]] == [["0.0", "%"]]
+    assert "-0.0" not in "\n".join(lines)
+
+
 def test_a_rotation_is_told_as_the_setting_takes_it() -> None:
     upside_down = tee().moved(np.diag([1.0, -1.0, -1.0]))
     assert in_words(best_orientation(upside_down, 45.0)) == "as it stands"
