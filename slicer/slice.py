@@ -120,6 +120,11 @@ def _check(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Proc
     own = (path for layer in layers for path in layer.paths if path.kind not in (Kind.SKIRT, Kind.SUPPORT))
     if next(own, None) is None:
         x, y, z = bounds_mm[1] - bounds_mm[0]
+        if process.walls == 0 and process.infill_density == 0:
+            raise SliceError(
+                f"part {part.index} gives no path at all: process.walls and process.infill_density are 0, and "
+                f"{process.bottom_layers} bottom and {process.top_layers} top layers give no skin"
+            )
         raise SliceError(
             f"part {part.index} gives no path at all: it measures {x:.3g} x {y:.3g} x {z:.3g} mm and no place of it is wider "
             f"than half of process.line_width_mm ({0.5 * process.line_width_mm:g} mm is the least)"

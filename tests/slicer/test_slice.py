@@ -147,3 +147,9 @@ def test_every_path_has_length_and_width_and_speed():
 def test_a_part_thinner_than_any_line_is_refused_with_its_measures():
     with pytest.raises(SliceError, match=r"part 1 gives no path at all: it measures 0.1 x 5 x 5 mm"):
         slice_part(whole(box(0.1, 5, 5)), profile())
+
+
+def test_settings_that_leave_nothing_to_print_are_named():
+    nothing = profile("process.walls=0", "process.infill_density=0", "process.top_layers=0", "process.bottom_layers=0")
+    with pytest.raises(SliceError, match=r"process\.walls and process\.infill_density are 0"):
+        slice_part(whole(box(20, 20, 5)), nothing)
