@@ -17,8 +17,6 @@ from mdp.sweep import Remainder, gains, sweep
 from profiles.machine import Machine
 from profiles.process import Search
 
-FRAGILE_MM = 1.0
-
 
 class Reason(IntEnum):
     """Why a candidate is out; FEASIBLE: it is not. The first reason that holds is counted."""
@@ -40,8 +38,8 @@ REASONS = {
     Reason.REACH: "the axes do not reach the direction",
     Reason.CLEARANCE: "the head would meet the table",
     Reason.VOLUME: "the part would be too small (search.least_volume_share)",
-    Reason.INTERFACE: "the part would hang on too small an area (search.least_interface_mm2)",
-    Reason.FRAGILE: "the plane would leave a sliver",
+    Reason.INTERFACE: "the part or a piece of it would hang on too small an area (search.least_interface_mm2)",
+    Reason.FRAGILE: "the plane would leave a sliver (search.fragile_mm)",
     Reason.GAIN: "nothing or too little would become safe (search.least_gain)",
 }
 
@@ -109,12 +107,19 @@ class Worth:
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """What the sweep says of some candidates, one array row each; reason is FEASIBLE or why not."""
+    """What the sweep says of some candidates, one array row each; reason is FEASIBLE or why not.
+
+    fragile_mm is the distance to the nearest surface that the plane would cut into a sliver, thin_mm that to the nearest thin
+    wall or rod, 0 where the plane goes through one; only the first one forbids a plane. footing_mm2 is the least area that a
+    piece of the part stands on. A piece lower than the side of a square of least_interface_mm2 is a crumb and may stand on less.
+    """
 
     reason: Ints
     volume_mm3: Floats
     section_mm2: Floats
     fragile_mm: Floats
+    thin_mm: Floats
+    footing_mm2: Floats
 
 
 def worth(remainder: Remainder, limits: Bounds, search: Search, angle_deg: float, least_gain_mm2: float) -> Worth:
@@ -132,7 +137,8 @@ def worth(remainder: Remainder, limits: Bounds, search: Search, angle_deg: float
 def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Checked:
     """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut."""
     rows, inverse = np.unique(direction, return_inverse=True)
-    found = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows])
+    sizes = (search.fragile_mm, sqrt(limits.least_interface_mm2))
+    found = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows], *sizes)
     at = (inverse, np.rint(offset_mm / search.offset_step_mm).astype(np.int64) - found.first[inverse])
     reason = np.zeros(len(direction), np.int32)
     checks = {
@@ -141,12 +147,13 @@ def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints,
         Reason.REACH: ~np.isfinite(limits.least_height_mm[direction]),
         Reason.CLEARANCE: found.lowest_mm[at] < limits.least_height_mm[direction],
         Reason.VOLUME: found.volume_mm3[at] < limits.least_volume_mm3,
-        Reason.INTERFACE: found.section_mm2[at] < limits.least_interface_mm2,
-        Reason.FRAGILE: found.fragile_mm[at] < FRAGILE_MM,
+        Reason.INTERFACE: found.footing_mm2[at] < limits.least_interface_mm2,
+        Reason.FRAGILE: found.fragile_mm[at] < search.fragile_mm,
     }
     for why, out in checks.items():
         reason[out & (reason == 0)] = why
-    return Checked(reason, found.volume_mm3[at], found.section_mm2[at], found.fragile_mm[at])
+    columns = (found.volume_mm3, found.section_mm2, found.fragile_mm, found.thin_mm, found.footing_mm2)
+    return Checked(reason, *(column[at] for column in columns))
 
 
 def refusals(remainder: Remainder, limits: Bounds, search: Search, angle_deg: float, least_gain_mm2: float) -> dict[Reason, int]:

@@ -16,7 +16,7 @@ from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
 
 LEAST_ALTITUDE = 1e-8  # of a triangle, as a share of the largest coordinate: below, rounding may decide which corner is higher
 DOUBT = 1e-6  # margin of a cosine
-SCATTERED = 0.1  # mean spread of a face's corner numbers, as a share of all, above which the surface is put in order
+GRID_BITS = 16  # of the space-filling curve's cells along each axis
 
 Indices = NDArray[np.uint32]
 
@@ -94,28 +94,26 @@ class Facets:
 
 
 def facets(mesh: Mesh, risky: Mask) -> Facets:
-    """The surface laid out; a mesh whose faces jump about in memory is put along a space-filling curve first."""
-    spread = float((mesh.faces.max(axis=1) - mesh.faces.min(axis=1)).mean())
-    if spread <= SCATTERED * len(mesh.vertices) or len(mesh.faces) < 1000:
-        return Facets(mesh, risky)
-    order = np.argsort(morton(mesh.vertices), kind="stable")
+    """The surface laid out along a space-filling curve."""
+    low = mesh.bounds_mm[0]
+    scale = (2**GRID_BITS - 1) / max(float((mesh.bounds_mm[1] - low).max()), 1e-12)
+    order = np.argsort(_morton(mesh.vertices, low, scale), kind="stable")
     number = np.empty(len(order), np.int32)
     number[order] = np.arange(len(order), dtype=np.int32)
-    faces = number[mesh.faces]
-    turn = np.argsort(faces.min(axis=1), kind="stable")
-    return Facets(Mesh(mesh.vertices[order], faces[turn]), risky[turn])
+    turn = np.argsort(_morton(mesh.vertices[mesh.faces].mean(axis=1), low, scale), kind="stable")
+    return Facets(Mesh(mesh.vertices[order], number[mesh.faces[turn]]), risky[turn])
 
 
-def morton(points: Floats) -> NDArray[np.uint64]:
-    """Position along a space-filling curve: near points get near numbers."""
-    low = points.min(axis=0)
-    scale = 1023.0 / max(float((points.max(axis=0) - low).max()), 1e-12)
-    cells = ((points - low) * scale).astype(np.uint64)
-    code = np.zeros(len(points), dtype=np.uint64)
-    for bit in range(10):
+@njit(cache=True)
+def _morton(points, low, scale):  # type: ignore[no-untyped-def]
+    """Position along Morton's curve: near points get near numbers."""
+    codes = np.zeros(len(points), np.int64)
+    for v in range(len(points)):
         for axis in range(3):
-            code |= ((cells[:, axis] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(3 * bit + axis)
-    return code
+            cell = int((points[v, axis] - low[axis]) * scale)
+            for bit in range(GRID_BITS):
+                codes[v] |= ((cell >> bit) & 1) << (3 * bit + axis)
+    return codes
 
 
 @njit(cache=True)

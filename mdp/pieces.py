@@ -62,13 +62,12 @@ def walk(v, heights, links, label, path, up):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def begin_basins(found, many, heights, links, label, up):  # type: ignore[no-untyped-def]
+def begin_basins(found, heights, links, label, up):  # type: ignore[no-untyped-def]
     """Number the vertices at which basins begin; returns them."""
     starts, neighbours = links
-    seeds = np.empty(many, np.int32)
+    seeds = np.empty(len(found), np.int32)
     size = 0
-    for k in range(many):
-        v = found[k]
+    for v in found:
         first = starts[v] < starts[v + 1]
         for at in range(starts[v], starts[v + 1]):
             first = first and not before(heights, neighbours[at], v, up)
@@ -79,16 +78,16 @@ def begin_basins(found, many, heights, links, label, up):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def saddle_joins(found, many, heights, links, label, path, up):  # type: ignore[no-untyped-def]
+def saddle_joins(found, heights, links, label, path, up):  # type: ignore[no-untyped-def]
     """(j, 3): two basins that meet, and the vertex at which they do."""
     starts, neighbours = links
     room = 0
-    for k in range(many):
-        room += starts[found[k] + 1] - starts[found[k]]
+    for v in found:
+        room += starts[v + 1] - starts[v]
     joins = np.empty((room, 3), np.int32)
     size = 0
-    for k in range(many):
-        v, last = found[k], -1
+    for v in found:
+        last = -1
         for at in range(starts[v], starts[v + 1]):
             if before(heights, neighbours[at], v, up):
                 basin = walk(int(neighbours[at]), heights, links, label, path, up)
@@ -102,7 +101,7 @@ def saddle_joins(found, many, heights, links, label, path, up):  # type: ignore[
 @njit(cache=True)
 def anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, up):  # type: ignore[no-untyped-def]
     """(j, 3): the basin of a void's first vertex, that of the surface which the ray from it meets, and the vertex."""
-    vertices, faces, vertex_normals = surface
+    vertices, faces, normals, vertex_normals = surface
     low, high = tree
     joins = np.empty((len(seeds), 3), np.int32)
     size = 0
@@ -112,7 +111,7 @@ def anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, p
             continue
         if anchor[v] == UNKNOWN:
             # Threads may look up the same vertex twice; the answer does not depend on the direction.
-            anchor[v] = first_hit(v, vertices, faces, low, high, -vertex_normals[v])
+            anchor[v] = first_hit(vertices[v], -vertex_normals[v], np.inf, v, -2.0, vertices, faces, normals, low, high)
         if anchor[v] < 0:
             continue
         w = faces[anchor[v], 0]
@@ -147,11 +146,11 @@ def _stands_on(v, vertices, heights, links):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def count_pieces(surface, standing, links, found, many, tree, anchor, cosines, heights, n, pieces):  # type: ignore[no-untyped-def]
+def count_pieces(surface, standing, links, found, tree, anchor, cosines, heights, n, pieces):  # type: ignore[no-untyped-def]
     """Components below each offset that do not reach the platform."""
     label, path = np.full(len(heights), -1, np.int32), np.empty(len(heights), np.int32)
-    seeds = begin_basins(found, many, heights, links, label, False)
-    saddles = saddle_joins(found, many, heights, links, label, path, False)
+    seeds = begin_basins(found, heights, links, label, False)
+    saddles = saddle_joins(found, heights, links, label, path, False)
     anchored = anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, False)
     size = len(seeds)
     begun, grounded_at = np.empty(size, np.int32), np.full(size, n + 1, np.int32)

@@ -1,4 +1,4 @@
-"""Rays: the first face that a ray from a vertex meets, over a tree of boxes."""
+"""Rays: the first face that a ray meets, over a tree of boxes."""
 
 import numpy as np
 from numba import njit
@@ -32,6 +32,9 @@ def _boxes(vertices, faces, leaves):  # type: ignore[no-untyped-def]
         for axis in range(3):
             low[node, axis] = min(low[2 * node, axis], low[2 * node + 1, axis])
             high[node, axis] = max(high[2 * node, axis], high[2 * node + 1, axis])
+    for node in range(2 * leaves):
+        if low[node, 0] > high[node, 0]:
+            high[node] = np.inf  # an empty box that no ray enters
     return low, high
 
 
@@ -66,15 +69,18 @@ def _distance(p, q, r, origin, ray):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def first_hit(v, vertices, faces, low, high, ray):  # type: ignore[no-untyped-def]
-    """The first face met from vertex v along `ray`, its own faces left out; -1: none. low, high: a Tree's boxes."""
+def first_hit(origin, ray, reach, own_vertex, facing, vertices, faces, normals, low, high):  # type: ignore[no-untyped-def]
+    """The first face met along `ray` within reach whose normal has at least the cosine `facing` with it; -1: none.
+
+    The faces around own_vertex are left out (-1: around none). low, high: a Tree's boxes.
+    """
     leaves = len(low) // 2
-    origin, inverse = vertices[v], np.empty(3)
+    inverse = np.empty(3)
     for axis in range(3):
         inverse[axis] = 1.0 / ray[axis] if abs(ray[axis]) > 1e-300 else 1e300
     stack = np.empty(DEPTH, dtype=np.int32)
     stack[0] = 1
-    top, reach, hit = 1, np.inf, -1
+    top, hit = 1, -1
     while top > 0:
         top -= 1
         node = stack[top]
@@ -87,7 +93,9 @@ def first_hit(v, vertices, faces, low, high, ray):  # type: ignore[no-untyped-de
             continue
         first = (node - leaves) * LEAF_FACES
         for f in range(first, min(first + LEAF_FACES, len(faces))):
-            if v in (faces[f, 0], faces[f, 1], faces[f, 2]):
+            if normals[f, 0] * ray[0] + normals[f, 1] * ray[1] + normals[f, 2] * ray[2] < facing:
+                continue
+            if own_vertex in (faces[f, 0], faces[f, 1], faces[f, 2]):
                 continue
             t = _distance(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], origin, ray)
             if t < reach:

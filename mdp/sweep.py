@@ -16,7 +16,8 @@ import numpy as np
 from numba import njit, prange
 
 from mdp.facets import Facets, facets
-from mdp.fragile import find_slivers
+from mdp.footing import find_footing
+from mdp.fragile import find_slivers, find_thin, thin_faces
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.pieces import UNKNOWN, count_pieces, find_critical
@@ -44,7 +45,9 @@ class Sweep:
 
     section_mm2: cross-section; volume_mm3: volume above; lowest_mm: least z of what lies above, exact where it is below the
     direction's watched height, some greater number elsewhere; fragile_mm: distance to the nearest surface that the plane
-    would cut into a sliver; pieces: components of the solid below that do not reach the platform.
+    would cut into a sliver; thin_mm: distance to the nearest thin wall or rod, 0 where the plane goes through one; pieces:
+    components of the solid below that do not reach the platform; footing_mm2: least cross-section of a component of the solid
+    above, crumbs left out, where there are no such pieces and what lies above is nowhere below the watched height.
     """
 
     first: Ints
@@ -53,7 +56,9 @@ class Sweep:
     volume_mm3: Floats
     lowest_mm: Floats
     fragile_mm: Floats
+    thin_mm: Floats
     pieces: Ints
+    footing_mm2: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +83,18 @@ class Remainder:
         """(n,) the face met from each vertex into the solid, -1 where none is; the sweep looks them up when needed."""
         return np.full(len(self.mesh.vertices), UNKNOWN, np.int32)
 
+    def thin(self, thickness_mm: float) -> Ints:
+        """The faces under whose middle the solid is thinner than this, looked up once a thickness."""
+        if thickness_mm not in self._thin:
+            mesh, tree = self.facets.mesh, self.tree
+            thin = thin_faces(mesh.vertices, mesh.faces, mesh.normals, tree.low, tree.high, thickness_mm)
+            self._thin[thickness_mm] = np.flatnonzero(thin).astype(np.int32)
+        return self._thin[thickness_mm]
+
+    @cached_property
+    def _thin(self) -> dict[float, Ints]:
+        return {}
+
     def columns(self, step_mm: float) -> int:
         """Room for the offsets of any direction."""
         return int(float(np.linalg.norm(self.mesh.bounds_mm[1] - self.mesh.bounds_mm[0])) / step_mm) + 3
@@ -90,17 +107,28 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     return Gains(*_gains(surface, np.ascontiguousarray(directions), step_mm, remainder.columns(step_mm), risky_below))
 
 
-def sweep(remainder: Remainder, directions: Floats, step_mm: float, watched_mm: Floats | None = None) -> Sweep:
+def sweep(
+    remainder: Remainder,
+    directions: Floats,
+    step_mm: float,
+    watched_mm: Floats | None = None,
+    thin_mm: float = 1.0,
+    crumb_mm: float = 2.0,
+) -> Sweep:
     """Whether a cut can be made at all offsets of (k, 3) unit directions.
 
-    watched_mm (k,): the height below which the least z of a part matters; absent: all heights.
+    watched_mm (k,): the height below which the least z of a part matters; absent: all heights. thin_mm: walls and rods below
+    this thickness are thin. crumb_mm: a piece above the plane that is lower than this may stand on any area.
     """
     laid = remainder.facets
     rows = (laid.points, laid.corners, laid.vectors_mm2, laid.rising_edges, laid.vertex_normal_rows, laid.flatness)
-    surface = (laid.mesh.vertices, laid.mesh.faces, laid.vertex_normals)
-    solid = (surface, laid.standing, laid.links, (remainder.tree.low, remainder.tree.high), remainder.anchors)
+    surface = (laid.mesh.vertices, laid.mesh.faces, laid.mesh.normals, laid.vertex_normals)
+    tree = (remainder.tree.low, remainder.tree.high)
+    solid = (surface, laid.standing, remainder.thin(thin_mm), laid.links, tree, remainder.anchors)
     watched = np.full(len(directions), np.inf) if watched_mm is None else np.ascontiguousarray(watched_mm)
-    return Sweep(*_sweep(rows, solid, np.ascontiguousarray(directions), watched, step_mm, remainder.columns(step_mm)))
+    needed = np.full(len(directions), -np.inf) if watched_mm is None else watched
+    settings = (watched, needed, crumb_mm / step_mm, step_mm, remainder.columns(step_mm))
+    return Sweep(*_sweep(rows, solid, np.ascontiguousarray(directions), *settings))
 
 
 @njit(cache=True, parallel=True)
@@ -119,17 +147,16 @@ def _gains(surface, directions, step, columns, risky_below):  # type: ignore[no-
 
 
 @njit(cache=True, parallel=True)
-def _sweep(rows, solid, directions, watched, step, columns):  # type: ignore[no-untyped-def]
+def _sweep(rows, solid, directions, watched, needed, crumb, step, columns):  # type: ignore[no-untyped-def]
     points, corners, vectors, edges, vertex_normals, flatness = rows
-    surface, standing, links, tree, anchor = solid
+    surface, standing, thin, links, tree, anchor = solid
     k = len(directions)
-    first, count = np.zeros(k, np.int32), np.zeros(k, np.int32)
-    section, volume = np.zeros((k, columns)), np.zeros((k, columns))
-    lowest, fragile = np.full((k, columns), np.inf), np.full((k, columns), np.inf)
-    pieces = np.zeros((k, columns), np.int32)
+    first, count, pieces = np.zeros(k, np.int32), np.zeros(k, np.int32), np.zeros((k, columns), np.int32)
+    section, volume, footing = np.zeros((k, columns)), np.zeros((k, columns)), np.zeros((k, columns))
+    lowest, fragile, thinnest = np.full((k, columns), np.inf), np.full((k, columns), np.inf), np.full((k, columns), np.inf)
     for row in prange(k):
         d, heights = directions[row], np.empty(points.shape[1])
-        cosines, found = np.empty(points.shape[1]), np.empty(points.shape[1], np.int32)
+        cosines, room = np.empty(points.shape[1]), np.empty(points.shape[1], np.int32)
         begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
         first[row], count[row] = begin, n
         if n > 0:
@@ -137,6 +164,11 @@ def _sweep(rows, solid, directions, watched, step, columns):  # type: ignore[no-
             find_lowest(points[2], edges, heights, n, watched[row], lowest[row])
             dot(vertex_normals[0], vertex_normals[1], vertex_normals[2], d[0], d[1], d[2], cosines)
             find_slivers(cosines, heights, n, step, fragile[row])
-            many = find_critical(cosines, flatness, heights, links, found)
-            count_pieces(surface, standing, links, found, many, tree, anchor, cosines, heights, n, pieces[row])
-    return first, count, section, volume, lowest, fragile, pieces
+            find_thin(corners, thin, heights, n, step, thinnest[row])
+            found = room[: find_critical(cosines, flatness, heights, links, room)]
+            count_pieces(surface, standing, links, found, tree, anchor, cosines, heights, n, pieces[row])
+            wanted = (pieces[row, :n] == 0) & (lowest[row, :n] >= needed[row])
+            footing[row] = section[row]
+            solid_above = (points, corners, surface, links, found, tree, anchor, cosines)
+            find_footing(solid_above, d, heights, crumb, wanted, footing[row])
+    return first, count, section, volume, lowest, fragile, thinnest, pieces, footing

@@ -84,7 +84,21 @@ class Search(Frozen):
     least_volume_share: float = Field(
         0.02, ge=0, lt=1, description="criterion IV: a part has at least this share of the model's volume (published: 0.1)"
     )
-    least_interface_mm2: float = Field(4.0, ge=0, le=1e6, description="least area a part stands on, mm2")
+    least_interface_mm2: float = Field(
+        4.0, ge=0, le=1e6, description="least area that a part, and each of its pieces that is no crumb, stands on, mm2"
+    )
+    fragile_mm: float = Field(
+        1.0,
+        ge=0,
+        le=100,
+        description="thinner than this is fragile, two line widths or so; no plane leaves a thinner sliver, mm",
+    )
+    pedestal_mm: float = Field(
+        0.0,
+        ge=0,
+        le=1000,
+        description="height of a pedestal under the model, so that low, strongly tilted cuts become printable, mm",
+    )
     most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
     time_limit_s: float | None = Field(None, ge=0, description="the search ends after this time with the best so far, s")
     least_gain: float = Field(0.005, ge=0, le=1, description="a cut must make at least this share of the model's risky area safe")
