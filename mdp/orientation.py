@@ -158,3 +158,14 @@ def _rotation(direction: Floats) -> Floats:
     about_y = np.array([[cos(y), 0.0, sin(y)], [0.0, 1.0, 0.0], [-sin(y), 0.0, cos(y)]])
     rotation: Floats = about_y @ about_x
     return rotation
+
+
+def in_words(orientation: Orientation) -> str:
+    """How the model is turned, in the order process.rotate_deg takes, and whether it needs holding."""
+    turns = [(_angle(angle), axis) for angle, axis in zip(orientation.turns_deg, "xy", strict=True)]
+    told = ", then ".join(f"{angle} about {axis}" for angle, axis in turns if angle != "0")
+    return (f"turned {told}" if told else "as it stands") + ("" if orientation.stable else ", rests nowhere without a raft")
+
+
+def _angle(value_deg: float) -> str:
+    return f"{round(value_deg, 1) + 0.0:g}"

@@ -32,6 +32,7 @@ Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE"
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
 BeamWidth = Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")]
 RankerName = Annotated[str, typer.Option("--ranker", metavar="classic", help="which candidates the beam follows")]
+Orient = Annotated[bool, typer.Option("--orient", help="first lay the model down the way that needs least support")]
 Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
 
 
@@ -41,6 +42,7 @@ def decompose(
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="folder for part-NN.stl, 3MF, JSON")] = None,
     beam_width: BeamWidth = None,
     ranker: RankerName = "classic",
+    orient: Orient = False,
     json: JsonFile = None,
     png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the parts")] = None,
     machine: MachineName = "generic_ac",
@@ -52,7 +54,7 @@ def decompose(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width)
-    return commands.decompose(model, profile, ranker, out, json, png)
+    return commands.decompose(model, profile, ranker, orient, out, json, png)
 
 
 @app.command()
@@ -61,6 +63,7 @@ def export(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write")],
     beam_width: BeamWidth = None,
     ranker: RankerName = "classic",
+    orient: Orient = False,
     json: JsonFile = None,
     force: Force = False,
     machine: MachineName = "generic_ac",
@@ -72,7 +75,7 @@ def export(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width)
-    return commands.export(model, profile, ranker, out, json, force)
+    return commands.export(model, profile, ranker, orient, out, json, force)
 
 
 @app.command()
@@ -80,6 +83,7 @@ def simulate(
     model: ModelOrGcode,
     beam_width: BeamWidth = None,
     ranker: RankerName = "classic",
+    orient: Orient = False,
     json: JsonFile = None,
     machine: MachineName = "generic_ac",
     material: MaterialName = "pla",
@@ -90,7 +94,7 @@ def simulate(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width)
-    return commands.simulate(model, profile, ranker, json)
+    return commands.simulate(model, profile, ranker, orient, json)
 
 
 @app.command("print")
@@ -100,6 +104,7 @@ def print_(
     baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
     beam_width: BeamWidth = None,
     ranker: RankerName = "classic",
+    orient: Orient = False,
     speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
     force: Force = False,
     machine: MachineName = "generic_ac",
@@ -111,7 +116,7 @@ def print_(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width)
-    return commands.print_model(model, profile, ranker, port, baud, speed, force)
+    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force)
 
 
 @profiles_app.command("list")
@@ -194,6 +199,9 @@ def _usage(error: TyperException, given: Sequence[str]) -> str:
     context = getattr(error, "ctx", None)
     if context is None:
         return message
+    files = [word for word in given if word.startswith("-") and Path(word).is_file()]
+    if files:
+        return f"{files[0]} begins with a dash: write ./{files[0]}"
     if message.startswith("No such option"):
         allowed = [option for parameter in context.command.params for option in parameter.opts if option.startswith("--")]
         return f"{message}; {context.command_path} knows {', '.join(allowed)}"

@@ -16,13 +16,15 @@ from profiles.profile import Profile
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 
 
-def decompose(model: str, profile: Profile, ranker: str, out: Path | None, json: Path | None, png: Path | None) -> int:
+def decompose(
+    model: str, profile: Profile, ranker: str, orient: bool, out: Path | None, json: Path | None, png: Path | None
+) -> int:
     """Find the parts of a model and save what is asked for."""
     if out is not None:
         check_folder(out)
     for file in (json, png):
         _check(file)
-    found = decompose_model(model, profile, ranker)
+    found = decompose_model(model, profile, ranker, orient)
     told = values(found.decomposition, found.read_s, found.total_s)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
@@ -37,48 +39,50 @@ def decompose(model: str, profile: Profile, ranker: str, out: Path | None, json:
     if json is not None:
         write_json(json, told)
     if json is None or str(json) != "-":
-        show(parts_table(found))
+        show(parts_table(found, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces))
     return 0
 
 
-def export(model: str, profile: Profile, ranker: str, out: Path, json: Path | None, force: bool) -> int:
+def export(model: str, profile: Profile, ranker: str, orient: bool, out: Path, json: Path | None, force: bool) -> int:
     """Write a model's G-code; refused when its dry run finds an error, unless forced."""
     check_writable(out)
     _check(json)
-    program = build(decompose_model(model, profile, ranker).decomposition, profile)
+    program = build(decompose_model(model, profile, ranker, orient).decomposition, profile)
     _refuse_errors(program, force)
     write_lines(out, program.lines)
     _tell(program, json)
     return 0
 
 
-def simulate(model: str, profile: Profile, ranker: str, json: Path | None) -> int:
+def simulate(model: str, profile: Profile, ranker: str, orient: bool, json: Path | None) -> int:
     """Dry-run a model or a G-code file; 1 when a finding is an error."""
     _check(json)
-    program = _program(model, profile, ranker)
+    program = _program(model, profile, ranker, orient)
     _tell(program, json)
     return 1 if _errors(program) else 0
 
 
-def print_model(model: str, profile: Profile, ranker: str, port: str, baud: int, sim_speed: float, force: bool) -> int:
+def print_model(
+    model: str, profile: Profile, ranker: str, orient: bool, port: str, baud: int, sim_speed: float, force: bool
+) -> int:
     """Dry-run, then stream a model or a G-code file to a printer."""
-    program = _program(model, profile, ranker)
+    program = _program(model, profile, ranker, orient)
     _refuse_errors(program, force)
     show(run_table(program.run))
     return print_program(program, profile, port, baud, sim_speed)
 
 
-def _program(model: str, profile: Profile, ranker: str) -> Program:
+def _program(model: str, profile: Profile, ranker: str, orient: bool) -> Program:
     if Path(model).suffix.lower() in GCODE_SUFFIXES:
         lines = _gcode_lines(Path(model))
         warm(profile)
         return Program(lines, dry_run(lines, profile), None)
-    return build(decompose_model(model, profile, ranker).decomposition, profile)
+    return build(decompose_model(model, profile, ranker, orient).decomposition, profile)
 
 
 def _gcode_lines(path: Path) -> tuple[str, ...]:
     try:
-        text = path.read_text(encoding="utf-8", errors="strict")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise GcodeError(f"G-code file {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
     except UnicodeDecodeError as error:

@@ -16,6 +16,8 @@ def check_writable(path: Path) -> None:
     if path.is_dir():
         raise OutputError(f"output {path} is a folder: a file name is expected")
     folder = path.parent
+    if folder.is_file():
+        raise OutputError(f"output {path}: {folder} is a file, not a folder")
     if not folder.is_dir():
         raise OutputError(f"output {path}: the folder {folder} does not exist")
     if not os.access(folder, os.W_OK):
@@ -27,7 +29,9 @@ def check_folder(path: Path) -> None:
     if path.exists() and not path.is_dir():
         raise OutputError(f"output {path} is a file: a folder is expected")
     nearest = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
-    if not nearest.is_dir() or not os.access(nearest, os.W_OK):
+    if nearest.is_file():
+        raise OutputError(f"output {path}: {nearest} is a file, not a folder")
+    if not os.access(nearest, os.W_OK):
         raise OutputError(f"output {path}: {nearest} is not writable")
 
 

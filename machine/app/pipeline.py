@@ -4,12 +4,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
+
 from machine.app.progress import Ticker, say
 from machine.app.warmup import warm
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode import write_gcode
 from machine.plan import plan
 from mdp.decomposition import Decomposition
+from mdp.mesh import Floats, Mesh
+from mdp.orientation import best_orientation, in_words, resting_orientations
 from mdp.ranker import RANKERS
 from mdp.read import locate, read_mesh
 from mdp.search import Progress
@@ -17,6 +21,9 @@ from mdp.search import decompose as search_parts
 from profiles.errors import ProfileError
 from profiles.profile import Profile
 from slicer.slice import slice_part
+
+ORIENTATIONS_TRIED = 4
+WELL_REDUCED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +49,8 @@ def model_name(model: str) -> str:
     return model if model.startswith("demo:") else Path(model).name
 
 
-def decompose_model(model: str, profile: Profile, ranker: str) -> Decomposed:
-    """Read a model and find its parts; repairs and notes go to stderr."""
+def decompose_model(model: str, profile: Profile, ranker: str, orient: bool = False) -> Decomposed:
+    """Read a model and find its parts; repairs and notes go to stderr. orient: lay the model down in the best way first."""
     if ranker not in RANKERS:
         raise ProfileError(f"--ranker {ranker}: this version knows {', '.join(RANKERS)}")
     began = perf_counter()
@@ -52,6 +59,8 @@ def decompose_model(model: str, profile: Profile, ranker: str) -> Decomposed:
     for repair in repairs:
         say(f"{model_name(model)}: {repair}")
     warm(profile)
+    if orient:
+        mesh = _laid_down(mesh, profile)
     ticker = Ticker()
 
     def show(progress: Progress) -> None:
@@ -60,9 +69,38 @@ def decompose_model(model: str, profile: Profile, ranker: str) -> Decomposed:
 
     found = search_parts(mesh, model_name(model), profile, ranker, show)
     ticker.close()
-    for note in found.notes:
+    for note in (*found.notes, *_hints(found, profile, orient)):
         say(f"{model_name(model)}: {note}")
     return Decomposed(found, read_s, perf_counter() - began)
+
+
+def _laid_down(mesh: Mesh, profile: Profile) -> Mesh:
+    """The model as it stands or in one of its resting orientations: where a quick search leaves the least risky area."""
+    quick = profile.model_copy(update={"search": profile.search.model_copy(update={"beam_width": 1})})
+    found = resting_orientations(mesh, profile.process.self_supporting_angle_deg, ORIENTATIONS_TRIED)
+    choices = [mesh, *(standing_still(mesh, orientation.rotation) for orientation in found)]
+    left = [search_parts(choice, "oriented", quick).residual_area_mm2 for choice in choices]
+    best = left.index(min(left))
+    say("the model is best printed as it stands" if best == 0 else f"the model is {in_words(found[best - 1])}")
+    return choices[best]
+
+
+def standing_still(mesh: Mesh, rotation: Floats) -> Mesh:
+    """The mesh turned, then set on z = 0 and centred about the turn axis."""
+    turned = mesh.moved(rotation)
+    low, high = turned.bounds_mm
+    middle = 0.5 * (low + high)
+    return turned.moved(np.eye(3), (-middle[0], -middle[1], -low[2]))
+
+
+def _hints(found: Decomposition, profile: Profile, orient: bool) -> tuple[str, ...]:
+    """What might do better than the parts found."""
+    if orient or found.reduction > WELL_REDUCED or found.risky_area_mm2 <= 0:
+        return ()
+    single = best_orientation(found.mesh, profile.process.self_supporting_angle_deg)
+    if single.risky_mm2 >= found.residual_area_mm2:
+        return ()
+    return (f"{in_words(single)} it would leave {single.risky_mm2:.0f} mm2 risky even in one part: try --orient",)
 
 
 def build(decomposition: Decomposition, profile: Profile) -> Program:
@@ -73,8 +111,6 @@ def build(decomposition: Decomposition, profile: Profile) -> Program:
     for position, part in enumerate(parts):
         ticker.tick(f"slicing part {part.index} of {len(parts)}", at_once=ticker.live)
         sliced.append(slice_part(part, profile, parts[:position], parts[position + 1 :]))
-        if sliced[-1].unsupported_mm2 > 0:
-            say(f"part {part.index}: {sliced[-1].unsupported_mm2:.0f} mm2 hang free: no support could be rooted below them")
     ticker.tick("planning moves", at_once=ticker.live)
     lines = tuple(write_gcode(plan(decomposition, sliced, profile), profile))
     ticker.tick("dry run", at_once=ticker.live)

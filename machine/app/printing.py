@@ -4,7 +4,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import inf
+from math import inf, isfinite
 from types import FrameType
 
 from machine.app.pipeline import Program
@@ -21,8 +21,8 @@ SIMULATED = "sim"
 
 def print_program(program: Program, profile: Profile, port: str, baud: int, sim_speed: float) -> int:
     """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible."""
-    if sim_speed < 0:
-        raise PrinterError(f"--sim-speed is {sim_speed:g}: it must be 0 (as fast as possible) or above")
+    if not (isfinite(sim_speed) and sim_speed >= 0):
+        raise PrinterError(f"--sim-speed is {sim_speed:g}: it must be 0 (as fast as possible) or a number above")
     if port != SIMULATED:
         return _ended(_stream(program, port, baud))
     with SimulatedPrinter(profile.machine, sim_speed or inf) as printer:

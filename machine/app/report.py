@@ -7,7 +7,7 @@ import numpy as np
 from machine.app.pipeline import Decomposed
 from machine.dryrun.dryrun import DryRun, summary
 from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, Part
-from mdp.orientation import Orientation, best_orientation
+from mdp.orientation import best_orientation, in_words
 from mdp.overhang import risky_upright
 
 
@@ -67,17 +67,6 @@ def _compared(decomposition: Decomposition, angle_deg: float, count_platform_fac
     rows[1][2] = ""
     head, *lines = table(rows).splitlines()
     return "\n".join([head, *(line + note for line, (_, _, note) in zip(lines, told, strict=True))]) + "\n"
-
-
-def in_words(orientation: Orientation) -> str:
-    """How the model is turned, in the order process.rotate_deg takes, and whether it needs holding."""
-    turns = [(_angle(angle), axis) for angle, axis in zip(orientation.turns_deg, "xy", strict=True)]
-    told = ", then ".join(f"{angle} about {axis}" for angle, axis in turns if angle != "0")
-    return (f"turned {told}" if told else "as it stands") + ("" if orientation.stable else ", rests nowhere without a raft")
-
-
-def _angle(value_deg: float) -> str:
-    return f"{round(value_deg, 1) + 0.0:g}"
 
 
 def _number(area_mm2: float) -> str:

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
+from mdp.save import stl
+from tests import shapes
 
 FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "process.first_layer_height_mm=0.3"]
 FAST += ["--set", "process.line_width_mm=0.6", "--set", "process.scale=0.6"]
@@ -34,6 +36,9 @@ WRONG = [
     (["profiles", "show", "unicorn"], "generic_ac"),
     (["profiles", "check", "nowhere.toml"], "nowhere.toml"),
     (["fly"], "decompose"),
+    (["decompose", "-lead.stl"], "./-lead.stl"),
+    (["decompose", "demo:tree", "--json", "empty.gcode/x.json"], "empty.gcode is a file"),
+    (["decompose", "demo:tree", "-o", "empty.gcode/parts"], "empty.gcode is a file"),
 ]
 
 
@@ -41,6 +46,7 @@ WRONG = [
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty.gcode").write_text("")
+    (tmp_path / "-lead.stl").write_text("solid")
     (tmp_path / "rubbish.gcode").write_bytes(bytes(range(256)))
     return tmp_path
 
@@ -96,6 +102,27 @@ def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Pat
         "axes", "findings",
     }  # fmt: skip
     assert first == again
+
+
+def test_the_simulated_speed_must_be_a_number(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("one.gcode").write_text("G28\nM104 S0\nM140 S0\n")
+    assert main(["print", "one.gcode", "--port", "sim", "--sim-speed", "nan"]) == 1
+    assert "--sim-speed is nan" in capsys.readouterr().err
+
+
+def test_a_byte_order_mark_is_read_over(folder: Path) -> None:
+    Path("mark.gcode").write_bytes(b"\xef\xbb\xbfG28\nM104 S0\nM140 S0\n")
+    assert main(["simulate", "mark.gcode"]) == 0
+
+
+def test_a_model_that_does_better_lying_down_is_laid_down(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    left = []
+    for arguments in ([], ["--orient"]):
+        assert main(["decompose", "tee.stl", *arguments, "--set", "search.directions=20", "--json", "out.json"]) == 0
+        left.append(json.loads(Path("out.json").read_text())["residual_area_mm2"])
+    assert left[1] <= left[0]
+    assert left[1] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_profiles_show_and_check_agree(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
