@@ -167,7 +167,7 @@ class _Search:
         following = list(kept)
         seen.update(node.signature for node in kept)
         mine = [tables[id(node)] for node in beam]
-        pool = entries(mine, self.model.risky_mm2, self.best.cost_mm2 - self.least_gain_mm2) if mine else iter(())
+        pool = entries(mine, self.model.risky_mm2, self.best.cost_mm2) if mine else iter(())
         for entry in self.ranker.ordered(pool, lambda entry: mine[entry.table].plan(entry.row), self.model):
             if len(following) >= width:
                 break
