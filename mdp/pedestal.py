@@ -1,0 +1,46 @@
+"""Pedestal: a prism under the model that lifts it, so that low, strongly tilted cuts come clear of the table."""
+
+import manifold3d as m3
+import numpy as np
+
+from mdp.cut import mesh_of, solid_of
+from mdp.mesh import Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM
+from profiles.errors import MeshError
+
+MARGIN_MM = 2.0  # the pedestal reaches this far beyond the model's feet
+LEAST_RADIUS_MM = 5.0  # even under a model that stands on a point
+SEGMENTS = 64
+
+
+def on_pedestal(mesh: Mesh, height_mm: float) -> Mesh:
+    """The mesh lifted by the height and one with a pedestal whose outline is that of its feet, grown by 2 mm.
+
+    Several feet stand on one pedestal, the hull of their outlines. The model's first 0.3 mm, which stand on the platform
+    otherwise, are sunk into the pedestal: so also a model that touches the platform in a point is held. A height of 0 leaves the
+    mesh as it is. Raises MeshError when the result is no solid.
+    """
+    if height_mm <= 0.0:
+        return mesh
+    solid = solid_of(mesh)
+    sunk_mm = min(PLATFORM_TOLERANCE_MM, 0.5 * float(mesh.bounds_mm[1, 2]))
+    pedestal = m3.Manifold.extrude(_outline(solid, sunk_mm), height_mm + sunk_mm)
+    joined = solid.translate((0.0, 0.0, height_mm)) + pedestal
+    if joined.status() != m3.Error.NoError:
+        raise MeshError(f"the model cannot be put on a pedestal of {height_mm:g} mm ({joined.status().name})")
+    return mesh_of(joined)
+
+
+def _outline(solid: m3.Manifold, height_mm: float) -> m3.CrossSection:
+    """What the pedestal looks like from above: the solid's section at a small height, grown, in one piece."""
+    feet = solid.slice(height_mm)
+    loops = feet.to_polygons()
+    if not loops:
+        raise MeshError("the model cannot be put on a pedestal: it has no section just above the platform")
+    if len(feet.decompose()) > 1:
+        feet = feet.hull()
+    corners = np.concatenate(loops)
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    least = m3.CrossSection.circle(LEAST_RADIUS_MM, SEGMENTS).translate((float(middle[0]), float(middle[1])))
+    grown = feet.offset(MARGIN_MM, m3.JoinType.Round, 2.0, SEGMENTS) + least
+    return grown if len(grown.decompose()) == 1 else grown.hull()
