@@ -45,6 +45,9 @@ def decompose(
     orient: Orient = False,
     json: JsonFile = None,
     png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the parts")] = None,
+    sheet: Annotated[
+        Path | None, typer.Option("--sheet", metavar="FILE", help="picture of the print order, tilted as printed")
+    ] = None,
     machine: MachineName = "generic_ac",
     material: MaterialName = "pla",
     process: ProcessName = "standard",
@@ -54,7 +57,7 @@ def decompose(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width)
-    return commands.decompose(model, profile, ranker, orient, out, json, png)
+    return commands.decompose(model, profile, ranker, orient, out, json, png, sheet)
 
 
 @app.command()

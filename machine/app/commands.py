@@ -3,7 +3,9 @@
 from pathlib import Path
 
 from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
+from machine.app.picture import contact_sheet, parts_picture
 from machine.app.pipeline import Program, build, decompose_model
+from machine.app.png import write_png
 from machine.app.printing import print_program
 from machine.app.progress import say
 from machine.app.report import parts_table, run_table, show
@@ -17,12 +19,19 @@ GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 
 
 def decompose(
-    model: str, profile: Profile, ranker: str, orient: bool, out: Path | None, json: Path | None, png: Path | None
+    model: str,
+    profile: Profile,
+    ranker: str,
+    orient: bool,
+    out: Path | None,
+    json: Path | None,
+    png: Path | None,
+    sheet: Path | None,
 ) -> int:
     """Find the parts of a model and save what is asked for."""
     if out is not None:
         check_folder(out)
-    for file in (json, png):
+    for file in (json, png, sheet):
         _check(file)
     found = decompose_model(model, profile, ranker, orient)
     told = values(found.decomposition, found.read_s, found.total_s)
@@ -33,9 +42,9 @@ def decompose(
         write_bytes(out / "decomposition.3mf", threemf(found.decomposition))
         write_json(out / "decomposition.json", told)
     if png is not None:
-        from machine.app.picture import parts_picture, write_png
-
         write_png(png, parts_picture(found.decomposition, profile))
+    if sheet is not None:
+        write_png(sheet, contact_sheet(found.decomposition, profile.machine))
     if json is not None:
         write_json(json, told)
     if json is None or str(json) != "-":

@@ -76,7 +76,8 @@ def test_a_bug_ends_with_exit_3_and_a_log_file(monkeypatch: pytest.MonkeyPatch, 
 
 
 def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
-    assert main(["decompose", "demo:bracket", *FAST, "-o", "parts", "--json", "out.json", "--png", "parts.png"]) == 0
+    wanted = ["-o", "parts", "--json", "out.json", "--png", "parts.png", "--sheet", "sheet.png"]
+    assert main(["decompose", "demo:bracket", *FAST, *wanted]) == 0
     told = json.loads(Path("out.json").read_text())
     assert set(told) == {
         "model", "faces", "beam_width", "ranker", "seconds", "risky_area_mm2", "residual_area_mm2", "reduction", "volume_mm3",
@@ -88,7 +89,7 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     assert sum(part["volume_mm3"] for part in told["parts"]) == pytest.approx(told["volume_mm3"], rel=1e-6)
     files = {part["file"] for part in told["parts"]} | {"decomposition.3mf", "decomposition.json"}
     assert {file.name for file in Path("parts").iterdir()} == files
-    assert Path("parts.png").read_bytes().startswith(b"\x89PNG")
+    assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png"))
 
 
 def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Path) -> None:
