@@ -190,10 +190,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return 0
     except Exception as error:  # noqa: BLE001 - the one place where a bug becomes a message and a log file
+        if _interrupted(error):
+            return _complain("interrupted", 130)
         from machine.app.crash import log_bug
 
         return _complain(f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, given)}", 3)
     return int(code or 0)
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether Ctrl-C lies beneath: compiled code turns it into an error of its own."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _usage(error: TyperException, given: Sequence[str]) -> str:

@@ -6,7 +6,7 @@ from machine.app.output import check_folder, check_writable, write_bytes, write_
 from machine.app.picture import contact_sheet, parts_picture
 from machine.app.pipeline import Program, build, decompose_model
 from machine.app.png import write_png
-from machine.app.printing import print_program
+from machine.app.printing import check_port, print_program
 from machine.app.progress import say
 from machine.app.report import parts_table, run_table, show
 from machine.app.warmup import warm
@@ -74,7 +74,8 @@ def simulate(model: str, profile: Profile, ranker: str, orient: bool, json: Path
 def print_model(
     model: str, profile: Profile, ranker: str, orient: bool, port: str, baud: int, sim_speed: float, force: bool
 ) -> int:
-    """Dry-run, then stream a model or a G-code file to a printer."""
+    """Dry-run, then stream a model or a G-code file to a printer, whose port is tried before any work is done."""
+    check_port(port, baud, sim_speed)
     program = _program(model, profile, ranker, orient)
     _refuse_errors(program, force)
     show(run_table(program.run))

@@ -10,6 +10,7 @@ from types import FrameType
 from machine.app.pipeline import Program
 from machine.app.progress import Ticker, say
 from machine.app.report import duration, show
+from machine.link.port import open_port
 from machine.link.progress import Progress
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import Outcome, print_lines
@@ -19,10 +20,17 @@ from profiles.profile import Profile
 SIMULATED = "sim"
 
 
-def print_program(program: Program, profile: Profile, port: str, baud: int, sim_speed: float) -> int:
-    """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible."""
+def check_port(port: str, baud: int, sim_speed: float) -> None:
+    """Refuse at once a port that cannot be opened; raises PrinterError."""
     if not (isfinite(sim_speed) and sim_speed >= 0):
         raise PrinterError(f"--sim-speed is {sim_speed:g}: it must be 0 (as fast as possible) or a number above")
+    if port != SIMULATED:
+        with open_port(port, baud):
+            pass
+
+
+def print_program(program: Program, profile: Profile, port: str, baud: int, sim_speed: float) -> int:
+    """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible."""
     if port != SIMULATED:
         return _ended(_stream(program, port, baud))
     with SimulatedPrinter(profile.machine, sim_speed or inf) as printer:

@@ -36,6 +36,9 @@ WRONG = [
     (["profiles", "show", "unicorn"], "generic_ac"),
     (["profiles", "check", "nowhere.toml"], "nowhere.toml"),
     (["fly"], "decompose"),
+    (["print", "demo:tree", "--port", "/dev/nowhere"], "/dev/nowhere does not exist"),
+    (["print", "demo:tree", "--port", "/dev/null"], "/dev/null"),
+    (["print", "demo:tree", "--port", "sim", "--sim-speed", "-1"], "--sim-speed is -1"),
     (["decompose", "-lead.stl"], "./-lead.stl"),
     (["decompose", "demo:tree", "--json", "empty.gcode/x.json"], "empty.gcode is a file"),
     (["decompose", "demo:tree", "-o", "empty.gcode/parts"], "empty.gcode is a file"),
@@ -73,6 +76,17 @@ def test_a_bug_ends_with_exit_3_and_a_log_file(monkeypatch: pytest.MonkeyPatch, 
     log = Path(capsys.readouterr().err.strip().rsplit(" ", 1)[1])
     assert "ZeroDivisionError: planted" in log.read_text()
     log.unlink()
+
+
+def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> int:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as beneath:
+            raise SystemError("returned a result with an exception set") from beneath
+
+    monkeypatch.setattr("machine.app.profile_commands.list_profiles", interrupted)
+    assert main(["profiles", "list"]) == 130
 
 
 def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
