@@ -121,7 +121,7 @@ def sweep(
     this thickness are thin. crumb_mm: a piece above the plane that is lower than this may stand on any area.
     """
     laid = remainder.facets
-    rows = (laid.points, laid.corners, laid.vectors_mm2, laid.rising_edges, laid.vertex_normal_rows, laid.flatness)
+    rows = (laid.points, laid.corners, laid.normals, laid.vectors_mm2, laid.rising_edges, laid.vertex_normal_rows, laid.flatness)
     surface = (laid.mesh.vertices, laid.mesh.faces, laid.mesh.normals, laid.vertex_normals)
     tree = (remainder.tree.low, remainder.tree.high)
     solid = (surface, laid.standing, remainder.thin(thin_mm), laid.links, tree, remainder.anchors)
@@ -148,7 +148,7 @@ def _gains(surface, directions, step, columns, risky_below):  # type: ignore[no-
 
 @njit(cache=True, parallel=True)
 def _sweep(rows, solid, directions, watched, needed, crumb, step, columns):  # type: ignore[no-untyped-def]
-    points, corners, vectors, edges, vertex_normals, flatness = rows
+    points, corners, normals, vectors, edges, vertex_normals, flatness = rows
     surface, standing, thin, links, tree, anchor = solid
     k = len(directions)
     first, count, pieces = np.zeros(k, np.int32), np.zeros(k, np.int32), np.zeros((k, columns), np.int32)
@@ -163,7 +163,7 @@ def _sweep(rows, solid, directions, watched, needed, crumb, step, columns):  # t
             sum_volumes(corners, vectors, d, heights, n, step, section[row], volume[row])
             find_lowest(points[2], edges, heights, n, watched[row], lowest[row])
             dot(vertex_normals[0], vertex_normals[1], vertex_normals[2], d[0], d[1], d[2], cosines)
-            find_slivers(cosines, heights, n, step, fragile[row])
+            find_slivers(corners, normals, d, heights, n, step, fragile[row])
             find_thin(corners, thin, heights, n, step, thinnest[row])
             found = room[: find_critical(cosines, flatness, heights, links, room)]
             count_pieces(surface, standing, links, found, tree, anchor, cosines, heights, n, pieces[row])

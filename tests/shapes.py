@@ -48,3 +48,9 @@ def bowl() -> Mesh:
 def ball(radius: float = 10.0, segments: int = 48) -> Mesh:
     """A sphere touching the platform in one point."""
     return standing(m3.Manifold.sphere(radius, segments))
+
+
+def octahedron(radius: float = 5.0) -> Mesh:
+    """A double pyramid standing on its point."""
+    points = [(radius, 0, 0), (0, radius, 0), (-radius, 0, 0), (0, -radius, 0), (0, 0, radius), (0, 0, -radius)]
+    return standing(m3.Manifold.hull_points(points))

@@ -10,22 +10,19 @@ from mdp.overhang import facing_down, risky_upright, threshold
 from mdp.plane import Plane
 from mdp.sweep import Gains, Remainder, Sweep, gains, sweep
 from tests import shapes
+from tests.mdp.solids import area_vectors_above, random_direction, random_solid
 
 STEP_MM = 1.3
+CRUMB_MM = 1.5
 SPHERE = st.tuples(st.integers(1, 999), st.integers(1, 999))  # no nearly level planes: manifold3d snaps them
 
 
 def _sweep_one(mesh: Mesh, direction: Floats) -> Sweep:
-    return sweep(Remainder(mesh, risky_upright(mesh, 45.0)), direction[None], STEP_MM)
+    return sweep(Remainder(mesh, risky_upright(mesh, 45.0)), direction[None], STEP_MM, crumb_mm=CRUMB_MM)
 
 
 def _gains_one(mesh: Mesh, direction: Floats) -> Gains:
     return gains(Remainder(mesh, risky_upright(mesh, 45.0)), direction[None], STEP_MM, threshold(45.0))
-
-
-def _direction(height: int, around: int) -> Floats:
-    z, angle = height / 1000.0, around / 1000.0 * 2.0 * np.pi
-    return np.array([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
 
 
 def _floating(solid: m3.Manifold) -> int:
@@ -33,39 +30,49 @@ def _floating(solid: m3.Manifold) -> int:
     return sum(1 for piece in solid.decompose() if piece.bounding_box()[2] > 0.3 and piece.volume() > 0)
 
 
-def _random_solid(seed: int) -> Mesh:
-    """Overlapping random boxes and balls on a base plate, some of them cut out: bowls, handles and voids appear."""
-    rng = np.random.default_rng(seed)
-    solid = m3.Manifold.cube((30, 30, 3), True).translate((0, 0, 1.5))
-    for k in range(6):
-        piece = m3.Manifold.sphere(rng.uniform(3, 8), 16) if k % 2 else m3.Manifold.cube(tuple(rng.uniform(3, 16, 3)), True)
-        piece = piece.rotate(tuple(rng.uniform(0, 90, 3))).translate(tuple(rng.uniform((-9, -9, 2), (9, 9, 18))))
-        solid = solid - piece if k == 5 else solid + piece
-    biggest = max(solid.decompose(), key=lambda piece: piece.volume())
-    return mesh_of(biggest.translate((0, 0, -biggest.bounding_box()[2])))
-
-
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), SPHERE)
 def test_every_offset_equals_the_exact_cut(seed: int, place: tuple[int, int]) -> None:
-    direction = _direction(*place)
-    mesh = _random_solid(seed)
+    direction, mesh = random_direction(*place), random_solid(seed)
     solid, swept, gained = solid_of(mesh), _sweep_one(mesh, direction), _gains_one(mesh, direction)
+    upright, down = risky_upright(mesh, 45.0), facing_down(mesh, direction, 45.0)
     platform_mm = float((mesh.vertices[mesh.vertices[:, 2] <= 0.3] @ direction).max())
     for column in range(swept.count[0]):
         plane = Plane(direction, (swept.first[0] + column) * STEP_MM)
         if np.abs(plane.heights_mm(mesh.vertices)).min() < 1e-6:
             continue  # a face in the plane belongs to either side
         above, below = cut(solid, plane)
-        part = mesh_of(above)
-        surface = ~(np.abs(plane.heights_mm(part.vertices)) < 1e-7)[part.faces].all(axis=1)
-        down = facing_down(part, direction, 45.0) & surface
-        assert swept.volume_mm3[0, column] == pytest.approx(above.volume(), abs=1e-9 * mesh.volume_mm3)
-        assert swept.section_mm2[0, column] == pytest.approx(part.areas_mm2[~surface].sum(), abs=1e-7 * mesh.areas_mm2.sum())
-        assert gained.residual_mm2[0, column] == pytest.approx(part.areas_mm2[down].sum(), abs=1e-7 * mesh.areas_mm2.sum())
-        assert swept.lowest_mm[0, column] == pytest.approx(part.bounds_mm[0, 2], abs=1e-9)
+        vectors = area_vectors_above(mesh, plane)
+        areas = np.linalg.norm(vectors, axis=1)
+        assert swept.volume_mm3[0, column] == _near(above.volume(), mesh.volume_mm3)
+        assert swept.section_mm2[0, column] == _near((vectors @ direction).sum(), mesh.areas_mm2.sum())
+        assert swept.section_mm2[0, column] == _near(_interface_mm2(above, plane), mesh.areas_mm2.sum())
+        assert gained.residual_mm2[0, column] == _near(areas[down].sum(), mesh.areas_mm2.sum())
+        assert gained.up_mm2[0, column] == _near(areas[upright].sum(), mesh.areas_mm2.sum())
+        assert swept.lowest_mm[0, column] == pytest.approx(above.bounding_box()[2], abs=1e-9)
         if plane.offset_mm > platform_mm:
             assert swept.pieces[0, column] == _floating(below)
+        if swept.pieces[0, column] == 0:
+            assert swept.footing_mm2[0, column] == _near(_least_footing_mm2(above, plane), mesh.areas_mm2.sum())
+
+
+def _near(expected: float, scale: float) -> object:
+    """Equal to 1e-9 of itself, or to rounding of the sum that it is what is left of."""
+    return pytest.approx(expected, rel=1e-9, abs=1e-12 * scale)
+
+
+def _interface_mm2(part: m3.Manifold, plane: Plane) -> float:
+    """Area of a part's faces in its base plane."""
+    mesh = mesh_of(part)
+    resting = (np.abs(plane.heights_mm(mesh.vertices)) < 1e-7)[mesh.faces].all(axis=1)
+    return float(mesh.areas_mm2[resting].sum())
+
+
+def _least_footing_mm2(part: m3.Manifold, plane: Plane) -> float:
+    """Least interface of the pieces at least CRUMB_MM high, or the part's when all of them are lower."""
+    pieces = [piece for piece in part.decompose() if piece.volume() > 0]
+    high = [piece for piece in pieces if plane.heights_mm(mesh_of(piece).vertices).max() >= CRUMB_MM]
+    return min((_interface_mm2(piece, plane) for piece in high), default=_interface_mm2(part, plane))
 
 
 @pytest.mark.parametrize("name", ["hollow", "bowl", "tee", "branch", "box"])
@@ -106,3 +113,28 @@ def test_one_core_and_two_give_the_same_numbers() -> None:
         numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     for a, b in zip(many, one, strict=True):
         assert all(np.array_equal(vars(a)[key], vars(b)[key]) for key in vars(a))
+
+
+def test_the_order_of_faces_and_vertices_in_memory_does_not_matter() -> None:
+    mesh, rng = random_solid(3), np.random.default_rng(3)
+    order = rng.permutation(len(mesh.vertices))
+    number = np.argsort(order).astype(np.int32)
+    shuffled = Mesh(mesh.vertices[order], number[mesh.faces][rng.permutation(len(mesh.faces))])
+    direction = random_direction(500, 123)
+    one, other = _sweep_one(mesh, direction), _sweep_one(shuffled, direction)
+    assert np.array_equal(one.pieces, other.pieces)
+    assert other.volume_mm3 == pytest.approx(one.volume_mm3, rel=1e-12, abs=1e-9)
+    assert other.footing_mm2 == pytest.approx(one.footing_mm2, rel=1e-12, abs=1e-9)
+
+
+def test_two_balls_that_touch_in_a_vertex_are_one_piece() -> None:
+    """A vertex with two rings of neighbours: what stands on it hangs together through it, as the mesh says."""
+    top, bottom = shapes.octahedron(5.0), shapes.octahedron(5.0)
+    vertices = np.concatenate([bottom.vertices, top.vertices + np.array([0, 0, 10.0])])
+    faces = np.concatenate([bottom.faces, top.faces + len(bottom.vertices)])
+    lower, upper = int(np.argmax(bottom.vertices[:, 2])), len(bottom.vertices) + int(np.argmin(top.vertices[:, 2]))
+    faces[faces == upper] = lower
+    keep = np.delete(np.arange(len(vertices)), upper)
+    mesh = Mesh(vertices[keep], np.searchsorted(keep, faces).astype(np.int32))
+    swept = sweep(Remainder(mesh, np.zeros(len(mesh.faces), bool)), np.array([[0.0, 0.0, 1.0]]), STEP_MM)
+    assert swept.pieces[0, : swept.count[0]].tolist() == [0] * 15
