@@ -87,6 +87,10 @@ class Facets:
         normals: Floats = _vertex_normals(self.mesh.vertices, self.mesh.faces, self.mesh.normals)
         return normals
 
+    def sharp_corners(self, cosine: float) -> Ints:
+        """Numbers 3 f + k of the face corners at vertices some face of which leans further than that from their normal."""
+        return np.flatnonzero(self.flatness[self.mesh.faces] <= cosine).astype(np.int32)
+
     @cached_property
     def vertex_normal_rows(self) -> Floats:
         """(3, n) vertex_normals."""

@@ -9,29 +9,37 @@ import numpy as np
 from numba import njit, prange
 
 from mdp.rays import first_hit
-from mdp.sums import BLOCK, column_over, dot
+from mdp.sums import column_over
 
 SLIVER_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a sliver when the plane comes too near
 OPPOSITE_COSINE = 0.8  # two faces of one wall or rod look opposite ways, within 37 degrees
 
 
+@njit(cache=True, inline="always")
+def _note(cosine, height, n, above, below):  # type: ignore[no-untyped-def]
+    b = min(column_over(height), n)
+    if cosine < 0.0:
+        below[b] = max(below[b], height)
+    elif b > 0:
+        above[b - 1] = min(above[b - 1], height)
+
+
 @njit(cache=True)
-def find_slivers(corners, normals, d, heights, n, step, fragile):  # type: ignore[no-untyped-def]
-    """Distance from each offset up to the next corner of a face looking along d, down to the next of one looking against it."""
-    above, below, cosines = np.full(n + 1, np.inf), np.full(n + 1, -np.inf), np.empty(BLOCK)
-    for begin in range(0, corners.shape[1], BLOCK):
-        end = min(begin + BLOCK, corners.shape[1])
-        dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], d[0], d[1], d[2], cosines[: end - begin])
-        for f in range(begin, end):
-            cosine = cosines[f - begin]
-            if abs(cosine) > SLIVER_COSINE:
-                for k in range(3):
-                    height = heights[corners[k, f]]
-                    b = min(column_over(height), n)
-                    if cosine < 0.0:
-                        below[b] = max(below[b], height)
-                    elif b > 0:
-                        above[b - 1] = min(above[b - 1], height)
+def find_slivers(cosines, flatness, sharp, corners, normals, d, heights, n, step, fragile):  # type: ignore[no-untyped-def]
+    """Distance from each offset up to the next surface looking along d and down to the next one looking against it.
+
+    Where the surface is smooth the normal of a vertex tells where it looks, at an edge or corner those of its faces do. sharp:
+    numbers 3 f + k of the face corners at edges.
+    """
+    above, below = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
+    for v in range(len(heights)):
+        if abs(cosines[v]) > SLIVER_COSINE and flatness[v] > SLIVER_COSINE:
+            _note(cosines[v], heights[v], n, above, below)
+    for corner in sharp:
+        f = corner // 3
+        cosine = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
+        if abs(cosine) > SLIVER_COSINE:
+            _note(cosine, heights[corners[corner % 3, f]], n, above, below)
     nearest = np.inf
     for column in range(n - 1, -1, -1):
         nearest = min(nearest, above[column])

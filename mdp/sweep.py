@@ -9,20 +9,29 @@ There are two passes: `gains` touches only the faces that are risky one way or t
 `sweep` tells whether it can be made, and is asked only for the directions that are worth it.
 """
 
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from mdp.facets import Facets, facets
 from mdp.footing import find_footing
-from mdp.fragile import find_slivers, find_thin, thin_faces
+from mdp.fragile import SLIVER_COSINE, find_slivers, find_thin, thin_faces
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.pieces import UNKNOWN, count_pieces, find_critical
 from mdp.rays import Tree
 from mdp.sums import dot, find_heights, find_lowest, sum_risks, sum_volumes
+
+# Threads of our own: they wait for each other without spinning, Ctrl-C reaches the one that asks, and kernels that are not
+# parallel themselves compile in half the time.
+THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+ROWS_AT_ONCE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +92,11 @@ class Remainder:
         """(n,) the face met from each vertex into the solid, -1 where none is; the sweep looks them up when needed."""
         return np.full(len(self.mesh.vertices), UNKNOWN, np.int32)
 
+    @cached_property
+    def sharp(self) -> Ints:
+        """Face corners at edges, where the normal of a vertex does not tell where the surface looks."""
+        return self.facets.sharp_corners(SLIVER_COSINE)
+
     def thin(self, thickness_mm: float) -> Ints:
         """The faces under whose middle the solid is thinner than this, looked up once a thickness."""
         if thickness_mm not in self._thin:
@@ -104,7 +118,11 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle."""
     laid = remainder.facets
     surface = (laid.points, laid.corners, laid.normals, laid.mesh.areas_mm2, laid.risky)
-    return Gains(*_gains(surface, np.ascontiguousarray(directions), step_mm, remainder.columns(step_mm), risky_below))
+    k, columns = len(directions), remainder.columns(step_mm)
+    found = Gains(np.zeros(k, np.int32), np.zeros(k, np.int32), np.zeros((k, columns)), np.zeros((k, columns)))
+    out = (found.first, found.count, found.up_mm2, found.residual_mm2)
+    _in_threads(_gains, k, surface, np.ascontiguousarray(directions), step_mm, risky_below, out)
+    return found
 
 
 def sweep(
@@ -124,37 +142,65 @@ def sweep(
     rows = (laid.points, laid.corners, laid.normals, laid.vectors_mm2, laid.rising_edges, laid.vertex_normal_rows, laid.flatness)
     surface = (laid.mesh.vertices, laid.mesh.faces, laid.mesh.normals, laid.vertex_normals)
     tree = (remainder.tree.low, remainder.tree.high)
-    solid = (surface, laid.standing, remainder.thin(thin_mm), laid.links, tree, remainder.anchors)
+    regions = (laid.standing, remainder.sharp, remainder.thin(thin_mm))
+    solid = (surface, *regions, laid.links, tree, remainder.anchors)
     watched = np.full(len(directions), np.inf) if watched_mm is None else np.ascontiguousarray(watched_mm)
     needed = np.full(len(directions), -np.inf) if watched_mm is None else watched
-    settings = (watched, needed, crumb_mm / step_mm, step_mm, remainder.columns(step_mm))
-    return Sweep(*_sweep(rows, solid, np.ascontiguousarray(directions), *settings))
+    shape = (len(directions), remainder.columns(step_mm))
+    found = Sweep(
+        first=np.zeros(shape[0], np.int32),
+        count=np.zeros(shape[0], np.int32),
+        section_mm2=np.zeros(shape),
+        volume_mm3=np.zeros(shape),
+        lowest_mm=np.full(shape, np.inf),
+        fragile_mm=np.full(shape, np.inf),
+        thin_mm=np.full(shape, np.inf),
+        pieces=np.zeros(shape, np.int32),
+        footing_mm2=np.zeros(shape),
+    )
+    sums = (found.section_mm2, found.volume_mm3, found.footing_mm2)
+    nearest = (found.lowest_mm, found.fragile_mm, found.thin_mm)
+    out = (found.first, found.count, found.pieces, *sums, *nearest)
+    _in_threads(
+        _sweep, shape[0], rows, solid, np.ascontiguousarray(directions), watched, needed, crumb_mm / step_mm, step_mm, out
+    )
+    return found
 
 
-@njit(cache=True, parallel=True)
-def _gains(surface, directions, step, columns, risky_below):  # type: ignore[no-untyped-def]
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="sweep")
+
+
+def _in_threads(kernel: Callable[..., None], count: int, *arguments: Any) -> None:
+    """Run a kernel over `count` rows, a few at a time on every core; each row is written by one call alone."""
+    spans = [(row, min(row + ROWS_AT_ONCE, count)) for row in range(0, count, ROWS_AT_ONCE)]
+    threads = min(THREADS, len(spans))
+    if threads < 2:
+        kernel(0, count, *arguments)
+        return
+    for done in [_pool(THREADS).submit(kernel, begin, end, *arguments) for begin, end in spans]:
+        done.result()
+
+
+@njit(cache=True, nogil=True)
+def _gains(begin_row, end_row, surface, directions, step, risky_below, out):  # type: ignore[no-untyped-def]
     points, corners, normals, areas, risky = surface
-    k = len(directions)
-    first, count = np.zeros(k, np.int32), np.zeros(k, np.int32)
-    up, residual = np.zeros((k, columns)), np.zeros((k, columns))
-    for row in prange(k):
+    first, count, up, residual = out
+    for row in range(begin_row, end_row):
         d, heights = directions[row], np.empty(points.shape[1])
         begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
         first[row], count[row] = begin, n
         if n > 0:
             sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, up[row], residual[row])
-    return first, count, up, residual
 
 
-@njit(cache=True, parallel=True)
-def _sweep(rows, solid, directions, watched, needed, crumb, step, columns):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True)
+def _sweep(begin_row, end_row, rows, solid, directions, watched, needed, crumb, step, out):  # type: ignore[no-untyped-def]
     points, corners, normals, vectors, edges, vertex_normals, flatness = rows
-    surface, standing, thin, links, tree, anchor = solid
-    k = len(directions)
-    first, count, pieces = np.zeros(k, np.int32), np.zeros(k, np.int32), np.zeros((k, columns), np.int32)
-    section, volume, footing = np.zeros((k, columns)), np.zeros((k, columns)), np.zeros((k, columns))
-    lowest, fragile, thinnest = np.full((k, columns), np.inf), np.full((k, columns), np.inf), np.full((k, columns), np.inf)
-    for row in prange(k):
+    surface, standing, sharp, thin, links, tree, anchor = solid
+    first, count, pieces, section, volume, footing, lowest, fragile, thinnest = out
+    for row in range(begin_row, end_row):
         d, heights = directions[row], np.empty(points.shape[1])
         cosines, room = np.empty(points.shape[1]), np.empty(points.shape[1], np.int32)
         begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
@@ -163,7 +209,7 @@ def _sweep(rows, solid, directions, watched, needed, crumb, step, columns):  # t
             sum_volumes(corners, vectors, d, heights, n, step, section[row], volume[row])
             find_lowest(points[2], edges, heights, n, watched[row], lowest[row])
             dot(vertex_normals[0], vertex_normals[1], vertex_normals[2], d[0], d[1], d[2], cosines)
-            find_slivers(corners, normals, d, heights, n, step, fragile[row])
+            find_slivers(cosines, flatness, sharp, corners, normals, d, heights, n, step, fragile[row])
             find_thin(corners, thin, heights, n, step, thinnest[row])
             found = room[: find_critical(cosines, flatness, heights, links, room)]
             count_pieces(surface, standing, links, found, tree, anchor, cosines, heights, n, pieces[row])
@@ -171,4 +217,3 @@ def _sweep(rows, solid, directions, watched, needed, crumb, step, columns):  # t
             footing[row] = section[row]
             solid_above = (points, corners, surface, links, found, tree, anchor, cosines)
             find_footing(solid_above, d, heights, crumb, wanted, footing[row])
-    return first, count, section, volume, lowest, fragile, thinnest, pieces, footing
