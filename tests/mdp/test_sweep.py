@@ -98,21 +98,16 @@ def test_offsets_cover_the_whole_range_of_a_direction() -> None:
     assert (swept.first[0], swept.count[0]) == (1, 19)
 
 
-def test_one_core_and_two_give_the_same_numbers() -> None:
-    import numba
-
-    mesh = shapes.branch()
+def test_one_core_and_two_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     directions = np.random.default_rng(3).normal(size=(50, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    remainder = Remainder(mesh, risky_upright(mesh, 45.0))
-    many = [gains(remainder, directions, 1.0, threshold(45.0)), sweep(remainder, directions, 1.0)]
-    numba.set_num_threads(1)
-    try:
-        one = [gains(remainder, directions, 1.0, threshold(45.0)), sweep(remainder, directions, 1.0)]
-    finally:
-        numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-    for a, b in zip(many, one, strict=True):
-        assert all(np.array_equal(vars(a)[key], vars(b)[key]) for key in vars(a))
+    remainder = Remainder(shapes.branch(), risky_upright(shapes.branch(), 45.0))
+    found = []
+    for threads in (1, 2):
+        monkeypatch.setattr("mdp.sweep.THREADS", threads)
+        found.append([gains(remainder, directions, 1.0, threshold(45.0)), sweep(remainder, directions, 1.0)])
+    for one, two in zip(*found, strict=True):
+        assert all(np.array_equal(vars(one)[key], vars(two)[key]) for key in vars(one))
 
 
 def test_the_order_of_faces_and_vertices_in_memory_does_not_matter() -> None:
