@@ -36,9 +36,12 @@ def find_footing(solid, d, heights, crumb, wanted, footing):  # type: ignore[no-
     for basin in range(len(seeds)):
         starts[basin + 1] = starts[basin] + max(begun[basin] - ended[basin], 0)
     areas, ends = np.zeros(starts[-1]), np.empty((2, 3))
+    lowest, highest = np.searchsorted(several, 1) - 1, np.searchsorted(several, several[n]) - 1
     for f in range(corners.shape[1]):
         i, j, k = corners[0, f], corners[1, f], corners[2, f]
         p, q, r = heights[i], heights[j], heights[k]
+        if max(p, q, r) <= lowest or min(p, q, r) > highest:
+            continue
         first, last = column_over(min(p, q, r)), column_over(max(p, q, r))
         if several[min(first, n)] == several[last]:
             continue
