@@ -134,10 +134,12 @@ def worth(remainder: Remainder, limits: Bounds, search: Search, angle_deg: float
     return Worth(direction, offset[kept], gain[kept], found.residual_mm2[kept], int(found.count.sum()))
 
 
-def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Checked:
-    """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut."""
+def check(
+    remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats, thin: bool = False
+) -> Checked:
+    """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut; thin: tell thin_mm too."""
     rows, inverse = np.unique(direction, return_inverse=True)
-    sizes = (search.fragile_mm, sqrt(limits.least_interface_mm2))
+    sizes = (sqrt(limits.least_interface_mm2), search.fragile_mm if thin else None)
     found = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows], *sizes)
     at = (inverse, np.rint(offset_mm / search.offset_step_mm).astype(np.int64) - found.first[inverse])
     reason = np.zeros(len(direction), np.int32)

@@ -6,7 +6,7 @@ that looks the other way; near an acute edge the other face looks aside, that is
 """
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from mdp.rays import first_hit
 from mdp.sums import column_over
@@ -50,11 +50,11 @@ def find_slivers(cosines, flatness, sharp, corners, normals, d, heights, n, step
         fragile[column] = min(fragile[column], (column - nearest) * step)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True)
 def thin_faces(vertices, faces, normals, low, high, thickness):  # type: ignore[no-untyped-def]
     """(m,) whether the solid is thinner than `thickness` mm under the middle of a face. low, high: boxes over the faces."""
     thin = np.zeros(len(faces), np.bool_)
-    for f in prange(len(faces)):
+    for f in range(len(faces)):
         middle = (vertices[faces[f, 0]] + vertices[faces[f, 1]] + vertices[faces[f, 2]]) / 3.0
         thin[f] = first_hit(middle, -normals[f], thickness, -1, OPPOSITE_COSINE, vertices, faces, normals, low, high) >= 0
     return thin

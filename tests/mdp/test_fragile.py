@@ -54,6 +54,6 @@ def test_only_a_sliver_forbids_a_plane_a_cut_across_a_fin_is_told() -> None:
     profile = load(settings=["search.clearance=false", "search.least_interface_mm2=0", "search.least_volume_share=0"])
     mesh = _on_block(m3.Manifold.cube((20, 0.8, 15), True).translate((0, 0, 17.4)))
     limits = bounds(mesh, profile.machine, profile.search, UP[None])
-    checked = check(_remainder(mesh), limits, profile.search, np.zeros(3, np.int32), np.array([9.0, 18.0, 24.0]))
+    checked = check(_remainder(mesh), limits, profile.search, np.zeros(3, np.int32), np.array([9.0, 18.0, 24.0]), thin=True)
     assert checked.reason.tolist() == [Reason.FEASIBLE, Reason.FEASIBLE, Reason.FRAGILE]
     assert checked.thin_mm == pytest.approx([1.0, 0.0, 0.0], abs=0.11)
