@@ -163,7 +163,7 @@ def sweep(
     nearest = (found.lowest_mm, found.fragile_mm, found.thin_mm)
     out = (found.first, found.count, found.pieces, *sums, *nearest)
     _in_threads(
-        _sweep, shape[0], rows, solid, np.ascontiguousarray(directions), watched, needed, crumb_mm / step_mm, step_mm, out
+        sweep_kernel, shape[0], rows, solid, np.ascontiguousarray(directions), watched, needed, crumb_mm / step_mm, step_mm, out
     )
     return found
 
@@ -197,7 +197,7 @@ def _gains(begin_row, end_row, surface, directions, step, risky_below, out):  # 
 
 
 @njit(cache=True, nogil=True)
-def _sweep(begin_row, end_row, rows, solid, directions, watched, needed, crumb, step, out):  # type: ignore[no-untyped-def]
+def sweep_kernel(begin_row, end_row, rows, solid, directions, watched, needed, crumb, step, out):  # type: ignore[no-untyped-def]
     points, corners, normals, vectors, edges, vertex_normals, flatness = rows
     surface, standing, sharp, thin, links, tree, anchor = solid
     first, count, pieces, section, volume, footing, lowest, fragile, thinnest = out

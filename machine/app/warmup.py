@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from time import perf_counter
 
 import manifold3d as m3
@@ -17,10 +18,11 @@ from mdp.decomposition import Decomposition, Part
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
 from mdp.search import decompose
+from mdp.sweep import sweep_kernel
 from profiles.profile import Profile, load
 from slicer.slice import slice_part
 
-COMPILING_AFTER_S = 4.0  # loading kernels that are compiled takes less
+COMPILING_AFTER_S = 4.0  # loading kernels that are compiled takes less; the cache may be an older version's
 
 
 def warm(profile: Profile) -> None:
@@ -32,7 +34,7 @@ def warm(profile: Profile) -> None:
         say("compiling the kernels (only the first run does)")
         other.append(subprocess.Popen([sys.executable, "-m", "machine.app.warmup"], stderr=subprocess.DEVNULL))
 
-    timer = threading.Timer(COMPILING_AFTER_S, compiling)
+    timer = threading.Timer(COMPILING_AFTER_S if _compiled_before() else 0.0, compiling)
     timer.daemon = True
     timer.start()
     try:
@@ -49,6 +51,11 @@ def warm(profile: Profile) -> None:
             process.wait()
     if other:
         say(f"compiled in {perf_counter() - began:.0f} s")
+
+
+def _compiled_before() -> bool:
+    """Whether numba's cache holds the largest kernel, of this or an older version."""
+    return any(Path(sweep_kernel.stats.cache_path).glob("sweep.*.nbi"))
 
 
 def _tee() -> m3.Manifold:
