@@ -20,6 +20,7 @@ from mdp.features import Model
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.node import Cut, Node
 from mdp.overhang import risky_above
+from mdp.pedestal import on_pedestal
 from mdp.plane import PLATFORM, Plane
 from mdp.pool import Table, entries
 from mdp.pose import level, poses, rotation
@@ -47,6 +48,8 @@ def decompose(
 ) -> Decomposition:
     """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible."""
     began = perf_counter()
+    if profile.search.pedestal_mm > 0:
+        mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     search = _Search(mesh, profile, ranker)
     best = search.run_published(on_stage) if profile.search.method == "published" else search.run(on_stage)
     parts = _parts(best, search.machine, profile.process.self_supporting_angle_deg, profile.search.clearance)

@@ -72,6 +72,14 @@ def test_without_clearance_more_candidates_survive() -> None:
     assert len(_decomposed(low, "search.clearance=false").parts) > 1
 
 
+def test_a_pedestal_makes_low_cuts_printable() -> None:
+    low = shapes.tee(height=14.0)
+    lifted = _decomposed(low, "search.pedestal_mm=20")
+    assert len(_decomposed(low).parts) == 1
+    assert len(lifted.parts) > 1
+    assert lifted.mesh.bounds_mm[1, 2] == pytest.approx(low.bounds_mm[1, 2] + 20.0, abs=0.31)
+
+
 def test_the_same_search_twice_gives_the_same_parts() -> None:
     first, second = _decomposed(shapes.branch()), _decomposed(shapes.branch())
     for a, b in zip(first.parts, second.parts, strict=True):
