@@ -7,6 +7,7 @@ bounds all descendants), two orders of the same cuts take one place, and a wider
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from time import perf_counter
 
 import manifold3d as m3
@@ -22,15 +23,17 @@ from mdp.node import Cut, Node
 from mdp.overhang import risky_above
 from mdp.pedestal import on_pedestal
 from mdp.plane import PLATFORM, Plane
-from mdp.pool import Table, entries
+from mdp.pool import Entry, Table, entries
 from mdp.pose import level, poses, rotation
 from mdp.ranker import RANKERS
+from mdp.record import Child, Offer, Trace
 from mdp.sequence import least_rotation
 from profiles.machine import Machine
 from profiles.profile import Profile
 
 PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4}
 MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
+RECORDED = 50  # candidates of a pool that are put on record, the B of the 2020 paper
 LADDER = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
@@ -44,14 +47,26 @@ class Progress:
 
 
 def decompose(
-    mesh: Mesh, name: str, profile: Profile, ranker: str = "classic", on_stage: Callable[[Progress], None] | None = None
+    mesh: Mesh,
+    name: str,
+    profile: Profile,
+    ranker: str = "classic",
+    on_stage: Callable[[Progress], None] | None = None,
+    on_record: Callable[[bytes], None] | None = None,
 ) -> Decomposition:
-    """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible."""
+    """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible.
+
+    on_record is given what the search looked at and what became of it, as the content of an .npz file.
+    """
     began = perf_counter()
     if profile.search.pedestal_mm > 0:
         mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     search = _Search(mesh, profile, ranker)
+    if on_record is not None:
+        search.trace = Trace(name, search.model, search.root.signature)
     best = search.run_published(on_stage) if profile.search.method == "published" else search.run(on_stage)
+    if on_record is not None and search.trace is not None:
+        on_record(search.trace.to_bytes())
     parts = _parts(best, search.machine, profile.process.self_supporting_angle_deg, profile.search.clearance)
     whole, notes = counted_once(mesh, parts)
     return Decomposition(
@@ -99,6 +114,7 @@ class _Search:
         self.stages = 0
         self.began = perf_counter()
         self.best = self.root
+        self.trace: Trace | None = None
         self._children: dict[tuple[int, int], Node | None] = {}
 
     def _late(self) -> bool:
@@ -119,6 +135,8 @@ class _Search:
             self.stages += 1
             tables = {id(node): self._table(node) for node in beams[widths[-1]]}
             self._children.clear()
+            if self.trace is not None:
+                self.trace.stage([node.signature for node in beams[widths[-1]]])
             following: list[Node] = []
             for width in widths:
                 following = self._next(beams[width], tables, following, width, seen[width])
@@ -171,13 +189,21 @@ class _Search:
         seen.update(node.signature for node in kept)
         mine = [tables[id(node)] for node in beam]
         pool = entries(mine, self.model.risky_mm2, self.best.cost_mm2) if mine else iter(())
-        for entry in self.ranker.ordered(pool, lambda entry: mine[entry.table].plan(entry.row), self.model):
+        ordered = self.ranker.ordered(pool, lambda entry: mine[entry.table].plan(entry.row), self.model)
+        if self.trace is not None:
+            ordered = iter(offered := list(islice(ordered, max(RECORDED, 2 * width))))
+        made: list[Child] = []
+        for place, entry in enumerate(ordered):
             if len(following) >= width:
                 break
             child = self._child(beam[entry.table], mine[entry.table], entry.row)
-            if child is not None and child.signature not in seen:
-                seen.add(child.signature)
-                following.append(child)
+            if child is not None:
+                made.append(Child(place, child.signature, child.cost_mm2))
+                if child.signature not in seen:
+                    seen.add(child.signature)
+                    following.append(child)
+        if self.trace is not None:
+            self.trace.pool([_offer(beam, mine, entry) for entry in offered], made)
         return following
 
     def _child(self, node: Node, table: Table, row: int) -> Node | None:
@@ -207,6 +233,11 @@ class _Search:
         counts = refusals(self.root.remainder, self.limits, self.settings, self.root.angle_deg, self.least_gain_mm2)
         told = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
         return (f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(told)}",)
+
+
+def _offer(beam: Sequence[Node], tables: Sequence[Table], entry: Entry) -> Offer:
+    table = tables[entry.table]
+    return Offer(beam[entry.table].signature, table.plane(entry.row), table.plan(entry.row), entry.round)
 
 
 def _without_limits(machine: Machine) -> Machine:

@@ -48,6 +48,9 @@ def decompose(
     sheet: Annotated[
         Path | None, typer.Option("--sheet", metavar="FILE", help="picture of the print order, tilted as printed")
     ] = None,
+    record: Annotated[
+        Path | None, typer.Option("--record", metavar="FILE", help="what the search saw, as .npz for training")
+    ] = None,
     machine: MachineName = "generic_ac",
     material: MaterialName = "pla",
     process: ProcessName = "standard",
@@ -57,7 +60,7 @@ def decompose(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width)
-    return commands.decompose(model, profile, ranker, orient, out, json, png, sheet)
+    return commands.decompose(model, profile, ranker, orient, out, json, png, sheet, record)
 
 
 @app.command()

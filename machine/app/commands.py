@@ -27,13 +27,14 @@ def decompose(
     json: Path | None,
     png: Path | None,
     sheet: Path | None,
+    record: Path | None,
 ) -> int:
     """Find the parts of a model and save what is asked for."""
     if out is not None:
         check_folder(out)
-    for file in (json, png, sheet):
+    for file in (json, png, sheet, record):
         _check(file)
-    found = decompose_model(model, profile, ranker, orient)
+    found = decompose_model(model, profile, ranker, orient, record)
     told = values(found.decomposition, found.read_s, found.total_s)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)

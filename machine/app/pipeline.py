@@ -6,6 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
+from machine.app.output import write_bytes
 from machine.app.progress import Ticker, say
 from machine.app.warmup import warm
 from machine.dryrun.dryrun import DryRun, dry_run
@@ -49,7 +50,7 @@ def model_name(model: str) -> str:
     return model if model.startswith("demo:") else Path(model).name
 
 
-def decompose_model(model: str, profile: Profile, ranker: str, orient: bool = False) -> Decomposed:
+def decompose_model(model: str, profile: Profile, ranker: str, orient: bool = False, record: Path | None = None) -> Decomposed:
     """Read a model and find its parts; repairs and notes go to stderr. orient: lay the model down in the best way first."""
     if ranker not in RANKERS:
         raise ProfileError(f"--ranker {ranker}: this version knows {', '.join(RANKERS)}")
@@ -67,7 +68,10 @@ def decompose_model(model: str, profile: Profile, ranker: str, orient: bool = Fa
         left = f"{100 * progress.best_share:.1f} % of the risky area left"
         ticker.tick(f"searching parts: stage {progress.stage}, {progress.beam} in the beam, {left}")
 
-    found = search_parts(mesh, model_name(model), profile, ranker, show)
+    kept: list[bytes] = []
+    found = search_parts(mesh, model_name(model), profile, ranker, show, kept.append if record is not None else None)
+    if record is not None:
+        write_bytes(record, kept[0])
     ticker.close()
     for note in (*found.notes, *_hints(found, profile, orient)):
         say(f"{model_name(model)}: {note}")

@@ -1,3 +1,4 @@
+import io
 from itertools import pairwise, product
 
 import numpy as np
@@ -78,6 +79,18 @@ def test_a_pedestal_makes_low_cuts_printable() -> None:
     assert len(_decomposed(low).parts) == 1
     assert len(lifted.parts) > 1
     assert lifted.mesh.bounds_mm[1, 2] == pytest.approx(low.bounds_mm[1, 2] + 20.0, abs=0.31)
+
+
+def test_a_record_tells_the_search_and_changes_nothing() -> None:
+    profile = load(settings=["search.directions=200", "search.beam_width=2"])
+    kept: list[bytes] = []
+    found = decompose(shapes.tee(), "tee", profile, on_record=kept.append)
+    told = np.load(io.BytesIO(kept[0]))
+    assert found.residual_area_mm2 == decompose(shapes.tee(), "tee", profile).residual_area_mm2
+    assert told["node_outcome"][0] * found.risky_area_mm2 == pytest.approx(found.residual_area_mm2, abs=1e-6)
+    assert told["features"].shape[1] == 6
+    assert told["chosen"].sum() == len(told["node_cost"]) - 1
+    assert (told["features"][:, 1] + told["features"][:, 5] <= 1 + 1e-9).all()
 
 
 def test_the_same_search_twice_gives_the_same_parts() -> None:
