@@ -17,6 +17,8 @@ from mdp.sweep import Remainder, gains, sweep
 from profiles.machine import Machine
 from profiles.process import Search
 
+THIN_MM = 1.0  # walls and rods of two lines or less are fragile where a plane crosses them
+
 
 class Reason(IntEnum):
     """Why a candidate is out; FEASIBLE: it is not. The first reason that holds is counted."""
@@ -139,7 +141,7 @@ def check(
 ) -> Checked:
     """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut; thin: tell thin_mm too."""
     rows, inverse = np.unique(direction, return_inverse=True)
-    sizes = (sqrt(limits.least_interface_mm2), search.fragile_mm if thin else None)
+    sizes = (sqrt(limits.least_interface_mm2), THIN_MM if thin else None)
     found = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows], *sizes)
     at = (inverse, np.rint(offset_mm / search.offset_step_mm).astype(np.int64) - found.first[inverse])
     reason = np.zeros(len(direction), np.int32)

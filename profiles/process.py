@@ -88,10 +88,7 @@ class Search(Frozen):
         4.0, ge=0, le=1e6, description="least area that a part, and each of its pieces that is no crumb, stands on, mm2"
     )
     fragile_mm: float = Field(
-        1.0,
-        ge=0,
-        le=100,
-        description="thinner than this is fragile, two line widths or so; no plane leaves a thinner sliver, mm",
+        0.3, ge=0, le=100, description="no plane leaves a sliver thinner than this, a layer and a half or so, mm"
     )
     pedestal_mm: float = Field(
         0.0,

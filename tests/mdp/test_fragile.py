@@ -51,7 +51,9 @@ def test_an_acute_edge_is_no_thin_wall() -> None:
 
 
 def test_only_a_sliver_forbids_a_plane_a_cut_across_a_fin_is_told() -> None:
-    profile = load(settings=["search.clearance=false", "search.least_interface_mm2=0", "search.least_volume_share=0"])
+    profile = load(
+        settings=["search.clearance=false", "search.least_interface_mm2=0", "search.least_volume_share=0", "search.fragile_mm=1"]
+    )
     mesh = _on_block(m3.Manifold.cube((20, 0.8, 15), True).translate((0, 0, 17.4)))
     limits = bounds(mesh, profile.machine, profile.search, UP[None])
     checked = check(_remainder(mesh), limits, profile.search, np.zeros(3, np.int32), np.array([9.0, 18.0, 24.0]), thin=True)
