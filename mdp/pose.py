@@ -5,7 +5,7 @@ The table's rotation is R = R_tilt R_turn with each factor a right-handed rotati
 """
 
 from dataclasses import dataclass
-from math import acos, atan2, ceil, cos, degrees, floor, hypot, radians, sin
+from math import atan2, ceil, cos, degrees, floor, hypot, radians, sin
 
 import numpy as np
 
@@ -120,8 +120,3 @@ def _turn_between(axis: Floats, a: Floats, b: Floats) -> float:
     """Angle about `axis` that turns the part of a across it onto that of b, radians in (-pi, pi]."""
     across_a, across_b = a - axis * (axis @ a), b - axis * (axis @ b)
     return atan2(float(axis @ np.cross(across_a, across_b)), float(across_a @ across_b))
-
-
-def angle_between_deg(a: Floats, b: Floats) -> float:
-    """Angle between two unit vectors, degrees."""
-    return degrees(acos(max(-1.0, min(1.0, float(a @ b)))))

@@ -15,13 +15,15 @@ from machine.gcode import write_gcode
 from machine.plan import plan
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
+from mdp.overhang import risky_upright, threshold
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
 from mdp.search import decompose
-from mdp.sweep import sweep_kernel
+from mdp.sweep import Remainder, gains, sweep, sweep_kernel
 from profiles.profile import Profile, load
 from slicer.slice import slice_part
 
+LEANING = np.array([0.0, np.sin(0.2), np.cos(0.2)])
 COMPILING_AFTER_S = 4.0  # loading kernels that are compiled takes less; the cache may be an older version's
 
 
@@ -38,6 +40,8 @@ def warm(profile: Profile) -> None:
     timer.daemon = True
     timer.start()
     try:
+        # The largest kernel first: meanwhile the other process compiles what comes after it.
+        sweep(_remainder(), LEANING[None], 1.0)
         few = profile.search.model_copy(update={"directions": 8, "beam_width": 1, "most_parts": 2})
         decompose(mesh_of(_tee()), "warm", profile.model_copy(update={"search": few}))
         for process in other:
@@ -58,6 +62,11 @@ def _compiled_before() -> bool:
     return any(Path(sweep_kernel.stats.cache_path).glob("sweep.*.nbi"))
 
 
+def _remainder() -> Remainder:
+    mesh = mesh_of(_tee())
+    return Remainder(mesh, risky_upright(mesh, 45.0))
+
+
 def _tee() -> m3.Manifold:
     bar = m3.Manifold.cube((30.0, 4.0, 4.0), True).translate((0.0, 0.0, 28.0))
     return m3.Manifold.cube((4.0, 4.0, 30.0), True).translate((0.0, 0.0, 15.0)) + bar
@@ -67,12 +76,11 @@ def _print(profile: Profile) -> None:
     """Slice, plan, write and dry-run a tee in two parts."""
     coarse = {"layer_height_mm": 0.3, "line_width_mm": 0.6, "first_layer_height_mm": 0.3, "support": "auto", "walls": 2}
     profile = profile.model_copy(update={"process": profile.process.model_copy(update=coarse)})
-    direction = np.array([0.0, np.sin(0.2), np.cos(0.2)])
-    plane = Plane(direction, 20.0)
+    plane = Plane(LEANING, 20.0)
     above, below = cut(_tee(), plane)
     parts = []
     for index, (base, solid) in enumerate(((PLATFORM, below), (plane, above)), start=1):
-        pose = level(profile.machine) if index == 1 else poses(profile.machine, direction)[0]
+        pose = level(profile.machine) if index == 1 else poses(profile.machine, LEANING)[0]
         mesh = mesh_of(solid)
         parts.append(Part(index, mesh, base, pose, rotation(profile.machine, pose), mesh.volume_mm3, 0.0))
     found = Decomposition("warm", mesh_of(_tee()), tuple(parts), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
@@ -81,4 +89,5 @@ def _print(profile: Profile) -> None:
 
 
 if __name__ == "__main__":
+    gains(_remainder(), LEANING[None], 1.0, threshold(45.0))
     _print(load())
