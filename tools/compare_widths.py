@@ -8,15 +8,17 @@ FOLDER holds models as npz (vertices in mm and faces). One line of FILE.csv is o
 that are there already are not searched again, so an interrupted run goes on where it stopped, and runs with other settings
 (told apart by the column `settings`) may share the file. --summary prints the tables and searches nothing. --paper-terms:
 faces on the platform count as risky, head and axes do not limit (`search.count_platform_faces=true`, `search.clearance=false`).
+J(1) in the tables is J at the least width there is.
 """
 
 import argparse
 import csv
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any, get_type_hints
 from zipfile import BadZipFile
 
 import numpy as np
@@ -132,7 +134,7 @@ def model(path: Path) -> Mesh:
     except (KeyError, ValueError, BadZipFile) as error:
         raise MeshError(f"{path}: holds no vertices and faces ({error})") from None
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    return Mesh(solid.vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]), solid.faces)
+    return Mesh(solid.vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]), solid.faces.astype(np.int32))
 
 
 def searched(name: str, settings: str, mesh: Mesh, profile: Profile) -> Row:
@@ -153,7 +155,7 @@ def read(path: Path) -> list[Row]:
     """The lines of a file; none when there is no such file."""
     if not path.exists():
         return []
-    kinds = {field.name: field.type for field in fields(Row)}
+    kinds: dict[str, Callable[[str], Any]] = get_type_hints(Row)
     with path.open(newline="", encoding="utf-8") as file:
         return [Row(**{key: kinds[key](value) for key, value in line.items()}) for line in csv.DictReader(file)]
 
