@@ -31,6 +31,10 @@ ProcessName = Annotated[str, typer.Option("--process", metavar="NAME|FILE", help
 Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
 BeamWidth = Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")]
+SearchName = Annotated[
+    str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
+]
+TimeLimit = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")]
 RankerName = Annotated[str, typer.Option("--ranker", metavar="classic", help="which candidates the beam follows")]
 Orient = Annotated[bool, typer.Option("--orient", help="first lay the model down the way that needs least support")]
 Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
@@ -41,6 +45,8 @@ def decompose(
     model: Model,
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="folder for part-NN.stl, 3MF, JSON")] = None,
     beam_width: BeamWidth = None,
+    search: SearchName = None,
+    time_limit: TimeLimit = None,
     ranker: RankerName = "classic",
     orient: Orient = False,
     json: JsonFile = None,
@@ -59,7 +65,7 @@ def decompose(
     """Cut a model into parts, each with its own printing direction."""
     from machine.app import commands
 
-    profile = _profile(machine, material, process, settings, beam_width)
+    profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
     return commands.decompose(model, profile, ranker, orient, out, json, png, sheet, record)
 
 
@@ -68,6 +74,8 @@ def export(
     model: Model,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write")],
     beam_width: BeamWidth = None,
+    search: SearchName = None,
+    time_limit: TimeLimit = None,
     ranker: RankerName = "classic",
     orient: Orient = False,
     json: JsonFile = None,
@@ -80,7 +88,7 @@ def export(
     """Write the G-code of a model, dry-run first."""
     from machine.app import commands
 
-    profile = _profile(machine, material, process, settings, beam_width)
+    profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
     return commands.export(model, profile, ranker, orient, out, json, force)
 
 
@@ -88,6 +96,8 @@ def export(
 def simulate(
     model: ModelOrGcode,
     beam_width: BeamWidth = None,
+    search: SearchName = None,
+    time_limit: TimeLimit = None,
     ranker: RankerName = "classic",
     orient: Orient = False,
     json: JsonFile = None,
@@ -99,7 +109,7 @@ def simulate(
     """Dry-run a model or a G-code file; exit 1 when a finding is an error."""
     from machine.app import commands
 
-    profile = _profile(machine, material, process, settings, beam_width)
+    profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
     return commands.simulate(model, profile, ranker, orient, json)
 
 
@@ -109,6 +119,8 @@ def print_(
     port: Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")],
     baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
     beam_width: BeamWidth = None,
+    search: SearchName = None,
+    time_limit: TimeLimit = None,
     ranker: RankerName = "classic",
     orient: Orient = False,
     speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
@@ -121,7 +133,7 @@ def print_(
     """Print a model or a G-code file over a serial port, or on the simulated printer."""
     from machine.app import commands
 
-    profile = _profile(machine, material, process, settings, beam_width)
+    profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
     return commands.print_model(model, profile, ranker, orient, port, baud, speed, force)
 
 
@@ -168,11 +180,20 @@ def _options(
     del version
 
 
-def _profile(machine: str, material: str, process: str, settings: list[str] | None, beam_width: int | None):  # type: ignore[no-untyped-def]
+def _profile(  # type: ignore[no-untyped-def]
+    machine: str,
+    material: str,
+    process: str,
+    settings: list[str] | None,
+    beam_width: int | None,
+    search: str | None,
+    time_limit_s: float | None,
+):
     from profiles.profile import load
 
-    beam = [] if beam_width is None else [f"search.beam_width={beam_width}"]
-    return load(machine, material, process, [*(settings or []), *beam])
+    options = {"search.beam_width": beam_width, "search.method": search, "search.time_limit_s": time_limit_s}
+    given = [f"{key}={value}" for key, value in options.items() if value is not None]
+    return load(machine, material, process, [*(settings or []), *given])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -26,6 +26,9 @@ WRONG = [
     (["decompose", "demo:tree", "--set", "walls"], "KEY=VALUE"),
     (["decompose", "demo:tree", "--beam-width", "0"], "beam_width"),
     (["decompose", "demo:tree", "--beam-width", "many"], "many"),
+    (["decompose", "demo:tree", "--search", "luck"], 'search.method is "luck": it must be one of "best", "published"'),
+    (["decompose", "demo:tree", "--time-limit", "-1"], "search.time_limit_s is -1"),
+    (["decompose", "demo:tree", "--time-limit", "soon"], "--time-limit is 'soon'"),
     (["decompose", "demo:tree", "--ranker", "oracle"], "classic"),
     (["export", "demo:tree"], "--out"),
     (["export", "demo:tree", "-o", "/nowhere/x.gcode"], "/nowhere"),
@@ -104,6 +107,22 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     files = {part["file"] for part in told["parts"]} | {"decomposition.3mf", "decomposition.json"}
     assert {file.name for file in Path("parts").iterdir()} == files
     assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png"))
+
+
+def test_options_of_the_search_are_its_profile_keys(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["decompose", "demo:bracket", *FAST, "--search", "published", "--beam-width", "3", "--json", "a.json"]) == 0
+    words = ["--set", "search.method=published", "--set", "search.beam_width=3"]
+    assert main(["decompose", "demo:bracket", *FAST, *words, "--json", "b.json"]) == 0
+    first, again = (json.loads(Path(name).read_text()) for name in ("a.json", "b.json"))
+    assert {**first, "seconds": None} == {**again, "seconds": None}
+
+
+@pytest.mark.parametrize("command", [["decompose"], ["export", "-o", "a.gcode"], ["simulate"], ["print", "--port", "sim"]])
+def test_a_time_limit_of_nothing_prints_one_part_and_says_so(
+    folder: Path, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    assert main([*command, "demo:bracket", *FAST, "--set", "process.support=none", "--time-limit", "0"]) == 0
+    assert "search.time_limit_s = 0 ended the search" in capsys.readouterr().err
 
 
 def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Path) -> None:
