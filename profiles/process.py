@@ -20,6 +20,18 @@ class Process(Frozen):
     )
     layer_height_mm: float = Field(0.2, ge=0.02, le=2, description="height of a layer, mm")
     first_layer_height_mm: float = Field(0.2, ge=0.02, le=2, description="height of part 1's first layer, mm")
+    adaptive_cusp_mm: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="layers are made as thick as steps of the surface no deeper than this allow, mm; 0: all layers alike",
+    )
+    least_layer_height_mm: float = Field(
+        0.08, ge=0.02, le=2, description="adaptive layers are not thinner: below a fifth of the nozzle a bead flows unevenly, mm"
+    )
+    most_layer_height_mm: float = Field(
+        0.28, ge=0.02, le=2, description="adaptive layers are not thicker: seven tenths of the nozzle still bond well, mm"
+    )
     line_width_mm: float = Field(0.45, ge=0.1, le=4, description="width of a bead, mm")
     walls: int = Field(3, ge=0, le=50, description="number of walls")
     top_layers: int = Field(4, ge=0, le=1000, description="solid layers under a surface that faces the printing direction")
@@ -31,6 +43,26 @@ class Process(Frozen):
     infill_angle_deg: float = Field(45.0, ge=0, le=360, description="direction of the infill lines in the part's frame, deg")
     infill_overlap: float = Field(
         0.15, ge=0, le=0.5, description="reach of infill into the innermost wall, share of a line width"
+    )
+    seam: Literal["aligned", "corner", "rear", "nearest", "random"] = Field(
+        "aligned",
+        description="where walls begin: in one line over the layers, in inner then outer corners, at the rear, nearest to the "
+        "tip, or scattered; never on the edge of an interface",
+    )
+    seam_gap: float = Field(
+        0.1,
+        ge=0,
+        le=1,
+        description="walls stop this short of their beginning, so that the ends do not bulge, share of a line width",
+    )
+    overhang_share: float = Field(
+        0.5, ge=0, le=1, description="walls with less than this share of their width on plastic below count as overhanging"
+    )
+    bridge_longest_mm: float = Field(
+        6.0, ge=0, le=100, description="spans up to this print without support; PLA with a fan manages more, PETG hardly, mm"
+    )
+    bridge_flow: float = Field(
+        1.0, ge=0.3, le=2, description="factor on extruded volume of bridges; 1: as much plastic as the layer has room for"
     )
     support: Literal["none", "auto"] = Field("auto", description="auto: support what the decomposition left risky")
     support_density: float = Field(0.15, gt=0, le=1, description="share of the support's inside that is filled")
@@ -48,9 +80,39 @@ class Process(Frozen):
         1.05, ge=0.5, le=1.5, description="factor on extruded volume of a part's first layer on plastic"
     )
     interface_speed_mm_s: float = Field(25.0, gt=0, le=1000, description="speed of a part's first layer on plastic, mm/s")
+    interface_layers: int = Field(
+        3, ge=1, le=100, description="layers of a part on plastic that get the interface's temperature, fan and extra walls"
+    )
+    interface_temperature_add_c: float = Field(
+        5.0,
+        ge=0,
+        le=50,
+        description="how much hotter a part's layers on plastic are printed, so that they weld to what has cooled, deg C",
+    )
+    interface_fan: float = Field(
+        0.3, ge=0, le=1, description="factor on the part fan in a part's layers on plastic: air chills the bond"
+    )
+    interface_extra_walls: int = Field(
+        1, ge=0, le=20, description="more walls in a part's layers on plastic, where bending stresses it most"
+    )
+    interface_seam_mm: float = Field(
+        1.0, ge=0, le=20, description="walls begin no nearer than this to the edge of an interface, mm"
+    )
+    interlock_mm: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="depth of grooves that a part leaves for the next to flow into, mm; 0: none, their worth is not measured",
+    )
     outer_wall_speed_mm_s: float = Field(40.0, gt=0, le=1000, description="speed of outer walls, mm/s")
     inner_wall_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of inner walls, mm/s")
     skin_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of solid skins, mm/s")
+    overhang_speed_mm_s: float = Field(
+        20.0, gt=0, le=1000, description="speed of overhanging walls, mm/s: slow, so that they set before they sag"
+    )
+    bridge_speed_mm_s: float = Field(
+        30.0, gt=0, le=1000, description="speed of bridges, mm/s: faster strands tear, slower ones sag"
+    )
     infill_speed_mm_s: float = Field(80.0, gt=0, le=1000, description="speed of sparse infill, mm/s")
     support_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of support, mm/s")
     first_layer_speed_mm_s: float = Field(20.0, gt=0, le=1000, description="speed of part 1's first layer, mm/s")
@@ -62,12 +124,18 @@ class Process(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for key in ("layer_height_mm", "first_layer_height_mm"):
+        adaptive = ("least_layer_height_mm", "most_layer_height_mm") if self.adaptive_cusp_mm > 0 else ()
+        for key in ("layer_height_mm", "first_layer_height_mm", *adaptive):
             if getattr(self, key) > 0.9 * self.line_width_mm:
                 raise ValueError(
                     f"{key} is {getattr(self, key):g} mm: at most 0.9 of line_width_mm "
                     f"({0.9 * self.line_width_mm:g} mm) is allowed"
                 )
+        if adaptive and self.least_layer_height_mm > self.most_layer_height_mm:
+            raise ValueError(
+                f"least_layer_height_mm is {self.least_layer_height_mm:g} mm: at most most_layer_height_mm "
+                f"({self.most_layer_height_mm:g} mm) is allowed"
+            )
         return self
 
 

@@ -14,10 +14,12 @@ class Kind(StrEnum):
 
     OUTER_WALL = "External perimeter"
     INNER_WALL = "Perimeter"
+    OVERHANG = "Overhang perimeter"
     GAP = "Gap fill"
     INFILL = "Internal infill"
     SKIN = "Solid infill"
     TOP_SKIN = "Top solid infill"
+    BRIDGE = "Bridge infill"
     SKIRT = "Skirt/Brim"
     SUPPORT = "Support material"
 
@@ -52,12 +54,16 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """Paths printed with the tip at z_mm above the base plane, in order; every bead is height_mm high."""
+    """Paths printed with the tip at z_mm above the base plane, in order; every bead is height_mm high.
+
+    nozzle_add_c: how much hotter than the material asks this layer is printed, deg C.
+    """
 
     z_mm: float
     height_mm: float
     paths: tuple[Path, ...]
     fan: float
+    nozzle_add_c: float = 0.0
 
     def volume_mm3(self, path: Path) -> float:
         """Plastic that a path of this layer extrudes."""

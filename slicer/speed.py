@@ -17,10 +17,12 @@ def of_kind_mm_s(process: Process) -> dict[Kind, float]:
     return {
         Kind.OUTER_WALL: process.outer_wall_speed_mm_s,
         Kind.INNER_WALL: process.inner_wall_speed_mm_s,
+        Kind.OVERHANG: process.overhang_speed_mm_s,
         Kind.GAP: process.outer_wall_speed_mm_s,
         Kind.INFILL: process.infill_speed_mm_s,
         Kind.SKIN: process.skin_speed_mm_s,
         Kind.TOP_SKIN: process.skin_speed_mm_s,
+        Kind.BRIDGE: process.bridge_speed_mm_s,
         Kind.SKIRT: process.first_layer_speed_mm_s,
         Kind.SUPPORT: process.support_speed_mm_s,
     }
