@@ -17,8 +17,6 @@ from mdp.sweep import Remainder, gains, sweep
 from profiles.machine import Machine
 from profiles.process import Search
 
-THIN_MM = 1.0  # walls and rods of two lines or less are fragile where a plane crosses them
-
 
 class Reason(IntEnum):
     """Why a candidate is out; FEASIBLE: it is not. The first reason that holds is counted."""
@@ -100,6 +98,7 @@ class Worth:
     """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be
     cut is not known yet. direction is a row of Bounds.directions; evaluated counts all planes looked at."""
 
+    remainder: Remainder
     direction: Ints
     offset_mm: Floats
     gain_mm2: Floats
@@ -111,16 +110,15 @@ class Worth:
 class Checked:
     """What the sweep says of some candidates, one array row each; reason is FEASIBLE or why not.
 
-    fragile_mm is the distance to the nearest surface that the plane would cut into a sliver, thin_mm that to the nearest thin
-    wall or rod, 0 where the plane goes through one; only the first one forbids a plane. footing_mm2 is the least area that a
-    piece of the part stands on. A piece lower than the side of a square of least_interface_mm2 is a crumb and may stand on less.
+    fragile_mm is the distance to the nearest surface that the plane would cut into a sliver. footing_mm2 is the least area
+    that a piece of the part stands on. A piece lower than the side of a square of least_interface_mm2 is a crumb and may stand
+    on less.
     """
 
     reason: Ints
     volume_mm3: Floats
     section_mm2: Floats
     fragile_mm: Floats
-    thin_mm: Floats
     footing_mm2: Floats
 
 
@@ -133,16 +131,14 @@ def worth(remainder: Remainder, limits: Bounds, search: Search, angle_deg: float
     above = (offset >= limits.least_offset_mm[:, None]) & np.isfinite(limits.least_height_mm)[:, None]
     kept = used & above & (gain >= least_gain_mm2)
     direction = np.nonzero(kept)[0].astype(np.int32)
-    return Worth(direction, offset[kept], gain[kept], found.residual_mm2[kept], int(found.count.sum()))
+    return Worth(remainder, direction, offset[kept], gain[kept], found.residual_mm2[kept], int(found.count.sum()))
 
 
-def check(
-    remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats, thin: bool = False
-) -> Checked:
-    """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut; thin: tell thin_mm too."""
+def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Checked:
+    """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut."""
     rows, inverse = np.unique(direction, return_inverse=True)
-    sizes = (sqrt(limits.least_interface_mm2), THIN_MM if thin else None)
-    found = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows], *sizes)
+    crumb_mm = sqrt(limits.least_interface_mm2)
+    found = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows], crumb_mm)
     at = (inverse, np.rint(offset_mm / search.offset_step_mm).astype(np.int64) - found.first[inverse])
     reason = np.zeros(len(direction), np.int32)
     checks = {
@@ -156,7 +152,7 @@ def check(
     }
     for why, out in checks.items():
         reason[out & (reason == 0)] = why
-    columns = (found.volume_mm3, found.section_mm2, found.fragile_mm, found.thin_mm, found.footing_mm2)
+    columns = (found.volume_mm3, found.section_mm2, found.fragile_mm, found.footing_mm2)
     return Checked(reason, *(column[at] for column in columns))
 
 

@@ -1,8 +1,9 @@
 """Features: the six metrics M1..M6 of a candidate as the 2020 paper defines them, one definition for search and training.
 
 M1 reduced risky area, M2 the same accumulated over the cuts so far, M3 volume of the part, M4 distance of the plane from the
-platform, M5 distance to fragile regions, M6 accumulated residual risky area. Areas are shares of the model's risky area, the
-volume a share of the model's, distances shares of the radius of its bounding sphere, cut to 0..1.
+platform, M5 distance to fragile regions (what the plane would cut into slivers, thin walls and rods, on either side of it), M6
+accumulated residual risky area. Areas are shares of the model's risky area, the volume a share of the model's, distances shares
+of the radius of its bounding sphere, cut to 0..1.
 """
 
 from dataclasses import dataclass

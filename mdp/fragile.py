@@ -1,4 +1,4 @@
-"""Fragile: how near a plane comes to what it would leave too thin to print, or to what is thin already (kernels of the sweep).
+"""Fragile: how near a plane comes to what it would leave too thin to print, or to what is thin already.
 
 A surface nearly level with the plane and close to it becomes a sliver. A fin, a bridge or a plate is thin by itself: a plane
 through it leaves an interface no wider than it is thick. A face is thin when a ray from its middle into the solid soon meets one
@@ -8,9 +8,12 @@ that looks the other way; near an acute edge the other face looks aside, that is
 import numpy as np
 from numba import njit
 
+from mdp.mesh import Floats
+from mdp.plane import Plane
 from mdp.rays import first_hit
 from mdp.sums import column_over
 
+THIN_MM = 1.0  # walls and rods of two lines or less are fragile where a plane crosses them
 SLIVER_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a sliver when the plane comes too near
 OPPOSITE_COSINE = 0.8  # two faces of one wall or rod look opposite ways, within 37 degrees
 
@@ -60,25 +63,8 @@ def thin_faces(vertices, faces, normals, low, high, thickness):  # type: ignore[
     return thin
 
 
-@njit(cache=True)
-def find_thin(corners, thin, heights, n, step, distance):  # type: ignore[no-untyped-def]
-    """Distance from each offset to the nearest thin face, 0 where the plane goes through one; thin: numbers of the faces."""
-    above, below, through = np.full(n + 1, np.inf), np.full(n + 1, -np.inf), np.zeros(n + 1, np.int32)
-    for f in thin:
-        a, b, c = heights[corners[0, f]], heights[corners[1, f]], heights[corners[2, f]]
-        low, high = min(a, b, c), max(a, b, c)
-        first, last = min(column_over(low), n), min(column_over(high), n)
-        through[first] += 1
-        through[last] -= 1
-        below[last] = max(below[last], high)
-        if first > 0:
-            above[first - 1] = min(above[first - 1], low)
-    nearest = np.inf
-    for column in range(n - 1, -1, -1):
-        nearest = min(nearest, above[column])
-        distance[column] = (nearest - column) * step
-    nearest, open_faces = -np.inf, 0
-    for column in range(n):
-        nearest = max(nearest, below[column])
-        open_faces += through[column]
-        distance[column] = 0.0 if open_faces > 0 else min(distance[column], (column - nearest) * step)
+def least_distance_mm(corners: Floats, plane: Plane) -> float:
+    """Distance from a plane to the nearest of some triangles, (k, 3, 3) corners, 0 where it meets one, infinite for none."""
+    heights = corners @ plane.normal - plane.offset_mm
+    low, high = heights.min(axis=1, initial=np.inf), heights.max(axis=1, initial=-np.inf)
+    return float(np.maximum(np.maximum(low, -high), 0.0).min(initial=np.inf))

@@ -55,7 +55,7 @@ class Table:
             residual_mm2=float(worth.residual_mm2[row]),
             volume_mm3=float(self._volume_mm3[row]),
             above_platform_mm=float(worth.offset_mm[row] - self.limits.least_offset_mm[worth.direction[row]]),
-            fragile_mm=float(self._fragile_mm[row]),
+            fragile_mm=min(float(self._fragile_mm[row]), worth.remainder.thin_mm(self.plane(row))),
             saved_before_mm2=self.saved_mm2,
             residual_before_mm2=self.residual_mm2,
         )

@@ -21,10 +21,11 @@ from numba import njit
 
 from mdp.facets import Facets, facets
 from mdp.footing import find_footing
-from mdp.fragile import SLIVER_COSINE, find_slivers, find_thin, thin_faces
+from mdp.fragile import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.pieces import UNKNOWN, count_pieces, find_critical
+from mdp.plane import Plane
 from mdp.rays import Tree
 from mdp.sums import dot, find_heights, find_lowest, sum_risks, sum_volumes
 
@@ -54,9 +55,9 @@ class Sweep:
 
     section_mm2: cross-section; volume_mm3: volume above; lowest_mm: least z of what lies above, exact where it is below the
     direction's watched height, some greater number elsewhere; fragile_mm: distance to the nearest surface that the plane
-    would cut into a sliver; thin_mm: distance to the nearest thin wall or rod, 0 where the plane goes through one; pieces:
-    components of the solid below that do not reach the platform; footing_mm2: least cross-section of a component of the solid
-    above, crumbs left out, where there are no such pieces and what lies above is nowhere below the watched height.
+    would cut into a sliver; pieces: components of the solid below that do not reach the platform; footing_mm2: least
+    cross-section of a component of the solid above, crumbs left out, where there are no such pieces and what lies above is
+    nowhere below the watched height.
     """
 
     first: Ints
@@ -65,7 +66,6 @@ class Sweep:
     volume_mm3: Floats
     lowest_mm: Floats
     fragile_mm: Floats
-    thin_mm: Floats
     pieces: Ints
     footing_mm2: Floats
 
@@ -97,17 +97,17 @@ class Remainder:
         """Face corners at edges, where the normal of a vertex does not tell where the surface looks."""
         return self.facets.sharp_corners(SLIVER_COSINE)
 
-    def thin(self, thickness_mm: float) -> Ints:
-        """The faces under whose middle the solid is thinner than this, looked up once a thickness."""
-        if thickness_mm not in self._thin:
-            mesh, tree = self.facets.mesh, self.tree
-            thin = thin_faces(mesh.vertices, mesh.faces, mesh.normals, tree.low, tree.high, thickness_mm)
-            self._thin[thickness_mm] = np.flatnonzero(thin).astype(np.int32)
-        return self._thin[thickness_mm]
-
     @cached_property
-    def _thin(self) -> dict[float, Ints]:
-        return {}
+    def thin(self) -> Floats:
+        """(k, 3, 3) corners of the faces under whose middle the solid is a thin wall or rod: a ray for every face."""
+        mesh, tree = self.facets.mesh, self.tree
+        thin = thin_faces(mesh.vertices, mesh.faces, mesh.normals, tree.low, tree.high, THIN_MM)
+        corners: Floats = mesh.vertices[mesh.faces[thin]]
+        return corners
+
+    def thin_mm(self, plane: Plane) -> float:
+        """Distance of a plane to the nearest thin wall or rod on either side, 0 where it goes through one; infinite: no such."""
+        return least_distance_mm(self.thin, plane)
 
     def columns(self, step_mm: float) -> int:
         """Room for the offsets of any direction."""
@@ -131,20 +131,17 @@ def sweep(
     step_mm: float,
     watched_mm: Floats | None = None,
     crumb_mm: float = 2.0,
-    thin_mm: float | None = None,
 ) -> Sweep:
     """Whether a cut can be made at all offsets of (k, 3) unit directions.
 
     watched_mm (k,): the height below which the least z of a part matters; absent: all heights. crumb_mm: a
-    piece above the plane that is lower than this may stand on any area. thin_mm: walls and rods below this thickness are
-    thin; absent: nothing is, which saves a ray for every face.
+    piece above the plane that is lower than this may stand on any area.
     """
     laid = remainder.facets
     rows = (laid.points, laid.corners, laid.normals, laid.vectors_mm2, laid.rising_edges, laid.vertex_normal_rows, laid.flatness)
     surface = (laid.mesh.vertices, laid.mesh.faces, laid.mesh.normals, laid.vertex_normals)
     tree = (remainder.tree.low, remainder.tree.high)
-    regions = (laid.standing, remainder.sharp, np.zeros(0, np.int32) if thin_mm is None else remainder.thin(thin_mm))
-    solid = (surface, *regions, laid.links, tree, remainder.anchors)
+    solid = (surface, laid.standing, remainder.sharp, laid.links, tree, remainder.anchors)
     watched = np.full(len(directions), np.inf) if watched_mm is None else np.ascontiguousarray(watched_mm)
     needed = np.full(len(directions), -np.inf) if watched_mm is None else watched
     shape = (len(directions), remainder.columns(step_mm))
@@ -155,13 +152,11 @@ def sweep(
         volume_mm3=np.zeros(shape),
         lowest_mm=np.full(shape, np.inf),
         fragile_mm=np.full(shape, np.inf),
-        thin_mm=np.full(shape, np.inf),
         pieces=np.zeros(shape, np.int32),
         footing_mm2=np.zeros(shape),
     )
     sums = (found.section_mm2, found.volume_mm3, found.footing_mm2)
-    nearest = (found.lowest_mm, found.fragile_mm, found.thin_mm)
-    out = (found.first, found.count, found.pieces, *sums, *nearest)
+    out = (found.first, found.count, found.pieces, *sums, found.lowest_mm, found.fragile_mm)
     _in_threads(
         sweep_kernel, shape[0], rows, solid, np.ascontiguousarray(directions), watched, needed, crumb_mm / step_mm, step_mm, out
     )
@@ -199,8 +194,8 @@ def _gains(begin_row, end_row, surface, directions, step, risky_below, out):  # 
 @njit(cache=True, nogil=True)
 def sweep_kernel(begin_row, end_row, rows, solid, directions, watched, needed, crumb, step, out):  # type: ignore[no-untyped-def]
     points, corners, normals, vectors, edges, vertex_normals, flatness = rows
-    surface, standing, sharp, thin, links, tree, anchor = solid
-    first, count, pieces, section, volume, footing, lowest, fragile, thinnest = out
+    surface, standing, sharp, links, tree, anchor = solid
+    first, count, pieces, section, volume, footing, lowest, fragile = out
     for row in range(begin_row, end_row):
         d, heights = directions[row], np.empty(points.shape[1])
         cosines, room = np.empty(points.shape[1]), np.empty(points.shape[1], np.int32)
@@ -211,7 +206,6 @@ def sweep_kernel(begin_row, end_row, rows, solid, directions, watched, needed, c
             find_lowest(points[2], edges, heights, n, watched[row], lowest[row])
             dot(vertex_normals[0], vertex_normals[1], vertex_normals[2], d[0], d[1], d[2], cosines)
             find_slivers(cosines, flatness, sharp, corners, normals, d, heights, n, step, fragile[row])
-            find_thin(corners, thin, heights, n, step, thinnest[row])
             found = room[: find_critical(cosines, flatness, heights, links, room)]
             count_pieces(surface, standing, links, found, tree, anchor, cosines, heights, n, pieces[row])
             wanted = (pieces[row, :n] == 0) & (lowest[row, :n] >= needed[row])

@@ -16,7 +16,7 @@ import numpy as np
 from mdp.candidates import bounds
 from mdp.cut import mesh_of, solid_of
 from mdp.footing import find_footing
-from mdp.fragile import SLIVER_COSINE, find_slivers, find_thin
+from mdp.fragile import SLIVER_COSINE, find_slivers
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
 from mdp.pieces import count_pieces, find_critical
@@ -62,7 +62,7 @@ def pieces_of_work(
     x, y, z = laid.points
     heights, counts = _all_heights(x, y, z, directions, step)
     looks = np.ascontiguousarray(directions @ laid.vertex_normal_rows)
-    thin, tree = remainder.thin(1.0), (remainder.tree.low, remainder.tree.high)
+    tree = (remainder.tree.low, remainder.tree.high)
     surface = (laid.mesh.vertices, laid.mesh.faces, laid.mesh.normals, laid.vertex_normals)
     sharp = laid.sharp_corners(SLIVER_COSINE)
     solid_rows = (laid.points, laid.corners, laid.flatness, surface, laid.standing, laid.links, tree, remainder.anchors)
@@ -74,7 +74,6 @@ def pieces_of_work(
         "section and volume": lambda: _volumes(laid.corners, laid.vectors_mm2, directions, heights, counts, step, columns),
         "lowest point": lambda: _lowest(z, laid.rising_edges, heights, counts, watched, columns),
         "slivers": lambda: _slivers(slivers, looks, laid.vertex_normal_rows, directions, heights, counts, step, columns),
-        "thin walls": lambda: _thin(laid.corners, thin, heights, counts, step, columns),
         "pieces below": lambda: _pieces(solid_rows, looks, directions, heights, counts, columns, False),
         "pieces below and footing above": lambda: _pieces(solid_rows, looks, directions, heights, counts, columns, True),
         "gains, whole": lambda: gains(remainder, directions, step, angle),
@@ -204,13 +203,6 @@ def _slivers(faces, looks, vertex_normals, directions, heights, counts, step, co
         d = directions[k]
         dot(vertex_normals[0], vertex_normals[1], vertex_normals[2], d[0], d[1], d[2], looks[k])
         find_slivers(looks[k], flatness, sharp, corners, normals, d, heights[k], counts[k], step, fragile)
-
-
-@numba.njit
-def _thin(corners, thin, heights, counts, step, columns):  # type: ignore[no-untyped-def]
-    distance = np.zeros(columns)
-    for k in range(len(heights)):
-        find_thin(corners, thin, heights[k], counts[k], step, distance)
 
 
 @numba.njit
