@@ -17,6 +17,9 @@ from mdp.sweep import Remainder, gains, sweep
 from profiles.machine import Machine
 from profiles.process import Search
 
+# A plane is never laid into a face that overhangs along its direction: that would look like resting on the cut, over air.
+COPLANAR_MM = 1e-4
+
 
 class Reason(IntEnum):
     """Why a candidate is out; FEASIBLE: it is not. The first reason that holds is counted."""
@@ -148,7 +151,7 @@ def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints,
         Reason.CLEARANCE: found.lowest_mm[at] < limits.least_height_mm[direction],
         Reason.VOLUME: found.volume_mm3[at] < limits.least_volume_mm3,
         Reason.INTERFACE: found.footing_mm2[at] < limits.least_interface_mm2,
-        Reason.FRAGILE: found.fragile_mm[at] < search.fragile_mm,
+        Reason.FRAGILE: found.fragile_mm[at] < max(search.fragile_mm, COPLANAR_MM),
     }
     for why, out in checks.items():
         reason[out & (reason == 0)] = why

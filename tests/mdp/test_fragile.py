@@ -58,9 +58,16 @@ def test_only_a_sliver_forbids_a_plane_and_m5_is_less_near_a_fin_than_far_from_i
     assert [table.plan(row).fragile_mm for row in rows] == pytest.approx([5.0, 1.0, 0.0, 0.0], abs=0.11)
 
 
-def _table(mesh: Mesh) -> Table:
+def test_no_plane_lies_in_an_overhanging_face_even_where_slivers_are_allowed() -> None:
+    table = _table(shapes.tee(stem=10, height=40), fragile_mm=0.0)
+    rows = [int(np.flatnonzero(table.worth.offset_mm == offset_mm)[0]) for offset_mm in (29.0, 30.0, 31.0)]
+    table.look(np.array(rows))
+    assert table.reason[rows].tolist() == [Reason.FEASIBLE, Reason.FRAGILE, Reason.FEASIBLE]
+
+
+def _table(mesh: Mesh, fragile_mm: float = 1.0) -> Table:
     """All candidates of a solid along the upright direction."""
-    words = ("clearance=false", "least_interface_mm2=0", "least_volume_share=0", "fragile_mm=1")
+    words = ("clearance=false", "least_interface_mm2=0", "least_volume_share=0", f"fragile_mm={fragile_mm}")
     profile = load(settings=[f"search.{word}" for word in words])
     limits = bounds(mesh, profile.machine, profile.search, UP[None])
     found = worth(_remainder(mesh), limits, profile.search, 45.0, -np.inf)

@@ -10,13 +10,16 @@ from mdp.candidates import directions
 from mdp.clearance import least_tip_height_mm
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
+from mdp.overhang import facing_down
+from mdp.plane import Plane
 from mdp.pose import Pose, rotation
-from mdp.search import counted_once, decompose
+from mdp.search import decompose, folded_mm3
 from mdp.sequence import least_rotation
 from profiles.errors import DecompositionError
 from profiles.profile import load
 from tests import shapes
 from tests.checks import assert_closed
+from tests.mdp.solids import random_solid
 
 
 def _decomposed(mesh: Mesh, *settings_: str, machine: str = "generic_ac") -> Decomposition:
@@ -47,6 +50,23 @@ def test_the_residual_that_the_sweep_promised_is_the_area_left_on_the_parts() ->
     by_parts = sum(part.risky_area_mm2 for part in found.parts)
     assert found.residual_area_mm2 == pytest.approx(by_parts)
     assert found.residual_area_mm2 < found.risky_area_mm2
+
+
+@pytest.mark.parametrize("seed", [3, 5, 11])
+def test_no_face_of_a_part_rests_on_air(seed: int) -> None:
+    found = _decomposed(random_solid(seed), "search.fragile_mm=0", "search.least_gain=0", "search.clearance=false")
+    assert len(found.parts) > 1
+    for position, part in enumerate(found.parts[1:], start=1):
+        beneath = sum(_area_in_plane(earlier.mesh, part.base, 1.0) for earlier in found.parts[:position])
+        down = part.mesh.areas_mm2[facing_down(part.mesh, part.direction, 45.0)].sum()
+        assert _area_in_plane(part.mesh, part.base, -1.0) == pytest.approx(beneath, abs=1e-5)
+        assert part.risky_area_mm2 == pytest.approx(down - beneath, abs=1e-5)
+
+
+def _area_in_plane(mesh: Mesh, plane: Plane, looking: float) -> float:
+    """Area of the faces in a plane that look along its normal (1) or against it (-1)."""
+    inside = np.abs(plane.heights_mm(mesh.vertices)[mesh.faces]).max(axis=1) < 1e-6
+    return float(mesh.areas_mm2[inside & (mesh.normals @ plane.normal * looking > 0.5)].sum())
 
 
 def test_a_box_is_one_part_and_says_why() -> None:
@@ -125,12 +145,14 @@ def test_a_time_limit_of_nothing_leaves_one_part_and_says_so() -> None:
     assert found.notes == ("search.time_limit_s = 0 ended the search; the best so far is used",)
 
 
-def test_space_that_a_fold_winds_around_twice_is_counted_once() -> None:
-    parts = _decomposed(shapes.tee()).parts
+def test_space_that_a_fold_winds_around_twice_is_told_and_no_other_difference_is_allowed() -> None:
+    found = _decomposed(shapes.tee())
     folded = shapes.tee(arm=40.004)  # as if its volume counted 0.4 mm3 twice
-    whole, notes = counted_once(folded, parts)
-    assert whole.volume_mm3 == pytest.approx(sum(part.volume_mm3 for part in parts), rel=1e-9)
-    assert notes == ("the surface passes through itself: 0.4 mm3 that it winds around twice are counted once",)
+    assert folded_mm3(found.mesh, found.parts) == 0.0
+    assert folded_mm3(folded, found.parts) == pytest.approx(0.4)
+    assert Decomposition(**vars(found) | {"mesh": folded, "folded_mm3": 0.4001}).volume_mm3 == pytest.approx(found.volume_mm3)
+    with pytest.raises(DecompositionError, match="add up to"):
+        Decomposition(**vars(found) | {"mesh": folded})
 
 
 def test_swapped_parts_are_refused() -> None:
