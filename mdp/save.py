@@ -61,17 +61,16 @@ def threemf(decomposition: Decomposition) -> bytes:
 
 def values(decomposition: Decomposition, read_s: float, total_s: float) -> dict[str, Any]:
     """What `decompose --json` writes."""
-    mesh = decomposition.mesh
     return {
         "model": decomposition.name,
-        "faces": len(mesh.faces),
+        "faces": len(decomposition.mesh.faces),
         "beam_width": decomposition.beam_width,
         "ranker": decomposition.ranker,
         "seconds": {"read": round(read_s, 3), "search": round(decomposition.search_s, 3), "total": round(total_s, 3)},
         "risky_area_mm2": decomposition.risky_area_mm2,
         "residual_area_mm2": decomposition.residual_area_mm2,
         "reduction": decomposition.reduction,
-        "volume_mm3": mesh.volume_mm3,
+        "volume_mm3": decomposition.volume_mm3,
         "candidates_evaluated": decomposition.candidates_evaluated,
         "rounds": decomposition.rounds,
         "parts": [

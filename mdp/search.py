@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import islice
 from time import perf_counter
 
-import manifold3d as m3
 import numpy as np
 
 from mdp.candidates import REASONS, Bounds, Checked, bounds, check, refusals, worth
@@ -68,10 +67,10 @@ def decompose(
     if on_record is not None and search.trace is not None:
         on_record(search.trace.to_bytes())
     parts = _parts(best, search.machine, profile.process.self_supporting_angle_deg, profile.search.clearance)
-    whole, notes = counted_once(mesh, parts)
+    folded = folded_mm3(mesh, parts)
     return Decomposition(
         name=name,
-        mesh=whole,
+        mesh=mesh,
         parts=parts,
         beam_width=profile.search.beam_width,
         ranker=ranker,
@@ -80,20 +79,24 @@ def decompose(
         candidates_evaluated=search.evaluated,
         rounds=search.stages,
         search_s=perf_counter() - began,
-        notes=(*notes, *search.notes(len(parts))),
+        notes=(*_folded_note(folded), *search.notes(len(parts))),
+        folded_mm3=folded,
     )
 
 
-def counted_once(mesh: Mesh, parts: Sequence[Part]) -> tuple[Mesh, tuple[str, ...]]:
-    """The model that the parts make up: the mesh itself, unless small folds of it pass through themselves.
+def folded_mm3(mesh: Mesh, parts: Sequence[Part]) -> float:
+    """Volume by which the parts differ from a mesh whose surface passes through itself a little, 0 for others.
 
-    Its volume counts such places twice, a cut counts them once; then the model is what the parts are together.
+    A mesh's volume counts a place as often as the surface winds around it, inside out places less than once; a cut counts it
+    once or not at all.
     """
-    twice = mesh.volume_mm3 - sum(part.volume_mm3 for part in parts)
-    if abs(twice) <= VOLUME_TOLERANCE * mesh.volume_mm3 or abs(twice) > MOST_FOLDED * mesh.volume_mm3:
-        return mesh, ()
-    together = mesh_of(m3.Manifold.batch_boolean([solid_of(part.mesh) for part in parts], m3.OpType.Add))
-    return together, (f"the surface passes through itself: {abs(twice):.3g} mm3 that it winds around twice are counted once",)
+    difference = abs(mesh.volume_mm3 - sum(part.volume_mm3 for part in parts))
+    return difference if VOLUME_TOLERANCE * mesh.volume_mm3 < difference <= MOST_FOLDED * mesh.volume_mm3 else 0.0
+
+
+def _folded_note(folded: float) -> tuple[str, ...]:
+    text = f"the surface passes through itself: {folded:.3g} mm3 that it winds around twice or inside out are counted once"
+    return (text,) if folded > 0 else ()
 
 
 class _Search:

@@ -46,7 +46,7 @@ def row(file: Path, profile: Profile) -> str:
         record = printer.record
     segments, volumes = record.deposited(profile.material.diameter_mm)
     share = inside_share(replace(program.run, segments_mm=segments), found.mesh, profile.process.line_width_mm).share
-    error = abs(sum(part.volume_mm3 for part in found.parts) / found.mesh.volume_mm3 - 1.0)
+    error = abs(found.volume_mm3 / found.mesh.volume_mm3 - 1.0)
     errors = sum(finding.severity == "error" for finding in program.run.findings)
     laid = volumes.sum() / program.run.segment_mm3.sum()
     told = [file.name, len(found.parts), f"{error:.1e}", f"{found.reduction:.3f}", f"{share:.4f}", f"{laid:.5f}", errors]

@@ -37,7 +37,7 @@ def parts_table(found: Decomposed, angle_deg: float = 45.0, count_platform_faces
     rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm3", "share", "risky before", "after mm2"]]
     for part in decomposition.parts:
         angles = [f"{part.pose.tilt_deg:.1f}", f"{part.pose.turn_deg:.1f}", f"{part.base.offset_mm:.1f}"]
-        share = f"{100 * part.volume_mm3 / decomposition.mesh.volume_mm3:.1f} %"
+        share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
         areas = [_number(_before_mm2(part, angle_deg, count_platform_faces)), _number(part.risky_area_mm2)]
         rows.append([str(part.index), *angles, f"{part.volume_mm3:.0f}", share, *areas])
     told = f"{decomposition.candidates_evaluated} candidates in {decomposition.search_s:.1f} s\n"
