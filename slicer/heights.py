@@ -5,9 +5,10 @@ from math import floor
 
 import numpy as np
 
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Mesh
 from profiles.errors import SliceError
 from profiles.process import Process
+from slicer.slopes import adaptive, slopes
 
 LEAST_SHARE = 0.25  # a layer thinner than this share of the layer height does not come out of the nozzle evenly
 MOST_LAYERS = 50_000  # ten metres of 0.2 mm; beyond that a unit or the scale is wrong
@@ -23,25 +24,72 @@ class Heights:
     cut_mm: Floats
 
 
+def heights_of(mesh: Mesh, process: Process, on_platform: bool, pedestal_mm: float = 0.0) -> Heights:
+    """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it.
+
+    A pedestal is sliced for itself: one layer ends exactly at its height. Raises SliceError as heights().
+    """
+    top = float(mesh.bounds_mm[1, 2])
+    if 0.0 < pedestal_mm < top:
+        low, high = heights(pedestal_mm, process, True), _upward(mesh, process, pedestal_mm, process.first_layer_height_mm)
+        both = ((low.tip_mm, high.tip_mm), (low.height_mm, high.height_mm), (low.cut_mm, high.cut_mm))
+        return Heights(*(np.concatenate(two) for two in both))
+    if process.adaptive_cusp_mm <= 0.0:
+        return heights(top, process, on_platform)
+    _check(top, process)
+    overlap, first = _first(process, on_platform)
+    if top + overlap <= first + process.least_layer_height_mm:
+        return heights(top, process, on_platform)
+    thick = [first, *adaptive(slopes(mesh, process), first - overlap, top, process.least_layer_height_mm)]
+    return _stacked(np.array(thick), -overlap, 0.0, top)
+
+
 def heights(top_mm: float, process: Process, on_platform: bool) -> Heights:
-    """Layers of a part that reaches from its base plane up to top_mm.
+    """Equal layers of a part that reaches from its base plane up to top_mm.
 
     A part on plastic begins pressed into it by the interface overlap: the tip of layer i = 1, 2, ... is at
     i * height - overlap. Each section is taken in the middle of what its layer fills above the base plane. The last
     layer meets the top: it is lower, or the one below is stretched when less than a quarter layer remains.
     Raises SliceError for a part that is too high to be meant.
     """
-    overlap = 0.0 if on_platform else process.interface_overlap * process.layer_height_mm
-    first = process.first_layer_height_mm if on_platform else process.layer_height_mm
-    if top_mm > MOST_LAYERS * process.layer_height_mm:
-        raise SliceError(
-            f"a part {top_mm:.6g} mm high needs {top_mm / process.layer_height_mm:.0f} layers of process.layer_height_mm "
-            f"{process.layer_height_mm:g} mm: at most {MOST_LAYERS} are allowed"
-        )
+    _check(top_mm, process)
+    overlap, first = _first(process, on_platform)
     thick = _thicknesses(top_mm + overlap, first, process.layer_height_mm, MOST_SHARE * process.line_width_mm)
-    tip = np.cumsum(thick) - overlap
-    bottom = np.maximum(tip - thick, 0.0)
-    return Heights(tip, thick, 0.5 * (bottom + np.minimum(tip, top_mm)))
+    return _stacked(thick, -overlap, 0.0, top_mm)
+
+
+def _upward(mesh: Mesh, process: Process, from_mm: float, first_mm: float) -> Heights:
+    """Layers of what stands on a pedestal."""
+    top = float(mesh.bounds_mm[1, 2])
+    _check(top, process)
+    if process.adaptive_cusp_mm > 0.0 and top - from_mm > first_mm + process.least_layer_height_mm:
+        thick = [first_mm, *adaptive(slopes(mesh, process), from_mm + first_mm, top, process.least_layer_height_mm)]
+        return _stacked(np.array(thick), from_mm, from_mm, top)
+    most = MOST_SHARE * process.line_width_mm
+    return _stacked(_thicknesses(top - from_mm, first_mm, process.layer_height_mm, most), from_mm, from_mm, top)
+
+
+def _first(process: Process, on_platform: bool) -> tuple[float, float]:
+    """How deep the first layer is pressed in, and its height."""
+    if on_platform:
+        return 0.0, process.first_layer_height_mm
+    return process.interface_overlap * process.layer_height_mm, process.layer_height_mm
+
+
+def _stacked(thick: Floats, from_mm: float, base_mm: float, top_mm: float) -> Heights:
+    """Layers of those heights on each other, cut in the middle of what they fill between base and top."""
+    tip = from_mm + np.cumsum(thick)
+    return Heights(tip, thick, 0.5 * (np.maximum(tip - thick, base_mm) + np.minimum(tip, top_mm)))
+
+
+def _check(top_mm: float, process: Process) -> None:
+    layer = process.least_layer_height_mm if process.adaptive_cusp_mm > 0.0 else process.layer_height_mm
+    if top_mm > MOST_LAYERS * layer:
+        name = "least_layer_height_mm" if process.adaptive_cusp_mm > 0.0 else "layer_height_mm"
+        raise SliceError(
+            f"a part {top_mm:.6g} mm high needs {top_mm / layer:.0f} layers of process.{name} "
+            f"{layer:g} mm: at most {MOST_LAYERS} are allowed"
+        )
 
 
 def _thicknesses(total: float, first: float, layer: float, most: float) -> Floats:

@@ -14,7 +14,7 @@ from slicer.bridge import Bridge
 from slicer.brim import brim
 from slicer.contact import contacts
 from slicer.gap import gaps
-from slicer.heights import heights
+from slicer.heights import heights_of
 from slicer.infill import infill
 from slicer.interface import beneath, sections_of
 from slicer.order import ordered
@@ -38,7 +38,7 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
     input gives the same paths. Raises SliceError when the part gives no bead at all.
     """
     process, mesh = profile.process, part.in_part_frame()
-    at = heights(float(mesh.bounds_mm[1, 2]), process, part.index == 1)
+    at = heights_of(mesh, process, part.index == 1)
     outlines = [cleaned(loops) for loops in sections(mesh, at.cut_mm)]
     walled = [walls(s, process.walls, process.line_width_mm, h) for s, h in zip(outlines, at.height_mm, strict=True)]
     below = beneath(part, earlier, outlines[0])
