@@ -8,7 +8,7 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 from profiles.process import Process
-from slicer.bridge import LEAST, LONGEST_MM, Bridge, bridge
+from slicer.bridge import LEAST, Bridge, bridge
 from slicer.polygons import Polygons, edges, grown
 
 RISKY_MARGIN = 1e-4  # faces at exactly the self-supporting angle count as safe whatever the rounding, as in the search
@@ -29,9 +29,9 @@ def contacts(
     """For every layer the part of its outline above a risky face.
 
     mesh and cuts_mm: part frame. below: plastic under the first layer, None: the platform, on which it may lie. Without
-    support every span from bank to bank is a bridge, however long.
+    support whatever has a bank to hold on to is printed as a bridge, however long.
     """
-    longest_mm = inf if process.support == "none" else LONGEST_MM
+    longest_mm = inf if process.support == "none" else process.bridge_longest_mm
     found = [Contact(Polygons(), ())] * len(outlines)
     for i, triangles in _risky(mesh, cuts_mm, process.self_supporting_angle_deg).items():
         if i == 0 and below is None:
@@ -49,9 +49,14 @@ def _contact(hanging: Polygons, bank: Polygons, width_mm: float, longest_mm: flo
     if all(island.area() < LEAST * width_mm**2 for island in islands):
         return Contact(hanging, ())
     banks = edges(grown(bank, 0.25 * width_mm))
-    spans = [bridge(island, banks, width_mm, longest_mm) for island in islands]
-    rest = [island for island, span in zip(islands, spans, strict=True) if span is None]
-    return Contact(Polygons.compose(rest) if rest else Polygons(), tuple(span for span in spans if span is not None))
+    rest, spans = [], []
+    for island in islands:
+        span = bridge(island, banks, width_mm)
+        if span is not None and (longest_mm == inf or span.carries(longest_mm)):
+            spans.append(span)
+        else:
+            rest.append(island)
+    return Contact(Polygons.compose(rest) if rest else Polygons(), tuple(spans))
 
 
 def _risky(mesh: Mesh, cuts_mm: Floats, angle_deg: float) -> dict[int, list[Floats]]:

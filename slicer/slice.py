@@ -10,7 +10,7 @@ from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import Bead
-from slicer.bridge import Bridge
+from slicer.bridge import Bridge, beside, bridge_beads, bridged
 from slicer.brim import brim
 from slicer.contact import contacts
 from slicer.gap import gaps
@@ -81,11 +81,12 @@ def _beads(
         for loop in loops
     ]
     beads += gaps(around.free, False, width, height_mm) + gaps(around.narrow, True, width, height_mm)
-    solid = region.solid
-    for bridge in bridges:
-        beads += skin(solid ^ bridge.area, Kind.SKIN, bridge.angle_deg, width, height_mm, overlap)
-        solid = solid - bridge.area
-    beads += skin(solid, Kind.SKIN, angle, width, height_mm, overlap)
+    for span in bridges:
+        area = bridged(span, around.inside, width)
+        if not area.is_empty():
+            beads += bridge_beads(area, span.angle_deg, process.bridge_flow, width, height_mm, overlap)
+            region = beside(region, area, width)
+    beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
     beads += skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
     density, pattern = process.infill_density, process.infill_pattern
     return beads + infill(region.sparse, pattern, density, process.infill_angle_deg, layer, width, height_mm, overlap)

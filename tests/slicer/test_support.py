@@ -86,7 +86,7 @@ def test_a_short_bridge_needs_no_support_and_a_long_one_does():
 def test_the_lines_of_a_bridge_run_from_bank_to_bank(turn, expected):
     spanned = table(5).moved(about(UP, np.radians(turn)))
     layer = slice_part(whole(spanned), profile()).layers[50]
-    along = max((p for p in layer.paths if p.kind is Kind.SKIN), key=lambda p: p.length_mm).points
+    along = max((p for p in layer.paths if p.kind is Kind.BRIDGE), key=lambda p: p.length_mm).points
     steps = np.diff(along, axis=0)
     longest = steps[np.argmax(np.hypot(*steps.T))]
     assert np.degrees(np.arctan2(*longest[::-1])) % 180 == pytest.approx(expected, abs=0.1)

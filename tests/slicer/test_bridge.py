@@ -1,0 +1,109 @@
+"""Bridges: their direction against brute force, where their lines end, and how they are printed."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.affinity import rotate
+
+from slicer.bridge import bridge
+from slicer.paths import Kind
+from slicer.polygons import Polygons, edges, grown
+from slicer.slice import slice_part
+from tests.shapes import standing
+from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
+
+WIDTH = 0.45
+
+
+def gap(length, span, turn_deg):
+    """A hanging rectangle between two banks along its long sides."""
+    hanging = Polygons.square((length, span), True).rotate(turn_deg)
+    banks = Polygons.square((length, span + 8), True).rotate(turn_deg) - hanging
+    return hanging, banks
+
+
+def found(hanging, banks):
+    return bridge(hanging, edges(grown(banks, 0.25 * WIDTH)), WIDTH)
+
+
+def apart_deg(a, b):
+    return abs((a - b + 90) % 180 - 90)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(3, 30), st.floats(2, 30), st.floats(0, 180))
+def test_lines_cross_the_gap_at_right_angles_however_it_lies(length, span, turn):
+    over = found(*gap(length, span, turn))
+    assert apart_deg(over.angle_deg, turn + 90) < 0.1
+    assert over.longest_mm == pytest.approx(span, abs=0.01)
+    assert over.loose == 0.0
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.tuples(st.floats(0, 6.28), st.floats(3, 6)), min_size=5, max_size=9, unique_by=lambda p: round(p[0], 1)))
+def test_no_direction_has_shorter_squared_spans(corners):
+    points = np.array([[r * np.cos(a), r * np.sin(a)] for a, r in sorted(corners)])
+    hanging = Polygons([points]).hull()
+    over = found(hanging, grown(hanging, 5) - hanging)
+    shape = as_shapely(hanging)
+    assert mean_span(shape, over.angle_deg) <= 1.02 * min(mean_span(shape, angle) for angle in range(0, 180, 3))
+
+
+def mean_span(shape, angle):
+    """Mean length of lines across a shape, each weighted by itself."""
+    turned = rotate(shape, -angle, origin=(0, 0))
+    low, high = turned.bounds[1], turned.bounds[3]
+    spans = [shapely.LineString([(-99, y), (99, y)]).intersection(turned).length for y in np.arange(low + WIDTH / 2, high, WIDTH)]
+    return sum(s * s for s in spans) / sum(spans)
+
+
+def test_a_ledge_is_printed_outwards_from_its_only_bank():
+    hanging = Polygons.square((10, 3))
+    over = found(hanging, Polygons.square((10, 3)).translate((0, 3)))
+    assert apart_deg(over.angle_deg, 90) < 0.1
+    assert over.loose == 1.0
+    assert not over.carries(100)
+
+
+def test_nothing_to_hold_on_to_is_no_bridge():
+    assert found(Polygons.square((5, 5)), Polygons.square((5, 5)).translate((20, 0))) is None
+
+
+def portal(span):
+    """Two posts and a plate across them."""
+    posts = m3.Manifold.cube((6, 10, 8)) + m3.Manifold.cube((6, 10, 8)).translate((6 + span, 0, 0))
+    return standing(posts + m3.Manifold.cube((12 + span, 10, 2)).translate((0, 0, 8)))
+
+
+def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks():
+    sliced = slice_part(whole(portal(5)), profile(*BARE, "process.bridge_speed_mm_s=27", "process.bridge_flow=0.9"))
+    beads = of_kind(sliced, Kind.BRIDGE)
+    layer = next(layer for layer in sliced.layers if any(p in beads for p in layer.paths))
+    assert layer.z_mm == pytest.approx(8.2)
+    assert {p.speed_mm_s for p in beads} == {27.0}
+    ends = np.concatenate([p.points for p in beads])
+    assert np.abs(ends[:, 0]).min() > 2.5
+    assert np.abs(ends[:, 0]).max() < 2.5 + 4 * WIDTH
+    plain = of_kind(slice_part(whole(portal(5)), profile(*BARE)), Kind.BRIDGE)
+    assert beads[0].flow == pytest.approx(0.9 * plain[0].flow)
+
+
+def test_a_plate_resting_on_plastic_is_no_bridge():
+    base, plate = cut(portal(0.0001), ((0, 0, 1), 8.0))
+    assert of_kind(slice_part(plate, profile(), [base]), Kind.BRIDGE) == []
+
+
+def test_a_part_that_spans_two_posts_of_an_earlier_one_is_a_bridge_from_its_first_layer():
+    base, plate = cut(portal(5), ((0, 0, 1), 8.0))
+    sliced = slice_part(plate, profile(), [base])
+    assert Kind.BRIDGE in {p.kind for p in sliced.layers[0].paths}
+    assert Kind.BRIDGE not in {p.kind for p in sliced.layers[1].paths}
+
+
+def test_without_support_a_long_span_is_still_a_bridge():
+    beads = of_kind(slice_part(whole(portal(25)), profile(*BARE)), Kind.BRIDGE)
+    steps = np.diff(max(beads, key=lambda p: p.length_mm).points, axis=0)
+    assert np.abs(steps[:, 1])[np.abs(steps[:, 0]) > 1].max() < 1e-6
