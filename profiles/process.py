@@ -65,10 +65,62 @@ class Process(Frozen):
         1.0, ge=0.3, le=2, description="factor on extruded volume of bridges; 1: as much plastic as the layer has room for"
     )
     support: Literal["none", "auto"] = Field("auto", description="auto: support what the decomposition left risky")
+    support_style: Literal["tree", "grid"] = Field(
+        "tree",
+        description="tree: what hangs is gathered into branches, which saves plastic and time; grid: columns straight down where "
+        "they find ground, sturdier under heavy flat places",
+    )
+    support_on_part: bool = Field(
+        True, description="false: support stands on the platform or on the part's base only, so that it scars no surface"
+    )
+    support_branch_angle_deg: float = Field(
+        40.0,
+        ge=0,
+        le=60,
+        description="support leans no farther than this from the printing direction, nor than self_supporting_angle_deg, deg; "
+        "40: a sparse branch holds itself less well than a wall",
+    )
+    support_branch_mm: float = Field(
+        2.0, ge=0.2, le=20, description="diameter of a branch at its top, mm; thinner ones are knocked over by the nozzle"
+    )
+    support_branch_growth_deg: float = Field(
+        5.0, ge=0, le=20, description="branches get thicker downward, each side leaning by this, deg: tall ones must not sway"
+    )
+    support_pattern: Literal["lines", "grid"] = Field("lines", description="what fills support: lines are easily broken away")
     support_density: float = Field(0.15, gt=0, le=1, description="share of the support's inside that is filled")
-    support_gap_mm: float = Field(0.2, ge=0, le=2, description="gap along the printing direction between support and part, mm")
+    support_walls: int = Field(
+        1, ge=0, le=10, description="outlines around support; leaning support needs one for its lines to end on"
+    )
+    support_interface_layers: int = Field(
+        3, ge=0, le=100, description="dense layers of support under the part: a floor even enough to lay a skin on"
+    )
+    support_bottom_interface_layers: int = Field(
+        2, ge=0, le=100, description="dense layers of support that stands on the part, so that it comes off in one piece"
+    )
+    support_interface_density: float = Field(
+        0.7, gt=0, le=1, description="share of the dense layers that is filled; a closed floor would weld to the part"
+    )
+    support_gap_mm: float = Field(
+        0.2, ge=0, le=2, description="gap along the printing direction between support and the part over it, mm; 0: it welds"
+    )
+    support_bottom_gap_mm: float = Field(
+        0.2, ge=0, le=2, description="gap along the printing direction between support and what it stands on, mm"
+    )
     support_distance_mm: float = Field(
-        0.6, ge=0, le=5, description="gap across the printing direction between support and part, mm"
+        0.3,
+        ge=0,
+        le=5,
+        description="gap across the printing direction between support and part, and to where later parts will be, mm; "
+        "two thirds of a line: near enough to hold the edges",
+    )
+    support_foot_mm: float = Field(
+        2.0, ge=0, le=20, description="support is wider by this in its first layer on the platform, so that it sticks, mm"
+    )
+    support_foot_density: float = Field(
+        0.7, gt=0, le=1, description="share of the support's first layer on the platform that is filled"
+    )
+    support_least_mm2: float = Field(
+        1.0, ge=0, le=1000, description="a hanging place smaller than this, seen from above, holds itself, mm2"
     )
     skirt_loops: int = Field(1, ge=0, le=20, description="loops around part 1's first layer, not touching it")
     skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from part 1, mm")
@@ -115,10 +167,22 @@ class Process(Frozen):
     )
     infill_speed_mm_s: float = Field(80.0, gt=0, le=1000, description="speed of sparse infill, mm/s")
     support_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of support, mm/s")
+    support_interface_speed_mm_s: float = Field(
+        40.0, gt=0, le=1000, description="speed of the dense layers of support, mm/s: their lines span the sparse ones"
+    )
     first_layer_speed_mm_s: float = Field(20.0, gt=0, le=1000, description="speed of part 1's first layer, mm/s")
     travel_speed_mm_s: float = Field(150.0, gt=0, le=2000, description="speed of travels, mm/s")
     lift_speed_mm_s: float = Field(10.0, gt=0, le=500, description="speed of lifts along the nozzle, mm/s")
     retract_travel_mm: float = Field(1.5, ge=0, le=100, description="shortest travel that is worth a retraction, mm")
+    combing: bool = Field(
+        True, description="true: travels go round through the inside of the layer where that avoids a retraction"
+    )
+    combing_detour_mm: float = Field(
+        8.0,
+        ge=0,
+        le=1000,
+        description="how much longer than straight such a way may be; 8 mm take as long as pulling back and priming 0.8 mm, mm",
+    )
     least_layer_time_s: float = Field(5.0, ge=0, le=600, description="layers printed faster than this are slowed down, s")
     least_speed_mm_s: float = Field(10.0, gt=0, le=1000, description="slowing for the layer time stops here, mm/s")
 

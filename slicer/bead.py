@@ -9,12 +9,17 @@ from numba import njit
 from mdp.mesh import Floats
 from slicer.paths import Kind
 
+WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
 ROUND_SIDES = 1.0 - pi / 4.0
 
 
 @dataclass(frozen=True, eq=False)
 class Bead:
-    """points: (n, 2) mm, a closed bead repeats its first point. rank: beads of an island are printed by rising rank."""
+    """points: (n, 2) mm, a closed bead repeats its first point.
+
+    rank: beads of an island are printed by rising rank; those of rank 0 and below are its walls and stay together around
+    each outer wall.
+    """
 
     kind: Kind
     points: Floats
@@ -26,6 +31,11 @@ class Bead:
     def closed(self) -> bool:
         """Whether the bead ends where it begins."""
         return len(self.points) > 3 and bool((self.points[0] == self.points[-1]).all())
+
+    @property
+    def one_way(self) -> bool:
+        """Whether the bead must begin where it does: walls have their seam there."""
+        return self.closed or self.kind in WALLS
 
     @property
     def length_mm(self) -> float:

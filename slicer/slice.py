@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.errors import SliceError
@@ -27,8 +25,6 @@ from slicer.skin import angle_of_layer_deg, skin
 from slicer.speed import speeds_mm_s
 from slicer.support import support_beads, supports
 from slicer.walls import Walls, walls
-
-NO_APPROACH = np.zeros((0, 2))
 
 
 def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> SlicedPart:
@@ -104,14 +100,14 @@ def _layer(
 ) -> Layer:
     """The beads in order, with speeds, flow and fan."""
     process, material = profile.process, profile.material
-    placed = ordered(beads, outline, process.line_width_mm, tip, process.retract_travel_mm)
+    placed = ordered(beads, outline, process, tip)
     flow, fixed = material.flow, None
     if index == 0:
         fixed = process.first_layer_speed_mm_s if on_platform else process.interface_speed_mm_s
         flow *= 1.0 if on_platform else process.interface_flow
     speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)
     paths = tuple(
-        Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, NO_APPROACH, p.retract)
+        Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract)
         for p, speed in zip(placed, speeds, strict=True)
     )
     return Layer(z_mm, height_mm, paths, 0.0 if index == 0 and on_platform else material.fan)
