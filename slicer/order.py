@@ -33,7 +33,7 @@ class Placed:
     bead: Bead
     points: Floats
     retract: bool
-    approach: Floats = NOWHERE
+    approach: Floats
 
 
 def ordered(beads: Sequence[Bead], section: Polygons, process: Process, tip: Floats | None) -> list[Placed]:
