@@ -22,6 +22,7 @@ class Kind(StrEnum):
     BRIDGE = "Bridge infill"
     SKIRT = "Skirt/Brim"
     SUPPORT = "Support material"
+    SUPPORT_INTERFACE = "Support material interface"
 
 
 def bead_area_mm2(width_mm: float, height_mm: float) -> float:
