@@ -114,7 +114,7 @@ def _layer(
 
 
 def _check(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Process) -> None:
-    own = (path for layer in layers for path in layer.paths if path.kind not in (Kind.SKIRT, Kind.SUPPORT))
+    own = (path for layer in layers for path in layer.paths if path.kind not in (Kind.SKIRT, Kind.SUPPORT, Kind.SUPPORT_INTERFACE))
     if next(own, None) is None:
         x, y, z = bounds_mm[1] - bounds_mm[0]
         if process.walls == 0 and process.infill_density == 0:

@@ -10,7 +10,7 @@ from machine.dryrun.dryrun import DryRun
 from mdp.mesh import Floats, Mesh
 from slicer.paths import Kind
 
-AROUND = (Kind.SKIRT.value, Kind.SUPPORT.value, "Support material interface", "Custom")
+AROUND = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, "Custom")
 PIECE_MM = 1.0
 ASIDE = np.array([3.1e-7, 1.7e-7])  # keeps upright rays off the edges of CAD faces
 
