@@ -34,15 +34,49 @@ class Process(Frozen):
     )
     line_width_mm: float = Field(0.45, ge=0.1, le=4, description="width of a bead, mm")
     walls: int = Field(3, ge=0, le=50, description="number of walls")
+    wall_order: Literal["inner-first", "outer-first"] = Field(
+        "inner-first",
+        description="inner-first: the outer wall leans on finished plastic, best over overhangs; outer-first: nothing pushes it "
+        "outward, best for fits",
+    )
+    outer_bulge: float = Field(
+        0.04,
+        ge=0,
+        le=0.2,
+        description="outer beads carry more plastic than their round sides hold and may bulge over the model by this, so that "
+        "the print has the model's volume, share of a line width; 0: as other slicers",
+    )
     top_layers: int = Field(4, ge=0, le=1000, description="solid layers under a surface that faces the printing direction")
     bottom_layers: int = Field(4, ge=0, le=1000, description="solid layers over a surface that faces away from it")
+    top_thickness_mm: float = Field(
+        0.7, ge=0, le=100, description="least thickness of the layers under a surface, however thin they are: more layers then, mm"
+    )
+    bottom_thickness_mm: float = Field(
+        0.5, ge=0, le=100, description="least thickness of the layers over a surface that faces away, mm"
+    )
+    solid_below_mm2: float = Field(
+        70.0,
+        ge=0,
+        le=1e6,
+        description="places of sparse infill smaller than this become solid: thin limbs gain strength, and travels cost more than "
+        "the plastic saved, mm2",
+    )
     infill_density: float = Field(0.2, ge=0, le=1, description="share of the inside that is filled")
-    infill_pattern: Literal["rectilinear", "grid", "triangles", "concentric"] = Field(
-        "grid", description="pattern of the sparse infill"
+    infill_pattern: Literal["rectilinear", "grid", "triangles", "gyroid", "honeycomb", "concentric"] = Field(
+        "grid", description="pattern of the sparse infill; a density of 1 is always solid lines"
     )
     infill_angle_deg: float = Field(45.0, ge=0, le=360, description="direction of the infill lines in the part's frame, deg")
     infill_overlap: float = Field(
         0.15, ge=0, le=0.5, description="reach of infill into the innermost wall, share of a line width"
+    )
+    infill_anchor_mm: float = Field(
+        2.5,
+        ge=0,
+        le=100,
+        description="run along the innermost wall that holds the end of a single infill line; 0: the ends only touch the wall, mm",
+    )
+    infill_joint_mm: float = Field(
+        12.0, ge=0, le=1000, description="infill lines whose ends are nearer than this along the wall are joined there, mm"
     )
     seam: Literal["aligned", "corner", "rear", "nearest", "random"] = Field(
         "aligned",
