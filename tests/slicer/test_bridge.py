@@ -21,8 +21,8 @@ WIDTH = 0.45
 def gap(length, span, turn_deg):
     """A hanging rectangle between two banks along its long sides."""
     hanging = Polygons.square((length, span), True).rotate(turn_deg)
-    banks = Polygons.square((length, span + 8), True).rotate(turn_deg) - hanging
-    return hanging, banks
+    sides = [Polygons.square((length, 4), True).translate((0, side * (span / 2 + 2))).rotate(turn_deg) for side in (-1, 1)]
+    return hanging, Polygons.compose(sides)
 
 
 def found(hanging, banks):
