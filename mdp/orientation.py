@@ -7,6 +7,7 @@ unless it is asked for the other.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import atan2, cos, degrees, hypot, pi, radians, sin, sqrt, tan
 
 import manifold3d as m3
@@ -14,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.cut import mesh_of
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Floats, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
 
 LEAN_DEG = 5.0  # a model that rests may be leaned by this much before it tips over
 SAME_FACET_DEG = 0.5
 SPREAD = 1000
 MOST_FACETS = 1000
-CHUNK = 32  # directions looked at together: their tables stay in the cache's reach
 EQUAL_MM2 = 1e-6  # areas that differ less are equal but for rounding
 SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 32)])
 
@@ -42,6 +42,7 @@ class Orientation:
         return _turns(self.rotation[2])
 
 
+@lru_cache(maxsize=2)
 def best_orientation(mesh: Mesh, angle_deg: float, resting: bool = True) -> Orientation:
     """The orientation with the least risky area (mm2); resting=False: also those that only a raft could hold.
 
@@ -73,19 +74,19 @@ def spread(count: int) -> Floats:
 
 def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> tuple[Floats, Floats]:
     """(k,) risky and standing areas, mm2, of the model printed as a whole along (k, 3) unit directions."""
-    risky, standing = np.zeros(len(directions)), np.zeros(len(directions))
+    facing_down, standing = np.zeros(len(directions)), np.zeros(len(directions))
     limit, areas = threshold(angle_deg), mesh.areas_mm2
-    for begin in range(0, len(directions), CHUNK):
-        some = directions[begin : begin + CHUNK]
-        down = np.less(some @ mesh.normals.T, limit)
-        heights = some @ mesh.vertices.T
-        low = heights <= heights.min(axis=1, keepdims=True) + PLATFORM_TOLERANCE_MM
-        for k in range(len(some)):
-            down_faces = np.flatnonzero(down[k])
-            stands = low[k][mesh.faces[down_faces]].all(axis=1)
-            standing[begin + k] = areas[down_faces[stands]].sum()
-            risky[begin + k] = areas[down_faces[~stands]].sum()
-    return risky, standing
+    normals, points = np.ascontiguousarray(mesh.normals.T), np.ascontiguousarray(mesh.vertices.T)
+    order = np.argsort(mesh.faces[:, 0], kind="stable")
+    starts = np.searchsorted(mesh.faces[order, 0], np.arange(len(mesh.vertices) + 1))
+    for k, direction in enumerate(directions):
+        down, heights = np.less(dot(normals.T, direction), limit), dot(points.T, direction)
+        low = np.less_equal(heights, heights.min() + PLATFORM_TOLERANCE_MM)
+        # Few faces stand: they are found from the few vertices that are low.
+        faces = np.concatenate([order[starts[v] : starts[v + 1]] for v in np.flatnonzero(low)])
+        stands = faces[low[mesh.faces[faces]].all(axis=1) & down[faces]]
+        facing_down[k], standing[k] = areas[down].sum(), areas[stands].sum()
+    return np.maximum(facing_down - standing, 0.0), standing
 
 
 def _measured(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:

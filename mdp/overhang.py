@@ -9,7 +9,7 @@ from math import radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Floats, Mesh, dot
 from mdp.plane import Plane
 
 ROUNDING = 1e-4
@@ -27,7 +27,7 @@ def threshold(self_supporting_angle_deg: float) -> float:
 
 def facing_down(mesh: Mesh, direction: Floats, self_supporting_angle_deg: float) -> Mask:
     """(m,) faces that overhang too far along a unit direction, whatever they rest on."""
-    down: Mask = np.asarray(np.less(mesh.normals @ direction, threshold(self_supporting_angle_deg)))
+    down: Mask = np.asarray(np.less(dot(mesh.normals, direction), threshold(self_supporting_angle_deg)))
     return down
 
 

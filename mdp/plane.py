@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdp.mesh import Floats
+from mdp.mesh import Floats, dot
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +21,7 @@ class Plane:
 
     def heights_mm(self, points: Floats) -> Floats:
         """(n,) signed distances of (n, 3) points, positive on the printed side."""
-        heights: Floats = points @ self.normal - self.offset_mm
-        return heights
+        return dot(points, self.normal) - self.offset_mm
 
 
 PLATFORM = Plane(np.array([0.0, 0.0, 1.0]), 0.0)

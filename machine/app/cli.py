@@ -3,6 +3,7 @@
 Exit codes: 0 done, 1 the user can fix it, 3 a bug (log file named), 130 interrupted. Heavy imports stay inside the commands.
 """
 
+import os
 import sys
 from collections.abc import Sequence
 from itertools import pairwise
@@ -199,6 +200,8 @@ def _profile(  # type: ignore[no-untyped-def]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    # numpy's library for products waits for its threads by spinning: on a busy machine that costs more than the products.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     command = typer.main.get_command(app)
     try:
         with command.make_context("tiltprint", given or ["--help"]) as context:
