@@ -46,7 +46,7 @@ def test_lines_cross_the_gap_at_right_angles_however_it_lies(length, span, turn)
 @given(st.lists(st.tuples(st.floats(0, 6.28), st.floats(3, 6)), min_size=5, max_size=9, unique_by=lambda p: round(p[0], 1)))
 def test_no_direction_has_shorter_squared_spans(corners):
     points = np.array([[r * np.cos(a), r * np.sin(a)] for a, r in sorted(corners)])
-    hanging = Polygons([points]).hull()
+    hanging = Polygons.hull_points(points)
     over = found(hanging, grown(hanging, 5) - hanging)
     shape = as_shapely(hanging)
     assert mean_span(shape, over.angle_deg) <= 1.02 * min(mean_span(shape, angle) for angle in range(0, 180, 3))

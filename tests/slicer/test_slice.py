@@ -80,7 +80,8 @@ def test_a_part_on_plastic_is_pressed_in_solid_slow_and_rich():
     assert {p.flow for p in first.paths if p.kind is Kind.OUTER_WALL} == {1.05}
     assert Kind.INFILL not in {p.kind for p in first.paths}
     assert Kind.SKIRT not in {p.kind for p in first.paths}
-    assert first.fan == 1.0
+    assert first.fan == pytest.approx(0.3)
+    assert first.nozzle_add_c == 5.0
 
 
 def test_a_part_in_its_own_frame_does_not_care_how_it_stood_in_the_workpiece():
