@@ -16,6 +16,7 @@ from slicer.heights import heights_of
 from slicer.infill import infill
 from slicer.interface import beneath, sections_of
 from slicer.order import ordered
+from slicer.overhang import overhanging
 from slicer.paths import Kind, Layer, Path, SlicedPart
 from slicer.polygons import Polygons, cleaned, united
 from slicer.region import Region, regions
@@ -57,7 +58,8 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
         beads += support_beads(props.areas[i], process, height)
         if i == 0 and part.index == 1:
             beads += brim(united([outline, props.areas[0]]), process, height)
-        layer = _layer(beads, outline, i, part.index == 1, profile, float(at.tip_mm[i]), height, tip)
+        bank = outlines[i - 1] if i else below
+        layer = _layer(beads, outline, bank, i, part.index == 1, profile, float(at.tip_mm[i]), height, tip)
         if layer.paths:
             tip = layer.paths[-1].points[-1]
             layers.append(layer)
@@ -91,6 +93,7 @@ def _beads(
 def _layer(
     beads: list[Bead],
     outline: Polygons,
+    bank: Polygons | None,
     index: int,
     on_platform: bool,
     profile: Profile,
@@ -98,10 +101,12 @@ def _layer(
     height_mm: float,
     tip: Floats | None,
 ) -> Layer:
-    """The beads in order, with speeds, flow and fan."""
+    """The beads in order, with speeds, flow, fan and heat."""
     process, material = profile.process, profile.material
-    placed = ordered(beads, outline, process, tip)
-    flow, fixed = material.flow, None
+    placed = overhanging(ordered(beads, outline, process, tip), outline, bank, process)
+    flow, fixed, fan, add_c = material.flow, None, material.fan, 0.0
+    if not on_platform and index < process.interface_layers:
+        fan, add_c = fan * process.interface_fan, process.interface_temperature_add_c
     if index == 0:
         fixed = process.first_layer_speed_mm_s if on_platform else process.interface_speed_mm_s
         flow *= 1.0 if on_platform else process.interface_flow
@@ -110,7 +115,7 @@ def _layer(
         Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract)
         for p, speed in zip(placed, speeds, strict=True)
     )
-    return Layer(z_mm, height_mm, paths, 0.0 if index == 0 and on_platform else material.fan)
+    return Layer(z_mm, height_mm, paths, 0.0 if index == 0 and on_platform else fan, add_c)
 
 
 def _check(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Process) -> None:
