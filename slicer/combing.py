@@ -42,7 +42,8 @@ class Ground:
 
     def leaves(self, since: Floats, to: Floats) -> NDArray[np.bool_]:
         """(n, 2) by two whether the travels between these points leave the safe inside."""
-        return _leaves(self.safe, since, to)
+        out: NDArray[np.bool_] = _leaves(self.safe, since, to)
+        return out
 
     def way(self, start: Floats, end: Floats, detour_mm: float) -> Floats | None:
         """Points (k, 2) between start and end of a way inside, at most detour_mm longer than the straight line; or None."""

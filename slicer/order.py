@@ -1,11 +1,11 @@
 """Order: in which sequence the beads of a layer are printed, and which travels between them retract.
 
 Skirt and support come first. Islands of the section follow each other on a short tour; inside an island the walls come
-first, each outer wall right after the inner walls behind it, then by rising rank gaps, skin and infill, each on a short tour.
+first, each outer wall right after the inner walls behind its seam, then by rising rank gaps, skin and infill.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,7 +77,7 @@ def _travels(
 def _sequence(beads: Sequence[Bead], section: Polygons, first: Floats) -> list[tuple[Bead, Floats]]:
     """The beads in order, each with its points as printed."""
     ranks = np.array([bead.rank for bead in beads], dtype=np.int32)
-    starts = np.array([bead.points[0] for bead in beads])
+    starts = _starts(beads)
     islands = _islands(starts, ranks, section)
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for k, island in enumerate(islands):
@@ -85,11 +85,15 @@ def _sequence(beads: Sequence[Bead], section: Polygons, first: Floats) -> list[t
     tip, placed = first, list[tuple[Bead, Floats]]()
     while groups:
         nearest = -1 if -1 in groups else _next_island(groups, starts, tip)
-        for items in _phases([beads[k] for k in groups.pop(nearest)]):
+        phases = _phases([beads[k] for k in groups.pop(nearest)])
+        begun = len(placed)
+        for number, items in enumerate(phases, start=1):
             entries = np.array([item[0].points[0] for item in items])
             exits = np.array([item[-1].points[-1] for item in items])
             fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
-            for k, flip in zip(*tour(entries, exits, fixed, tip[0], tip[1]), strict=True):
+            last = number == len(phases) > 1 and not groups  # the next layer most likely begins where this island began
+            goal = np.ascontiguousarray(placed[begun][1][:1]) if last else NOWHERE
+            for k, flip in zip(*tour(entries, exits, fixed, tip[0], tip[1], goal), strict=True):
                 placed += [(bead, bead.points[::-1] if flip else bead.points) for bead in items[k]]
             tip = placed[-1][1][-1]
     return placed
@@ -116,29 +120,36 @@ def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
 
 
 def _families(walls: Sequence[Bead], leaders: Sequence[Bead]) -> list[list[Bead]]:
-    """Each outer wall with the inner walls nearest to it, by rising rank, equal ranks as they lie nearest."""
-    if len(leaders) == 1:
-        members = [list(walls)]
-    else:
-        points = np.concatenate([leader.points for leader in leaders])
-        which = np.repeat(np.arange(len(leaders)), [len(leader.points) for leader in leaders])
-        of = {id(leader): k for k, leader in enumerate(leaders)}
-        near = which[_nearest(points, np.array([bead.points[0] for bead in walls]))]
-        members = [[] for _ in leaders]
-        for bead, k in zip(walls, near, strict=True):
-            members[of.get(id(bead), int(k))].append(bead)
-    return [_by_rank(family) for family in members]
+    """Each outer wall with the inner walls nearest to it, in chains from the inside out that begin side by side."""
+    points = np.concatenate([leader.points for leader in leaders])
+    which = np.repeat(np.arange(len(leaders)), [len(leader.points) for leader in leaders])
+    inner = [bead for bead in walls if bead.kind is not Kind.OUTER_WALL]
+    members: list[list[Bead]] = [[] for _ in leaders]
+    near = np.zeros(len(inner), np.int64) if len(leaders) == 1 else which[_nearest(points, _starts(inner))]
+    for bead, k in zip(inner, near, strict=True):
+        members[k].append(bead)
+    return [chain for leader, family in zip(leaders, members, strict=True) for chain in _chains(leader, family)]
 
 
-def _by_rank(family: list[Bead]) -> list[Bead]:
-    out: list[Bead] = []
-    left = sorted(family, key=lambda bead: bead.rank)
-    while left:
-        equal = [bead for bead in left if bead.rank == left[0].rank]
-        place = out[-1].points[-1] if out else equal[0].points[0]
-        best = min(range(len(equal)), key=lambda k: float(((equal[k].points[0] - place) ** 2).sum())) if len(equal) > 1 else 0
-        out.append(left.pop(best))
-    return out
+def _chains(leader: Bead, family: Sequence[Bead]) -> Iterator[list[Bead]]:
+    """The walls of a family: of every rank the one that begins nearest to the leader's start goes with the leader.
+
+    The others, around places of their own where the walls behind an outer wall part, follow in chains of their own: to
+    print them first would mean to go there and back.
+    """
+    chain, others = [leader], list[Bead]()
+    for rank in sorted({bead.rank for bead in family}, key=lambda rank: abs(rank - leader.rank)):
+        equal = [bead for bead in family if bead.rank == rank]
+        equal.sort(key=lambda bead: float(((bead.points[0] - leader.points[0]) ** 2).sum()))
+        chain.append(equal[0])
+        others += equal[1:]
+    yield sorted(chain, key=lambda bead: bead.rank)
+    if others:
+        yield from _chains(others[0], others[1:])
+
+
+def _starts(beads: Sequence[Bead]) -> Floats:
+    return np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
 
 
 @njit(cache=True)

@@ -20,10 +20,14 @@ Tour = tuple[NDArray[np.int64], NDArray[np.bool_]]
 
 
 @njit(cache=True)
-def tour(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: float) -> Tour:
-    """Order and turns of n things from the place x, y; starts, ends: (n, 2) mm; fixed: (n,) must not be turned."""
+def tour(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: float, goal: Floats) -> Tour:
+    """Order and turns of n things from the place x, y; starts, ends: (n, 2) mm; fixed: (n,) must not be turned.
+
+    goal: (1, 2) where the tour should end up, or (0, 2).
+    """
     order, flips = _greedy(starts, ends, fixed, x, y)
-    ways = np.empty((len(order), 4))  # in x, in y, out x, out y of each thing in its place
+    ways = np.zeros((len(order) + len(goal), 4))  # in x, in y, out x, out y of each thing in its place, then the goal
+    ways[len(order) :, :2] = goal
     for k in range(len(order)):
         _enter(ways, k, starts[order[k]], ends[order[k]], flips[k])
     still = fixed[order]
@@ -100,7 +104,7 @@ def _reverse(order: NDArray[np.int64], flips: NDArray[np.bool_], ways: Floats, s
 def _turn_round(
     order: NDArray[np.int64], flips: NDArray[np.bool_], ways: Floats, still: NDArray[np.bool_], x: float, y: float, reach: int
 ) -> float:
-    n = len(ways)
+    n = len(order)
     gained = 0.0
     for i in range(n):
         px, py = (x, y) if i == 0 else (ways[i - 1, 2], ways[i - 1, 3])
@@ -114,7 +118,7 @@ def _turn_round(
                 back += np.hypot(inner_x - out_x, inner_y - out_y)
             inner_x, inner_y = in_x, in_y
             last_x, last_y = _turned(ways, still, i)[2:]
-            after = 0.0 if j + 1 == n else np.hypot(ways[j + 1, 0] - last_x, ways[j + 1, 1] - last_y)
+            after = 0.0 if j + 1 == len(ways) else np.hypot(ways[j + 1, 0] - last_x, ways[j + 1, 1] - last_y)
             change = before + forth + _gap(ways, j, j + 1, x, y) - np.hypot(in_x - px, in_y - py) - back - after
             if change > GAIN_MM:
                 _reverse(order, flips, ways, still, i, j)
@@ -128,13 +132,13 @@ def _move(
     order: NDArray[np.int64], flips: NDArray[np.bool_], ways: Floats, still: NDArray[np.bool_], x: float, y: float, reach: int
 ) -> float:
     """Up to MOST_MOVED neighbours cut out and put elsewhere: by three reversals, or two where they are turned on the way."""
-    n = len(ways)
+    n = len(order)
     gained = 0.0
     for i in range(n):
         for many in range(1, min(MOST_MOVED, n - i) + 1):
             last = i + many - 1
             saved = _gap(ways, i - 1, i, x, y) + _gap(ways, last, last + 1, x, y)
-            if last + 1 < n:
+            if last + 1 < len(ways):
                 fx, fy = (x, y) if i == 0 else (ways[i - 1, 2], ways[i - 1, 3])
                 saved -= np.hypot(ways[last + 1, 0] - fx, ways[last + 1, 1] - fy)
             if saved <= GAIN_MM:
@@ -145,7 +149,7 @@ def _move(
                     continue
                 kx, ky = (x, y) if k < 0 else (ways[k, 2], ways[k, 3])
                 added = np.hypot(ways[i, 0] - kx, ways[i, 1] - ky) - _gap(ways, k, k + 1, x, y)
-                if k + 1 < n:
+                if k + 1 < len(ways):
                     added += np.hypot(ways[k + 1, 0] - ways[last, 2], ways[k + 1, 1] - ways[last, 3])
                 if saved - added > best:
                     best, to = saved - added, k

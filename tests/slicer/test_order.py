@@ -13,6 +13,9 @@ from slicer.speed import _slowed
 from tests.shapes import box, tee
 from tests.slicer.hand import profile, whole
 
+STANDARD = profile().process
+STRAIGHT = profile("process.combing=false").process
+
 
 def line(x0, y0, x1, y1, rank=3):
     return Bead(Kind.INFILL, np.array([[x0, y0], [x1, y1]], dtype=float), 0.45, rank)
@@ -20,14 +23,14 @@ def line(x0, y0, x1, y1, rank=3):
 
 def test_lines_are_visited_from_the_nearest_end():
     beads = [line(0, 9, 9, 9), line(0, 0, 9, 0), line(0, 3, 9, 3)]
-    placed = ordered(beads, Polygons.square((10, 10)), 0.45, np.array([0.0, 0.0]), 1.5)
+    placed = ordered(beads, Polygons.square((10, 10)), STANDARD, np.array([0.0, 0.0]))
     assert [tuple(p.points[0]) for p in placed] == [(0, 0), (9, 3), (0, 9)]
 
 
 def test_an_island_is_finished_before_the_next_begins():
     section = Polygons.square((10, 10), True) + Polygons.square((10, 10), True).translate((20, 0))
     beads = [line(x, y, x + 1, y, rank) for rank in (-1, 0, 2) for x in (-3, 17) for y in (0, 2)]
-    placed = ordered(beads, section, 0.45, np.array([0.0, 0.0]), 1.5)
+    placed = ordered(beads, section, STANDARD, np.array([0.0, 0.0]))
     assert [p.points[0][0] > 10 for p in placed] == [False] * 6 + [True] * 6
     assert [p.bead.rank for p in placed] == [-1, -1, 0, 0, 2, 2] * 2
 
@@ -35,20 +38,20 @@ def test_an_island_is_finished_before_the_next_begins():
 def test_an_island_in_a_hole_is_an_island_of_its_own():
     section = Polygons.square((30, 30), True) - Polygons.square((20, 20), True) + Polygons.square((6, 6), True)
     beads = [line(-1, 0, 1, 0, 0), line(-13, -13, -13, 13, 0), line(-1, 1, 1, 1, 2), line(-12, -13, -12, 13, 2)]
-    placed = ordered(beads, section, 0.45, np.array([-13.0, -13.0]), 1.5)
+    placed = ordered(beads, section, STANDARD, np.array([-13.0, -13.0]))
     assert [p.points[0][0] < -10 for p in placed] == [True, True, False, False]
 
 
 def test_a_travel_inside_the_section_does_not_retract_and_one_across_a_hole_does():
     section = Polygons.square((20, 20)) - Polygons.square((4, 4)).translate((8, 8))
     beads = [line(1, 5, 5, 5), line(15, 5, 19, 5), line(15, 10, 19, 10, 4), line(1, 10, 5, 10, 5)]
-    placed = ordered(beads, section, 0.45, np.array([0.9, 5.0]), 1.5)
+    placed = ordered(beads, section, STRAIGHT, np.array([0.9, 5.0]))
     assert [p.retract for p in placed] == [False, False, False, True]
 
 
 def test_a_short_travel_never_retracts():
     apart = Polygons.square((2, 2)) + Polygons.square((2, 2)).translate((3, 0))
-    placed = ordered([line(0.5, 1, 1.7, 1), line(3.1, 1, 4, 1)], apart, 0.45, np.array([0.5, 1.0]), 1.5)
+    placed = ordered([line(0.5, 1, 1.7, 1), line(3.1, 1, 4, 1)], apart, STANDARD, np.array([0.5, 1.0]))
     assert [p.retract for p in placed] == [False, False]
 
 

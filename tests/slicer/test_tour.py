@@ -1,0 +1,55 @@
+"""Short orders against brute force."""
+
+from itertools import permutations, product
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slicer.tour import _greedy, tour
+
+NO_GOAL = np.zeros((0, 2))
+
+
+def things(seed, count):
+    """Starts, ends and whether they are fixed, of random things."""
+    random = np.random.default_rng(seed)
+    starts = random.uniform(0, 50, (count, 2))
+    return starts, starts + random.uniform(-15, 15, (count, 2)), random.random(count) < 0.4
+
+
+def travel(starts, ends, order, flips, goal=NO_GOAL):
+    """Length of all travels of an order, from the origin."""
+    ways = [(ends[k], starts[k]) if flip else (starts[k], ends[k]) for k, flip in zip(order, flips, strict=True)]
+    stops = [np.zeros(2), *(point for way in ways for point in way), *goal]
+    return sum(float(np.hypot(*(b - a))) for a, b in zip(stops[::2], stops[1::2], strict=False))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6), st.integers(1, 5), st.booleans())
+def test_a_tour_of_few_things_is_close_to_the_shortest_there_is(seed, count, goal):
+    starts, ends, fixed = things(seed, count)
+    target = np.array([[25.0, 25.0]]) if goal else NO_GOAL
+    order, flips = tour(starts, ends, fixed, 0.0, 0.0, target)
+    ways = product(*([False] if still else [False, True] for still in fixed))
+    every = ((p, [turns[k] for k in p]) for turns in ways for p in permutations(range(count)))
+    best = min(travel(starts, ends, p, turned, target) for p, turned in every)
+    assert travel(starts, ends, order, flips, target) <= 1.3 * best + 1e-9
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6), st.integers(1, 80))
+def test_a_tour_has_everything_once_turns_nothing_fixed_and_is_never_longer_than_the_greedy_one(seed, count):
+    starts, ends, fixed = things(seed, count)
+    order, flips = tour(starts, ends, fixed, 0.0, 0.0, NO_GOAL)
+    assert sorted(order) == list(range(count))
+    assert not (flips & fixed[order]).any()
+    assert travel(starts, ends, order, flips) <= travel(starts, ends, *_greedy(starts, ends, fixed, 0.0, 0.0)) + 1e-6
+
+
+def test_exchanges_save_a_tenth_of_the_travel_between_many_short_lines():
+    starts, ends, _ = things(3, 3000)
+    ends = starts + 0.05 * (ends - starts)
+    loose = np.zeros(3000, dtype=bool)
+    shorter = travel(starts, ends, *tour(starts, ends, loose, 0.0, 0.0, NO_GOAL))
+    assert shorter < 0.92 * travel(starts, ends, *_greedy(starts, ends, loose, 0.0, 0.0))
