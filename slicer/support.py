@@ -1,115 +1,182 @@
-"""Support: columns straight down from hanging places to what stands below, and the lines that fill them."""
+"""Support: from hanging places down to ground, what of it is printed, and what hanging places it cannot hold."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import radians, tan
+
+import numpy as np
 
 from profiles.process import Process
-from slicer.bead import Bead, spacing_mm
+from slicer.branch import Growth
+from slicer.columns import Columns
 from slicer.contact import RIM_MM
-from slicer.hatch import hatched
-from slicer.order import OUTSIDE
-from slicer.paths import Kind
-from slicer.polygons import RESOLUTION_MM, Polygons, closed, contours, grown, opened, sealed, united
+from slicer.heights import Heights
+from slicer.polygons import Polygons, grown, opened, sealed, united
+from slicer.room import EVEN_MM, Room, leaning, rooms
+from slicer.tree import Tree
 
-LEAST_MM2 = 1.0  # a column thinner than this falls over, and so small a place holds itself
-LEAST_LINES = 3  # an island with fewer lines gets its outline instead
+LEAST_MM2 = 1e-3  # places smaller than this are rounding
+SLACK_MM = 0.01  # what rounding may add to the lean
 
 
 @dataclass(frozen=True, eq=False)
 class Supports:
-    """areas: where each layer prints support; unsupported_mm2: hanging area, seen from above, that none could reach."""
+    """Of every layer: where support is printed, where it is dense, and which hanging places nothing holds."""
 
     areas: tuple[Polygons, ...]
-    unsupported_mm2: float
+    dense: tuple[Polygons, ...]
+    missed: tuple[Polygons, ...]
+
+    @property
+    def unsupported_mm2(self) -> float:
+        """Hanging area, seen from above, that none could reach."""
+        return float(sum(place.area() for place in self.missed))
 
 
 def supports(
     hanging: Sequence[Polygons],
     outlines: Sequence[Polygons],
+    at: Heights,
     process: Process,
     below: Polygons | None,
-    later: Callable[[], Sequence[Polygons]],
+    forbidden: Sequence[Polygons],
+    far_mm: float,
 ) -> Supports:
     """Support below the hanging places of each layer.
 
-    A column goes straight down to the part itself, to `below` (plastic of earlier parts just under the base plane) or to
-    the platform (below is None). It must not stand where a later part will be: later() gives their sections per layer.
+    below: plastic of earlier parts just under the base plane; None: the platform. forbidden: per layer what later parts
+    must find empty. far_mm: no part and no support is farther than this from the origin.
     """
-    if process.support == "none" or all(place.is_empty() for place in hanging):
-        return Supports((Polygons(),) * len(outlines), 0.0)
-    blocked = [s if s.is_empty() else grown(s, process.support_distance_mm) for s in later()]
-    columns = _columns(hanging, outlines, blocked)
-    if below is not None or any(not b.is_empty() for b in blocked):
-        columns = _rooted(columns, outlines, below)
-    missed = [hanging[0], *(h - grown(c, RIM_MM) for h, c in zip(hanging[1:], columns, strict=False) if not h.is_empty())]
-    unsupported = sum(place.area() for place in missed)
-    return Supports(_printed(columns, outlines, process, below), unsupported if unsupported >= LEAST_MM2 else 0.0)
+    nothing = (Polygons(),) * len(outlines)
+    wanted = _worthwhile(hanging, process.support_least_mm2)
+    count = max((k for k, place in enumerate(wanted) if not place.is_empty()), default=-1)
+    if process.support == "none" or count < 0:
+        return Supports(nothing, nothing, nothing)
+    room = rooms(outlines, at, process, below, forbidden[:count], far_mm)
+    bodies, contacts = _descended(wanted, room, process)
+    printed = _standing(bodies, room, process, below is None)
+    missed = _missed(wanted, printed, outlines, room, process)
+    dense = _dense(printed, contacts, room, process)
+    if below is None:
+        foot = leaning(printed[0], process.support_foot_mm) - grown(outlines[0], process.support_distance_mm)
+        printed[0] = foot - forbidden[0]
+    rest = nothing[len(printed) :]
+    return Supports((*printed, *rest), (*dense, *rest), missed)
 
 
-def _columns(hanging: Sequence[Polygons], outlines: Sequence[Polygons], blocked: Sequence[Polygons]) -> list[Polygons]:
-    """Everything below the hanging places down to the part's own surface."""
-    column = Polygons()
-    columns = [column] * len(outlines)
-    for i in range(len(outlines) - 2, -1, -1):
-        if not hanging[i + 1].is_empty():
-            column = (column + grown(hanging[i + 1], RIM_MM)).simplify(RESOLUTION_MM)
-        if not column.is_empty():
-            column = column - outlines[i]
-        if not column.is_empty() and not blocked[i].is_empty():
-            column = column - blocked[i]
-        columns[i] = column
-    return columns
+def _worthwhile(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
+    """The hanging places without those that, seen from above, are too small to matter."""
+    places = [grown(place, RIM_MM) for place in hanging if not place.is_empty()]
+    islands = united(places).decompose()
+    small = united([island for island in islands if island.area() < least_mm2])
+    if small.is_empty():
+        return list(hanging)
+    kept = [place if place.is_empty() else place - small for place in hanging]
+    return [place if place.area() >= LEAST_MM2 else Polygons() for place in kept]
 
 
-def _rooted(columns: Sequence[Polygons], outlines: Sequence[Polygons], below: Polygons | None) -> list[Polygons]:
-    """What of the columns stands on the part, on earlier plastic or on the platform without a break."""
-    rooted: list[Polygons] = []
-    for i, column in enumerate(columns):
-        if column.is_empty() or (i == 0 and below is None):
-            rooted.append(column)
-        else:
-            ground = rooted[-1] + outlines[i - 1] if i else below
-            rooted.append(column ^ sealed(ground, RIM_MM))
-    return rooted
+def _window(k: int, room: Room, process: Process) -> range:
+    """The layers, from the highest down, on which a hanging place of layer k may rest.
+
+    The distance across keeps support as much lower under a slope that is just too flat.
+    """
+    drop = float(room.bottom_mm[k]) - process.support_gap_mm
+    slack = process.support_distance_mm / max(tan(radians(process.self_supporting_angle_deg)), 0.5)
+    highest = int(np.searchsorted(room.top_mm, drop + EVEN_MM, side="right")) - 1
+    lowest = int(np.searchsorted(room.top_mm, drop - slack - EVEN_MM))
+    return range(highest, min(lowest, highest) - 1, -1) if highest >= 0 else range(0)
 
 
-def _printed(
-    columns: Sequence[Polygons], outlines: Sequence[Polygons], process: Process, below: Polygons | None
-) -> tuple[Polygons, ...]:
-    """Columns with their gaps to the part, without what is too small or stands on nothing."""
-    gap = ceil(process.support_gap_mm / process.layer_height_mm - 1e-6)
+def _descended(wanted: Sequence[Polygons], room: Room, process: Process) -> tuple[list[Polygons], list[Polygons]]:
+    """Support from the top down: per layer all of it, and where it begins."""
+    count, radius = len(room.reached), room.radius_mm
+    grows: Columns | Tree = Tree(Growth.of(process, radius)) if process.support_style == "tree" else Columns(Polygons())
+    bodies, contacts = [Polygons()] * count, [Polygons()] * count
+    beginning: dict[int, list[tuple[Polygons, int]]] = {}
+    for k, place in enumerate(wanted):
+        span = _window(k, room, process)
+        if not place.is_empty() and len(span):
+            beginning.setdefault(min(span[0], count - 1), []).append((place, span[-1]))
+    pending: list[tuple[Polygons, int]] = []
+    for m in range(count - 1, -1, -1):
+        pending += beginning.get(m, [])
+        area = grows.area
+        if pending:
+            contact = _contact(united([place for place, _ in pending]), area, room.reached[m], radius)
+            grows = grows.joined(contact, float(room.top_mm[m]))
+            area, contacts[m] = grows.area, contact
+        if not area.is_empty():
+            bodies[m] = leaning(area, radius)
+            grows = grows.lowered(room, m) if m else grows
+        left = [(place - bodies[m], last) for place, last in pending if last < m]
+        pending = [(place, last) for place, last in left if place.area() >= LEAST_MM2]
+    return bodies, contacts
+
+
+def _contact(place: Polygons, present: Polygons, reached: Polygons, radius: float) -> Polygons:
+    """Reached places whose discs cover a hanging place as far as can be, beside the support already present."""
+    bare = place if present.is_empty() else place - leaning(present, radius)
+    if bare.area() < LEAST_MM2:
+        return Polygons()
+    core = grown(bare, -radius)
+    contact = (bare if core.is_empty() else core + (bare - grown(core, radius))) ^ reached
+    beside = bare - leaning(contact, radius)
+    return contact + (leaning(beside, radius) ^ reached) if beside.area() >= LEAST_MM2 else contact
+
+
+def _standing(bodies: Sequence[Polygons], room: Room, process: Process, on_platform: bool) -> list[Polygons]:
+    """Support from the ground up: what lies within the lean of the layer below or on ground, wide enough for a bead."""
     printed: list[Polygons] = []
-    for i, column in enumerate(columns):
-        if column.is_empty():
-            printed.append(column)
+    least = 0.5 * np.pi * room.radius_mm**2
+    for m, body in enumerate(bodies):
+        if body.is_empty() or (m == 0 and on_platform):
+            printed.append(body)
             continue
-        over, under = outlines[i + 1 : i + 1 + gap], list(outlines[max(i - gap, 0) : i])
-        if below is not None and i < gap:
-            under.append(below)
-        free = column - united([grown(outlines[i], process.support_distance_mm), *over, *under])
-        free = opened(free, 0.5 * process.line_width_mm)
-        islands = [island for island in free.decompose() if island.area() >= LEAST_MM2]
-        if i > 0:
-            roots = list(outlines[max(i - gap - 1, 0) : i]) + ([below] if below is not None and i <= gap else [])
-            footing = grown(united([printed[-1], *roots]), process.line_width_mm)
-            if (free - footing).area() > 0.0:
-                islands = [island for island in islands if not (island ^ footing).is_empty()]
-        printed.append(Polygons.compose(islands) if islands else Polygons())
-    return tuple(printed)
+        carried = leaning(printed[-1], float(room.lean_mm[m]) + SLACK_MM) if m else Polygons()
+        if (body - carried).area() >= LEAST_MM2:
+            stands = opened(body ^ (carried + room.ground[m]), 0.45 * process.line_width_mm)
+            islands = [island for island in stands.decompose() if island.area() >= least]
+            body = Polygons.compose(islands) if islands else Polygons()
+        printed.append(body)
+    return printed
 
 
-def support_beads(area: Polygons, process: Process, height_mm: float) -> list[Bead]:
-    """Sparse zigzags, the same lines in every layer so that they stand on each other."""
-    beads: list[Bead] = []
-    if area.is_empty():
-        return beads
-    width = process.line_width_mm
-    apart = spacing_mm(width, height_mm) / process.support_density
-    for island in area.decompose():
-        inner = grown(island, -0.5 * width)
-        lines = hatched(inner, grown(island, -0.25 * width), process.infill_angle_deg, apart, 2.0 * apart)
-        if sum(len(line) // 2 for line in lines) < LEAST_LINES:
-            lines = [closed(loop) for loop in contours(inner)]
-        beads += [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in lines]
-    return beads
+def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], room: Room, process: Process) -> list[Polygons]:
+    """Where printed support is next to the part: under what it holds and over what it stands on."""
+    roofs, floors = process.support_interface_layers, process.support_bottom_interface_layers
+    dense = []
+    for m, area in enumerate(printed):
+        if area.is_empty():
+            dense.append(area)
+            continue
+        over = [leaning(c, room.radius_mm) for c in contacts[m : m + roofs] if not c.is_empty()]
+        under = [g for g in room.ground[max(m - floors + 1, 0) : m + 1] if not g.is_empty()]
+        near = opened(area ^ united([*over, *under]), 0.45 * process.line_width_mm)
+        dense.append(near)
+    return dense
+
+
+def _missed(
+    wanted: Sequence[Polygons], printed: Sequence[Polygons], outlines: Sequence[Polygons], room: Room, process: Process
+) -> tuple[Polygons, ...]:
+    """What of the hanging places neither lies over printed support, half a bead beyond its edge, nor spans from there to
+    the part.
+    """
+    missed = []
+    half = 0.5 * process.line_width_mm
+    for k, place in enumerate(wanted):
+        if place.is_empty():
+            missed.append(place)
+            continue
+        held = united([printed[m] for m in _window(k, room, process) if m < len(printed)])
+        held = held if held.is_empty() else grown(held, half)
+        bare = place - held
+        if k and not held.is_empty() and bare.area() >= LEAST_MM2:
+            x0, y0, x1, y1 = bare.bounds()
+            reach = 2.0 * process.support_distance_mm + 1.0
+            window = Polygons.square((x1 - x0 + 2.0 * reach, y1 - y0 + 2.0 * reach)).translate((x0 - reach, y0 - reach))
+            spanned = sealed((held + outlines[k - 1]) ^ window, 0.5 * process.support_distance_mm + RIM_MM)
+            bare = bare - spanned
+        missed.append(bare if bare.area() >= LEAST_MM2 else Polygons())
+    small = _worthwhile(missed, process.support_least_mm2)
+    return tuple(small)

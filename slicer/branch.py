@@ -1,0 +1,149 @@
+"""Branch: a piece of support on its way down; it shrinks to a trunk, and trunks lean towards each other until they are one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, hypot, pi, radians, tan
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.polygons import Polygons, contours, united
+from slicer.room import EVEN_MM, Room, leaning
+
+CORNERS = 12  # of a trunk's outline
+THICKEST_MM = 4.0  # a trunk's radius: enough for any part that fits a machine
+MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
+LEAST_MM2 = 1e-4  # places smaller than this are rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """The places of a branch's middle in one layer, all within `radius` of x, y; top_mm: where the branch ends.
+
+    full: the area has every place within the radius.
+    """
+
+    area: Polygons
+    x: float
+    y: float
+    radius: float
+    top_mm: float
+    full: bool = False
+
+    def shrunk(self, radius: float) -> "Branch":
+        """Every place moved towards the middle, by no more than the radius becomes less."""
+        share = radius / self.radius
+        matrix = np.array([[share, 0.0, (1.0 - share) * self.x], [0.0, share, (1.0 - share) * self.y]])
+        return Branch(self.area.transform(matrix), self.x, self.y, radius, self.top_mm)
+
+
+def branch_of(area: Polygons, top_mm: float) -> Branch:
+    """A branch through all places of an area."""
+    points = np.concatenate(contours(area))
+    x, y = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return Branch(area, float(x), float(y), float(np.hypot(points[:, 0] - x, points[:, 1] - y).max()), top_mm)
+
+
+def trunk(x: float, y: float, radius: float, top_mm: float) -> Branch:
+    """A round branch."""
+    around = Polygons.circle(radius / cos(pi / CORNERS), CORNERS)
+    return Branch(around.translate((x, y)), x, y, radius, top_mm, True)
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """How thick trunks are: radius of their places at the top, its growth per mm downward."""
+
+    least_mm: float
+    per_mm: float
+
+    @classmethod
+    def of(cls, process: Process, radius_mm: float) -> "Growth":
+        """The growth of a process whose beads reach radius_mm around each place."""
+        slope = tan(radians(process.support_branch_growth_deg))
+        return cls(max(0.5 * process.support_branch_mm - radius_mm, 0.1 * radius_mm), slope)
+
+    def radius_mm(self, branch: Branch, z_mm: float) -> float:
+        """Of a trunk at a height."""
+        return min(self.least_mm + self.per_mm * max(branch.top_mm - z_mm, 0.0), max(THICKEST_MM, self.least_mm))
+
+
+def lowered(branches: Sequence[Branch], room: Room, layer: int, growth: Growth) -> list[Branch]:
+    """The branches of a layer in the layer below: every place of the former is within the lean of one of the latter, or
+    on ground.
+    """
+    z, lean, reached = float(room.top_mm[layer - 1]), float(room.lean_mm[layer]), room.reached[layer - 1]
+    wished = _wished(branches, z, lean, float(room.top_mm[layer]) - z, growth)
+    bad = united([branch.area for branch in wished]) - reached
+    if bad.area() < LEAST_MM2:
+        return _apart(wished)
+    low: list[Branch] = []
+    for old, new in zip(branches, wished, strict=True):
+        if (new.area ^ bad).area() < LEAST_MM2:
+            low.append(new)
+        else:
+            low += _squeezed(old, reached, room.ground[layer], lean, growth.radius_mm(old, z))
+    return _apart(low)
+
+
+def _wished(branches: Sequence[Branch], z_mm: float, lean: float, rise: float, growth: Growth) -> list[Branch]:
+    """Where the branches would go if nothing was in their way: wide ones shrink, trunks go to meet the nearest trunk."""
+    thick = [growth.radius_mm(branch, z_mm) for branch in branches]
+    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + EVEN_MM]
+    goals = _goals(np.array([[branches[k].x, branches[k].y] for k in trunks]), z_mm * lean / rise)
+    goal_of = dict(zip(trunks, goals, strict=True))
+    wished = []
+    for k, branch in enumerate(branches):
+        if branch.radius - lean > thick[k]:
+            wished.append(branch.shrunk(branch.radius - lean))
+            continue
+        x, y = goal_of.get(k, (branch.x, branch.y))
+        away = hypot(x - branch.x, y - branch.y)
+        share = 1.0 if away <= lean else lean / away
+        x, y = branch.x + share * (x - branch.x), branch.y + share * (y - branch.y)
+        wished.append(trunk(x, y, thick[k], branch.top_mm))
+    return wished
+
+
+def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
+    """For each trunk half way to the nearest other one, or its own place; reach_mm: how far it can lean down to the ground."""
+    if len(at) < 2:
+        return [(float(x), float(y)) for x, y in at]
+    apart = np.hypot(at[:, None, 0] - at[None, :, 0], at[:, None, 1] - at[None, :, 1])
+    np.fill_diagonal(apart, np.inf)
+    nearest = apart.argmin(axis=1)
+    meet = apart[np.arange(len(at)), nearest] <= 2.0 * MEETING * reach_mm
+    goals = np.where(meet[:, None], 0.5 * (at + at[nearest]), at)
+    return [(float(x), float(y)) for x, y in goals]
+
+
+def _squeezed(branch: Branch, reached: Polygons, ground: Polygons, lean: float, thick: float) -> list[Branch]:
+    """A branch that is in something's way: it stays where it is, or the part of it that can goes on, or it ends on ground."""
+    spare = 2.0 * lean + 0.1
+    side = 2.0 * (branch.radius + spare)
+    window = Polygons.square((side, side), True).translate((branch.x, branch.y))
+    near = reached ^ window
+    if branch.radius <= thick + EVEN_MM:
+        straight = trunk(branch.x, branch.y, branch.radius, branch.top_mm)
+        if (straight.area - near).area() < LEAST_MM2:
+            return [straight]
+        if 2.0 * (branch.area - ground).area() < branch.area.area():
+            return []
+    rest = branch.area - near
+    if rest.area() < LEAST_MM2:
+        return [branch]
+    rest = rest - ground
+    kept = (branch.area ^ near) + (leaning(rest, lean) ^ near) if rest.area() >= LEAST_MM2 else branch.area ^ near
+    return [branch_of(island, branch.top_mm) for island in kept.decompose() if island.area() >= LEAST_MM2]
+
+
+def _apart(branches: list[Branch]) -> list[Branch]:
+    """Without branches that lie wholly inside a trunk."""
+    if len(branches) < 2:
+        return branches
+    x, y, radius, full = np.array([[b.x, b.y, b.radius, b.full] for b in branches]).T
+    deep = radius[None, :] - radius[:, None] - np.hypot(x[:, None] - x[None, :], y[:, None] - y[None, :])
+    rank = np.arange(len(branches))
+    inside = (deep >= -1e-9) & (full[None, :] > 0) & ((radius[None, :] > radius[:, None]) | (rank[None, :] < rank[:, None]))
+    return [branches[k] for k in np.flatnonzero(~inside.any(axis=1))]

@@ -1,0 +1,29 @@
+"""Columns: support that goes straight down, and aside only where there is no ground below."""
+
+from dataclasses import dataclass
+
+from slicer.polygons import Polygons
+from slicer.room import FINE_MM, Room, leaning
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The places of a layer's support."""
+
+    area: Polygons
+
+    def joined(self, contact: Polygons, top_mm: float) -> "Columns":
+        """With what begins in this layer."""
+        return self if contact.is_empty() else Columns((self.area + contact).simplify(FINE_MM))
+
+    def lowered(self, room: Room, layer: int) -> "Columns":
+        """What carries a layer's support in the layer below."""
+        stuck = self.area - room.reached[layer - 1]
+        if stuck.is_empty():
+            return self
+        straight = self.area ^ room.reached[layer - 1]
+        stuck = stuck - room.ground[layer]
+        if stuck.is_empty():
+            return Columns(straight)
+        aside = leaning(stuck, float(room.lean_mm[layer])) ^ room.reached[layer - 1]
+        return Columns((straight + aside).simplify(FINE_MM))

@@ -1,0 +1,54 @@
+"""Props: the beads of a layer's support: outlines, sparse lines that stand on each other, dense lines next to the part."""
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import Bead, spacing_mm
+from slicer.hatch import hatched
+from slicer.order import OUTSIDE
+from slicer.paths import Kind
+from slicer.polygons import Polygons, closed, contours, grown, opened
+
+JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
+SEAM = 0.1  # of a line width: lines overlap the outline by this and so hold on to it
+
+
+def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: float, foot: bool) -> list[Bead]:
+    """The beads of a layer's support, its dense places as an interface; foot: the first layer on the platform."""
+    if area.is_empty():
+        return []
+    width = process.line_width_mm
+    spacing = spacing_mm(width, height_mm)
+    beads = [
+        Bead(Kind.SUPPORT, closed(loop), width, OUTSIDE)
+        for level in range(process.support_walls)
+        for loop in contours(grown(area, -0.5 * width - level * spacing))
+    ]
+    edge = process.support_walls * spacing
+    inner = grown(area, SEAM * width - edge) if edge else area
+    roof = opened(inner ^ dense, 0.5 * width) if not dense.is_empty() else dense
+    rest = inner if roof.is_empty() else opened(inner - roof, 0.25 * width)
+    density = process.support_foot_density if foot else process.support_density
+    beads += [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in _sparse(rest, density, process, spacing)]
+    lines = _lines(roof, process.infill_angle_deg + 90.0, process.support_interface_density, process, spacing)
+    return beads + [Bead(Kind.SUPPORT_INTERFACE, line, width, OUTSIDE) for line in lines]
+
+
+def _sparse(area: Polygons, density: float, process: Process, spacing: float) -> list[Floats]:
+    angle = process.infill_angle_deg
+    if process.support_pattern == "lines":
+        return _lines(area, angle, density, process, spacing)
+    return [line for turn in (0.0, 90.0) for line in _lines(area, angle + turn, 0.5 * density, process, spacing)]
+
+
+def _lines(area: Polygons, angle_deg: float, density: float, process: Process, spacing: float) -> list[Floats]:
+    """Zigzags; an island that no line meets gets its outline where there is no other."""
+    width = process.line_width_mm
+    apart = spacing / density
+    lines: list[Floats] = []
+    for island in area.decompose() if not area.is_empty() else []:
+        inner = grown(island, -0.5 * width)
+        found = hatched(inner, grown(island, -0.25 * width), angle_deg, apart, JOIN * apart)
+        if not found and not process.support_walls:
+            found = [closed(loop) for loop in contours(inner)]
+        lines += found
+    return lines

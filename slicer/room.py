@@ -1,0 +1,83 @@
+"""Room: where support may stand in each layer, and from where it finds ground within the angle that it may lean.
+
+Everything here is about the middle of a branch: a place is free when a disc of the branch's least radius around it keeps
+all gaps, and reached when a chain of such places, each within the lean of the one below, leads down to ground.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import radians, tan
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.heights import Heights
+from slicer.polygons import JoinType, Polygons, grown, united
+
+COARSE_MM = 0.03  # sections are simplified by this before they are grown, and grown by as much more
+FINE_MM = 0.005  # reached places are simplified by this, and lean by as much less
+EVEN_MM = 1e-6  # heights nearer than this are equal
+SEGMENTS = 16  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """Per layer: free, ground to stand on (grown by the radius), what is reached, and the lean from the layer below, mm."""
+
+    radius_mm: float
+    bottom_mm: Floats
+    top_mm: Floats
+    lean_mm: Floats
+    ground: tuple[Polygons, ...]
+    reached: tuple[Polygons, ...]
+
+
+def leaning(area: Polygons, distance_mm: float) -> Polygons:
+    """The area grown with round corners by at most a distance."""
+    return area.offset(distance_mm, JoinType.Round, 2.0, SEGMENTS) if distance_mm > 0.0 else area
+
+
+def rooms(
+    outlines: Sequence[Polygons],
+    at: Heights,
+    process: Process,
+    below: Polygons | None,
+    forbidden: Sequence[Polygons],
+    far_mm: float,
+) -> Room:
+    """The room of as many layers as there are `forbidden`, for the part with these outlines.
+
+    below: plastic just under the base plane, None: the platform, which is ground everywhere up to far_mm from the origin.
+    """
+    count, radius = len(forbidden), process.line_width_mm
+    top = at.tip_mm
+    bottom = top - at.height_mm
+    angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
+    lean = at.height_mm[:count] * tan(radians(angle))
+    solid = [s if s.is_empty() else s.simplify(COARSE_MM) for s in outlines]
+    wide = [s if s.is_empty() else grown(s, radius + COARSE_MM) for s in solid]
+    tall = [s if s.is_empty() else grown(s, radius + process.support_distance_mm + COARSE_MM) for s in solid[:count]]
+    base = None if below is None else grown(below, radius)
+    root = int(np.searchsorted(np.maximum(bottom, 0.0), process.support_bottom_gap_mm - EVEN_MM))
+    ground: list[Polygons] = []
+    reached: list[Polygons] = []
+    for m in range(count):
+        near = min(int(np.searchsorted(top, bottom[m] - process.support_bottom_gap_mm + EVEN_MM, side="right")), m)
+        over = int(np.searchsorted(bottom, top[m] + process.support_gap_mm - EVEN_MM))
+        blocked = [tall[m], *wide[near:m], *wide[m + 1 : over], forbidden[m]]
+        whole = united([b for b in blocked if not b.is_empty()])
+        stands = [wide[near - 1]] if near > 0 and process.support_on_part else []
+        if base is not None and m == root:
+            stands.append(base)
+        ground.append(united(stands))
+        if m == 0 and below is None:
+            start = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True)
+        else:
+            start = ground[m] if m == 0 or reached[-1].is_empty() else _leant(reached[-1], float(lean[m])) + ground[m]
+        reached.append(start if start.is_empty() else (start - whole).simplify(FINE_MM))
+    return Room(radius, bottom, top, lean, tuple(ground), tuple(reached))
+
+
+def _leant(reached: Polygons, lean_mm: float) -> Polygons:
+    return leaning(reached, lean_mm - min(FINE_MM, 0.1 * lean_mm))
