@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from mdp.mesh import Floats
-from slicer.paths import Kind
+from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
 ROUND_SIDES = 1.0 - pi / 4.0
@@ -64,3 +64,12 @@ def spacing_mm(width_mm: float, height_mm: float) -> float:
 def width_for_mm(spacing: float, height_mm: float) -> float:
     """Width of the bead that fills a strip of that width between two others: the inverse of spacing_mm."""
     return spacing + height_mm * ROUND_SIDES
+
+
+def bulged(width_mm: float, height_mm: float, free_sides: int, most_mm: float) -> float:
+    """Flow of a bead that fills the rectangle of its width on its free sides, where nothing covers its round ones.
+
+    The bead bulges by most_mm at most: half of height times (1 - pi/4) would fill the rectangle.
+    """
+    bulge = min(0.5 * height_mm * ROUND_SIDES, most_mm)
+    return 1.0 + free_sides * bulge * height_mm / bead_area_mm2(width_mm, height_mm)

@@ -19,16 +19,16 @@ from slicer.chords import chains
 from slicer.halfedges import opposites
 
 SPUR = 1.0  # a branch shorter than this many widths is a corner of the boundary, not a limb
-EVEN = 1.2  # widths within one power of this factor are printed as one bead
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """points: (n, 2) mm; width_mm: mean width of the place along it; share: area of the place / area along the lines."""
+    """points: (n, 2) mm; width_mm: mean width of the place along it; place, area_mm2: which place, and its whole area."""
 
     points: Floats
     width_mm: float
-    share: float
+    place: int
+    area_mm2: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,11 @@ class _Chain:
         return float(self.steps.sum())
 
 
-def centrelines(outlines: Sequence[Floats], step_mm: float) -> list[Line]:
-    """Lines down the middle of narrow polygons given by their contours, which are sampled at least every step_mm."""
+def centrelines(outlines: Sequence[Floats], step_mm: float, even: float, shortest_mm: float) -> list[Line]:
+    """Lines down the middle of narrow polygons given by their contours, which are sampled at least every step_mm.
+
+    Lines are cut where their width changes by the factor `even`, but not into pieces shorter than shortest_mm.
+    """
     loops = [_sampled(loop, step_mm) for loop in outlines]
     if not loops:
         return []
@@ -66,7 +69,7 @@ def centrelines(outlines: Sequence[Floats], step_mm: float) -> list[Line]:
         _Chain(points[a:b], widths[a:b], (int(ends[k, 0]), int(ends[k, 1])), int(places[k]))
         for k, (a, b) in enumerate(pairwise(cuts))
     ]
-    return _lines(_merged(_pruned(found)), areas)
+    return _lines(_merged(_pruned(found)), areas, even, shortest_mm)
 
 
 def _sampled(loop: Floats, step_mm: float) -> Floats:
@@ -122,26 +125,27 @@ def _merged(found: list[_Chain]) -> list[_Chain]:
     return list(alive.values())
 
 
-def _lines(found: list[_Chain], areas: Floats) -> list[Line]:
+def _lines(found: list[_Chain], areas: Floats, even: float, shortest_mm: float) -> list[Line]:
     """Chains cut where the width changes."""
-    along = np.zeros(len(areas))
-    for chain in found:
-        along[chain.place] += float(chain.steps @ (0.5 * (chain.widths[1:] + chain.widths[:-1])))
     lines = []
-    for chain in found:
-        share = float(areas[chain.place] / along[chain.place]) if along[chain.place] > 0 else 1.0
-        for a, b in _even(chain.widths):
+    for chain in sorted(found, key=lambda chain: chain.place):
+        for a, b in _even(chain.widths, chain.steps, even, shortest_mm):
             steps = chain.steps[a:b]
             middle = 0.5 * (chain.widths[a:b] + chain.widths[a + 1 : b + 1])
             if steps.sum() > 0:
-                lines.append(Line(chain.points[a : b + 1], float(steps @ middle / steps.sum()), share))
+                lines.append(
+                    Line(chain.points[a : b + 1], float(steps @ middle / steps.sum()), chain.place, float(areas[chain.place]))
+                )
     return lines
 
 
-def _even(widths: Floats) -> list[tuple[int, int]]:
-    """Ranges of steps with nearly one width."""
+def _even(widths: Floats, steps: Floats, even: float, shortest_mm: float) -> list[tuple[int, int]]:
+    """Ranges of steps with nearly one width, none shorter than shortest_mm but where the whole chain is."""
     middle = 0.5 * (widths[1:] + widths[:-1])
     smooth = np.convolve(np.pad(middle, 2, mode="edge"), np.full(5, 0.2), mode="valid")
-    level: Ints = np.round(np.log(np.maximum(smooth, 1e-3)) / np.log(EVEN)).astype(np.int32)
-    cuts = [0, *(np.flatnonzero(np.diff(level)) + 1).tolist(), len(middle)]
-    return list(pairwise(cuts))
+    level: Ints = np.round(np.log(np.maximum(smooth, 1e-3)) / np.log(even)).astype(np.int32)
+    way, cuts = np.concatenate([[0.0], np.cumsum(steps)]), [0]
+    for cut in (np.flatnonzero(np.diff(level)) + 1).tolist():
+        if way[cut] - way[cuts[-1]] >= shortest_mm <= way[-1] - way[cut]:
+            cuts.append(cut)
+    return list(pairwise([*cuts, len(middle)]))

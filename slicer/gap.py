@@ -1,50 +1,94 @@
-"""Gaps: beads for the places that the walls leave because two of them do not fit."""
+"""Gaps: beads for the places that the walls and the skin leave because no pair of beads fits."""
 
+from collections.abc import Iterable
+from itertools import groupby
 from math import pi
 
 import numpy as np
+from numba import njit
 
 from mdp.mesh import Floats
-from slicer.bead import Bead, length_mm, width_for_mm
+from slicer.bead import Bead, bulged, length_mm, width_for_mm
 from slicer.centreline import centrelines
 from slicer.paths import Kind
-from slicer.polygons import Polygons, area_mm2, closed, contours, grown
+from slicer.polygons import Polygons, area_mm2, closed, contours, edges, grown
 
 RANK = 1
-COMPACT = 0.6  # 4 pi area / perimeter^2; a rectangle of 1:3 has 0.59: rounder places get a small ring, longer ones a line
-LEAST_FLOW, MOST_FLOW = 0.5, 1.3
+LEAST_LINE = 0.35  # of the line width: a thinner place of the section stays empty
+LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empty, as PrusaSlicer's classic walls leave it
+FEW_MM2 = 0.25  # of the line width squared: a smaller place between beads stays empty
+COMPACT = 0.55  # 4 pi area / perimeter^2; a rectangle of 1:3 has 0.59: rounder places get a small ring, longer ones a line
+SPARE = 0.015  # of the line width by which a thin wall's bead may reach over the section where that tapers
+LEAST_FLOW, MOST_FLOW = 0.3, 1.3
+SHORTEST = 0.25  # of the line width: what is shorter is no stroke
 STEP = 0.5  # of the line width: sampling of the boundary for the centreline
+LOOSE, CLOSE = (1.2, 1.25), (1.06, 0.4)  # factor of the width and line widths of length in which a bead keeps one width
+
+Stroke = tuple[Floats, float]  # points and width of the place across them
 
 
-def gaps(places: Polygons, between: bool, line_width_mm: float, height_mm: float) -> list[Bead]:
-    """Beads that fill narrow places with their area times height of plastic.
+def gaps(
+    places: Polygons, line_width_mm: float, height_mm: float, section: Polygons | None = None, bulge: float = 0.0
+) -> list[Bead]:
+    """Beads that fill narrow places with their area times height of plastic; none is wider than two lines.
 
-    between: the places lie between walls, so their beads' rounded sides are covered; else they are free on both sides.
-    No bead is narrower than half a line or wider than two.
+    Without a section the places lie between beads, which cover the round sides; no bead is narrower than half a line.
+    Else the places are thin walls of the section: their beads keep inside it, and may bulge over it on both sides by a
+    share of the line width, which makes up for their round sides.
     """
-    rings: list[tuple[Floats, float, float]] = []
-    long: list[Floats] = []
-    for island in places.decompose():
-        loops = contours(island)
-        perimeter = length_mm(closed(loops[0])) if loops else 0.0
-        if len(loops) == 1 and 4.0 * pi * area_mm2(loops[0]) > COMPACT * perimeter**2:
-            rings += _ring(island, perimeter)
-        else:
-            long += loops
-    lines = rings + [(line.points, line.width_mm, line.share) for line in centrelines(long, STEP * line_width_mm)]
-    beads = []
-    for points, across, share in lines:
-        wished = width_for_mm(across, height_mm) if between else across
-        width = min(max(wished, 0.5 * line_width_mm), 2.0 * line_width_mm)
-        flow = share * min(wished / width, 1.0)
-        if length_mm(points) > 0.5 * line_width_mm:
+    beads: list[Bead] = []
+    borders = None if section is None or places.is_empty() else edges(section)
+    for area, strokes in _strokes(places, line_width_mm, *(LOOSE if section is None else CLOSE)):
+        long = [stroke for stroke in strokes if length_mm(stroke[0]) > SHORTEST * line_width_mm]
+        if borders is not None:
+            long = [(points, min(across, 2.0 * (_clearance(borders, points) + SPARE * line_width_mm))) for points, across in long]
+        drawn = sum(length_mm(points) * across for points, across in long)
+        for points, across in long:
+            wished = width_for_mm(across, height_mm) if section is None else across
+            width = min(max(wished, (0.5 if section is None else LEAST_LINE) * line_width_mm), 2.0 * line_width_mm)
+            flow = area / drawn * min(wished / width, 1.0)
+            if section is not None:
+                flow *= bulged(width, height_mm, 2, bulge * line_width_mm)
             beads.append(Bead(Kind.GAP, points, width, RANK, float(np.clip(flow, LEAST_FLOW, MOST_FLOW))))
     return beads
 
 
-def _ring(island: Polygons, perimeter_mm: float) -> list[tuple[Floats, float, float]]:
-    """Centreline, width and share of a ring whose two sides meet in the middle of a round place."""
+@njit(cache=True)
+def _clearance(borders: Floats, points: Floats) -> float:
+    """Least distance of points (n, 2) to (m, 4) edges."""
+    least = np.inf
+    for e in range(len(borders)):
+        ax, ay = borders[e, 0], borders[e, 1]
+        dx, dy = borders[e, 2] - ax, borders[e, 3] - ay
+        square = max(dx * dx + dy * dy, 1e-18)
+        for k in range(len(points)):
+            x, y = points[k, 0] - ax, points[k, 1] - ay
+            share = min(max((x * dx + y * dy) / square, 0.0), 1.0)
+            least = min(least, (x - share * dx) ** 2 + (y - share * dy) ** 2)
+    return float(np.sqrt(least))
+
+
+def _strokes(places: Polygons, line_width_mm: float, even: float, shortest: float) -> Iterable[tuple[float, list[Stroke]]]:
+    """For each place its area and the strokes that fill it."""
+    long: list[Polygons] = []
+    for island in places.decompose() if not places.is_empty() else []:
+        loops = contours(island)
+        perimeter = length_mm(closed(loops[0])) if loops else 0.0
+        if not loops or island.area() < FEW_MM2 * line_width_mm**2:
+            continue
+        if len(loops) == 1 and 4.0 * pi * area_mm2(loops[0]) > COMPACT * perimeter**2:
+            yield island.area(), _ring(island, perimeter)
+        else:
+            long.append(island)
+    outlines = [loop for island in long for loop in contours(island)]
+    for _, lines in groupby(
+        centrelines(outlines, STEP * line_width_mm, even, shortest * line_width_mm), key=lambda line: line.place
+    ):
+        several = list(lines)
+        yield several[0].area_mm2, [(line.points, line.width_mm) for line in several]
+
+
+def _ring(island: Polygons, perimeter_mm: float) -> list[Stroke]:
+    """A ring whose two sides meet in the middle of a round place."""
     radius = 2.0 * island.area() / perimeter_mm
-    loops = [closed(loop) for loop in contours(grown(island, -0.5 * radius))]
-    total = sum(length_mm(loop) for loop in loops)
-    return [(loop, radius, island.area() / (total * radius)) for loop in loops]
+    return [(closed(loop), radius) for loop in contours(grown(island, -0.5 * radius))]

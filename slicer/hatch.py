@@ -8,8 +8,6 @@ from mdp.mesh import Floats
 from slicer.polygons import Polygons, edges
 from slicer.scanline import clipped, joined
 
-EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
-
 
 def hatched(area: Polygons, fence: Polygons, angle_deg: float, spacing_mm: float, reach_mm: float) -> list[Floats]:
     """Lines on a fixed grid, the same in every layer: y = (k + 1/2) spacing in a frame turned by the angle.
@@ -24,20 +22,6 @@ def hatched(area: Polygons, fence: Polygons, angle_deg: float, spacing_mm: float
     low, high = _extent(sides)
     first, last = ceil(low / spacing_mm - 0.5), ceil(high / spacing_mm - 0.5)
     heights = (np.arange(first, last, dtype=np.float64) + 0.5) * spacing_mm
-    return _polylines(sides, _edges(fence, turn), heights, reach_mm, turn)
-
-
-def filled(area: Polygons, fence: Polygons, angle_deg: float, spacing_mm: float, reach_mm: float) -> list[Floats]:
-    """Lines spread evenly over the extent of `area`, at most spacing_mm apart; else as hatched()."""
-    turn = _turned(angle_deg)
-    sides = _edges(area, turn)
-    if not len(sides):
-        return []
-    low, high = _extent(sides)
-    edge = EDGE * spacing_mm
-    gaps = ceil((high - low - 2.0 * edge) / spacing_mm - 0.01)
-    ends = (low + edge, high - edge) if gaps > 0 else (0.5 * (low + high),) * 2
-    heights = np.linspace(*ends, max(gaps, 0) + 1, dtype=np.float64)
     return _polylines(sides, _edges(fence, turn), heights, reach_mm, turn)
 
 

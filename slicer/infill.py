@@ -1,49 +1,85 @@
-"""Infill: sparse patterns; each pattern is a function of the area that returns polylines meeting a density."""
+"""Infill: sparse patterns; each pattern tells the bundles of lines that one layer takes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.anchor import anchored
 from slicer.bead import Bead, length_mm, spacing_mm
-from slicer.hatch import hatched
+from slicer.bundle import Bundle, cut_to, ruled
+from slicer.clip import border_of, together
+from slicer.gyroid import gyroid
+from slicer.honeycomb import honeycomb
 from slicer.paths import Kind
 from slicer.polygons import Polygons, closed, contours, grown
 
-JOIN = 3.0  # spacings of solid lines: ends nearer than this are joined, farther ones would add plastic along the wall
 RANK = 3
+SAMPLES = 6  # layers from which the plastic of anchors is judged
+MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas are mostly border
 
 
-def infill(
-    area: Polygons, pattern: str, density: float, angle_deg: float, layer: int, width_mm: float, height_mm: float, overlap: float
-) -> list[Bead]:
-    """Beads whose plastic is `density` (0..1) of area times height; `overlap` as for skin."""
-    spacing = spacing_mm(width_mm, height_mm)
-    inner = grown(area, -(0.5 * spacing - overlap * width_mm))
+def infill(area: Polygons, process: Process, density: float, layer: int, z_mm: float, height_mm: float) -> list[Bead]:
+    """Beads of the process's pattern in an area; density (0..1) of the pattern as pattern_density() tells it."""
+    width, spacing = process.line_width_mm, spacing_mm(process.line_width_mm, height_mm)
+    overlap = process.infill_overlap if process.walls else 0.0
+    inner = area if area.is_empty() else grown(area, -(0.5 * spacing - overlap * width))
     if density <= 0 or inner.is_empty():
         return []
-    lines = PATTERNS[pattern](inner, grown(area, -0.1 * width_mm), angle_deg, layer, spacing, density)
-    return [Bead(Kind.INFILL, line, width_mm, RANK) for line in lines if length_mm(line) > width_mm]
+    if process.infill_pattern == "concentric":
+        lines = _concentric(inner, spacing, density)
+    else:
+        bundles = PATTERNS[process.infill_pattern](process.infill_angle_deg, layer, z_mm, spacing, density)
+        border = border_of(inner)
+        pieces = together([cut_to(border, bundle) for bundle in bundles])
+        lines = anchored(pieces, border, process.infill_anchor_mm, process.infill_joint_mm, width)
+    return [Bead(Kind.INFILL, line, width, RANK) for line in lines if length_mm(line) > width]
 
 
-def rectilinear(
-    inner: Polygons, fence: Polygons, angle_deg: float, layer: int, spacing_mm: float, density: float
-) -> list[Floats]:
+def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: float) -> float:
+    """The density to draw the pattern with so that it meets the process's density together with its anchors.
+
+    areas: the sparse areas of all layers of a part. One figure for all of them, or lines would not stand on each other.
+    """
+    asked = process.infill_density
+    filled = [i for i, area in enumerate(areas) if not area.is_empty()]
+    if not filled or asked <= 0:
+        return asked
+    chosen = sorted({filled[(2 * k + 1) * len(filled) // (2 * SAMPLES)] for k in range(SAMPLES)})
+    spacing = spacing_mm(process.line_width_mm, height_mm)
+    drawn = asked
+    for _ in range(2):
+        beads = [bead for i in chosen for bead in infill(areas[i], process, drawn, i, i * height_mm, height_mm)]
+        got = sum(bead.length_mm for bead in beads) * spacing / sum(areas[i].area() for i in chosen)
+        if got <= 0.0:
+            return asked
+        drawn = min(max(drawn * asked / got, asked * (1.0 - MOST_SHIFT)), asked * (1.0 + MOST_SHIFT), 1.0)
+    return drawn
+
+
+def _rectilinear(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[Bundle]:
     """Lines in one direction, turned by 90 degrees from layer to layer."""
-    return hatched(inner, fence, angle_deg + 90.0 * (layer % 2), spacing_mm / density, JOIN * spacing_mm)
+    return [ruled(angle_deg + 90.0 * (layer % 2), spacing_mm / density)]
 
 
-def grid(inner: Polygons, fence: Polygons, angle_deg: float, layer: int, spacing_mm: float, density: float) -> list[Floats]:
+def _grid(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[Bundle]:
     """Two crossing directions in every layer."""
-    apart = 2.0 * spacing_mm / density
-    return [line for k in range(2) for line in hatched(inner, fence, angle_deg + 90.0 * k, apart, JOIN * spacing_mm)]
+    return [ruled(angle_deg + 90.0 * k, 2.0 * spacing_mm / density) for k in range(2)]
 
 
-def triangles(inner: Polygons, fence: Polygons, angle_deg: float, layer: int, spacing_mm: float, density: float) -> list[Floats]:
+def _triangles(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[Bundle]:
     """Three directions in every layer."""
-    apart = 3.0 * spacing_mm / density
-    return [line for k in range(3) for line in hatched(inner, fence, angle_deg + 60.0 * k, apart, JOIN * spacing_mm)]
+    return [ruled(angle_deg + 60.0 * k, 3.0 * spacing_mm / density) for k in range(3)]
 
 
-def concentric(inner: Polygons, fence: Polygons, angle_deg: float, layer: int, spacing_mm: float, density: float) -> list[Floats]:
+def _gyroid(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[Bundle]:
+    return [gyroid(angle_deg, z_mm, spacing_mm, density)]
+
+
+def _honeycomb(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[Bundle]:
+    return [honeycomb(angle_deg, layer, spacing_mm, density)]
+
+
+def _concentric(inner: Polygons, spacing_mm: float, density: float) -> list[Floats]:
     """Outlines shrunk step by step."""
     lines, area = [], grown(inner, -0.5 * (spacing_mm / density - spacing_mm))
     while not area.is_empty():
@@ -52,5 +88,10 @@ def concentric(inner: Polygons, fence: Polygons, angle_deg: float, layer: int, s
     return lines
 
 
-Pattern = Callable[[Polygons, Polygons, float, int, float, float], list[Floats]]
-PATTERNS: dict[str, Pattern] = {"rectilinear": rectilinear, "grid": grid, "triangles": triangles, "concentric": concentric}
+PATTERNS: dict[str, Callable[[float, int, float, float, float], list[Bundle]]] = {
+    "rectilinear": _rectilinear,
+    "grid": _grid,
+    "triangles": _triangles,
+    "gyroid": _gyroid,
+    "honeycomb": _honeycomb,
+}

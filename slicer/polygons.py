@@ -54,6 +54,21 @@ def united(several: Sequence[Polygons]) -> Polygons:
     return Polygons.batch_boolean(list(several), OpType.Add) if several else Polygons()
 
 
+def strips(lines: Sequence[Floats], reach_mm: float) -> Polygons:
+    """Everything nearer than the reach to lines (n, 2), with square ends."""
+    quads = [_quads(line, reach_mm) for line in lines]
+    return Polygons(list(np.concatenate(quads)), FillRule.Positive)
+
+
+def _quads(line: Floats, reach_mm: float) -> Floats:
+    """(n - 1, 4, 2) a counter-clockwise rectangle round every segment."""
+    steps = np.diff(line, axis=0)
+    along = steps * (reach_mm / np.maximum(np.hypot(*steps.T), 1e-9))[:, None]
+    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    a, b = line[:-1] - along, line[1:] + along
+    return np.stack([a - left, b - left, b + left, a + left], axis=1)
+
+
 def contours(polygons: Polygons) -> list[Floats]:
     """Contours as (n, 2) arrays, the first point not repeated."""
     return [np.asarray(loop, dtype=np.float64) for loop in polygons.to_polygons() if len(loop) > 2]

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
+from profiles.process import Process
 from slicer.polygons import Polygons, grown, opened
-
-SPARSE_LEAST_MM2 = 25.0  # in line widths squared: a smaller island of infill costs more travel than plastic
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,45 +18,50 @@ class Region:
 
 
 def regions(
-    sections: Sequence[Polygons],
-    insides: Sequence[Polygons],
-    beneath: Polygons | None,
-    top_layers: int,
-    bottom_layers: int,
-    density: float,
-    width_mm: float,
+    sections: Sequence[Polygons], insides: Sequence[Polygons], beneath: Polygons | None, process: Process
 ) -> list[Region]:
     """Regions of every layer from the sections and what the walls enclose.
 
-    A place is solid when one of the next top_layers sections above or bottom_layers below does not cover it. beneath:
-    plastic of earlier parts under the first layer, which is then solid throughout; None: the platform.
+    A place is solid when one of the next top_layers sections above or bottom_layers below does not cover it: so every
+    vertical line meets that many layers of wall or skin below a surface, on slopes too. beneath: plastic of earlier parts
+    under the first layer, which is then solid throughout; None: the platform.
     """
     empty = Polygons()
     on_plastic = beneath is not None
-    above = _common([*sections[1:], empty], top_layers) if top_layers else list(insides)
-    below = _common([*reversed(sections[:-1]), beneath if on_plastic else empty], bottom_layers, on_plastic)[::-1]
+    top, bottom = shell_layers(process)
+    above = _common([*sections[1:], empty], top) if top else list(insides)
+    below = _common([*reversed(sections[:-1]), beneath if on_plastic else empty], bottom, on_plastic)[::-1]
     found = []
     for i, inside in enumerate(insides):
         if inside.is_empty():
             found.append(Region(empty, empty, empty))
             continue
-        whole = density >= 1.0 or (on_plastic and i == 0)
-        sparse = empty if whole else _sparse(inside, above[i], below[i] if bottom_layers else inside, width_mm)
+        whole = process.infill_density >= 1.0 or (on_plastic and i == 0)
+        sparse = empty if whole else _sparse(inside, above[i], below[i] if bottom else inside, process)
         next_section = sections[i + 1] if i + 1 < len(sections) else empty
-        found.append(_region(inside, sparse, next_section if top_layers else inside, width_mm))
+        found.append(_region(inside, sparse, next_section if top else inside, process.line_width_mm))
     return found
 
 
-def _sparse(inside: Polygons, above: Polygons, below: Polygons, width_mm: float) -> Polygons:
+def shell_layers(process: Process) -> tuple[int, int]:
+    """Solid layers under and over a surface: as many as asked for, more where layers are thin; 0 stays 0."""
+    wished = (process.top_layers, process.top_thickness_mm), (process.bottom_layers, process.bottom_thickness_mm)
+    top, bottom = (max(count, ceil(mm / process.layer_height_mm - 1e-6)) if count else 0 for count, mm in wished)
+    return top, bottom
+
+
+def _sparse(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:
     """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
+    width_mm = process.line_width_mm
     covered = inside ^ above ^ below
     sparse = inside
     if inside.area() - covered.area() > 1e-6:
         skin = opened(inside - covered, 0.25 * width_mm)
         sparse = inside if skin.is_empty() else opened(inside - grown(skin, width_mm), width_mm)
-    least = SPARSE_LEAST_MM2 * width_mm**2
+    if process.infill_density <= 0.0 or sparse.is_empty():
+        return sparse
     islands = sparse.decompose()
-    kept = [island for island in islands if island.area() >= least]
+    kept = [island for island in islands if island.area() >= process.solid_below_mm2]
     return sparse if len(kept) == len(islands) else Polygons.compose(kept) if kept else Polygons()
 
 
@@ -70,7 +75,10 @@ def _region(inside: Polygons, sparse: Polygons, next_section: Polygons, width_mm
         solid = inside - sparse
     top = solid - next_section
     top = top if top.is_empty() else opened(top, width_mm)
-    return Region(top, solid if top.is_empty() else opened(solid - top, 0.25 * width_mm), sparse)
+    if top.is_empty():
+        return Region(top, solid, sparse)
+    under = opened(solid - top, 0.25 * width_mm)
+    return Region(solid - under, under, sparse)
 
 
 def _common(layers: Sequence[Polygons], count: int, last_repeats: bool = False) -> list[Polygons]:

@@ -1,11 +1,21 @@
-"""Skin: solid fill by lines at alternating +-45 degrees."""
+"""Skin: solid fill by lines at alternating +-45 degrees, and by short beads where no such line fits."""
 
+from collections.abc import Sequence
+from math import ceil
+
+import numpy as np
+
+from mdp.mesh import Floats
+from slicer.anchor import anchored
 from slicer.bead import Bead, length_mm, spacing_mm
-from slicer.hatch import filled
+from slicer.bundle import MARGIN_MM, Box, Bundle, Lines, cut_to, straight
+from slicer.clip import border_of
+from slicer.gap import FEW_MM2, LEAST_GAP, gaps
 from slicer.paths import Kind
-from slicer.polygons import Polygons, grown
+from slicer.polygons import Polygons, grown, opened, strips
 
-JOIN = 3.0  # spacings: neighbouring line ends nearer than this are joined
+JOIN = 4.0  # spacings along the border: line ends nearer than this are joined
+EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
 RANK = 2
 LEAST_FLOW, MOST_FLOW = 0.85, 1.15
 
@@ -13,22 +23,45 @@ LEAST_FLOW, MOST_FLOW = 0.85, 1.15
 def skin(area: Polygons, kind: Kind, angle_deg: float, width_mm: float, height_mm: float, overlap: float) -> list[Bead]:
     """Beads that fill an area completely; `overlap` is the reach into the walls around, share of a line width.
 
-    The lines of each connected piece are spread evenly and its flow makes the plastic equal to area times height, so
-    that neither the joints at the line ends nor the overlap over-fill it.
+    The lines of each connected piece are spread evenly; places they leave get beads of their own. The flow makes the
+    plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill it.
     """
     spacing = spacing_mm(width_mm, height_mm)
     beads: list[Bead] = []
-    for island in area.decompose():
-        inner = grown(island, -(0.5 * spacing - overlap * width_mm))
-        fence = grown(island, -0.1 * width_mm)
-        lines = [line for line in filled(inner, fence, angle_deg, spacing, JOIN * spacing) if length_mm(line) > 0.5 * width_mm]
+    for island in area.decompose() if not area.is_empty() else []:
+        border = border_of(grown(island, -(0.5 * spacing - overlap * width_mm)))
+        lines = anchored(cut_to(border, _even(angle_deg, spacing)), border, 0.0, JOIN * spacing, 0.0)
+        lines = [line for line in lines if length_mm(line) > 0.5 * width_mm]
+        rest = left_over(island, lines, width_mm)
+        beads += gaps(rest, width_mm, height_mm)
         total = sum(length_mm(line) for line in lines)
         if total > 0:
-            flow = min(max(island.area() / (total * spacing), LEAST_FLOW), MOST_FLOW)
+            flow = min(max((island.area() - rest.area()) / (total * spacing), LEAST_FLOW), MOST_FLOW)
             beads += [Bead(kind, line, width_mm, RANK, flow) for line in lines]
     return beads
+
+
+def left_over(area: Polygons, lines: Sequence[Floats], width_mm: float) -> Polygons:
+    """What of an area lines of that width do not cover, as far as plastic fits into it."""
+    rest = area - strips(lines, 0.5 * width_mm) if lines else area
+    if rest.area() < FEW_MM2 * width_mm**2:
+        return Polygons()
+    places = [place for place in opened(rest, 0.5 * LEAST_GAP * width_mm).decompose() if place.area() >= FEW_MM2 * width_mm**2]
+    return Polygons.compose(places) if places else Polygons()
 
 
 def angle_of_layer_deg(infill_angle_deg: float, layer: int) -> float:
     """Direction of the skin lines of a layer: neighbours cross at right angles."""
     return infill_angle_deg + 90.0 * (layer % 2)
+
+
+def _even(angle_deg: float, spacing: float) -> Bundle:
+    """Lines spread evenly over the whole extent, at most a spacing apart."""
+
+    def draw(box: Box) -> Lines:
+        low, high, edge = box[1] + MARGIN_MM, box[3] - MARGIN_MM, EDGE * spacing
+        between = ceil((high - low - 2.0 * edge) / spacing - 0.01)
+        ends = (low + edge, high - edge) if between > 0 else (0.5 * (low + high),) * 2
+        return straight(np.linspace(*ends, max(between, 0) + 1, dtype=np.float64), box)
+
+    return Bundle(angle_deg, draw)

@@ -1,6 +1,7 @@
 """Slicing: one part of a decomposition becomes layers of paths in its own frame."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats
@@ -13,7 +14,7 @@ from slicer.brim import brim
 from slicer.contact import contacts
 from slicer.gap import gaps
 from slicer.heights import heights_of
-from slicer.infill import infill
+from slicer.infill import infill, pattern_density
 from slicer.interface import beneath, sections_of
 from slicer.order import ordered
 from slicer.overhang import overhanging
@@ -25,7 +26,7 @@ from slicer.section import sections
 from slicer.skin import angle_of_layer_deg, skin
 from slicer.speed import speeds_mm_s
 from slicer.support import support_beads, supports
-from slicer.walls import Walls, walls
+from slicer.walls import Walls, wall_beads, walls
 
 
 def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> SlicedPart:
@@ -39,22 +40,16 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
     outlines = [cleaned(loops) for loops in sections(mesh, at.cut_mm)]
     walled = [walls(s, process.walls, process.line_width_mm, h) for s, h in zip(outlines, at.height_mm, strict=True)]
     below = beneath(part, earlier, outlines[0])
-    filled = regions(
-        outlines,
-        [w.inside for w in walled],
-        below,
-        process.top_layers,
-        process.bottom_layers,
-        process.infill_density,
-        process.line_width_mm,
-    )
+    filled = regions(outlines, [w.inside for w in walled], below, process)
+    density = pattern_density([region.sparse for region in filled], process, process.layer_height_mm)
     over = contacts(mesh, outlines, at.cut_mm, process, below)
     props = supports([c.hanging for c in over], outlines, process, below, lambda: sections_of(later, part, at.cut_mm))
     layers: list[Layer] = []
     tip: Floats | None = None
     for i, outline in enumerate(outlines):
         height = float(at.height_mm[i])
-        beads = _beads(walled[i], filled[i], over[i].bridges, i, process, height)
+        region, beads = _beads(outline, walled[i], filled[i], over[i].bridges, i, process, height)
+        beads += infill(region.sparse, process, density, i, float(at.tip_mm[i]), height)
         beads += support_beads(props.areas[i], process, height)
         if i == 0 and part.index == 1:
             beads += brim(united([outline, props.areas[0]]), process, height)
@@ -68,26 +63,20 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
 
 
 def _beads(
-    around: Walls, region: Region, bridges: Sequence[Bridge], layer: int, process: Process, height_mm: float
-) -> list[Bead]:
-    """Everything a layer prints of the part itself."""
+    outline: Polygons, around: Walls, region: Region, bridges: Sequence[Bridge], layer: int, process: Process, height_mm: float
+) -> tuple[Region, list[Bead]]:
+    """What a layer prints of the part itself but for the infill, and the regions beside its bridges."""
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
     angle = angle_of_layer_deg(process.infill_angle_deg, layer)
-    beads = [
-        Bead(Kind.INNER_WALL if level else Kind.OUTER_WALL, seamed(loop), width, -level)
-        for level, loops in enumerate(around.loops)
-        for loop in loops
-    ]
-    beads += gaps(around.free, False, width, height_mm) + gaps(around.narrow, True, width, height_mm)
+    beads = [replace(bead, points=seamed(bead.points)) for bead in wall_beads(around, process, height_mm)]
+    beads += gaps(around.free, width, height_mm, outline, process.outer_bulge) + gaps(around.narrow, width, height_mm)
     for span in bridges:
         area = bridged(span, around.inside, width)
         if not area.is_empty():
             beads += bridge_beads(area, span.angle_deg, process.bridge_flow, width, height_mm, overlap)
             region = beside(region, area, width)
     beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
-    beads += skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
-    density, pattern = process.infill_density, process.infill_pattern
-    return beads + infill(region.sparse, pattern, density, process.infill_angle_deg, layer, width, height_mm, overlap)
+    return region, beads + skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
 
 
 def _layer(

@@ -7,11 +7,13 @@ beads fit, no wall turns round; the place is handed out as narrow and gets one c
 from dataclasses import dataclass
 
 from mdp.mesh import Floats
-from slicer.bead import spacing_mm
+from profiles.process import Process
+from slicer.bead import Bead, bulged, spacing_mm
+from slicer.gap import LEAST_GAP, LEAST_LINE
+from slicer.paths import Kind
 from slicer.polygons import Polygons, contours, grown, opened
 
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
-LEAST_LINE = 0.35  # of the line width: what is narrower stays empty; half a line is the narrowest bead, with less flow
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,7 @@ def walls(section: Polygons, count: int, width_mm: float, height_mm: float) -> W
         half = 0.5 * (width_mm if level == 0 else spacing)
         line = grown(area, -half)
         core = grown(line, -0.5 * spacing)
-        rest = _rest(area, core, half + 0.5 * spacing, width_mm)
+        rest = _rest(area, core, half + 0.5 * spacing, (LEAST_GAP if level else LEAST_LINE) * width_mm)
         if not rest.is_empty():
             line = line ^ grown(core, 0.5 * spacing + SLACK_MM)
             free, narrow = (rest, narrow) if level == 0 else (free, narrow + rest)
@@ -45,16 +47,30 @@ def walls(section: Polygons, count: int, width_mm: float, height_mm: float) -> W
         if core.is_empty():
             break
     core = grown(area, -spacing)
-    rest = _rest(area, core, spacing, width_mm)
+    rest = _rest(area, core, spacing, (LEAST_GAP if count else LEAST_LINE) * width_mm)
     if not rest.is_empty():
         area = area ^ grown(core, spacing + SLACK_MM)
         free, narrow = (rest, narrow) if count == 0 else (free, narrow + rest)
     return Walls(tuple(levels), free, narrow, area)
 
 
-def _rest(area: Polygons, core: Polygons, distance_mm: float, width_mm: float) -> Polygons:
-    """What of the area the core does not reach over a distance, as far as a line fits into it."""
+def wall_beads(found: Walls, process: Process, height_mm: float) -> list[Bead]:
+    """The walls as beads; all ranks are at most 0, so that walls come before gaps, skin and infill.
+
+    Outer beads make up for what their outer round side leaves out of the section.
+    """
+    width, beads = process.line_width_mm, []
+    outer_flow = bulged(width, height_mm, 1, process.outer_bulge * width)
+    for level, loops in enumerate(found.loops):
+        kind, flow = (Kind.INNER_WALL, 1.0) if level else (Kind.OUTER_WALL, outer_flow)
+        rank = -level if process.wall_order == "inner-first" else level - process.walls
+        beads += [Bead(kind, loop, width, rank, flow) for loop in loops]
+    return beads
+
+
+def _rest(area: Polygons, core: Polygons, distance_mm: float, least_mm: float) -> Polygons:
+    """What of the area the core does not reach over a distance, where it is at least so wide."""
     if area.is_empty():
         return area
     rest = area - grown(core, distance_mm + SLACK_MM)
-    return rest if rest.is_empty() else opened(rest, 0.5 * LEAST_LINE * width_mm)
+    return rest if rest.is_empty() else opened(rest, 0.5 * least_mm)

@@ -1,0 +1,176 @@
+"""Anchors: ends of infill lines joined along the border of their area, and hooked onto it where no neighbour is near.
+
+Ends that follow each other on the border are joined by rising distance, unless that would close a ring or the distance
+is beyond a limit; an end left alone gets a short run along the border, towards the side with more room.
+"""
+
+import numpy as np
+from numba import njit
+
+from mdp.mesh import Floats
+from slicer.clip import Border, Indices, Pieces
+
+TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
+
+
+def anchored(pieces: Pieces, border: Border, hook_mm: float, most_mm: float, apart_mm: float) -> list[Floats]:
+    """Pieces as long lines (n, 2): joined where ends are at most most_mm apart along the border, else with hooks.
+
+    A hook is hook_mm long, less where it would come nearer than apart_mm to another end or hook.
+    """
+    if not len(pieces.starts):
+        return []
+    bounds = np.append(pieces.starts, len(pieces.points))
+    points, starts = _anchored(pieces.points, bounds, pieces.ends, border.edges, border.offsets, hook_mm, most_mm, apart_mm)
+    return np.split(points, starts[1:])
+
+
+@njit(cache=True)
+def _places(points: Floats, bounds: Indices, ends: Indices, edges: Floats) -> tuple[Floats, Floats]:
+    """Way along all contours to the beginning of each edge (m + 1,) and to each end (2 k,)."""
+    way = np.zeros(len(edges) + 1)
+    for e in range(len(edges)):
+        way[e + 1] = way[e] + np.hypot(edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1])
+    place = np.empty(2 * len(ends))
+    for k in range(len(ends)):
+        for side in range(2):
+            p, e = points[bounds[k + 1] - 1 if side else bounds[k]], ends[k, side]
+            along = np.hypot(p[0] - edges[e, 0], p[1] - edges[e, 1])
+            place[2 * k + side] = min(way[e] + along, way[e + 1])
+    return way, place
+
+
+@njit(cache=True)
+def _following(place: Floats, contour: Indices, way: Floats, offsets: Indices) -> tuple[Indices, Floats]:
+    """Of each end the next one on its contour, which may be itself, and how far it is."""
+    order = np.argsort(place, kind="mergesort")
+    after, gap = np.empty(len(place), np.int64), np.empty(len(place))
+    i = 0
+    while i < len(order):
+        c, j = contour[order[i]], i
+        while j < len(order) and contour[order[j]] == c:
+            j += 1
+        for k in range(i, j):
+            here, there = order[k], order[k + 1 if k + 1 < j else i]
+            after[here] = there
+            gap[here] = place[there] - place[here]
+            if k + 1 == j:
+                gap[here] += way[offsets[c + 1]] - way[offsets[c]]
+        i = j
+    return after, gap
+
+
+@njit(cache=True)
+def _joined(after: Indices, gap: Floats, most_mm: float) -> tuple[Indices, Indices]:
+    """Of each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
+    partner, sense = np.full(len(after), -1, np.int64), np.zeros(len(after), np.int64)
+    root = np.arange(len(after) // 2)
+    for here in np.argsort(np.round(gap / TIE_MM), kind="mergesort"):
+        there = after[here]
+        if gap[here] > most_mm:
+            break
+        if partner[here] >= 0 or partner[there] >= 0:
+            continue
+        a, b = here // 2, there // 2
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        if a != b:
+            root[a] = b
+            partner[here], partner[there], sense[here], sense[there] = there, here, 1, -1
+    return partner, sense
+
+
+@njit(cache=True)
+def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm: float) -> Floats:
+    """Of each end the length of its hook, negative for a way back along the border."""
+    room, before = gap - apart_mm, np.empty(len(after), np.int64)
+    for here in range(len(after)):
+        before[after[here]] = here
+        if sense[here] == 1:
+            room[here] = 0.0
+    hooks = np.zeros(len(after))
+    for here in range(len(after)):
+        if partner[here] < 0:
+            back = before[here]
+            way = here if room[here] >= room[back] else back
+            length = min(hook_mm, room[way])
+            if length > apart_mm:
+                hooks[here] = length if way == here else -length
+                room[way] -= length + apart_mm
+    return hooks
+
+
+@njit(cache=True)
+def _run(out: Floats, n: int, e: int, place: float, length: float, sense: int, edges: Floats, way: Floats, a: int, b: int) -> int:
+    """Appends the vertices of contour a..b-1 passed on a run from `place` on edge e, and its last point; the new n."""
+    left = length
+    at = place - way[e] if sense > 0 else way[e + 1] - place
+    step = way[e + 1] - way[e]
+    while left > step - at:
+        left -= step - at
+        out[n, 0], out[n, 1] = (edges[e, 2], edges[e, 3]) if sense > 0 else (edges[e, 0], edges[e, 1])
+        n += 1
+        e += sense
+        e = a if e == b else b - 1 if e < a else e
+        step, at = way[e + 1] - way[e], 0.0
+    share = (at + left) / step if step > 0.0 else 0.0
+    share = share if sense > 0 else 1.0 - share
+    out[n, 0] = edges[e, 0] + share * (edges[e, 2] - edges[e, 0])
+    out[n, 1] = edges[e, 1] + share * (edges[e, 3] - edges[e, 1])
+    return n + 1
+
+
+@njit(cache=True)
+def _anchored(
+    points: Floats,
+    bounds: Indices,
+    ends: Indices,
+    edges: Floats,
+    offsets: Indices,
+    hook_mm: float,
+    most_mm: float,
+    apart_mm: float,
+) -> tuple[Floats, Indices]:
+    way, place = _places(points, bounds, ends, edges)
+    on = ends.ravel()
+    contour = np.searchsorted(offsets, on, side="right") - 1
+    after, gap = _following(place, contour, way, offsets)
+    partner, sense = _joined(after, gap, most_mm)
+    hooks = _hooks(partner, sense, after, gap, hook_mm, apart_mm)
+    out = np.empty((len(points) + 2 * len(edges) + 4 * len(ends) + 8, 2))
+    starts, done = np.empty(len(ends), np.int64), np.zeros(len(ends), np.bool_)
+    n = count = 0
+    for seed in range(len(ends)):
+        if done[seed]:
+            continue
+        end = 2 * seed
+        while partner[end] >= 0:
+            end = partner[end] ^ 1
+        starts[count] = n
+        count += 1
+        if hooks[end] != 0.0:
+            a, b = offsets[contour[end]], offsets[contour[end] + 1]
+            n = _run(out, n, on[end], place[end], abs(hooks[end]), 1 if hooks[end] > 0 else -1, edges, way, a, b)
+            out[starts[count - 1] : n] = out[starts[count - 1] : n][::-1].copy()
+        while True:
+            k = end // 2
+            done[k] = True
+            for i in range(bounds[k], bounds[k + 1]):
+                out[n] = points[i if end % 2 == 0 else bounds[k] + bounds[k + 1] - 1 - i]
+                n += 1
+            end ^= 1
+            length = hooks[end]
+            if partner[end] >= 0:
+                length = gap[end] if sense[end] > 0 else -gap[partner[end]]
+            if length != 0.0:
+                a, b = offsets[contour[end]], offsets[contour[end] + 1]
+                n = _run(out, n, on[end], place[end], abs(length), 1 if length > 0 else -1, edges, way, a, b)
+            if partner[end] < 0:
+                break
+            n -= 1  # the run's last point is the partner itself
+            end = partner[end]
+    return out[:n], starts[:count]

@@ -1,0 +1,51 @@
+"""Bundle: open lines laid over a box in a frame turned by an angle, before they are cut to an area."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from mdp.mesh import Floats
+from slicer.clip import NO_PIECES, Border, Indices, Pieces, trimmed, turn
+
+Box = tuple[float, float, float, float]
+Lines = tuple[Floats, Indices]
+MARGIN_MM = 0.1  # lines begin and end this far outside the box
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """draw gives, for a box x0 y0 x1 y1 of the turned frame, points (n, 2) and the start of each line, mm."""
+
+    angle_deg: float
+    draw: Callable[[Box], Lines]
+
+
+def cut_to(border: Border, bundle: Bundle) -> Pieces:
+    """What of a bundle lies inside a border, in the border's own frame."""
+    if not len(border.edges):
+        return NO_PIECES
+    edges = border.turned(bundle.angle_deg)
+    x0, y0 = edges[:, :2].min(axis=0)
+    x1, y1 = edges[:, :2].max(axis=0)
+    pieces = trimmed(*bundle.draw((x0 - MARGIN_MM, y0 - MARGIN_MM, x1 + MARGIN_MM, y1 + MARGIN_MM)), edges)
+    return Pieces(pieces.points @ turn(bundle.angle_deg).T, pieces.starts, pieces.ends)
+
+
+def numbers(low: float, high: float, apart_mm: float) -> Floats:
+    """Whole numbers k for which (k + 1/2) apart lies between low and high: a grid that is the same in every layer."""
+    return np.arange(ceil(low / apart_mm - 0.5), ceil(high / apart_mm - 0.5), dtype=np.float64)
+
+
+def straight(heights: Floats, box: Box) -> Lines:
+    """Horizontal lines across a box."""
+    points = np.empty((len(heights), 2, 2))
+    points[:, 0, 0], points[:, 1, 0] = box[0], box[2]
+    points[:, :, 1] = heights[:, None]
+    return points.reshape(-1, 2), 2 * np.arange(len(heights))
+
+
+def ruled(angle_deg: float, apart_mm: float) -> Bundle:
+    """Straight lines at an angle, on a grid that is the same in every layer."""
+    return Bundle(angle_deg, lambda box: straight((numbers(box[1], box[3], apart_mm) + 0.5) * apart_mm, box))
