@@ -146,7 +146,8 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
     yield f";HEIGHT:{_number(move.height_mm)}"
     pen.kind = None
     material = profile.material
-    wanted = material.first_layer_nozzle_c if move.part == 1 and move.index == 1 else material.nozzle_c
+    heated = min(material.nozzle_c + move.nozzle_add_c, profile.machine.nozzle_limit_c)
+    wanted = material.first_layer_nozzle_c if move.part == 1 and move.index == 1 else heated
     if wanted != pen.nozzle_c:
         pen.nozzle_c = wanted
         yield pen.dialect.nozzle.format(_number(wanted))

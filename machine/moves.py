@@ -22,13 +22,14 @@ class BeginPart:
 
 @dataclass(frozen=True)
 class BeginLayer:
-    """The strokes after this lie in one layer; z_mm is measured from the part's base plane."""
+    """The strokes after this lie in one layer; z_mm is measured from the part's base plane, nozzle_add_c from the material's."""
 
     part: int
     index: int
     z_mm: float
     height_mm: float
     fan: float
+    nozzle_add_c: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

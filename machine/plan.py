@@ -92,7 +92,7 @@ def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
 
 
 def _layer(tip: Tip, part: int, number: int, layer: Layer, shift: Floats, profile: Profile) -> Iterator[Move]:
-    yield BeginLayer(part, number, layer.z_mm, layer.height_mm, layer.fan)
+    yield BeginLayer(part, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c)
     z = layer.z_mm + float(shift[2])
     for path in layer.paths:
         points = np.column_stack([path.points + shift[:2], np.full(len(path.points), z)])

@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from machine.dryrun import dry_run
 from machine.dryrun.timeline import lengths
 from machine.gcode import write_gcode
-from machine.moves import MachineProgram, Stroke
+from machine.moves import BeginLayer, MachineProgram, Stroke
 from machine.parse import parse_gcode
 from machine.parsed import MoveKind
 from machine.rows import rows
@@ -99,6 +100,13 @@ def test_the_first_layer_s_temperature_is_waited_for_and_lowered_in_the_second()
     assert lines.index("M109 S215") < lines.index(";LAYER_CHANGE")
     second = [k for k, line in enumerate(lines) if line == ";LAYER_CHANGE"][1]
     assert lines[second + 3] == "M104 S210"
+
+
+def test_layers_that_ask_for_more_heat_get_it_up_to_the_machines_limit():
+    profile, _, _, program = printed()
+    moves = tuple(replace(m, nozzle_add_c=95.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in program.moves)
+    heats = [line for line in write_gcode(replace(program, moves=moves), profile) if line.startswith("M104 S")]
+    assert heats[-3:] == ["M104 S210", "M104 S300", "M104 S0"]
 
 
 def test_the_fan_follows_the_layers() -> None:
