@@ -12,20 +12,22 @@ from slicer.bead import Bead
 from slicer.bridge import Bridge, beside, bridge_beads, bridged
 from slicer.brim import brim
 from slicer.contact import contacts
+from slicer.forbidden import far_mm, forbidden
 from slicer.gap import gaps
 from slicer.heights import heights_of
 from slicer.infill import infill, pattern_density
-from slicer.interface import beneath, sections_of
+from slicer.interface import beneath
 from slicer.order import ordered
 from slicer.overhang import overhanging
 from slicer.paths import Kind, Layer, Path, SlicedPart
 from slicer.polygons import Polygons, cleaned, united
+from slicer.props import support_beads
 from slicer.region import Region, regions
 from slicer.seam import seamed
 from slicer.section import sections
 from slicer.skin import angle_of_layer_deg, skin
 from slicer.speed import speeds_mm_s
-from slicer.support import support_beads, supports
+from slicer.support import supports
 from slicer.walls import Walls, wall_beads, walls
 
 
@@ -43,14 +45,16 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
     filled = regions(outlines, [w.inside for w in walled], below, process)
     density = pattern_density([region.sparse for region in filled], process, process.layer_height_mm)
     over = contacts(mesh, outlines, at.cut_mm, process, below)
-    props = supports([c.hanging for c in over], outlines, process, below, lambda: sections_of(later, part, at.cut_mm))
+    far = far_mm(mesh)
+    shut = forbidden(part, later, at.tip_mm - at.height_mm, at.tip_mm, process.support_distance_mm, far)
+    props = supports([c.hanging for c in over], outlines, at, process, below, shut, far)
     layers: list[Layer] = []
     tip: Floats | None = None
     for i, outline in enumerate(outlines):
         height = float(at.height_mm[i])
         region, beads = _beads(outline, walled[i], filled[i], over[i].bridges, i, process, height)
         beads += infill(region.sparse, process, density, i, float(at.tip_mm[i]), height)
-        beads += support_beads(props.areas[i], process, height)
+        beads += support_beads(props.areas[i], props.dense[i], process, height, i == 0 and part.index == 1)
         if i == 0 and part.index == 1:
             beads += brim(united([outline, props.areas[0]]), process, height)
         bank = outlines[i - 1] if i else below
@@ -108,7 +112,9 @@ def _layer(
 
 
 def _check(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Process) -> None:
-    own = (path for layer in layers for path in layer.paths if path.kind not in (Kind.SKIRT, Kind.SUPPORT, Kind.SUPPORT_INTERFACE))
+    own = (
+        path for layer in layers for path in layer.paths if path.kind not in (Kind.SKIRT, Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
+    )
     if next(own, None) is None:
         x, y, z = bounds_mm[1] - bounds_mm[0]
         if process.walls == 0 and process.infill_density == 0:
