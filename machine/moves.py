@@ -34,13 +34,18 @@ class BeginLayer:
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """Extruding: points_mm (n, 3) machine coordinates, the first is where the tip already stands; filament_mm (n - 1,)."""
+    """Extruding: points_mm (n, 3) machine coordinates, the first is where the tip already stands; filament_mm (n - 1,).
+
+    fan: 0..1 where it differs from the layer's. acceleration_mm_s2: where it differs from what the axes allow.
+    """
 
     kind: Kind
     points_mm: Floats
     filament_mm: Floats
     speed_mm_s: float
     width_mm: float
+    fan: float | None = None
+    acceleration_mm_s2: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +53,16 @@ class Travel:
     """Moving without extruding through points_mm (n, 3), machine coordinates, the first is where the tip stands."""
 
     points_mm: Floats
+    speed_mm_s: float
+    acceleration_mm_s2: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Wipe:
+    """Moving over what was just printed while filament is pulled back: points_mm (n, 3), filament_mm (n - 1,) above 0."""
+
+    points_mm: Floats
+    filament_mm: Floats
     speed_mm_s: float
 
 
@@ -67,7 +82,7 @@ class Reorient:
     speed_deg_s: float
 
 
-Move = BeginPart | BeginLayer | Stroke | Travel | Retract | Reorient
+Move = BeginPart | BeginLayer | Stroke | Travel | Wipe | Retract | Reorient
 
 
 @dataclass(frozen=True, eq=False)

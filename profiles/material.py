@@ -14,10 +14,33 @@ class Material(Frozen):
     nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature, deg C")
     first_layer_nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature of part 1's first layer, deg C")
     bed_c: float = Field(ge=0, le=200, description="bed temperature, deg C; 0: bed off")
-    fan: float = Field(ge=0, le=1, description="part fan from the second layer on, 0 to 1")
+    fan: float = Field(ge=0, le=1, description="part fan in layers that take least_layer_time_s or less, 0 to 1")
+    fan_least: float = Field(
+        0.35, ge=0, le=1, description="part fan in layers that take fan_layer_time_s or more, at most fan; between, in between"
+    )
+    fan_layer_time_s: float = Field(
+        60.0, gt=0, le=3600, description="layers that take longer have cooled by themselves and need only fan_least, s"
+    )
+    fan_bridge: float | None = Field(None, ge=0, le=1, description="part fan on bridges and overhanging walls; absent: fan")
+    fan_off_layers: int = Field(1, ge=0, le=1000, description="layers of part 1 without any fan: they must stick to the plate")
     flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on all extruded volume")
     retract_mm: float = Field(ge=0, le=15, description="filament pulled back before a travel that crosses outside, mm")
     retract_speed_mm_s: float = Field(35.0, gt=0, le=200, description="speed of retraction and priming, mm/s")
+    wipe_mm: float = Field(
+        2.0,
+        ge=0,
+        le=50,
+        description="way back over the path just printed while filament is pulled back, mm; 2 mm rub the drop off, 0: none",
+    )
+    coast_mm: float = Field(
+        0.0,
+        ge=0,
+        le=10,
+        description="last stretch of a path before a retraction that is printed by pressure alone, mm; 0: no coasting",
+    )
+    retract_prime_extra_mm: float = Field(
+        0.0, ge=0, le=2, description="filament pushed beyond what was pulled back at the end of every retracted travel, mm"
+    )
     prime_extra_mm: float = Field(
         0.0, ge=0, le=10, description="filament pushed beyond what was retracted after a reorientation, mm"
     )

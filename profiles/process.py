@@ -205,6 +205,16 @@ class Process(Frozen):
         40.0, gt=0, le=1000, description="speed of the dense layers of support, mm/s: their lines span the sparse ones"
     )
     first_layer_speed_mm_s: float = Field(20.0, gt=0, le=1000, description="speed of part 1's first layer, mm/s")
+    gap_speed_mm_s: float = Field(
+        30.0, gt=0, le=1000, description="speed of the lines in gaps between walls, mm/s: their width changes all the time"
+    )
+    top_skin_speed_mm_s: float = Field(40.0, gt=0, le=1000, description="speed of the uppermost skins, mm/s: they are seen")
+    small_wall_mm: float = Field(
+        40.0, ge=0, le=1000, description="closed walls no longer than this are small, mm; 40: a hole of 13 mm"
+    )
+    small_wall_speed_mm_s: float = Field(
+        25.0, gt=0, le=1000, description="greatest speed of small walls, mm/s: on a tight curve a fast head rings and pulls"
+    )
     travel_speed_mm_s: float = Field(150.0, gt=0, le=2000, description="speed of travels, mm/s")
     lift_speed_mm_s: float = Field(10.0, gt=0, le=500, description="speed of lifts along the nozzle, mm/s")
     retract_travel_mm: float = Field(1.5, ge=0, le=100, description="shortest travel that is worth a retraction, mm")
@@ -216,6 +226,28 @@ class Process(Frozen):
         ge=0,
         le=1000,
         description="how much longer than straight such a way may be; 8 mm take as long as pulling back and priming 0.8 mm, mm",
+    )
+    lift_mm: float = Field(
+        0.2,
+        ge=0,
+        le=10,
+        description="lift along the nozzle for travels that retract, mm; a layer's height clears what has curled up",
+    )
+    acceleration_mm_s2: float | None = Field(None, gt=0, le=100000, description="acceleration; absent: what the axes allow, mm/s2")
+    outer_wall_acceleration_mm_s2: float | None = Field(
+        None, gt=0, le=100000, description="acceleration of outer walls; absent: acceleration_mm_s2, mm/s2"
+    )
+    infill_acceleration_mm_s2: float | None = Field(
+        None, gt=0, le=100000, description="acceleration of sparse infill and support; absent: acceleration_mm_s2, mm/s2"
+    )
+    bridge_acceleration_mm_s2: float | None = Field(
+        None, gt=0, le=100000, description="acceleration of bridges and overhanging walls; absent: acceleration_mm_s2, mm/s2"
+    )
+    first_layer_acceleration_mm_s2: float | None = Field(
+        None, gt=0, le=100000, description="acceleration of part 1's first layer; absent: acceleration_mm_s2, mm/s2"
+    )
+    travel_acceleration_mm_s2: float | None = Field(
+        None, gt=0, le=100000, description="acceleration of travels; absent: acceleration_mm_s2, mm/s2"
     )
     least_layer_time_s: float = Field(5.0, ge=0, le=600, description="layers printed faster than this are slowed down, s")
     least_speed_mm_s: float = Field(10.0, gt=0, le=1000, description="slowing for the layer time stops here, mm/s")

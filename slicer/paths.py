@@ -36,7 +36,7 @@ class Path:
 
     points: (n, 2) mm, n >= 2; a closed path repeats its first point at the end. flow: factor on the bead's volume.
     approach: (k, 2) mm, points that the travel to the first point passes, k >= 0. retract: pull the filament back
-    during that travel.
+    during that travel. fan: part fan 0..1 where it differs from the layer's.
     """
 
     kind: Kind
@@ -46,6 +46,7 @@ class Path:
     flow: float
     approach: Floats
     retract: bool
+    fan: float | None = None
 
     @property
     def length_mm(self) -> float:

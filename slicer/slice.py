@@ -12,6 +12,7 @@ from slicer.bead import Bead
 from slicer.bridge import Bridge, beside, bridge_beads, bridged
 from slicer.brim import brim
 from slicer.contact import contacts
+from slicer.cooling import fan_share, hanging_fan
 from slicer.forbidden import far_mm, forbidden
 from slicer.gap import gaps
 from slicer.heights import heights_of
@@ -26,7 +27,7 @@ from slicer.region import Region, regions
 from slicer.seam import seamed
 from slicer.section import sections
 from slicer.skin import angle_of_layer_deg, skin
-from slicer.speed import speeds_mm_s
+from slicer.speed import layer_time_s, speeds_mm_s
 from slicer.support import supports
 from slicer.walls import Walls, wall_beads, walls
 
@@ -97,18 +98,22 @@ def _layer(
     """The beads in order, with speeds, flow, fan and heat."""
     process, material = profile.process, profile.material
     placed = overhanging(ordered(beads, outline, process, tip), outline, bank, process)
-    flow, fixed, fan, add_c = material.flow, None, material.fan, 0.0
+    flow, fixed, fan, add_c = material.flow, None, 1.0, 0.0
     if not on_platform and index < process.interface_layers:
-        fan, add_c = fan * process.interface_fan, process.interface_temperature_add_c
+        fan, add_c = process.interface_fan, process.interface_temperature_add_c
     if index == 0:
         fixed = process.first_layer_speed_mm_s if on_platform else process.interface_speed_mm_s
         flow *= 1.0 if on_platform else process.interface_flow
     speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)
+    if on_platform and index < material.fan_off_layers:
+        fan = 0.0
+    blown = [hanging_fan(material, p.bead.kind, fan) for p in placed]
     paths = tuple(
-        Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract)
-        for p, speed in zip(placed, speeds, strict=True)
+        Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, blow)
+        for p, blow, speed in zip(placed, blown, speeds, strict=True)
     )
-    return Layer(z_mm, height_mm, paths, 0.0 if index == 0 and on_platform else fan, add_c)
+    fan *= fan_share(material, process, layer_time_s(placed, speeds, profile))
+    return Layer(z_mm, height_mm, paths, fan, add_c)
 
 
 def _check(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Process) -> None:

@@ -8,20 +8,23 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
+from slicer.bead import Bead, length_mm
 from slicer.order import Placed
 from slicer.paths import Kind, bead_area_mm2
 
+RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
+
 
 def of_kind_mm_s(process: Process) -> dict[Kind, float]:
-    """The process's speed of every kind of bead; gaps are as delicate as outer walls."""
+    """The process's speed of every kind of bead."""
     return {
         Kind.OUTER_WALL: process.outer_wall_speed_mm_s,
         Kind.INNER_WALL: process.inner_wall_speed_mm_s,
         Kind.OVERHANG: process.overhang_speed_mm_s,
-        Kind.GAP: process.outer_wall_speed_mm_s,
+        Kind.GAP: process.gap_speed_mm_s,
         Kind.INFILL: process.infill_speed_mm_s,
         Kind.SKIN: process.skin_speed_mm_s,
-        Kind.TOP_SKIN: process.skin_speed_mm_s,
+        Kind.TOP_SKIN: process.top_skin_speed_mm_s,
         Kind.BRIDGE: process.bridge_speed_mm_s,
         Kind.SKIRT: process.first_layer_speed_mm_s,
         Kind.SUPPORT: process.support_speed_mm_s,
@@ -36,13 +39,35 @@ def speeds_mm_s(placed: Sequence[Placed], profile: Profile, height_mm: float, fi
     below least_speed_mm_s.
     """
     process, table = profile.process, of_kind_mm_s(profile.process)
-    wished = np.array([table[p.bead.kind] if fixed_mm_s is None else fixed_mm_s for p in placed])
+    wished = np.array([_of_bead(p.bead, table, process) if fixed_mm_s is None else fixed_mm_s for p in placed])
     areas = np.array([bead_area_mm2(p.bead.width_mm, height_mm) * p.bead.flow * flow for p in placed])
     speeds = np.minimum(wished, profile.material.volumetric_limit_mm3_s / areas)
     lengths = np.array([p.bead.length_mm for p in placed])
-    hops = [a.points[-1] - b.points[0] for a, b in pairwise(placed)]
-    travel_s = float(np.hypot(*np.array(hops).T).sum()) / process.travel_speed_mm_s if hops else 0.0
-    return _slowed(speeds, lengths, process.least_layer_time_s - travel_s, process.least_speed_mm_s)
+    return _slowed(speeds, lengths, process.least_layer_time_s - travel_time_s(placed, profile), process.least_speed_mm_s)
+
+
+def _of_bead(bead: Bead, table: dict[Kind, float], process: Process) -> float:
+    """The kind's speed; a small closed wall's at most small_wall_speed_mm_s."""
+    if bead.kind in RINGS and bead.length_mm <= process.small_wall_mm:
+        ends = bead.points[-1] - bead.points[0]
+        if float(np.hypot(ends[0], ends[1])) <= bead.width_mm:  # a seam gap leaves a wall a little open
+            return min(table[bead.kind], process.small_wall_speed_mm_s)
+    return table[bead.kind]
+
+
+def travel_time_s(placed: Sequence[Placed], profile: Profile) -> float:
+    """What a layer's travels and retractions take at least."""
+    material = profile.material
+    points = [np.vstack([a.points[-1:], b.approach, b.points[:1]]) for a, b in pairwise(placed)]
+    length = sum(length_mm(np.ascontiguousarray(way)) for way in points)
+    pulls = sum(p.retract for p in placed) * 2.0 * material.retract_mm / material.retract_speed_mm_s
+    return length / profile.process.travel_speed_mm_s + pulls
+
+
+def layer_time_s(placed: Sequence[Placed], speeds: Floats, profile: Profile) -> float:
+    """What a layer takes at least, accelerations left out."""
+    lengths = np.array([p.bead.length_mm for p in placed])
+    return float((lengths / speeds).sum()) + travel_time_s(placed, profile)
 
 
 def _slowed(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float) -> Floats:

@@ -1,0 +1,27 @@
+"""Cooling: how hard the fan blows on a layer and on what hangs in the air."""
+
+from profiles.material import Material
+from profiles.process import Process
+from slicer.paths import Kind
+
+HANGING = (Kind.BRIDGE, Kind.OVERHANG)
+STEP = 0.05  # the fan is set in such steps: finer ones would only fill the file
+
+
+def fan_share(material: Material, process: Process, time_s: float) -> float:
+    """Part fan (0..1) of a layer that takes time_s: the material's fan up to least_layer_time_s, then less and less.
+
+    Straight from `fan` to `fan_least` between least_layer_time_s and fan_layer_time_s, as PrusaSlicer has it.
+    """
+    least = min(material.fan_least, material.fan)
+    quick, slow = process.least_layer_time_s, material.fan_layer_time_s
+    if time_s <= quick:
+        share = 1.0
+    else:
+        share = max(0.0, (slow - time_s) / (slow - quick)) if slow > quick else 0.0
+    return round((least + share * (material.fan - least)) / STEP) * STEP
+
+
+def hanging_fan(material: Material, kind: Kind, factor: float) -> float | None:
+    """Part fan of a path where it differs from the layer's: bridges and overhanging walls."""
+    return material.fan_bridge * factor if kind in HANGING and material.fan_bridge is not None else None
