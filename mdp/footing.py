@@ -6,14 +6,13 @@ number for each column of each run. Only wanted columns with several pieces are 
 section.
 """
 
-import numpy as np
-from numba import njit
 
-from mdp.pieces import anchor_joins, before, begin_basins, by_column, root, saddle_joins, walk
+from mdp.kernel import floats, ints, part, table
+from mdp.pieces import alone, anchor_joins, before, begin_basins, by_column, join_columns, root, saddle_joins, together, walk
 from mdp.sums import column_over
 
 
-@njit(cache=True)
+@part
 def find_footing(solid, d, heights, crumb, wanted, footing):  # type: ignore[no-untyped-def]
     """Lower each offset's footing, given as its section, to the least section of a piece at least `crumb` steps high above it.
 
@@ -21,22 +20,27 @@ def find_footing(solid, d, heights, crumb, wanted, footing):  # type: ignore[no-
     """
     points, corners, surface, links, found, tree, anchor, cosines = solid
     n = len(wanted)
-    label, path = np.full(len(heights), -1, np.int32), np.empty(len(heights), np.int32)
-    seeds = begin_basins(found, heights, links, label, True)
+    label, path = ints(len(heights), -1), ints(len(heights), 0)
+    up = n >= 0
+    seeds = begin_basins(found, heights, links, label, up)
     if len(seeds) == 1:
         return
-    saddles = saddle_joins(found, heights, links, label, path, True)
-    anchored = anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, True)
-    joins = np.concatenate((saddles, anchored))
+    saddles = saddle_joins(found, heights, links, label, path, up)
+    anchored = anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, up)
+    joins = together(saddles, anchored)
     begun, ended, elder = _lifetimes(seeds, joins, heights, n)
     several = _several(begun, ended, wanted)
     if several[n] == 0:
         return
-    starts = np.zeros(len(seeds) + 1, np.int64)
+    starts = ints(len(seeds) + 1, 0)
     for basin in range(len(seeds)):
         starts[basin + 1] = starts[basin] + max(begun[basin] - ended[basin], 0)
-    areas, ends = np.zeros(starts[-1]), np.empty((2, 3))
-    lowest, highest = np.searchsorted(several, 1) - 1, np.searchsorted(several, several[n]) - 1
+    areas, ends = floats(starts[len(seeds)], 0.0), table(2, 3)
+    lowest, highest = 0, n - 1
+    while several[lowest + 1] == 0:
+        lowest += 1
+    while several[highest] == several[n]:
+        highest -= 1
     for f in range(corners.shape[1]):
         i, j, k = corners[0, f], corners[1, f], corners[2, f]
         p, q, r = heights[i], heights[j], heights[k]
@@ -46,7 +50,7 @@ def find_footing(solid, d, heights, crumb, wanted, footing):  # type: ignore[no-
         if several[min(first, n)] == several[last]:
             continue
         top = i if p >= max(q, r) else (j if q >= r else k)
-        basin = walk(int(top), heights, links, label, path, True)
+        basin = walk(int(top), heights, links, label, path, up)
         for column in range(first, last):
             if several[column] < several[column + 1]:
                 piece = basin
@@ -59,32 +63,30 @@ def find_footing(solid, d, heights, crumb, wanted, footing):  # type: ignore[no-
                 footing[column] = min(footing[column], areas[starts[piece] + column - ended[piece]])
 
 
-@njit(cache=True)
+@part
 def _lifetimes(seeds, joins, heights, n):  # type: ignore[no-untyped-def]
     """For every basin: the column below which it begins, the one below which it has gone, and the basin it goes into."""
     size = len(seeds)
-    begun, ended, elder = np.empty(size, np.int32), np.zeros(size, np.int32), np.arange(size)
+    begun, ended, elder, parent = ints(size, 0), ints(size, 0), alone(size), alone(size)
     for basin in range(size):
         begun[basin] = min(column_over(heights[seeds[basin]]), n)
-    columns = np.empty(len(joins), np.int32)
-    for k in range(len(joins)):
-        columns[k] = min(column_over(heights[joins[k, 2]]), n)
+    columns = join_columns(joins, heights, n)
     sequence, _ = by_column(columns, n)
-    parent = np.arange(size)
-    for k in sequence[::-1]:
+    for place in range(len(sequence) - 1, -1, -1):
+        k = sequence[place]
         a, b = root(parent, joins[k, 0]), root(parent, joins[k, 1])
         if a != b:
-            if before(heights, seeds[a], seeds[b], True):
+            if before(heights, seeds[a], seeds[b], n >= 0):
                 a, b = b, a
             parent[a], elder[a], ended[a] = b, b, columns[k]
     return begun, ended, elder
 
 
-@njit(cache=True)
+@part
 def _several(begun, ended, wanted):  # type: ignore[no-untyped-def]
     """(n + 1,) how many of the wanted columns before each have several pieces above them."""
     n = len(wanted)
-    pieces, several = np.zeros(n + 1, np.int32), np.zeros(n + 1, np.int32)
+    pieces, several = ints(n + 1, 0), ints(n + 1, 0)
     for basin in range(len(begun)):
         if begun[basin] > ended[basin]:
             pieces[ended[basin]] += 1
@@ -96,7 +98,7 @@ def _several(begun, ended, wanted):  # type: ignore[no-untyped-def]
     return several
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _section(points, i, j, k, heights, d, column, ends):  # type: ignore[no-untyped-def]
     """A face's share of the area within the section's outline: half the triangle of its crossing segment and the origin."""
     for v, w in ((i, j), (j, k), (k, i)):

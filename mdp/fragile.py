@@ -8,6 +8,7 @@ that looks the other way; near an acute edge the other face looks aside, that is
 import numpy as np
 from numba import njit
 
+from mdp.kernel import floats, inlined, part
 from mdp.mesh import Floats
 from mdp.plane import Plane
 from mdp.rays import first_hit
@@ -18,7 +19,7 @@ SLIVER_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a s
 OPPOSITE_COSINE = 0.8  # two faces of one wall or rod look opposite ways, within 37 degrees
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _note(cosine, height, n, above, below):  # type: ignore[no-untyped-def]
     b = min(column_over(height), n)
     if cosine < 0.0:
@@ -27,14 +28,14 @@ def _note(cosine, height, n, above, below):  # type: ignore[no-untyped-def]
         above[b - 1] = min(above[b - 1], height)
 
 
-@njit(cache=True)
+@part
 def find_slivers(cosines, flatness, sharp, corners, normals, d, heights, n, step, fragile):  # type: ignore[no-untyped-def]
     """Distance from each offset up to the next surface looking along d and down to the next one looking against it.
 
     Where the surface is smooth the normal of a vertex tells where it looks, at an edge or corner those of its faces do. sharp:
     numbers 3 f + k of the face corners at edges.
     """
-    above, below = np.full(n + 1, np.inf), np.full(n + 1, -np.inf)
+    above, below = floats(n + 1, np.inf), floats(n + 1, -np.inf)
     for v in range(len(heights)):
         if abs(cosines[v]) > SLIVER_COSINE and flatness[v] > SLIVER_COSINE:
             _note(cosines[v], heights[v], n, above, below)

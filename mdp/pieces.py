@@ -9,8 +9,8 @@ solid, closed voids and handles included.
 """
 
 import numpy as np
-from numba import njit
 
+from mdp.kernel import inlined, int_table, ints, part
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.rays import first_hit
 from mdp.sums import column_over
@@ -18,7 +18,7 @@ from mdp.sums import column_over
 UNKNOWN = -2
 
 
-@njit(cache=True)
+@part
 def find_critical(cosines, flatness, heights, links, found):  # type: ignore[no-untyped-def]
     """Vertices that are not regular, or have no single ring of neighbours; returns how many. cosines: of vertex normals and d."""
     starts, neighbours = links
@@ -37,14 +37,14 @@ def find_critical(cosines, flatness, heights, links, found):  # type: ignore[no-
     return many
 
 
-@njit(cache=True, inline="always")
+@inlined
 def before(heights, a, b, up):  # type: ignore[no-untyped-def]
     """Whether a comes before b: strictly lower, ties by number; the reverse for a sweep from the top (up)."""
     lower = heights[a] < heights[b] or (heights[a] == heights[b] and a < b)
     return lower != up
 
 
-@njit(cache=True)
+@part
 def walk(v, heights, links, label, path, up):  # type: ignore[no-untyped-def]
     """The basin of a vertex; labels all vertices on the way. The vertices at which basins begin are labelled already."""
     starts, neighbours = links
@@ -61,11 +61,11 @@ def walk(v, heights, links, label, path, up):  # type: ignore[no-untyped-def]
     return label[v]
 
 
-@njit(cache=True)
+@part
 def begin_basins(found, heights, links, label, up):  # type: ignore[no-untyped-def]
     """Number the vertices at which basins begin; returns them."""
     starts, neighbours = links
-    seeds = np.empty(len(found), np.int32)
+    seeds = ints(len(found), 0)
     size = 0
     for v in found:
         first = starts[v] < starts[v + 1]
@@ -77,14 +77,14 @@ def begin_basins(found, heights, links, label, up):  # type: ignore[no-untyped-d
     return seeds[:size]
 
 
-@njit(cache=True)
+@part
 def saddle_joins(found, heights, links, label, path, up):  # type: ignore[no-untyped-def]
     """(j, 3): two basins that meet, and the vertex at which they do."""
     starts, neighbours = links
     room = 0
     for v in found:
         room += starts[v + 1] - starts[v]
-    joins = np.empty((room, 3), np.int32)
+    joins = int_table(room, 3)
     size = 0
     for v in found:
         last = -1
@@ -98,12 +98,12 @@ def saddle_joins(found, heights, links, label, path, up):  # type: ignore[no-unt
     return joins[:size]
 
 
-@njit(cache=True)
+@part
 def anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, up):  # type: ignore[no-untyped-def]
     """(j, 3): the basin of a void's first vertex, that of the surface which the ray from it meets, and the vertex."""
     vertices, faces, normals, vertex_normals = surface
     low, high = tree
-    joins = np.empty((len(seeds), 3), np.int32)
+    joins = int_table(len(seeds), 3)
     size = 0
     for basin in range(len(seeds)):
         v = seeds[basin]
@@ -125,7 +125,38 @@ def anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, p
     return joins[:size]
 
 
-@njit(cache=True, inline="always")
+@part
+def together(some, more):  # type: ignore[no-untyped-def]
+    """The joins of two lists in one."""
+    both = int_table(len(some) + len(more), 3)
+    for k in range(len(some)):
+        for which in range(3):
+            both[k, which] = some[k, which]
+    for k in range(len(more)):
+        for which in range(3):
+            both[len(some) + k, which] = more[k, which]
+    return both
+
+
+@part
+def join_columns(joins, heights, n):  # type: ignore[no-untyped-def]
+    """The first column that is not below each join."""
+    columns = ints(len(joins), 0)
+    for k in range(len(joins)):
+        columns[k] = min(column_over(heights[joins[k, 2]]), n)
+    return columns
+
+
+@part
+def alone(size):  # type: ignore[no-untyped-def]
+    """The parents of basins none of which have been joined."""
+    parent = ints(size, 0)
+    for basin in range(size):
+        parent[basin] = basin
+    return parent
+
+
+@inlined
 def root(parent, v):  # type: ignore[no-untyped-def]
     """The basin that stands for all that v has been joined with."""
     while parent[v] != v:
@@ -134,7 +165,7 @@ def root(parent, v):  # type: ignore[no-untyped-def]
     return v
 
 
-@njit(cache=True)
+@part
 def _stands_on(v, vertices, heights, links):  # type: ignore[no-untyped-def]
     """Whether a neighbour further down stands on the platform too: then v's component stands there already."""
     starts, neighbours = links
@@ -145,49 +176,49 @@ def _stands_on(v, vertices, heights, links):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True)
+@part
 def count_pieces(surface, standing, links, found, tree, anchor, cosines, heights, n, pieces):  # type: ignore[no-untyped-def]
     """Components below each offset that do not reach the platform."""
-    label, path = np.full(len(heights), -1, np.int32), np.empty(len(heights), np.int32)
-    seeds = begin_basins(found, heights, links, label, False)
-    saddles = saddle_joins(found, heights, links, label, path, False)
-    anchored = anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, False)
+    label, path = ints(len(heights), -1), ints(len(heights), 0)
+    up = n < 0  # a constant would have all these functions compiled once for every value of it
+    seeds = begin_basins(found, heights, links, label, up)
+    saddles = saddle_joins(found, heights, links, label, path, up)
+    anchored = anchor_joins(seeds, surface, tree, anchor, cosines, heights, links, label, path, up)
     size = len(seeds)
-    begun, grounded_at = np.empty(size, np.int32), np.full(size, n + 1, np.int32)
+    begun, grounded_at = ints(size, 0), ints(size, n + 1)
     for basin in range(size):
         begun[basin] = min(column_over(heights[seeds[basin]]), n)
     for k in range(len(standing)):
         v = int(standing[k])
         if not _stands_on(v, surface[0], heights, links):
-            basin = walk(v, heights, links, label, path, False)
+            basin = walk(v, heights, links, label, path, up)
             grounded_at[basin] = min(grounded_at[basin], min(column_over(heights[v]), n))
-    joins = np.concatenate((saddles, anchored))
-    columns = np.empty(len(joins), np.int32)
-    for k in range(len(joins)):
-        columns[k] = min(column_over(heights[joins[k, 2]]), n)
+    joins = together(saddles, anchored)
+    columns = join_columns(joins, heights, n)
     _count(begun, grounded_at, joins, columns, n, pieces)
 
 
-@njit(cache=True)
+@part
 def by_column(columns, n):  # type: ignore[no-untyped-def]
     """Indices in the order of their columns, and where each column's begin."""
-    starts = np.zeros(n + 3, np.int32)
+    starts, place = ints(n + 3, 0), ints(n + 3, 0)
     for k in range(len(columns)):
         starts[columns[k] + 1] += 1
     for b in range(n + 2):
         starts[b + 1] += starts[b]
-    sequence, place = np.empty(len(columns), np.int32), starts.copy()
+        place[b + 1] = starts[b + 1]
+    sequence = ints(len(columns), 0)
     for k in range(len(columns)):
         sequence[place[columns[k]]] = k
         place[columns[k]] += 1
     return sequence, starts
 
 
-@njit(cache=True)
+@part
 def _count(begun, grounded_at, joins, columns, n, pieces):  # type: ignore[no-untyped-def]
     """Join basins in the order of the offsets and count those that hang free."""
     size = len(begun)
-    parent, grounded = np.arange(size), np.zeros(size, np.bool_)
+    parent, grounded = alone(size), ints(size, 0)
     _, birth = by_column(begun, n)
     landed, landing = by_column(grounded_at, n + 1)
     joined, joining = by_column(columns, n)
@@ -198,13 +229,13 @@ def _count(begun, grounded_at, joins, columns, n, pieces):  # type: ignore[no-un
             k = joined[at]
             p, q = root(parent, joins[k, 0]), root(parent, joins[k, 1])
             if p != q:
-                if not (grounded[p] and grounded[q]):
+                if grounded[p] == 0 or grounded[q] == 0:
                     floating -= 1
                 parent[max(p, q)] = min(p, q)
-                grounded[min(p, q)] = grounded[p] or grounded[q]
+                grounded[min(p, q)] = max(grounded[p], grounded[q])
         for at in range(landing[b], landing[b + 1]):
             here = root(parent, landed[at])
-            if not grounded[here]:
-                grounded[here] = True
+            if grounded[here] == 0:
+                grounded[here] = 1
                 floating -= 1
         pieces[b] = floating

@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from mdp.kernel import floats, inlined, ints, part
 from mdp.mesh import Mesh
 
 LEAF_FACES = 4
@@ -38,7 +39,7 @@ def _boxes(vertices, faces, leaves):  # type: ignore[no-untyped-def]
     return low, high
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _enters(low, high, node, origin, inverse, reach):  # type: ignore[no-untyped-def]
     near, far = 0.0, reach
     for axis in range(3):
@@ -49,7 +50,7 @@ def _enters(low, high, node, origin, inverse, reach):  # type: ignore[no-untyped
     return near <= far * (1.0 + 1e-9)
 
 
-@njit(cache=True)
+@part
 def _distance(p, q, r, origin, ray):  # type: ignore[no-untyped-def]
     """Distance along the ray to a triangle (Moeller and Trumbore, edges included), infinite for a miss."""
     e1x, e1y, e1z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -68,18 +69,17 @@ def _distance(p, q, r, origin, ray):  # type: ignore[no-untyped-def]
     return t if t > 0.0 else np.inf
 
 
-@njit(cache=True)
+@part
 def first_hit(origin, ray, reach, own_vertex, facing, vertices, faces, normals, low, high):  # type: ignore[no-untyped-def]
     """The first face met along `ray` within reach whose normal has at least the cosine `facing` with it; -1: none.
 
     The faces around own_vertex are left out (-1: around none). low, high: a Tree's boxes.
     """
     leaves = len(low) // 2
-    inverse = np.empty(3)
+    inverse = floats(3, 0.0)
     for axis in range(3):
         inverse[axis] = 1.0 / ray[axis] if abs(ray[axis]) > 1e-300 else 1e300
-    stack = np.empty(DEPTH, dtype=np.int32)
-    stack[0] = 1
+    stack = ints(DEPTH, 1)
     top, hit = 1, -1
     while top > 0:
         top -= 1

@@ -2,20 +2,19 @@
 
 Heights are in steps above the direction's first offset: offset column c lies at height c, column c is below a vertex at height t
 when c < t. Faces are taken in blocks: what every face needs is worked out in plain loops over the block, which the compiler turns
-into vector instructions, then added to the columns one face after the other. No flag allows the compiler to change a
-result, so all processors and numbers of threads give the same numbers.
+into vector instructions, then added to the columns one face after the other.
 """
 
 import numpy as np
-from numba import njit
+
+from mdp.kernel import floats, inlined, int_table, ints, part, table, vector_part
 
 BLOCK = 128
 AHEAD = 3  # columns of a face that are worked out for the whole block; the few faces that cross more are finished singly
 THIRD = 1.0 / 3.0
-EXACT = {"nnan", "ninf", "nsz"}
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def find_heights(x, y, z, d, step, heights):  # type: ignore[no-untyped-def]
     """Fill the heights of all vertices; returns the first offset's number and the count of offsets in between."""
     d0, d1, d2 = d[0], d[1], d[2]
@@ -30,13 +29,13 @@ def find_heights(x, y, z, d, step, heights):  # type: ignore[no-untyped-def]
     return begin, max(int(np.ceil(most)) - begin, 0)
 
 
-@njit(cache=True, inline="always")
+@inlined
 def column_over(height):  # type: ignore[no-untyped-def]
     """The number of offsets strictly below a height: the first column that is not below it."""
     return max(int(np.ceil(height)), 0)
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def _sorted_heights(a, b, c, heights, low, middle, high):  # type: ignore[no-untyped-def]
     for k in range(len(low)):
         p, q, r = heights[a[k]], heights[b[k]], heights[c[k]]
@@ -45,14 +44,14 @@ def _sorted_heights(a, b, c, heights, low, middle, high):  # type: ignore[no-unt
         middle[k] = max(least, min(most, r))
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def dot(x, y, z, d0, d1, d2, out):  # type: ignore[no-untyped-def]
     """Products of (n,) vectors given by their coordinates with one vector."""
     for k in range(len(out)):
         out[k] = x[k] * d0 + y[k] * d1 + z[k] * d2
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def _ramps(low, middle, high, rise, fall, column, crossed):  # type: ignore[no-untyped-def]
     """The first column each face crosses and how many, and the two factors of its share above an offset."""
     for k in range(len(low)):
@@ -65,20 +64,20 @@ def _ramps(low, middle, high, rise, fall, column, crossed):  # type: ignore[no-u
         crossed[k] = np.int32(max(np.ceil(high[k]), 0.0)) - np.int32(first)
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _share(c, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
     """Share of a face above an offset that it crosses."""
     return 1.0 - (c - low) * (c - low) * rise if c < middle else (high - c) * (high - c) * fall
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _moment(c, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
     """First moment about an offset of the share of a face above it."""
     mean, up, down = (low + middle + high) * THIRD, c - low, high - c
     return mean - c + up * up * rise * up * THIRD if c < middle else down * down * fall * down * THIRD
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def _weigh(ahead, low, middle, high, rise, fall, weight, area, moment):  # type: ignore[no-untyped-def]
     for k in range(len(low)):
         c = max(np.ceil(low[k]), 0.0) + ahead
@@ -87,7 +86,7 @@ def _weigh(ahead, low, middle, high, rise, fall, weight, area, moment):  # type:
         moment[k] = inside * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def _add_volumes(column, crossed, low, middle, high, rise, fall, weight, parts, sums):  # type: ignore[no-untyped-def]
     for k in range(len(low)):
         b = np.uint32(column[k])
@@ -105,11 +104,11 @@ def _add_volumes(column, crossed, low, middle, high, rise, fall, weight, parts, 
             sums[b + ahead, 3] += weight[k] * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@njit(cache=True)
+@part
 def sum_volumes(corners, vectors, d, heights, n, step, section, volume):  # type: ignore[no-untyped-def]
     """Cross-section at and volume above each offset, by the divergence theorem."""
-    sums = np.zeros((n + AHEAD + 1, 4))
-    rows, parts, ints = np.empty((6, BLOCK)), np.empty((2 * AHEAD, BLOCK)), np.empty((2, BLOCK), np.int32)
+    sums = table(n + AHEAD + 1, 4)
+    rows, parts, places = table(6, BLOCK), table(2 * AHEAD, BLOCK), int_table(2, BLOCK)
     for begin in range(0, corners.shape[1], BLOCK):
         end = min(begin + BLOCK, corners.shape[1])
         size = end - begin
@@ -117,10 +116,10 @@ def sum_volumes(corners, vectors, d, heights, n, step, section, volume):  # type
         rise, fall, weight = rows[3, :size], rows[4, :size], rows[5, :size]
         _sorted_heights(corners[0, begin:end], corners[1, begin:end], corners[2, begin:end], heights, low, middle, high)
         dot(vectors[0, begin:end], vectors[1, begin:end], vectors[2, begin:end], d[0], d[1], d[2], weight)
-        _ramps(low, middle, high, rise, fall, ints[0, :size], ints[1, :size])
+        _ramps(low, middle, high, rise, fall, places[0, :size], places[1, :size])
         for ahead in range(AHEAD):
             _weigh(float(ahead), low, middle, high, rise, fall, weight, parts[2 * ahead, :size], parts[2 * ahead + 1, :size])
-        _add_volumes(ints[0, :size], ints[1, :size], low, middle, high, rise, fall, weight, parts, sums)
+        _add_volumes(places[0, :size], places[1, :size], low, middle, high, rise, fall, weight, parts, sums)
     whole, first_moment = 0.0, 0.0
     for column in range(n - 1, -1, -1):
         whole += sums[column + 1, 0]
@@ -129,31 +128,31 @@ def sum_volumes(corners, vectors, d, heights, n, step, section, volume):  # type
         volume[column] = (sums[column, 3] + first_moment - column * whole) * step
 
 
-@njit(cache=True)
+@part
 def _select(normals, risky, d, risky_below, chosen, kind):  # type: ignore[no-untyped-def]
     """The faces that are risky either way, with 1: upright only, 2: along d only, 3: both; returns how many."""
-    slopes = np.empty(BLOCK)
+    slopes = floats(BLOCK, 0.0)
     many = 0
     for begin in range(0, normals.shape[1], BLOCK):
         end = min(begin + BLOCK, normals.shape[1])
         dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], d[0], d[1], d[2], slopes[: end - begin])
         for f in range(begin, end):
-            code = np.int8(risky[f]) + 2 * np.int8(slopes[f - begin] < risky_below)
+            code = int(risky[f]) + 2 * int(slopes[f - begin] < risky_below)
             chosen[many], kind[many] = f, code
             many += int(code > 0)
     return many
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def _pick(chosen, a, b, c, areas, p, q, r, weight):  # type: ignore[no-untyped-def]
     for k in range(len(chosen)):
-        f = chosen[k]
+        f = np.uint32(chosen[k])
         p[k], q[k], r[k] = a[f], b[f], c[f]
     for k in range(len(chosen)):
         weight[k] = areas[chosen[k]]
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def _cover(ahead, low, middle, high, rise, fall, weight, area):  # type: ignore[no-untyped-def]
     for k in range(len(low)):
         c = max(np.ceil(low[k]), 0.0) + ahead
@@ -161,26 +160,26 @@ def _cover(ahead, low, middle, high, rise, fall, weight, area):  # type: ignore[
         area[k] = inside * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@njit(cache=True, error_model="numpy", fastmath=EXACT)
+@vector_part
 def _add_areas(kind, column, crossed, low, middle, high, rise, fall, weight, parts, sums):  # type: ignore[no-untyped-def]
     for k in range(len(low)):
-        b, which = np.uint32(column[k]), np.uint32(kind[k])
-        sums[which, b, 0] += weight[k]
-        sums[which, b, 1] += parts[0, k]
-        sums[which, b + 1, 1] += parts[1, k]
-        sums[which, b + 2, 1] += parts[2, k]
+        b, which = np.uint32(column[k]), 2 * np.uint32(kind[k])
+        sums[b, which] += weight[k]
+        sums[b, which + 1] += parts[0, k]
+        sums[b + 1, which + 1] += parts[1, k]
+        sums[b + 2, which + 1] += parts[2, k]
         for ahead in range(AHEAD, crossed[k]):
             c = float(b) + ahead
-            sums[which, b + ahead, 1] += weight[k] * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+            sums[b + ahead, which + 1] += weight[k] * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
 
 
-@njit(cache=True)
+@part
 def sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, up, residual):  # type: ignore[no-untyped-def]
     """Risky areas above each offset: printed straight up, and along d. Only the faces that are risky either way count."""
-    sums = np.zeros((4, n + AHEAD + 1, 2))
-    chosen, kind = np.empty(len(areas) + 1, np.uint32), np.empty(len(areas) + 1, np.int8)
+    sums = table(n + AHEAD + 1, 8)
+    chosen, kind = ints(len(areas) + 1, 0), ints(len(areas) + 1, 0)
     many = _select(normals, risky, d, risky_below, chosen, kind)
-    rows, parts, ints = np.empty((6, BLOCK)), np.empty((AHEAD, BLOCK)), np.empty((2, BLOCK), np.int32)
+    rows, parts, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
     picked = np.empty((3, BLOCK), np.uint32)
     for begin in range(0, many, BLOCK):
         end = min(begin + BLOCK, many)
@@ -190,20 +189,20 @@ def sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, up, re
         a, b, c = picked[0, :size], picked[1, :size], picked[2, :size]
         _pick(chosen[begin:end], corners[0], corners[1], corners[2], areas, a, b, c, weight)
         _sorted_heights(a, b, c, heights, low, middle, high)
-        _ramps(low, middle, high, rise, fall, ints[0, :size], ints[1, :size])
+        _ramps(low, middle, high, rise, fall, places[0, :size], places[1, :size])
         for ahead in range(AHEAD):
             _cover(float(ahead), low, middle, high, rise, fall, weight, parts[ahead, :size])
-        _add_areas(kind[begin:end], ints[0, :size], ints[1, :size], low, middle, high, rise, fall, weight, parts, sums)
-    whole = np.zeros(4)
+        _add_areas(kind[begin:end], places[0, :size], places[1, :size], low, middle, high, rise, fall, weight, parts, sums)
+    whole = floats(4, 0.0)
     for column in range(n - 1, -1, -1):
         for which in range(1, 4):
-            whole[which] += sums[which, column + 1, 0]
-        both = sums[3, column, 1] + whole[3]
-        up[column] = sums[1, column, 1] + whole[1] + both
-        residual[column] = sums[2, column, 1] + whole[2] + both
+            whole[which] += sums[column + 1, 2 * which]
+        both = sums[column, 7] + whole[3]
+        up[column] = sums[column, 3] + whole[1] + both
+        residual[column] = sums[column, 5] + whole[2] + both
 
 
-@njit(cache=True)
+@part
 def find_lowest(z, edges, heights, n, watched, lowest):  # type: ignore[no-untyped-def]
     """Least z above each offset, among vertices and crossings of edges, lowest first, below the watched height."""
     known = 0  # columns before it have their least z: that of a vertex above them met earlier

@@ -22,6 +22,7 @@ from numba import njit
 from mdp.facets import Facets, facets
 from mdp.footing import find_footing
 from mdp.fragile import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
+from mdp.kernel import floats, ints
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.pieces import UNKNOWN, count_pieces, find_critical
@@ -184,7 +185,7 @@ def _gains(begin_row, end_row, surface, directions, step, risky_below, out):  # 
     points, corners, normals, areas, risky = surface
     first, count, up, residual = out
     for row in range(begin_row, end_row):
-        d, heights = directions[row], np.empty(points.shape[1])
+        d, heights = directions[row], floats(points.shape[1], 0.0)
         begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
         first[row], count[row] = begin, n
         if n > 0:
@@ -197,8 +198,8 @@ def sweep_kernel(begin_row, end_row, rows, solid, directions, watched, needed, c
     surface, standing, sharp, links, tree, anchor = solid
     first, count, pieces, section, volume, footing, lowest, fragile = out
     for row in range(begin_row, end_row):
-        d, heights = directions[row], np.empty(points.shape[1])
-        cosines, room = np.empty(points.shape[1]), np.empty(points.shape[1], np.int32)
+        d, heights = directions[row], floats(points.shape[1], 0.0)
+        cosines, room = floats(points.shape[1], 0.0), ints(points.shape[1], 0)
         begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
         first[row], count[row] = begin, n
         if n > 0:
@@ -208,7 +209,9 @@ def sweep_kernel(begin_row, end_row, rows, solid, directions, watched, needed, c
             find_slivers(cosines, flatness, sharp, corners, normals, d, heights, n, step, fragile[row])
             found = room[: find_critical(cosines, flatness, heights, links, room)]
             count_pieces(surface, standing, links, found, tree, anchor, cosines, heights, n, pieces[row])
-            wanted = (pieces[row, :n] == 0) & (lowest[row, :n] >= needed[row])
-            footing[row] = section[row]
+            wanted = ints(n, 0)
+            for column in range(n):
+                footing[row, column] = section[row, column]
+                wanted[column] = int(pieces[row, column] == 0 and lowest[row, column] >= needed[row])
             solid_above = (points, corners, surface, links, found, tree, anchor, cosines)
             find_footing(solid_above, d, heights, crumb, wanted, footing[row])
