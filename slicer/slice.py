@@ -1,7 +1,8 @@
 """Slicing: one part of a decomposition becomes layers of paths in its own frame."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+
+import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats
@@ -17,14 +18,14 @@ from slicer.forbidden import far_mm, forbidden
 from slicer.gap import gaps
 from slicer.heights import heights_of
 from slicer.infill import infill, pattern_density
-from slicer.interface import beneath
+from slicer.interface import beneath, interface_edges, strengthened
 from slicer.order import ordered
 from slicer.overhang import overhanging
 from slicer.paths import Kind, Layer, Path, SlicedPart
 from slicer.polygons import Polygons, cleaned, united
 from slicer.props import support_beads
 from slicer.region import Region, regions
-from slicer.seam import seamed
+from slicer.seam import Surroundings, rear_of, seamed
 from slicer.section import sections
 from slicer.skin import angle_of_layer_deg, skin
 from slicer.speed import layer_time_s, speeds_mm_s
@@ -41,7 +42,8 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
     process, mesh = profile.process, part.in_part_frame()
     at = heights_of(mesh, process, part.index == 1)
     outlines = [cleaned(loops) for loops in sections(mesh, at.cut_mm)]
-    walled = [walls(s, process.walls, process.line_width_mm, h) for s, h in zip(outlines, at.height_mm, strict=True)]
+    processes = strengthened(process, part.index > 1, len(outlines))
+    walled = [walls(s, p.walls, p.line_width_mm, h) for s, p, h in zip(outlines, processes, at.height_mm, strict=True)]
     below = beneath(part, earlier, outlines[0])
     filled = regions(outlines, [w.inside for w in walled], below, process)
     density = pattern_density([region.sparse for region in filled], process, process.layer_height_mm)
@@ -49,15 +51,18 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
     far = far_mm(mesh)
     shut = forbidden(part, later, at.tip_mm - at.height_mm, at.tip_mm, process.support_distance_mm, far)
     props = supports([c.hanging for c in over], outlines, at, process, below, shut, far)
+    edges, rear = interface_edges(part, outlines[0], below, later), rear_of(mesh.bounds_mm)
     layers: list[Layer] = []
-    tip: Floats | None = None
+    tip, seams = None, np.zeros((0, 2))
     for i, outline in enumerate(outlines):
         height = float(at.height_mm[i])
-        region, beads = _beads(outline, walled[i], filled[i], over[i].bridges, i, process, height)
+        region, beads = _beads(outline, walled[i], filled[i], over[i].bridges, i, processes[i], height)
         beads += infill(region.sparse, process, density, i, float(at.tip_mm[i]), height)
         beads += support_beads(props.areas[i], props.dense[i], process, height, i == 0 and part.index == 1)
         if i == 0 and part.index == 1:
             beads += brim(united([outline, props.areas[0]]), process, height)
+        around = Surroundings(rear, seams, rear if tip is None else tip, edges, float(at.cut_mm[i]), i)
+        beads, seams = seamed(beads, process, around)
         bank = outlines[i - 1] if i else below
         layer = _layer(beads, outline, bank, i, part.index == 1, profile, float(at.tip_mm[i]), height, tip)
         if layer.paths:
@@ -73,7 +78,7 @@ def _beads(
     """What a layer prints of the part itself but for the infill, and the regions beside its bridges."""
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
     angle = angle_of_layer_deg(process.infill_angle_deg, layer)
-    beads = [replace(bead, points=seamed(bead.points)) for bead in wall_beads(around, process, height_mm)]
+    beads = wall_beads(around, process, height_mm)
     beads += gaps(around.free, width, height_mm, outline, process.outer_bulge) + gaps(around.narrow, width, height_mm)
     for span in bridges:
         area = bridged(span, around.inside, width)
