@@ -22,7 +22,7 @@ ANCHOR = 2.0  # line widths that the lines of a bridge reach over its banks
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
 ADRIFT = 10.0  # and one held nowhere like this
 TOLERATED = 0.02  # share of a bridge's length that may have a loose end: corners of the place
-GAIN = 1e-6  # a direction is better only by more than rounding, so that equal ones go to the first
+GAIN = 0.01  # a direction is better only by this share, more than where the lines happen to lie; else the place's own sides win
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +68,12 @@ def bridge(hanging: Polygons, banks: Floats, width_mm: float) -> Bridge | None:
 
 
 def _angles(sides: Floats) -> list[float]:
-    """Directions worth trying, radians in 0 .. pi, the regular ones first."""
+    """Directions worth trying, radians in 0 .. pi, those of the place's sides first."""
     steps = sides[:, 2:] - sides[:, :2]
     longest = np.argsort(-np.hypot(*steps.T), kind="stable")[:SIDES]
     along = np.arctan2(steps[longest, 1], steps[longest, 0])
     own = np.round(np.concatenate([along, along + 0.5 * np.pi]) % np.pi, 4)
-    return [*(np.pi * np.arange(TURNS) / TURNS).tolist(), *np.unique(own).tolist()]
+    return [*np.unique(own).tolist(), *(np.pi * np.arange(TURNS) / TURNS).tolist()]
 
 
 @njit(cache=True)

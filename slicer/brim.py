@@ -6,7 +6,7 @@ from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
 from slicer.paths import Kind
 from slicer.polygons import Polygons, area_mm2, contours, rounded
-from slicer.seam import seamed
+from slicer.seam import begun_at_rear
 
 RANK = -2000
 
@@ -22,7 +22,7 @@ def brim(footprint: Polygons, process: Process, height_mm: float) -> list[Bead]:
     beads: list[Bead] = []
     for k in reversed(range(count)):
         loops = [loop for loop in contours(rounded(outside, nearest + k * spacing)) if area_mm2(loop) > 0]
-        beads += [Bead(Kind.SKIRT, seamed(loop), process.line_width_mm, RANK - k) for loop in loops]
+        beads += [Bead(Kind.SKIRT, begun_at_rear(loop), process.line_width_mm, RANK - k) for loop in loops]
     return beads
 
 

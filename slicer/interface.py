@@ -6,7 +6,8 @@ import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
-from slicer.polygons import Polygons, cleaned, united
+from profiles.process import Process
+from slicer.polygons import Polygons, cleaned, contours, united
 from slicer.section import sections
 
 BENEATH_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
@@ -29,3 +30,28 @@ def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Pol
 
 def _in_frame_of(part: Part, other: Part) -> Mesh:
     return other.mesh.moved(part.rotation, (0.0, 0.0, -part.base.offset_mm))
+
+
+def strengthened(process: Process, on_plastic: bool, layers: int) -> list[Process]:
+    """The process of every layer: a part on plastic has more walls in its first ones, if it has walls at all."""
+    extra = process.interface_extra_walls if on_plastic and process.walls else 0
+    stronger = process.model_copy(update={"walls": process.walls + extra}) if extra else process
+    return [stronger if i < process.interface_layers else process for i in range(layers)]
+
+
+def interface_edges(part: Part, first: Polygons, below: Polygons | None, later: Sequence[Part]) -> Floats:
+    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface.
+
+    first: section of its first layer, below: plastic under its base plane.
+    """
+    found = [] if below is None else [_segments(np.insert(loop, 2, 0.0, axis=1)) for loop in contours(first ^ below)]
+    for other in later:
+        for loop in contours(cleaned(sections(other.in_part_frame(), np.array([BENEATH_MM]))[0])):
+            placed = np.insert(loop, 2, other.base.offset_mm, axis=1) @ other.rotation
+            found.append(_segments(placed @ part.rotation.T - np.array([0.0, 0.0, part.base.offset_mm])))
+    return np.concatenate(found) if found else np.zeros((0, 6))
+
+
+def _segments(loop: Floats) -> Floats:
+    """(n, 6) sides of a loop (n, 3) in space."""
+    return np.hstack([loop, np.roll(loop, -1, axis=0)])

@@ -7,7 +7,6 @@ from slicer.bead import Bead
 from slicer.order import ordered
 from slicer.paths import Kind
 from slicer.polygons import Polygons
-from slicer.seam import seamed
 from slicer.slice import slice_part
 from slicer.speed import _slowed
 from tests.shapes import box, tee
@@ -68,20 +67,6 @@ def test_inner_walls_come_from_the_inside_out_then_the_outer_wall_then_the_fill(
     kinds = [path.kind for path in slice_part(whole(box(20, 20, 4)), profile()).layers[10].paths]
     assert kinds[:3] == [Kind.INNER_WALL, Kind.INNER_WALL, Kind.OUTER_WALL]
     assert set(kinds[3:]) == {Kind.INFILL}
-
-
-def test_a_seam_hides_in_an_inner_corner():
-    ell = np.array([[0, 0], [10, 0], [10, 4], [4, 4], [4, 10], [0, 10]], dtype=float)
-    assert tuple(seamed(ell)[0]) == (4, 4)
-    assert tuple(seamed(np.roll(ell, 2, axis=0))[0]) == (4, 4)
-
-
-def test_a_seam_of_a_round_wall_is_at_the_rear():
-    turn = np.linspace(0, 2 * np.pi, 60, endpoint=False)
-    circle = np.column_stack([np.cos(turn), np.sin(turn)])
-    assert seamed(circle)[0] == pytest.approx([0, 1], abs=1e-9)
-    assert seamed(circle)[0] is not seamed(circle)[-1]
-    assert (seamed(circle)[0] == seamed(circle)[-1]).all()
 
 
 def test_seams_of_a_tower_stand_over_each_other():
