@@ -1,0 +1,104 @@
+"""Drawing: one layer as SVG, every bead as wide as it is printed, coloured by kind, with travels and seams."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.errors import SliceError
+from slicer.paths import Kind, Layer, Path, SlicedPart
+
+COLOURS = {
+    Kind.OUTER_WALL: "#e8a33d",
+    Kind.INNER_WALL: "#f4d160",
+    Kind.OVERHANG: "#2746c7",
+    Kind.GAP: "#d9d9d9",
+    Kind.INFILL: "#b3372b",
+    Kind.SKIN: "#9a5bb5",
+    Kind.TOP_SKIN: "#f07a6a",
+    Kind.BRIDGE: "#4f8fe0",
+    Kind.SKIRT: "#3f7f5f",
+    Kind.SUPPORT: "#4caf50",
+    Kind.SUPPORT_INTERFACE: "#1b7f3b",
+}
+WALLS = (Kind.OUTER_WALL, Kind.OVERHANG)
+TRAVEL_COLOUR, RETRACTED_COLOUR, SEAM_COLOUR = "#3c8d93", "#c2185b", "#000000"
+MARGIN_MM = 2.0
+LINE_MM = 0.06  # how thick travels are drawn
+SCALE = 10  # pixels a millimetre, for viewers that do not zoom
+LEGEND_MM = 3.0
+
+
+def layer_svg(sliced: SlicedPart, number: int) -> str:
+    """The picture of a part's layer, counted from 1, in the part's frame: x to the right, y up, 1 unit = 1 mm.
+
+    Each bead is a polyline as wide as the bead in the group of its kind (id: the kind's name), with round ends; travels are
+    thin lines, dashed without and solid with a retraction; a dot stands at the beginning of every outer wall. Raises
+    SliceError for a layer that the part does not have.
+    """
+    if not 1 <= number <= len(sliced.layers):
+        raise SliceError(f"part {sliced.index} has no layer {number}: its layers are 1 to {len(sliced.layers)}")
+    layer = sliced.layers[number - 1]
+    points = np.concatenate([path.points for path in layer.paths])
+    low, high = points.min(axis=0) - MARGIN_MM, points.max(axis=0) + MARGIN_MM
+    kinds = [kind for kind in Kind if any(path.kind is kind for path in layer.paths)]
+    lines = [*_head(sliced.index, number, layer, low, high, len(kinds)), *_legend(kinds, low, high)]
+    lines.append('<g transform="scale(1 -1)" fill="none" stroke-linecap="round" stroke-linejoin="round">')
+    for kind in kinds:
+        lines += _beads(kind, [path for path in layer.paths if path.kind is kind])
+    lines += [*_travels(layer.paths), *_seams(layer.paths), "</g>", "</svg>"]
+    return "\n".join(lines) + "\n"
+
+
+def _head(part: int, number: int, layer: Layer, low: Floats, high: Floats, rows: int) -> Iterator[str]:
+    width, height = high - low
+    width, height = max(width, 10.0 * LEGEND_MM), height + LEGEND_MM * (rows + 1)
+    yield (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{SCALE * width:.0f}" height="{SCALE * height:.0f}" '
+        f'viewBox="{low[0]:.3f} {-high[1]:.3f} {width:.3f} {height:.3f}">'
+    )
+    yield f"<title>part {part}, layer {number}, z {layer.z_mm:.3f} mm, height {layer.height_mm:.3f} mm</title>"
+    yield f'<rect x="{low[0]:.3f}" y="{-high[1]:.3f}" width="{width:.3f}" height="{height:.3f}" fill="#ffffff"/>'
+
+
+def _legend(kinds: Sequence[Kind], low: Floats, high: Floats) -> Iterator[str]:
+    """The kinds with their colours, below the layer."""
+    for row, kind in enumerate(kinds):
+        y = -low[1] + LEGEND_MM * (row + 0.5)
+        yield (
+            f'<rect x="{low[0] + 1:.3f}" y="{y - 1:.3f}" width="4" height="2" fill="{COLOURS[kind]}"/>'
+            f'<text x="{low[0] + 6:.3f}" y="{y + 0.8:.3f}" font-size="2.2" font-family="sans-serif">{kind.value}</text>'
+        )
+
+
+def _beads(kind: Kind, paths: Sequence[Path]) -> Iterator[str]:
+    yield f'<g id="{kind.value}" stroke="{COLOURS[kind]}">'
+    for path in paths:
+        yield f'<polyline stroke-width="{path.width_mm:.4f}" points="{_points(path.points)}"/>'
+    yield "</g>"
+
+
+def _travels(paths: Sequence[Path]) -> Iterator[str]:
+    yield f'<g id="travels" stroke-width="{LINE_MM}">'
+    for before, path in pairwise(paths):
+        points = np.vstack([before.points[-1:], path.approach.reshape(-1, 2), path.points[:1]])
+        if float(np.hypot(*np.diff(points, axis=0).T).sum()) > LINE_MM:
+            colour, dashes = (RETRACTED_COLOUR, "") if path.retract else (TRAVEL_COLOUR, ' stroke-dasharray="0.3 0.2"')
+            yield f'<polyline stroke="{colour}"{dashes} points="{_points(points)}"/>'
+    yield "</g>"
+
+
+def _seams(paths: Sequence[Path]) -> Iterator[str]:
+    """Where outer walls begin; the stretches of one wall follow each other without a travel."""
+    yield f'<g id="seams" fill="{SEAM_COLOUR}">'
+    end = np.full(2, np.nan)
+    for path in paths:
+        if path.kind in WALLS and not (path.points[0] == end).all():
+            yield f'<circle cx="{path.points[0, 0]:.3f}" cy="{path.points[0, 1]:.3f}" r="{0.3 * path.width_mm:.3f}"/>'
+        end = path.points[-1]
+    yield "</g>"
+
+
+def _points(points: Floats) -> str:
+    return " ".join(f"{x:.3f},{y:.3f}" for x, y in points.tolist())
