@@ -8,12 +8,14 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.polygons import Polygons, contours, united
-from slicer.room import EVEN_MM, Room, leaning
+from slicer.polygons import Polygons, contours, grown, sealed, united
+from slicer.room import EVEN_MM, SMOOTH_MM, Room, leaning, solid
 
 CORNERS = 12  # of a trunk's outline
-THICKEST_MM = 4.0  # a trunk's radius: enough for any part that fits a machine
+THICKEST_MM = 3.0  # a trunk's radius: enough for any part that fits a machine
 MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
+THIN_MM = 0.05  # radius of the places of a branch between obstacles: hardly more than one place
+DRAWN_IN = 0.7  # of the lean: then right corners move by the lean
 LEAST_MM2 = 1e-4  # places smaller than this are rounding
 
 
@@ -79,12 +81,17 @@ def lowered(branches: Sequence[Branch], room: Room, layer: int, growth: Growth) 
     if bad.area() < LEAST_MM2:
         return _apart(wished)
     low: list[Branch] = []
+    left: list[Branch] = []
     for old, new in zip(branches, wished, strict=True):
         if (new.area ^ bad).area() < LEAST_MM2:
             low.append(new)
-        else:
-            low += _squeezed(old, reached, room.ground[layer], lean, growth.radius_mm(old, z))
-    return _apart(low)
+            continue
+        narrow = _narrowed(old, reached, lean)
+        if narrow is not None:
+            low.append(narrow)
+        elif not old.full or not _rests(old, room.ground[layer]):
+            left.append(old)
+    return _apart(low + _aside(left, room, layer))
 
 
 def _wished(branches: Sequence[Branch], z_mm: float, lean: float, rise: float, growth: Growth) -> list[Branch]:
@@ -118,24 +125,42 @@ def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in goals]
 
 
-def _squeezed(branch: Branch, reached: Polygons, ground: Polygons, lean: float, thick: float) -> list[Branch]:
-    """A branch that is in something's way: it stays where it is, or the part of it that can goes on, or it ends on ground."""
-    spare = 2.0 * lean + 0.1
-    side = 2.0 * (branch.radius + spare)
-    window = Polygons.square((side, side), True).translate((branch.x, branch.y))
-    near = reached ^ window
-    if branch.radius <= thick + EVEN_MM:
-        straight = trunk(branch.x, branch.y, branch.radius, branch.top_mm)
-        if (straight.area - near).area() < LEAST_MM2:
-            return [straight]
-        if 2.0 * (branch.area - ground).area() < branch.area.area():
-            return []
-    rest = branch.area - near
-    if rest.area() < LEAST_MM2:
-        return [branch]
-    rest = rest - ground
-    kept = (branch.area ^ near) + (leaning(rest, lean) ^ near) if rest.area() >= LEAST_MM2 else branch.area ^ near
-    return [branch_of(island, branch.top_mm) for island in kept.decompose() if island.area() >= LEAST_MM2]
+def _narrowed(branch: Branch, reached: Polygons, lean: float) -> Branch | None:
+    """The branch where it is, as thick as it was or by the lean thinner, if that is free."""
+    if branch.full and (branch.area - reached).area() < LEAST_MM2:
+        return branch
+    if branch.radius <= THIN_MM:
+        return None
+    thin = trunk(branch.x, branch.y, max(branch.radius - lean, THIN_MM), branch.top_mm)
+    thin = thin if branch.full or branch.radius - lean <= THIN_MM else branch.shrunk(branch.radius - lean)
+    return thin if (thin.area - reached).area() < LEAST_MM2 else None
+
+
+def _rests(branch: Branch, ground: Polygons) -> bool:
+    """Whether most of a branch has come to ground."""
+    return 2.0 * (branch.area - ground).area() < branch.area.area()
+
+
+def _aside(branches: Sequence[Branch], room: Room, layer: int) -> list[Branch]:
+    """Branches in the way of something: what of them has a place below stays, the rest goes aside, or ends on ground."""
+    if not branches:
+        return []
+    reached, lean = room.reached[layer - 1], float(room.lean_mm[layer])
+    area = sealed(united([branch.area for branch in branches]), SMOOTH_MM)
+    kept = area ^ reached
+    rest = solid(area - reached)
+    rest = rest if rest.is_empty() else solid(rest - room.ground[layer])
+    kept = _thinned(kept, lean) if rest.is_empty() else kept + (leaning(rest, lean) ^ reached)
+    top = max(branch.top_mm for branch in branches)
+    islands = kept.simplify(SMOOTH_MM).decompose()
+    return [branch_of(island, top) for island in islands if island.area() >= LEAST_MM2]
+
+
+def _thinned(area: Polygons, lean: float) -> Polygons:
+    """The area with its edges drawn in; what is too narrow for that stays."""
+    core = grown(area, -DRAWN_IN * lean)
+    bits = (area - leaning(core, lean)).decompose()
+    return united([core, *(bit for bit in bits if bit.area() >= lean**2)])
 
 
 def _apart(branches: list[Branch]) -> list[Branch]:

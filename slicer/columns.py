@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
-from slicer.polygons import Polygons
-from slicer.room import FINE_MM, Room, leaning
+from slicer.polygons import Polygons, sealed
+from slicer.room import SMOOTH_MM, Room, leaning, solid
+
+JOIN_MM = 0.2  # places nearer than twice this are one: discs around them would overlap all the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,7 +16,7 @@ class Columns:
 
     def joined(self, contact: Polygons, top_mm: float) -> "Columns":
         """With what begins in this layer."""
-        return self if contact.is_empty() else Columns((self.area + contact).simplify(FINE_MM))
+        return self if contact.is_empty() else Columns(sealed(self.area + contact, JOIN_MM).simplify(SMOOTH_MM))
 
     def lowered(self, room: Room, layer: int) -> "Columns":
         """What carries a layer's support in the layer below."""
@@ -22,8 +24,8 @@ class Columns:
         if stuck.is_empty():
             return self
         straight = self.area ^ room.reached[layer - 1]
-        stuck = stuck - room.ground[layer]
+        stuck = solid(stuck - room.ground[layer])
         if stuck.is_empty():
             return Columns(straight)
         aside = leaning(stuck, float(room.lean_mm[layer])) ^ room.reached[layer - 1]
-        return Columns((straight + aside).simplify(FINE_MM))
+        return Columns((straight + aside).simplify(SMOOTH_MM))

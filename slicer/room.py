@@ -15,10 +15,13 @@ from profiles.process import Process
 from slicer.heights import Heights
 from slicer.polygons import JoinType, Polygons, grown, united
 
-COARSE_MM = 0.03  # sections are simplified by this before they are grown, and grown by as much more
+COARSE_MM = 0.03  # sections are simplified by this before they are grown
+MARGIN_MM = 0.08  # and grown by this more, which leaves room for simplified support
 FINE_MM = 0.005  # reached places are simplified by this, and lean by as much less
+SMOOTH_MM = 0.05  # support is simplified by this: its edges come from single faces, and nobody needs them
+SLIVER_MM = 0.02  # what is narrower than twice this and has no place has neighbours that do
 EVEN_MM = 1e-6  # heights nearer than this are equal
-SEGMENTS = 16  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
+SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +41,12 @@ def leaning(area: Polygons, distance_mm: float) -> Polygons:
     return area.offset(distance_mm, JoinType.Round, 2.0, SEGMENTS) if distance_mm > 0.0 else area
 
 
+def solid(places: Polygons) -> Polygons:
+    """Without slivers."""
+    core = grown(places, -SLIVER_MM)
+    return core if core.is_empty() else grown(core, 1.5 * SLIVER_MM) ^ places
+
+
 def rooms(
     outlines: Sequence[Polygons],
     at: Heights,
@@ -55,9 +64,9 @@ def rooms(
     bottom = top - at.height_mm
     angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
     lean = at.height_mm[:count] * tan(radians(angle))
-    solid = [s if s.is_empty() else s.simplify(COARSE_MM) for s in outlines]
-    wide = [s if s.is_empty() else grown(s, radius + COARSE_MM) for s in solid]
-    tall = [s if s.is_empty() else grown(s, radius + process.support_distance_mm + COARSE_MM) for s in solid[:count]]
+    plain = [s if s.is_empty() else s.simplify(COARSE_MM) for s in outlines]
+    wide = [s if s.is_empty() else grown(s, radius + MARGIN_MM) for s in plain]
+    tall = [s if s.is_empty() else grown(s, radius + process.support_distance_mm + MARGIN_MM) for s in plain[:count]]
     base = None if below is None else grown(below, radius)
     root = int(np.searchsorted(np.maximum(bottom, 0.0), process.support_bottom_gap_mm - EVEN_MM))
     ground: list[Polygons] = []

@@ -12,7 +12,7 @@ from slicer.columns import Columns
 from slicer.contact import RIM_MM
 from slicer.heights import Heights
 from slicer.polygons import Polygons, grown, opened, sealed, united
-from slicer.room import EVEN_MM, Room, leaning, rooms
+from slicer.room import COARSE_MM, EVEN_MM, SMOOTH_MM, Room, leaning, rooms, solid
 from slicer.tree import Tree
 
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
@@ -100,28 +100,35 @@ def _descended(wanted: Sequence[Polygons], room: Room, process: Process) -> tupl
     pending: list[tuple[Polygons, int]] = []
     for m in range(count - 1, -1, -1):
         pending += beginning.get(m, [])
-        area = grows.area
+        body = _body(grows.area, radius)
         if pending:
-            contact = _contact(united([place for place, _ in pending]), area, room.reached[m], radius)
+            contact = _contact(united([place for place, _ in pending]), body, room.reached[m], radius)
             grows = grows.joined(contact, float(room.top_mm[m]))
-            area, contacts[m] = grows.area, contact
-        if not area.is_empty():
-            bodies[m] = leaning(area, radius)
-            grows = grows.lowered(room, m) if m else grows
-        left = [(place - bodies[m], last) for place, last in pending if last < m]
+            contacts[m] = _body(contact, radius)
+            body = body + contacts[m]
+        left = [(place - body, last) for place, last in pending if last < m]
         pending = [(place, last) for place, last in left if place.area() >= LEAST_MM2]
+        if not body.is_empty():
+            bodies[m] = body
+            grows = grows.lowered(room, m) if m else grows
     return bodies, contacts
 
 
-def _contact(place: Polygons, present: Polygons, reached: Polygons, radius: float) -> Polygons:
+def _body(area: Polygons, radius: float) -> Polygons:
+    """Discs around all places of an area."""
+    return area if area.is_empty() else leaning(area, radius).simplify(COARSE_MM)
+
+
+def _contact(place: Polygons, body: Polygons, reached: Polygons, radius: float) -> Polygons:
     """Reached places whose discs cover a hanging place as far as can be, beside the support already present."""
-    bare = place if present.is_empty() else place - leaning(present, radius)
+    bare = solid(place - body)
     if bare.area() < LEAST_MM2:
         return Polygons()
+    bare = sealed(bare, 3.0 * SMOOTH_MM).simplify(2.0 * SMOOTH_MM)
     core = grown(bare, -radius)
     contact = (bare if core.is_empty() else core + (bare - grown(core, radius))) ^ reached
-    beside = bare - leaning(contact, radius)
-    return contact + (leaning(beside, radius) ^ reached) if beside.area() >= LEAST_MM2 else contact
+    beside = solid(bare - leaning(contact, radius))
+    return contact if beside.is_empty() else contact + (leaning(beside, radius) ^ reached)
 
 
 def _standing(bodies: Sequence[Polygons], room: Room, process: Process, on_platform: bool) -> list[Polygons]:
@@ -132,9 +139,11 @@ def _standing(bodies: Sequence[Polygons], room: Room, process: Process, on_platf
         if body.is_empty() or (m == 0 and on_platform):
             printed.append(body)
             continue
-        carried = leaning(printed[-1], float(room.lean_mm[m]) + SLACK_MM) if m else Polygons()
+        carried = printed[-1] if m else Polygons()
         if (body - carried).area() >= LEAST_MM2:
-            stands = opened(body ^ (carried + room.ground[m]), 0.45 * process.line_width_mm)
+            carried = leaning(carried, float(room.lean_mm[m]) + SLACK_MM)
+        if (body - carried).area() >= LEAST_MM2:
+            stands = opened((body ^ (carried + room.ground[m])).simplify(COARSE_MM), 0.45 * process.line_width_mm)
             islands = [island for island in stands.decompose() if island.area() >= least]
             body = Polygons.compose(islands) if islands else Polygons()
         printed.append(body)
@@ -149,7 +158,7 @@ def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], room: Room
         if area.is_empty():
             dense.append(area)
             continue
-        over = [leaning(c, room.radius_mm) for c in contacts[m : m + roofs] if not c.is_empty()]
+        over = [contact for contact in contacts[m : m + roofs] if not contact.is_empty()]
         under = [g for g in room.ground[max(m - floors + 1, 0) : m + 1] if not g.is_empty()]
         near = opened(area ^ united([*over, *under]), 0.45 * process.line_width_mm)
         dense.append(near)
