@@ -19,6 +19,7 @@ from profiles.process import Search
 
 # A plane is never laid into a face that overhangs along its direction: that would look like resting on the cut, over air.
 COPLANAR_MM = 1e-4
+LEAST_FOOTING_MM2 = 1e-6  # a piece that stands on less floats in the air, whatever interface is asked for
 
 
 class Reason(IntEnum):
@@ -150,7 +151,7 @@ def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints,
         Reason.REACH: ~np.isfinite(limits.least_height_mm[direction]),
         Reason.CLEARANCE: found.lowest_mm[at] < limits.least_height_mm[direction],
         Reason.VOLUME: found.volume_mm3[at] < limits.least_volume_mm3,
-        Reason.INTERFACE: found.footing_mm2[at] < limits.least_interface_mm2,
+        Reason.INTERFACE: found.footing_mm2[at] < max(limits.least_interface_mm2, LEAST_FOOTING_MM2),
         Reason.FRAGILE: found.fragile_mm[at] < max(search.fragile_mm, COPLANAR_MM),
     }
     for why, out in checks.items():

@@ -7,8 +7,10 @@ import numpy as np
 
 from mdp.formats import READERS
 from mdp.mesh import Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.pose import about
 from mdp.repair import repaired
+from mdp.repair.edges import components
 from mdp.surface import Surface
 from profiles.errors import MeshError
 
@@ -53,7 +55,23 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
         solid, notes = repaired(surfaces)
     except MeshError as error:
         raise MeshError(f"{path}: {error}.") from None
-    return _resting(solid, rotate_deg), tuple(notes)
+    mesh = _resting(solid, rotate_deg)
+    return mesh, (*notes, *floating(mesh))
+
+
+def floating(mesh: Mesh) -> tuple[str, ...]:
+    """A sentence about the pieces that do not reach the platform, if there are any; closed voids are no pieces."""
+    faces = mesh.faces.astype(np.int64)
+    label = components(len(mesh.vertices), faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())[faces[:, 0]]
+    corners = mesh.vertices[faces]
+    volumes = np.bincount(label, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
+    lowest = np.full(len(volumes), np.inf)
+    np.minimum.at(lowest, label, corners[:, :, 2].min(axis=1))
+    heights = lowest[(volumes > 0) & (lowest > PLATFORM_TOLERANCE_MM)]
+    if not len(heights):
+        return ()
+    pieces = "1 piece floats" if len(heights) == 1 else f"{len(heights)} pieces float at least"
+    return (f"{pieces} {heights.min():.3g} mm above the platform on nothing: no cut changes that, only support can hold such",)
 
 
 def _surfaces(path: Path) -> list[Surface]:

@@ -1,0 +1,86 @@
+"""Models that searches stumble over: lattices, points to stand on, pieces in the air, nothing to do and nothing to be done."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.cut import mesh_of, solid_of
+from mdp.decomposition import Decomposition
+from mdp.mesh import Mesh
+from mdp.read import floating
+from mdp.search import decompose
+from profiles.profile import load
+from tests import shapes
+
+
+def _decomposed(mesh: Mesh, *settings: str) -> Decomposition:
+    return decompose(mesh, "hard", load(settings=[f"search.{word}" for word in ("directions=60", "most_parts=3", *settings)]))
+
+
+def _lattice(cells: int) -> m3.Manifold:
+    """Rods along the edges of cells cubed cubes of 5 mm."""
+    places = [(5.0 * i, 5.0 * j) for i in range(cells + 1) for j in range(cells + 1)]
+    layer = m3.Manifold.batch_boolean([_rod(cells).translate((x, y, 0)) for x, y in places], m3.OpType.Add)
+    across = layer.rotate((0, 90, 0)).translate((0, 0, 5.0 * cells))
+    along = layer.rotate((-90, 0, 0)).translate((0, 0, 5.0 * cells))
+    return layer + across + along
+
+
+def _rod(cells: int) -> m3.Manifold:
+    return m3.Manifold.cube((2.0, 2.0, 5.0 * cells)).translate((-1.0, -1.0, 0.0))
+
+
+def test_a_lattice_of_thousands_of_handles_is_cut_into_parts_that_hang_together() -> None:
+    solid = _lattice(11)
+    found = _decomposed(shapes.standing(solid), "clearance=false")
+    assert solid.genus() > 3000
+    assert len(found.parts) == 3
+    assert len(solid_of(found.parts[0].mesh).decompose()) == 1
+    assert sum(solid_of(part.mesh).volume() for part in found.parts) == pytest.approx(solid.volume(), rel=1e-9)
+
+
+@pytest.mark.parametrize("mesh", [shapes.standing(m3.Manifold.cylinder(20, 0, 10, 48)), shapes.octahedron(15.0)])
+def test_a_steep_model_on_its_point_needs_no_support_and_says_so(mesh: Mesh) -> None:
+    found = _decomposed(mesh, "clearance=false")
+    assert len(found.parts) == 1
+    assert found.notes == ("no face needs support: the model is printed straight up as one part",)
+
+
+def test_a_ball_on_its_point_is_cut_and_every_part_stands_on_the_ones_before() -> None:
+    found = _decomposed(shapes.ball(), "clearance=false")
+    assert len(found.parts) == 3
+    assert found.reduction > 0.3
+    assert found.parts[0].mesh.bounds_mm[0, 2] == 0.0
+
+
+@pytest.mark.parametrize("least_mm2", [0, 4])
+def test_no_part_stands_on_air_where_a_piece_of_the_model_floats(least_mm2: int) -> None:
+    bits = m3.Manifold.cube((10, 10, 10), True).translate((25, 0, 30))
+    mesh = mesh_of(m3.Manifold.cube((10, 10, 10), True).translate((0, 0, 5)) + bits)
+    found = _decomposed(mesh, "clearance=false", f"least_interface_mm2={least_mm2}")
+    assert len(found.parts) == 1
+    assert found.residual_area_mm2 == pytest.approx(100.0)
+    assert "hang on too small an area" in found.notes[0]
+
+
+def test_pieces_that_float_are_told_and_voids_are_not() -> None:
+    block = m3.Manifold.cube((10, 10, 10), True).translate((0, 0, 5))
+    high, higher = (block.translate((20, 0, z)) for z in (12.5, 40))
+    assert floating(mesh_of(block + high)) == (
+        "1 piece floats 12.5 mm above the platform on nothing: no cut changes that, only support can hold such",
+    )
+    assert floating(mesh_of(block + high + higher))[0].startswith("2 pieces float at least 12.5 mm")
+    assert floating(shapes.hollow()) == floating(mesh_of(block + block.translate((20, 0, 0)))) == ()
+
+
+def test_a_model_without_a_feasible_cut_is_one_part_and_every_candidate_has_its_reason() -> None:
+    found = _decomposed(shapes.tee(height=12.0, arm=14.0), "least_volume_share=0.5")
+    assert len(found.parts) == 1
+    counts = [int(word) for word in found.notes[0].replace(":", " ").split() if word.isdigit()]
+    assert counts[0] == sum(counts[1:]) > 0
+
+
+def test_a_time_limit_that_ends_a_search_leaves_whole_parts() -> None:
+    whole = _decomposed(shapes.branch(), "time_limit_s=0")
+    assert (len(whole.parts), whole.reduction) == (1, 0.0)
+    assert np.array_equal(np.sort(whole.parts[0].mesh.areas_mm2), np.sort(mesh_of(solid_of(shapes.branch())).areas_mm2))
