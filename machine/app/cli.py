@@ -80,6 +80,8 @@ def export(
     ranker: RankerName = "classic",
     orient: Orient = False,
     json: JsonFile = None,
+    svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer")] = None,
+    layer: Annotated[str | None, typer.Option("--layer", metavar="PART:LAYER", help="which layer, counted from 1:1")] = None,
     force: Force = False,
     machine: MachineName = "generic_ac",
     material: MaterialName = "pla",
@@ -90,7 +92,7 @@ def export(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
-    return commands.export(model, profile, ranker, orient, out, json, force)
+    return commands.export(model, profile, ranker, orient, out, json, svg, layer, force)
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from machine.app.layer_picture import asked, drawn
 from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
 from machine.app.picture import contact_sheet, parts_picture
 from machine.app.pipeline import Program, build, decompose_model
@@ -53,13 +54,29 @@ def decompose(
     return 0
 
 
-def export(model: str, profile: Profile, ranker: str, orient: bool, out: Path, json: Path | None, force: bool) -> int:
-    """Write a model's G-code; refused when its dry run finds an error, unless forced."""
+def export(
+    model: str,
+    profile: Profile,
+    ranker: str,
+    orient: bool,
+    out: Path,
+    json: Path | None,
+    svg: Path | None,
+    layer: str | None,
+    force: bool,
+) -> int:
+    """Write a model's G-code, and one layer's picture where asked; refused when its dry run finds an error, unless forced."""
     check_writable(out)
     _check(json)
+    if svg is not None:
+        check_writable(svg)
+    wanted = asked(layer, svg is not None)
     program = build(decompose_model(model, profile, ranker, orient).decomposition, profile)
     _refuse_errors(program, force)
+    picture = b"" if svg is None else drawn(program.sliced, *wanted)
     write_lines(out, program.lines)
+    if svg is not None:
+        write_bytes(svg, picture)
     _tell(program, json)
     return 0
 

@@ -21,6 +21,7 @@ from mdp.search import Progress
 from mdp.search import decompose as search_parts
 from profiles.errors import ProfileError
 from profiles.profile import Profile
+from slicer.paths import SlicedPart
 from slicer.slice import slice_part
 
 ORIENTATIONS_TRIED = 4
@@ -43,6 +44,7 @@ class Program:
     lines: tuple[str, ...]
     run: DryRun
     decomposition: Decomposition | None
+    sliced: tuple[SlicedPart, ...] = ()
 
 
 def model_name(model: str) -> str:
@@ -120,4 +122,4 @@ def build(decomposition: Decomposition, profile: Profile) -> Program:
     ticker.tick("dry run", at_once=ticker.live)
     run = dry_run(lines, profile)
     ticker.close()
-    return Program(lines, run, decomposition)
+    return Program(lines, run, decomposition, tuple(sliced))

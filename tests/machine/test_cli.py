@@ -33,6 +33,8 @@ WRONG = [
     (["export", "demo:tree"], "--out"),
     (["export", "demo:tree", "-o", "/nowhere/x.gcode"], "/nowhere"),
     (["export", "demo:tree", "-o", "."], "folder"),
+    (["export", "demo:tree", "-o", "x.gcode", "--layer", "1:1"], "--svg FILE must say where to"),
+    (["export", "demo:tree", "-o", "x.gcode", "--svg", "x.svg", "--layer", "two"], "PART:LAYER is expected"),
     (["print", "demo:tree"], "--port"),
     (["print", "empty.gcode", "--port", "sim"], "empty.gcode"),
     (["simulate", "rubbish.gcode"], "rubbish.gcode"),
