@@ -1,20 +1,15 @@
-"""Measures one evaluation of all candidates of a solid: `python tools/bench_sweep.py MODEL [--set KEY=VALUE]`.
+"""Measures the kernels of one evaluation of all candidates: `python tools/bench_sweep.py MODEL [--set KEY=VALUE]`.
 
-One evaluation is `gains` and `sweep` of every direction, as the search asks for them. Every figure is the least of several
-runs, warm: processor time on one thread, wall time on two. Growth: the model decimated to 2,000 faces by manifold3d, then
-subdivided at the edges' midpoints, so that the shape stays and only the faces become more.
+Processor time on one thread, warm, the least of several runs; tools/bench_search.py measures evaluations and searches as wholes.
 """
 
 import argparse
-import resource
-import time
 from collections.abc import Callable, Sequence
 
 import numba
 import numpy as np
 
 from mdp.candidates import bounds
-from mdp.cut import mesh_of, solid_of
 from mdp.footing import find_footing
 from mdp.fragile import SLIVER_COSINE, find_slivers
 from mdp.mesh import Floats, Mesh
@@ -24,9 +19,7 @@ from mdp.read import locate, read_mesh
 from mdp.sums import dot, find_heights, find_lowest, sum_risks, sum_volumes
 from mdp.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
-
-RUNS = 5
-LARGEST = 200_000
+from tools.bench_search import on_cores
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -38,20 +31,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     profile = load(settings=options.set)
     mesh, _ = read_mesh(locate(options.model))
     kernels(mesh, profile)
-    growth(mesh, profile)
-    print(f"\nlargest resident memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
 
 
 def kernels(mesh: Mesh, profile: Profile) -> None:
     """One row a kernel, on one thread."""
-    remainder, limits, angle = solid(mesh, profile), bounds(mesh, profile.machine, profile.search), threshold(45.0)
+    angle_deg, limits = profile.process.self_supporting_angle_deg, bounds(mesh, profile.machine, profile.search)
+    remainder, angle = Remainder(mesh, risky_upright(mesh, angle_deg)), threshold(angle_deg)
     directions, step = limits.directions, profile.search.offset_step_mm
     count = int(gains(remainder, directions, step, angle).count.sum())
     print(f"{len(mesh.faces)} faces, {len(directions)} directions, {count} candidates\n")
     print("| kernel | us a direction | us a candidate |\n|---|---|---|")
     for name, work in pieces_of_work(remainder, limits.least_height_mm, directions, step, angle).items():
-        core_s = least_core_s(work)
-        print(f"| {name} | {core_s / len(directions) * 1e6:.1f} | {core_s / count * 1e6:.2f} |")
+        spent_s = core_s(work)
+        print(f"| {name} | {spent_s / len(directions) * 1e6:.1f} | {spent_s / count * 1e6:.2f} |")
 
 
 def pieces_of_work(
@@ -81,87 +73,9 @@ def pieces_of_work(
     }
 
 
-def growth(mesh: Mesh, profile: Profile) -> None:
-    """One row a number of faces: what a face costs must not grow."""
-    heads = ("faces", "candidates", "us a candidate", "ns a face and direction", "1 core s", "2 cores s", "made ready s")
-    print(f"\n| {' | '.join(heads)} |\n|{'---|' * len(heads)}")
-    shape = decimated(mesh, 2000)
-    while len(shape.faces) <= LARGEST:
-        print(f"| {' | '.join(row(shape, profile))} |")
-        shape = subdivided(shape)
-
-
-def row(shape: Mesh, profile: Profile) -> list[str]:
-    """The figures of one mesh."""
-    limits, angle, step = bounds(shape, profile.machine, profile.search), threshold(45.0), profile.search.offset_step_mm
-    directions, watched, remainder = limits.directions, limits.least_height_mm, solid(shape, profile)
-    began = time.process_time()
-    gains(remainder, directions[:1], step, angle)
-    sweep(remainder, directions[:1], step, watched[:1])
-    ready_s = time.process_time() - began
-    count = int(gains(remainder, directions, step, angle).count.sum())
-
-    def evaluate() -> None:
-        gains(remainder, directions, step, angle)
-        sweep(remainder, directions, step, watched)
-
-    core_s, two_s = least_core_s(evaluate), least_wall_s(evaluate, 2)
-    each = [core_s / count * 1e6, core_s / len(directions) / len(shape.faces) * 1e9]
-    seconds = [f"{value:.3f}" for value in (core_s, two_s, ready_s)]
-    return [str(len(shape.faces)), str(count), f"{each[0]:.2f}", f"{each[1]:.1f}", *seconds]
-
-
-def solid(mesh: Mesh, profile: Profile) -> Remainder:
-    """The mesh ready for the sweep."""
-    return Remainder(mesh, risky_upright(mesh, profile.process.self_supporting_angle_deg))
-
-
-def decimated(mesh: Mesh, faces: int) -> Mesh:
-    """About so many faces; manifold3d drops edges shorter than a tolerance, which is doubled until few enough are left."""
-    shape, tolerance = mesh, 0.05
-    while len(shape.faces) > faces:
-        shape = mesh_of(solid_of(mesh).simplify(tolerance))
-        tolerance *= 1.2
-    return Mesh(shape.vertices - np.array([0.0, 0.0, shape.bounds_mm[0, 2]]), shape.faces)
-
-
-def subdivided(mesh: Mesh) -> Mesh:
-    """Every face split into four at the midpoints of its edges."""
-    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    once, which = np.unique(edges, axis=0, return_inverse=True)
-    middles = mesh.vertices[once].mean(axis=1)
-    ab, bc, ca = (len(mesh.vertices) + which.reshape(-1, 3)).T
-    a, b, c = mesh.faces.T
-    faces = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return Mesh(np.concatenate([mesh.vertices, middles]), np.concatenate([np.stack(face, axis=1) for face in faces]))
-
-
-def least_core_s(work: Callable[[], object]) -> float:
+def core_s(work: Callable[[], object]) -> float:
     """Processor time on one thread, the least of several runs."""
-    numba.set_num_threads(1)
-    try:
-        return _least(work, time.process_time)
-    finally:
-        numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-
-
-def least_wall_s(work: Callable[[], object], threads: int) -> float:
-    """Wall time on some threads, the least of several runs."""
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
-    try:
-        return _least(work, time.perf_counter)
-    finally:
-        numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-
-
-def _least(work: Callable[[], object], clock: Callable[[], float]) -> float:
-    work()
-    seconds = []
-    for _ in range(RUNS):
-        began = clock()
-        work()
-        seconds.append(clock() - began)
-    return min(seconds)
+    return on_cores(1, work)[0]
 
 
 @numba.njit
