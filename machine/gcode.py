@@ -7,10 +7,12 @@ from math import ceil
 import numpy as np
 
 from machine import settings
+from machine.acceleration import travel_mm_s2
+from machine.arcs import FEWEST_CHORDS, fitted
 from machine.blocks import filled
 from machine.dialects import DIALECTS, Dialect
 from machine.dryrun.timeline import move_times
-from machine.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Retract, Stroke, Travel
+from machine.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Retract, Stroke, Travel, Wipe
 from machine.rows import rows
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
@@ -18,6 +20,7 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 UNKNOWN = -(10**12)
+ROUNDING_MM = 0.0015  # an arc's centre is written in thousandths
 
 
 @dataclass
@@ -36,6 +39,8 @@ class Pen:
     width_mm: float = 0.0
     height_mm: float = 0.0
     fan: int = 0
+    layer_fan: float = 0.0
+    acceleration: int | None = None
     nozzle_c: float = 0.0
     percent: int = -1
     rotary: Pose | None = None
@@ -66,9 +71,11 @@ def _lines(program: MachineProgram, profile: Profile, parts: list[BeginPart], pe
     yield from _start(profile, pen)
     for place, move in enumerate(program.moves):
         if isinstance(move, Stroke):
-            yield from _stroke(move, pen)
+            yield from _stroke(move, profile, pen)
         elif isinstance(move, Travel):
             yield from _travel(move, pen)
+        elif isinstance(move, Wipe):
+            yield from _wipe(move, pen)
         elif isinstance(move, Retract):
             yield from _retract(move, pen)
         elif isinstance(move, Reorient):
@@ -88,7 +95,8 @@ def clock(program: MachineProgram, profile: Profile) -> Floats:
     """(number of moves + 1,) seconds from the first move to the beginning of each, and to the end."""
     machine = profile.machine
     straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)
-    times = move_times(straight.end - straight.start, straight.speed, np.zeros(len(straight.speed), dtype=np.bool_), machine)
+    stop = np.zeros(len(straight.speed), dtype=np.bool_)
+    times = move_times(straight.end - straight.start, straight.speed, stop, machine, straight.acceleration)
     each = np.bincount(straight.move, weights=times, minlength=len(program.moves))
     elapsed: Floats = np.concatenate([[0.0], np.cumsum(each)])
     return elapsed
@@ -151,7 +159,12 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
     if wanted != pen.nozzle_c:
         pen.nozzle_c = wanted
         yield pen.dialect.nozzle.format(_number(wanted))
-    fan = round(255 * move.fan)
+    pen.layer_fan = move.fan
+    yield from _blow(move.fan, pen)
+
+
+def _blow(share: float, pen: Pen) -> Iterator[str]:
+    fan = round(255 * share)
     if fan != pen.fan:
         pen.fan = fan
         yield pen.dialect.fan_on.format(fan) if fan else pen.dialect.fan_off
@@ -164,16 +177,60 @@ def _progress(seconds: float, total: float, pen: Pen) -> Iterator[str]:
         yield pen.dialect.progress.format(percent, ceil((total - seconds) / 60.0 - 1e-9))
 
 
-def _stroke(move: Stroke, pen: Pen) -> Iterator[str]:
-    """One line a point; a point that rounds to where the tip is gives its filament to the next line."""
+def _stroke(move: Stroke, profile: Profile, pen: Pen) -> Iterator[str]:
+    """What changes before the stroke, then its lines."""
+    yield from _blow(pen.layer_fan if move.fan is None else move.fan, pen)
+    if move.acceleration_mm_s2 is not None and round(move.acceleration_mm_s2) != pen.acceleration:
+        pen.acceleration = round(move.acceleration_mm_s2)
+        yield pen.dialect.acceleration.format(pen.acceleration, round(travel_mm_s2(profile) or pen.acceleration))
     if move.kind is not pen.kind:
         pen.kind = move.kind
         yield f";TYPE:{move.kind.value}"
     if move.width_mm != pen.width_mm:
         pen.width_mm = move.width_mm
         yield f";WIDTH:{_number(move.width_mm)}"
-    points = np.rint(move.points_mm[1:] * 1000.0).astype(np.int64).tolist()
-    filament = pen.filament_mm + np.cumsum(move.filament_mm)
+    machine = profile.machine
+    if machine.arcs and len(move.points_mm) > FEWEST_CHORDS and np.ptp(move.points_mm[:, 2]) == 0.0:
+        yield from _curved(move, machine.arc_tolerance_mm, pen)
+    else:
+        yield from _pushed(move.points_mm, move.filament_mm, move.speed_mm_s, pen)
+
+
+def _curved(move: Stroke, tolerance_mm: float, pen: Pen) -> Iterator[str]:
+    """A stroke in one plane with arcs where they keep to it."""
+    flat = np.rint(move.points_mm[:, :2] * 1000.0) / 1000.0
+    runs, arcs = fitted(flat, move.filament_mm, tolerance_mm - ROUNDING_MM)
+    done = 0
+    for (first, last), (x, y, clockwise) in zip(runs.tolist(), arcs.tolist(), strict=True):
+        if first > done:
+            yield from _pushed(move.points_mm[done : first + 1], move.filament_mm[done:first], move.speed_mm_s, pen)
+        yield from _arc(move, first, last, (x - flat[first, 0], y - flat[first, 1]), clockwise > 0, pen)
+        done = last
+    if done < len(flat) - 1:
+        yield from _pushed(move.points_mm[done:], move.filament_mm[done:], move.speed_mm_s, pen)
+
+
+def _arc(move: Stroke, first: int, last: int, centre: tuple[float, float], clockwise: bool, pen: Pen) -> Iterator[str]:
+    pen.filament_mm += float(move.filament_mm[first:last].sum())
+    pen.most_filament_mm = max(pen.most_filament_mm, pen.filament_mm)
+    e = round(pen.filament_mm * 1e5)
+    pen.x, pen.y = (round(float(value) * 1000.0) for value in move.points_mm[last, :2])
+    word = pen.dialect.arc_right if clockwise else pen.dialect.arc_left
+    place = f" X{pen.x / 1000:.3f} Y{pen.y / 1000:.3f} I{centre[0]:.3f} J{centre[1]:.3f}"
+    yield f"{word}{place} E{(e - pen.pushed) / 1e5:.5f}{_feed(move.speed_mm_s, pen)}"
+    pen.pushed = e
+
+
+def _wipe(move: Wipe, pen: Pen) -> Iterator[str]:
+    yield ";WIPE_START"
+    yield from _pushed(move.points_mm, -move.filament_mm, move.speed_mm_s, pen)
+    yield ";WIPE_END"
+
+
+def _pushed(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) -> Iterator[str]:
+    """One line a point; a point that rounds to where the tip is gives its filament to the next line."""
+    points = np.rint(points_mm[1:] * 1000.0).astype(np.int64).tolist()
+    filament = pen.filament_mm + np.cumsum(filament_mm)
     pen.filament_mm = float(filament[-1])
     pen.most_filament_mm = max(pen.most_filament_mm, pen.filament_mm)
     word = pen.dialect.stroke
@@ -181,7 +238,7 @@ def _stroke(move: Stroke, pen: Pen) -> Iterator[str]:
         if x == pen.x and y == pen.y and z == pen.z:
             continue
         place = _place(x, y, z, pen)
-        yield f"{word}{place} E{(e - pen.pushed) / 1e5:.5f}{_feed(move.speed_mm_s, pen)}"
+        yield f"{word}{place} E{(e - pen.pushed) / 1e5:.5f}{_feed(speed_mm_s, pen)}"
         pen.pushed = e
 
 

@@ -3,9 +3,11 @@
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from math import hypot, inf
 
 import numpy as np
 
+from machine.arcs import centre_of, chord_count, chords, sweep_rad
 from machine.parsed import Event, MoveKind, ParsedProgram
 from machine.words import BLOCK, FLAG, FLAGS, MACRO, PAREN, WORD, shown, unframed
 from profiles.errors import GcodeError
@@ -14,6 +16,8 @@ from profiles.machine import Machine
 LONGEST_LINE = 2000
 INCH_MM = 25.4
 DEFAULT_FEED = 1500.0
+CHORD_MM = 0.005  # arcs are read as chords that stay so near
+ROUND_MM = 0.1  # by how much an arc's radius may differ at its ends
 E_AXIS = 5
 
 
@@ -29,6 +33,8 @@ class Reader:
     relative_e: bool = False
     scale: float = 1.0
     feed: float = DEFAULT_FEED
+    printing: float = inf
+    travelling: float = inf
     motion: bool = False
     part: int = 0
     layer: int = 0
@@ -135,9 +141,42 @@ def _straight(reader: Reader, words: list[tuple[str, float]]) -> None:
         else:
             at[axis] = at[axis] + value if reader.relative else value
     if moved:
-        reader.rows.append(
-            (reader.number, *before, *at, reader.feed, reader.part, reader.layer, reader.type, reader.width, reader.height)
+        _row(reader, before)
+
+
+def _row(reader: Reader, before: tuple[float, ...]) -> None:
+    """A move from a place to where the reader is now."""
+    at = reader.at
+    acceleration = reader.printing if at[E_AXIS] != before[E_AXIS] else reader.travelling
+    told = (reader.part, reader.layer, reader.type, reader.width, reader.height)
+    reader.rows.append((reader.number, *before, *at, reader.feed, *told, acceleration))
+
+
+def _arc(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    """G2 and G3 in the X Y plane, by I J or R: rows of chords, the other axes going along evenly."""
+    clockwise, before = name == "G2", tuple(reader.at)
+    shape = {letter: value * reader.scale for letter, value in words if letter in "IJR" and letter not in reader.letters}
+    known = len(reader.rows)
+    _straight(reader, [(letter, value) for letter, value in words if letter not in shape])
+    after = tuple(reader.at)
+    del reader.rows[known:]
+    start, end = (before[0], before[1]), (after[0], after[1])
+    if "R" in shape:
+        centre = centre_of(start, end, shape["R"], clockwise)
+    else:
+        centre = (start[0] + shape.get("I", 0.0), start[1] + shape.get("J", 0.0)) if shape else None
+    radii = [0.0, 0.0] if centre is None else [hypot(p[0] - centre[0], p[1] - centre[1]) for p in (start, end)]
+    if centre is None or min(radii) == 0.0 or abs(radii[0] - radii[1]) > ROUND_MM:
+        raise GcodeError(
+            f"line {reader.number}: {name} is no arc: I and J, or R, must give a centre as far from its beginning as from its end"
         )
+    sweep = sweep_rad(start, end, centre, clockwise)
+    points = chords(start, end, centre, sweep, chord_count(max(radii), sweep, CHORD_MM))
+    for k, point in enumerate(points, start=1):
+        row_before, share = tuple(reader.at) if k > 1 else before, k / len(points)
+        others = [a + share * (b - a) for a, b in zip(before[2:], after[2:], strict=True)]
+        reader.at[:] = after if k == len(points) else [*point, *others]
+        _row(reader, row_before)
 
 
 def _dispatch(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
@@ -145,7 +184,7 @@ def _dispatch(reader: Reader, name: str, words: list[tuple[str, float]]) -> None
     if action is not None:
         action(reader, name, words)
     elif name[0] in "GT":
-        raise GcodeError(f"line {reader.number}: {name} is not supported: G0, G1, G4, G20, G21, G28, G90, G91, G92 and T0 are")
+        raise GcodeError(f"line {reader.number}: {name} is not supported: G0 to G4, G20, G21, G28, G90, G91, G92 and T0 are")
     else:
         _ignore(reader, name)
 
@@ -194,22 +233,28 @@ def _note(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
     reader.events.append(Event(reader.number, name, value, "".join(letter for letter, _ in words), len(reader.rows)))
 
 
+def _accelerate(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
+    """M204: P while filament moves, T while it stands still, S both; what is not above 0 tells nothing."""
+    for letter, value in words:
+        if value > 0 and letter in "PS":
+            reader.printing = value * reader.scale
+        if value > 0 and letter in "TS":
+            reader.travelling = value * reader.scale
+
+
 def _nothing(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
     """Codes without a bearing on motion or heat."""
-
-
-def _refuse_arc(reader: Reader, name: str, words: list[tuple[str, float]]) -> None:
-    raise GcodeError(f"line {reader.number}: {name} (an arc) is not supported: write straight moves")
 
 
 Action = Callable[[Reader, str, list[tuple[str, float]]], None]
 ACTIONS: tuple[tuple[Action, str], ...] = (
     (_mode, "G20 G21 G90 G91 M82 M83"),
     (_note, "G4 M0 M1 M18 M84 M104 M106 M107 M109 M140 M190 M400"),
-    (_nothing, "G17 G94 M73 M105 M110 M115 M117 M118 M155 M201 M203 M204 M205 M220 M221 T0"),
+    (_nothing, "G17 G94 M73 M105 M110 M115 M117 M118 M155 M201 M203 M205 M220 M221 T0"),
+    (_accelerate, "M204"),
     (_home, "G28"),
     (_set, "G92"),
-    (_refuse_arc, "G2 G3"),
+    (_arc, "G2 G3"),
 )
 CODES: dict[str, Action] = {code: action for action, codes in ACTIONS for code in codes.split()}
 
@@ -251,7 +296,7 @@ def _name(letter: str, value: float) -> str:
 
 
 def _arrays(reader: Reader) -> ParsedProgram:
-    table = np.array(reader.rows, dtype=np.float64).reshape(-1, 19)
+    table = np.array(reader.rows, dtype=np.float64).reshape(-1, 20)
     start, end = table[:, 1:6], table[:, 7:12]
     e_mm = table[:, 12] - table[:, 6]
     turned = (np.abs(end[:, 3:] - start[:, 3:]) > 1e-9).any(axis=1)
@@ -265,6 +310,6 @@ def _arrays(reader: Reader) -> ParsedProgram:
     return ParsedProgram(
         line=whole[:, 0], start=start, end=end, e_mm=e_mm, filament_mm=np.cumsum(e_mm), feed=table[:, 13], kind=kind,
         part=whole[:, 1], layer=whole[:, 2], type=whole[:, 3], types=tuple(reader.types),
-        width_mm=table[:, 17], height_mm=table[:, 18], events=tuple(reader.events), ignored=reader.ignored,
-        layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
+        width_mm=table[:, 17], height_mm=table[:, 18], acceleration=table[:, 19],
+        events=tuple(reader.events), ignored=reader.ignored, layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
     )  # fmt: skip

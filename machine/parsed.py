@@ -37,7 +37,8 @@ class ParsedProgram:
     before where G28 or G92 set a position. e_mm: filament pushed by the move. filament_mm: running sum of e_mm. feed:
     F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
     type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
-    layers: number of layer changes. parts: numbers of the parts in order. unsupported: (line, part, mm2).
+    acceleration: mm/s2 told by M204, inf where the axes decide. layers: number of layer changes. parts: numbers of the parts
+    in order. unsupported: (line, part, mm2).
     """
 
     line: NDArray[np.int64]
@@ -53,6 +54,7 @@ class ParsedProgram:
     types: tuple[str, ...]
     width_mm: Floats
     height_mm: Floats
+    acceleration: Floats
     events: tuple[Event, ...]
     ignored: dict[str, tuple[int, int]]
     layers: int

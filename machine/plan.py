@@ -1,34 +1,25 @@
 """Plan: sliced parts in order become one program of strokes, travels and reorientations in machine coordinates."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import inf, pi
 
 import numpy as np
 
 from machine import limits
+from machine.acceleration import of_kind_mm_s2
 from machine.collide import Printed, hull, together
 from machine.kinematics.table import part_shift, workpiece_points
-from machine.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Retract, Stroke, Travel
+from machine.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel
 from machine.reorient import approach_z, safe_pose
 from machine.rows import rows
+from machine.travel import Tip, go, lift_speed, prime, retract, to_path, trail_of, travel_speed
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.profile import Profile
-from slicer.paths import Layer, Path, SlicedPart, bead_area_mm2
+from slicer.paths import Kind, Layer, Path, SlicedPart, bead_area_mm2
 
-STANDING_MM = 1e-6
-
-
-@dataclass
-class Tip:
-    """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back."""
-
-    at_mm: Floats
-    pose: Pose
-    retracted_mm: float = 0.0
-    prime_extra_mm: float = 0.0
+MOST_COASTED = 0.25  # a path coasts over this share of its length at most
 
 
 def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile) -> MachineProgram:
@@ -67,116 +58,84 @@ def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile:
     if first:
         tip.at_mm = target.copy()
     else:
-        yield from _retract(tip, profile)
+        yield from retract(tip, profile)
     safe = safe_pose(profile.machine, printed, tip.at_mm, tip.pose, part.pose, part.index)
     if first:
         tip.at_mm[2] = safe.z_mm
-        for speed in (_lift_speed(profile), _travel_speed(profile)):
+        for speed in (lift_speed(profile), travel_speed(profile)):
             yield Travel(np.array([tip.at_mm, tip.at_mm]), speed)
-    yield from _go(tip, [*tip.at_mm[:2], safe.z_mm], profile)
+    yield from go(tip, [*tip.at_mm[:2], safe.z_mm], profile)
     if safe.over_mm is not None:
-        yield from _go(tip, [*safe.over_mm, safe.z_mm], profile)
+        yield from go(tip, [*safe.over_mm, safe.z_mm], profile)
     if first or tip.pose != part.pose:
         yield _reorient(tip, part.pose, profile)
         tip.prime_extra_mm = 0.0 if first else profile.material.prime_extra_mm
     yield part
     across_z = approach_z(profile.machine, printed, part.pose, safe, target, part.index)
-    yield from _go(tip, [*target[:2], across_z], profile)
-    yield from _go(tip, list(target), profile)
+    yield from go(tip, [*target[:2], across_z], profile)
+    yield from go(tip, list(target), profile)
 
 
 def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
     speed = limits.turn_speed(pose.tilt_deg - tip.pose.tilt_deg, pose.turn_deg - tip.pose.turn_deg, profile.machine)
-    tip.pose = pose
+    tip.pose, tip.trail = pose, tip.trail[:0]
     return Reorient(pose, speed)
 
 
 def _layer(tip: Tip, part: int, number: int, layer: Layer, shift: Floats, profile: Profile) -> Iterator[Move]:
+    accelerations = of_kind_mm_s2(profile, part == 1 and number == 1)
     yield BeginLayer(part, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c)
     z = layer.z_mm + float(shift[2])
-    for path in layer.paths:
+    for path, following in zip(layer.paths, [*layer.paths[1:], None], strict=True):
         points = np.column_stack([path.points + shift[:2], np.full(len(path.points), z)])
-        yield from _to_path(tip, path, points[0], shift, profile)
-        yield from _prime(tip, profile)
-        yield _stroke(path, layer.height_mm, points, profile)
-        tip.at_mm = points[-1]
+        yield from to_path(tip, path, points[0], shift, profile)
+        yield from prime(tip, profile)
+        coast = profile.material.coast_mm if following is not None and following.retract else 0.0
+        yield _stroke(path, layer.height_mm, points, profile, accelerations, coast)
+        tip.at_mm, tip.trail = points[-1], trail_of(points, path.width_mm)
 
 
-def _to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile) -> Iterator[Move]:
-    """Up to the layer first, then along the approach to the path's start."""
-    if float(np.linalg.norm(start - tip.at_mm)) <= STANDING_MM:
-        return
-    if path.retract:
-        yield from _retract(tip, profile)
-    if abs(float(start[2] - tip.at_mm[2])) > STANDING_MM:
-        yield from _go(tip, [*tip.at_mm[:2], start[2]], profile)
-    between = np.column_stack([path.approach.reshape(-1, 2) + shift[:2], np.full(len(path.approach), start[2])])
-    points = np.vstack([tip.at_mm, between, start])
-    keep = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])
-    if keep.sum() > 1:
-        yield Travel(points[keep], _travel_speed(profile))
-    tip.at_mm = start
-
-
-def _go(tip: Tip, target: list[float], profile: Profile) -> Iterator[Move]:
-    """A straight travel; straight up and down at the lift speed."""
-    points = np.array([tip.at_mm, target], dtype=np.float64)
-    if float(np.linalg.norm(points[1] - points[0])) > STANDING_MM:
-        upright = bool(np.all(np.abs(points[1, :2] - points[0, :2]) <= STANDING_MM))
-        speed = _lift_speed(profile) if upright else _travel_speed(profile)
-        yield Travel(points, limits.travel_speed(points, speed, profile.machine))
-        tip.at_mm = points[1]
-
-
-def _travel_speed(profile: Profile) -> float:
-    return min(profile.process.travel_speed_mm_s, profile.machine.x.speed_mm_s, profile.machine.y.speed_mm_s)
-
-
-def _lift_speed(profile: Profile) -> float:
-    return min(profile.process.lift_speed_mm_s, profile.machine.z.speed_mm_s)
-
-
-def _stroke(path: Path, height_mm: float, points: Floats, profile: Profile) -> Stroke:
+def _stroke(
+    path: Path, height_mm: float, points: Floats, profile: Profile, accelerations: dict[Kind, float] | None, coast_mm: float
+) -> Stroke:
     """Filament by volume (the path's flow holds the material's); the speed lowered to what axes, extruder and hot end can do."""
     machine, material = profile.machine, profile.material
     area = bead_area_mm2(path.width_mm, height_mm) * path.flow
     filament_area = pi * material.diameter_mm**2 / 4.0
     length = np.hypot(*np.diff(path.points, axis=0).T)
+    pushing = length
+    if 0.0 < coast_mm < MOST_COASTED * float(length.sum()):
+        points, length, pushing = _coasted(points, length, coast_mm)
     fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s * filament_area) / area if area > 0 else inf
     speed = limits.travel_speed(points, min(path.speed_mm_s, fastest), machine)
-    return Stroke(path.kind, points, length * area / filament_area, speed, path.width_mm)
+    acceleration = None if accelerations is None else accelerations[path.kind]
+    return Stroke(path.kind, points, pushing * area / filament_area, speed, path.width_mm, path.fan, acceleration)
 
 
-def _retract(tip: Tip, profile: Profile) -> Iterator[Move]:
-    amount = profile.material.retract_mm - tip.retracted_mm
-    if amount > 0:
-        tip.retracted_mm += amount
-        yield Retract(amount, _filament_speed(profile))
-
-
-def _prime(tip: Tip, profile: Profile) -> Iterator[Move]:
-    amount = tip.retracted_mm + tip.prime_extra_mm
-    if amount > 0:
-        tip.retracted_mm = tip.prime_extra_mm = 0.0
-        yield Retract(-amount, _filament_speed(profile))
-
-
-def _filament_speed(profile: Profile) -> float:
-    return min(profile.material.retract_speed_mm_s, profile.machine.extruder_speed_mm_s)
+def _coasted(points: Floats, length: Floats, coast_mm: float) -> tuple[Floats, Floats, Floats]:
+    """Points, lengths and pushed lengths of a stroke whose last coast_mm push nothing; a step is cut where that begins."""
+    done = np.cumsum(length)
+    until = float(done[-1]) - coast_mm
+    k = int(np.searchsorted(done, until))
+    share = 1.0 - (done[k] - until) / length[k] if length[k] > 0.0 else 1.0
+    points = np.insert(points, k + 1, points[k] + share * (points[k + 1] - points[k]), axis=0)
+    length = np.insert(length, k, share * length[k])
+    length[k + 1] *= 1.0 - share
+    return points, length, np.where(np.arange(len(length)) <= k, length, 0.0)
 
 
 def _finish(tip: Tip, part: int, printed: Printed, profile: Profile) -> Iterator[Move]:
     """Retract, lift, bring the table back to level."""
-    yield from _retract(tip, profile)
+    yield from retract(tip, profile)
     home = level(profile.machine)
     if tip.pose == home:
         z = min(float(tip.at_mm[2]) + profile.machine.lift_mm, profile.machine.z.limits_mm[1])
-        yield from _go(tip, [*tip.at_mm[:2], z], profile)
+        yield from go(tip, [*tip.at_mm[:2], z], profile)
         return
     safe = safe_pose(profile.machine, printed, tip.at_mm, tip.pose, home, part)
-    yield from _go(tip, [*tip.at_mm[:2], safe.z_mm], profile)
+    yield from go(tip, [*tip.at_mm[:2], safe.z_mm], profile)
     if safe.over_mm is not None:
-        yield from _go(tip, [*safe.over_mm, safe.z_mm], profile)
+        yield from go(tip, [*safe.over_mm, safe.z_mm], profile)
     yield _reorient(tip, home, profile)
 
 

@@ -140,6 +140,12 @@ class Machine(Frozen):
     )
     extruder_speed_mm_s: float = Field(60.0, gt=0, le=500, description="greatest speed of the filament, mm/s")
     extruder_acceleration_mm_s2: float = Field(1500.0, gt=0, le=100000, description="acceleration of the filament, mm/s2")
+    arcs: bool = Field(
+        False, description="true: strokes along circles are written as arcs, G2 and G3; the firmware must know them"
+    )
+    arc_tolerance_mm: float = Field(
+        0.025, ge=0.003, le=0.5, description="an arc stays so near to the path it replaces, mm; 0.025 is an eighteenth of a bead"
+    )
     table: Table
     head: Head
     clearance_mm: float = Field(1.0, ge=0, le=100, description="least distance kept between head and table, mm")

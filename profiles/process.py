@@ -158,7 +158,22 @@ class Process(Frozen):
     )
     skirt_loops: int = Field(1, ge=0, le=20, description="loops around part 1's first layer, not touching it")
     skirt_distance_mm: float = Field(4.0, gt=0, le=50, description="distance of the skirt from part 1, mm")
-    brim_mm: float = Field(0.0, ge=0, le=50, description="width of the brim around part 1's first layer, mm; 0: none")
+    brim_mm: float = Field(
+        0.0, ge=0, le=50, description="width of the brim around part 1's first layer, mm; 0: only where its base is too small"
+    )
+    small_base_brim_mm: float = Field(
+        5.0,
+        ge=0,
+        le=50,
+        description="width of the brim that part 1 gets when a push of 1 N at the print's top would tip it off the plate, mm; 0: none",
+    )
+    brim_gap_mm: float = Field(0.0, ge=0, le=5, description="gap between part 1 and its brim, mm; 0.1 comes off more easily")
+    elephant_foot_mm: float = Field(
+        0.0, ge=0, le=1, description="part 1's first layer is this much smaller all round, as a warm plate squeezes it out, mm"
+    )
+    pedestal_gap_mm: float = Field(
+        0.1, ge=0, le=1, description="gap between a pedestal and the model on it, so that it breaks away, mm"
+    )
     interface_overlap: float = Field(
         0.5, ge=0, le=0.9, description="how deep a part's first layer is pressed into the part it stands on, share of its height"
     )
@@ -233,7 +248,9 @@ class Process(Frozen):
         le=10,
         description="lift along the nozzle for travels that retract, mm; a layer's height clears what has curled up",
     )
-    acceleration_mm_s2: float | None = Field(None, gt=0, le=100000, description="acceleration; absent: what the axes allow, mm/s2")
+    acceleration_mm_s2: float | None = Field(
+        None, gt=0, le=100000, description="acceleration of every stroke; absent: what the axes allow, mm/s2"
+    )
     outer_wall_acceleration_mm_s2: float | None = Field(
         None, gt=0, le=100000, description="acceleration of outer walls; absent: acceleration_mm_s2, mm/s2"
     )

@@ -75,7 +75,7 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     found = sorted(dict.fromkeys(found), key=lambda finding: (finding.severity, finding.line))
     return DryRun(
         program=program,
-        times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine),
+        times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration),
         dwell_s=sum(event.value for event in program.events if event.code == "G4"),
         segments_mm=segments,
         segment_row=rows,
@@ -85,10 +85,16 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     )
 
 
+def retractions(program: ParsedProgram) -> int:
+    """How often filament is pulled back; pulled in several moves that follow each other counts once."""
+    pulled = program.e_mm[np.abs(program.e_mm) > 1e-9] < 0
+    return int((pulled & ~np.concatenate([[False], pulled[:-1]])).sum()) if len(pulled) else 0
+
+
 def summary(run: DryRun) -> dict[str, Any]:
     """The figures of `simulate --json` and `export --json`."""
     program = run.program
-    travels = program.kind == MoveKind.TRAVEL
+    travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0)  # a wipe, which pulls back, is none
     points = run.segments_mm.reshape(-1, 3)
     return {
         "time_s": run.time_s,
@@ -98,7 +104,7 @@ def summary(run: DryRun) -> dict[str, Any]:
         "layers": program.layers,
         "parts": len(program.parts),
         "reorientations": int((program.kind == MoveKind.ROTATE).sum()),
-        "retractions": int(((program.kind == MoveKind.RETRACT) & (program.e_mm < 0)).sum()),
+        "retractions": retractions(program),
         "bounds_mm": [points.min(axis=0).tolist(), points.max(axis=0).tolist()] if len(points) else [],
         "axes": {
             letter: [float(program.end[:, k].min()), float(program.end[:, k].max())] if len(program.end) else []

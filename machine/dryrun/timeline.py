@@ -40,16 +40,21 @@ def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
     return length, measure
 
 
-def move_times(deltas: Floats, speed: Floats, stop: NDArray[np.bool_], machine: Machine) -> Floats:
+def move_times(
+    deltas: Floats, speed: Floats, stop: NDArray[np.bool_], machine: Machine, most_mm_s2: Floats | None = None
+) -> Floats:
     """(n,) seconds for (n, 6) deltas of X Y Z tilt turn E at (n,) speeds (mm/s or deg/s along what F measures).
 
-    stop: (n,) True where the machine stands still before the move. Axes that would be too fast slow the move down.
+    stop: (n,) True where the machine stands still before the move. most_mm_s2: (n,) acceleration told for X Y Z. Axes that
+    would be too fast slow the move down.
     """
     length, measure = lengths(deltas)
     share = np.abs(deltas) / np.maximum(length, TINY)[:, None]
     with np.errstate(divide="ignore"):
         cruise = np.minimum(speed, (axis_speeds(machine) / share).min(axis=1))
         acceleration = (axis_accelerations(machine) / share).min(axis=1)
+    if most_mm_s2 is not None:
+        acceleration = np.where(measure == 0, np.minimum(acceleration, most_mm_s2), acceleration)
     moving = measure < 3
     times = np.zeros(len(deltas))
     if moving.any():

@@ -67,13 +67,32 @@ def words_of(text: str) -> Words:
 
 def move(body: Body, words: Words) -> None:
     """G0, G1; the caller has made sure of a free block."""
+    body.motion.go(words, body.now_s, _pushes(body, words))
+
+
+def _arc(body: Body, words: Words, text: str) -> Iterator[float]:
+    """G2, G3: chord after chord, each waiting for a free block."""
+    places = body.motion.arc(words, text.startswith("G2"), _pushes(body, words))
+    if not places:
+        body.say("echo: Bad arc parameters")
+    for place in places:
+        at = list(body.motion.native)
+        while not body.motion.free(body.now_s):
+            yield body.motion.next_free_s()
+        if body.motion.native != at:  # stopped on the way
+            return
+        body.motion.reach(place, body.now_s)
+
+
+def _pushes(body: Body, words: Words) -> bool:
+    """False where a move would push filament through a cold nozzle, which is said."""
     hot = True
     if "E" in words and body.nozzle.at(body.now_s) < COLD_C:
         before = body.motion.native[5] + body.motion.shift[5]
         hot = words["E"] == (0.0 if body.motion.filament_relative else before)
         if not hot:
             body.say("echo: cold extrusion prevented")
-    body.motion.go(words, body.now_s, hot)
+    return hot
 
 
 def _dwell(body: Body, words: Words, text: str) -> Iterator[float]:
@@ -189,6 +208,8 @@ def _nothing(body: Body, words: Words, text: str) -> Work:
 
 
 COMMANDS: dict[str, Callable[[Body, Words, str], Work]] = {
+    "G2": _arc,
+    "G3": _arc,
     "G4": _dwell,
     "G20": _inches,
     "G21": _inches,

@@ -3,7 +3,9 @@
 from array import array
 from collections import deque
 from collections.abc import Mapping, Sequence
+from math import ceil, pi
 
+from machine.arcs import centre_of, chords, sweep_rad
 from profiles.machine import Machine
 
 BLOCKS = 16  # Marlin's BLOCK_BUFFER_SIZE
@@ -11,6 +13,7 @@ ROW = 15  # numbers of a recorded move: 6 where it begins, 6 where it ends, feed
 FIRST_FEED = 25.0  # mm/s until a program gives an F: Marlin's 1500 mm/min
 SLACK = 1e-6  # a coordinate printed with few decimals may stand this far outside a limit
 INCH_MM = 25.4
+ARC_MM, CIRCLE_CHORDS = 1.0, 72  # Marlin's MAX_ARC_SEGMENT_MM and MIN_CIRCLE_SEGMENTS
 
 
 class Motion:
@@ -55,18 +58,56 @@ class Motion:
 
     def go(self, words: Mapping[str, float], now_s: float, extrude: bool) -> None:
         """Plan one G0 or G1; without `extrude` (cold nozzle) the filament stands still."""
+        start = tuple(self.native)
+        self._aim(words)
+        if not extrude:
+            self.shift[5] += self.native[5] - start[5]
+            self.native[5] = start[5]
+        self._plan(start, now_s)
+
+    def arc(self, words: Mapping[str, float], clockwise: bool, extrude: bool) -> list[list[float]]:
+        """Where the chords of a G2 or G3 end, in `native` terms; [] for what Marlin answers with "Bad arc parameters"."""
+        scale = INCH_MM if self.inches else 1.0
+        start = list(self.native)
+        self._aim(words)
+        if not extrude:
+            self.shift[5] += self.native[5] - start[5]
+            self.native[5] = start[5]
+        end, self.native[:] = list(self.native), start
+        begin, finish = (start[0], start[1]), (end[0], end[1])
+        if "R" in words:
+            centre = centre_of(begin, finish, words["R"] * scale, clockwise)
+        else:
+            centre = (start[0] + words.get("I", 0.0) * scale, start[1] + words.get("J", 0.0) * scale)
+        if centre is None or centre == begin:
+            return []
+        sweep = sweep_rad(begin, finish, centre, clockwise)
+        radius = ((start[0] - centre[0]) ** 2 + (start[1] - centre[1]) ** 2) ** 0.5
+        count = max(1, ceil(abs(sweep) * radius / ARC_MM), ceil(abs(sweep) / (2.0 * pi) * CIRCLE_CHORDS))
+        shares = [k / count for k in range(1, count + 1)]
+        return [
+            [x, y, *(a + share * (b - a) for a, b in zip(start[2:], end[2:], strict=True))]
+            for share, (x, y) in zip(shares, chords(begin, finish, centre, sweep, count), strict=True)
+        ]
+
+    def reach(self, place: Sequence[float], now_s: float) -> None:
+        """Plan one chord of an arc."""
+        start = tuple(self.native)
+        self.native[:] = [self._allowed(axis, value) for axis, value in enumerate(place)]
+        self._plan(start, now_s)
+
+    def _aim(self, words: Mapping[str, float]) -> None:
+        """Take over the feed and the target of a move."""
         scale = INCH_MM if self.inches else 1.0
         if "F" in words and words["F"] > 0:
             self.feed = words["F"] * scale / 60.0
-        start = tuple(self.native)
         for axis, letter in enumerate(self.letters):
             if letter in words:
                 value = words[letter] * (1.0 if 3 <= axis < 5 else scale)
                 relative = self.relative if axis < 5 else self.filament_relative
                 self.native[axis] = self._allowed(axis, self.native[axis] + value if relative else value - self.shift[axis])
-        if not extrude:
-            self.shift[5] += self.native[5] - start[5]
-            self.native[5] = start[5]
+
+    def _plan(self, start: Sequence[float], now_s: float) -> None:
         deltas = [b - a for a, b in zip(start, self.native, strict=True)]
         if not any(deltas):
             return

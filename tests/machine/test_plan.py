@@ -8,7 +8,7 @@ from machine.collide import hull
 from machine.dryrun import dry_run
 from machine.gcode import write_gcode
 from machine.kinematics.table import machine_points, workpiece_points
-from machine.moves import BeginLayer, BeginPart, Reorient, Retract, Stroke, Travel
+from machine.moves import BeginLayer, BeginPart, Reorient, Retract, Stroke, Travel, Wipe
 from machine.plan import plan
 from machine.reorient import poses_between, safe_pose
 from mdp.pose import Pose, level
@@ -38,16 +38,16 @@ def test_every_stroke_lies_where_the_slicer_put_it_on_the_workpiece(machine: str
 
 @BOTH
 def test_each_travel_and_stroke_begins_where_the_last_one_ended(machine: str) -> None:
-    moves = [move for move in printed(machine)[3].moves if isinstance(move, Stroke | Travel)]
+    moves = [move for move in printed(machine)[3].moves if isinstance(move, Stroke | Travel | Wipe)]
     for before, after in pairwise(moves):
         assert after.points_mm[0] == pytest.approx(before.points_mm[-1], abs=1e-9)
 
 
-def test_a_reorientation_is_retract_lift_turn_cross_lower_prime() -> None:
+def test_a_reorientation_is_wipe_lift_turn_cross_lower_prime() -> None:
     moves = printed()[3].moves
     turn = [k for k, move in enumerate(moves) if isinstance(move, Reorient)][1]
     names = [type(move).__name__ for move in moves[turn - 2 : turn + 7]]
-    assert names == ["Retract", "Travel", "Reorient", "BeginPart", "Travel", "Travel", "BeginLayer", "Retract", "Stroke"]
+    assert names == ["Wipe", "Travel", "Reorient", "BeginPart", "Travel", "Travel", "BeginLayer", "Retract", "Stroke"]
     lift, across, lower = (moves[turn + k].points_mm for k in (-1, 2, 3))
     assert (lift[0, :2] == lift[1, :2]).all()
     assert lift[1, 2] > lift[0, 2]
@@ -58,7 +58,7 @@ def test_a_reorientation_is_retract_lift_turn_cross_lower_prime() -> None:
 
 def test_after_a_reorientation_more_is_primed_than_was_retracted() -> None:
     profile, _, _, program = printed()
-    back = [move.filament_mm for move in program.moves if isinstance(move, Retract)]
+    back = [float(np.sum(move.filament_mm)) for move in program.moves if isinstance(move, Retract | Wipe)]
     material = profile.material
     assert -(material.retract_mm + material.prime_extra_mm) in back
     assert sum(back) == pytest.approx(material.retract_mm - material.prime_extra_mm)
