@@ -311,5 +311,6 @@ def _arrays(reader: Reader) -> ParsedProgram:
         line=whole[:, 0], start=start, end=end, e_mm=e_mm, filament_mm=np.cumsum(e_mm), feed=table[:, 13], kind=kind,
         part=whole[:, 1], layer=whole[:, 2], type=whole[:, 3], types=tuple(reader.types),
         width_mm=table[:, 17], height_mm=table[:, 18], acceleration=table[:, 19],
-        events=tuple(reader.events), ignored=reader.ignored, layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
+        events=tuple(reader.events), ignored=reader.ignored,
+        layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
     )  # fmt: skip
