@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from slicer.polygons import Polygons, sealed
 from slicer.room import SMOOTH_MM, Room, leaning, solid
 
-JOIN_MM = 0.2  # places nearer than twice this are one: discs around them would overlap all the same
+JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,9 +14,9 @@ class Columns:
 
     area: Polygons
 
-    def joined(self, contact: Polygons, top_mm: float) -> "Columns":
+    def joined(self, contact: Polygons, reached: Polygons, top_mm: float) -> "Columns":
         """With what begins in this layer."""
-        return self if contact.is_empty() else Columns(sealed(self.area + contact, JOIN_MM).simplify(SMOOTH_MM))
+        return self if contact.is_empty() else Columns(sealed(self.area + contact, JOIN_MM).simplify(SMOOTH_MM) ^ reached)
 
     def lowered(self, room: Room, layer: int) -> "Columns":
         """What carries a layer's support in the layer below."""

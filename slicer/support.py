@@ -48,9 +48,12 @@ def supports(
     must find empty. far_mm: no part and no support is farther than this from the origin.
     """
     nothing = (Polygons(),) * len(outlines)
-    wanted = _worthwhile(hanging, process.support_least_mm2)
+    if process.support == "none":
+        return Supports(nothing, nothing, nothing)
+    afloat = _afloat(hanging, outlines, at, process, below)
+    wanted = _worthwhile(afloat, process.support_least_mm2)
     count = max((k for k, place in enumerate(wanted) if not place.is_empty()), default=-1)
-    if process.support == "none" or count < 0:
+    if count < 0:
         return Supports(nothing, nothing, nothing)
     room = rooms(outlines, at, process, below, forbidden[:count], far_mm)
     bodies, contacts = _descended(wanted, room, process)
@@ -62,6 +65,23 @@ def supports(
         printed[0] = foot - forbidden[0]
     rest = nothing[len(printed) :]
     return Supports((*printed, *rest), (*dense, *rest), missed)
+
+
+def _afloat(
+    hanging: Sequence[Polygons], outlines: Sequence[Polygons], at: Heights, process: Process, below: Polygons | None
+) -> list[Polygons]:
+    """The hanging places without those that have plastic or the platform no farther below than support would be."""
+    found = []
+    for k, place in enumerate(hanging):
+        if not place.is_empty():
+            drop = float(at.tip_mm[k] - at.height_mm[k]) - process.support_gap_mm
+            near = list(outlines[int(np.searchsorted(at.tip_mm, drop - EVEN_MM)) : max(k - 1, 0)])
+            if k and drop <= EVEN_MM:
+                place = place - united(near + [below]) if below is not None else Polygons()
+            elif near:
+                place = place - united(near)
+        found.append(place)
+    return found
 
 
 def _worthwhile(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
@@ -103,7 +123,7 @@ def _descended(wanted: Sequence[Polygons], room: Room, process: Process) -> tupl
         body = _body(grows.area, radius)
         if pending:
             contact = _contact(united([place for place, _ in pending]), body, room.reached[m], radius)
-            grows = grows.joined(contact, float(room.top_mm[m]))
+            grows = grows.joined(contact, room.reached[m], float(room.top_mm[m]))
             contacts[m] = _body(contact, radius)
             body = body + contacts[m]
         left = [(place - body, last) for place, last in pending if last < m]
@@ -140,9 +160,9 @@ def _standing(bodies: Sequence[Polygons], room: Room, process: Process, on_platf
             printed.append(body)
             continue
         carried = printed[-1] if m else Polygons()
-        if (body - carried).area() >= LEAST_MM2:
+        if not solid(body - carried).is_empty():
             carried = leaning(carried, float(room.lean_mm[m]) + SLACK_MM)
-        if (body - carried).area() >= LEAST_MM2:
+        if not solid(body - carried).is_empty():
             stands = opened((body ^ (carried + room.ground[m])).simplify(COARSE_MM), 0.45 * process.line_width_mm)
             islands = [island for island in stands.decompose() if island.area() >= least]
             body = Polygons.compose(islands) if islands else Polygons()

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from math import floor
 
 from slicer.branch import LEAST_MM2, Branch, Growth, branch_of, lowered
-from slicer.polygons import Polygons, united
-from slicer.room import Room
+from slicer.columns import JOIN_MM
+from slicer.polygons import Polygons, sealed, united
+from slicer.room import SMOOTH_MM, Room
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
 
@@ -23,14 +24,17 @@ class Tree:
         """The places of all branches."""
         return united([branch.area for branch in (*self.branches, *(branch for _, branch in self.young))])
 
-    def joined(self, contact: Polygons, top_mm: float) -> "Tree":
+    def joined(self, contact: Polygons, reached: Polygons, top_mm: float) -> "Tree":
         """With what begins in this layer."""
         if contact.is_empty():
             return self
         young = dict(self.young)
         for cell, piece in _cells(contact):
             old = young.get(cell)
-            young[cell] = branch_of(piece, top_mm) if old is None else branch_of(old.area + piece, max(old.top_mm, top_mm))
+            area = piece if old is None else old.area + piece
+            area = sealed(area, JOIN_MM).simplify(SMOOTH_MM) ^ reached
+            if area.area() > LEAST_MM2:
+                young[cell] = branch_of(area, top_mm if old is None else old.top_mm)
         return Tree(self.growth, self.branches, tuple(young.items()))
 
     def lowered(self, room: Room, layer: int) -> "Tree":
