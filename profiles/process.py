@@ -49,7 +49,10 @@ class Process(Frozen):
     top_layers: int = Field(4, ge=0, le=1000, description="solid layers under a surface that faces the printing direction")
     bottom_layers: int = Field(4, ge=0, le=1000, description="solid layers over a surface that faces away from it")
     top_thickness_mm: float = Field(
-        0.7, ge=0, le=100, description="least thickness of the layers under a surface, however thin they are: more layers then, mm"
+        0.7,
+        ge=0,
+        le=100,
+        description="least thickness of the layers under a surface, however thin they are: more layers then, mm",
     )
     bottom_thickness_mm: float = Field(
         0.5, ge=0, le=100, description="least thickness of the layers over a surface that faces away, mm"
@@ -165,7 +168,7 @@ class Process(Frozen):
         5.0,
         ge=0,
         le=50,
-        description="width of the brim that part 1 gets when a push of 1 N at the print's top would tip it off the plate, mm; 0: none",
+        description="width of part 1's brim where a push of 1 N at the print's top would tip it off the plate, mm; 0: none",
     )
     brim_gap_mm: float = Field(0.0, ge=0, le=5, description="gap between part 1 and its brim, mm; 0.1 comes off more easily")
     elephant_foot_mm: float = Field(

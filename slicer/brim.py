@@ -3,6 +3,7 @@
 from math import ceil
 
 from profiles.process import Process
+from slicer.base import tips_over
 from slicer.bead import Bead, spacing_mm
 from slicer.paths import Kind
 from slicer.polygons import Polygons, area_mm2, contours, rounded
@@ -11,11 +12,18 @@ from slicer.seam import begun_at_rear
 RANK = -2000
 
 
-def brim(footprint: Polygons, process: Process, height_mm: float) -> list[Bead]:
-    """The brim, outermost bead first so that it ends at the part; without a brim the skirt's loops."""
+def brim(footprint: Polygons, base: Polygons, top_mm: float, process: Process, height_mm: float) -> list[Bead]:
+    """The brim, outermost bead first so that it ends at the part; without a brim the skirt's loops.
+
+    footprint: all that the first layer prints; base: what of it the print stands on; top_mm: how high it will be. A base
+    that would tip over gets a brim of process.small_base_brim_mm.
+    """
     spacing = spacing_mm(process.line_width_mm, height_mm)
-    if process.brim_mm > 0:
-        count, nearest = max(ceil(process.brim_mm / spacing - 1e-9), 1), 0.5 * spacing
+    width = process.brim_mm
+    if width == 0.0 and process.small_base_brim_mm > 0.0 and tips_over(base, top_mm):
+        width = process.small_base_brim_mm
+    if width > 0.0:
+        count, nearest = max(ceil(width / spacing - 1e-9), 1), process.brim_gap_mm + 0.5 * spacing
     else:
         count, nearest = process.skirt_loops, process.skirt_distance_mm + 0.5 * process.line_width_mm
     outside = _outside(footprint)
