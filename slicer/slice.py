@@ -9,6 +9,7 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
+from slicer.base import compensated
 from slicer.bead import Bead
 from slicer.bridge import Bridge, beside, bridge_beads, bridged
 from slicer.brim import brim
@@ -42,6 +43,8 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
     process, mesh = profile.process, part.in_part_frame()
     at = heights_of(mesh, process, part.index == 1)
     outlines = [cleaned(loops) for loops in sections(mesh, at.cut_mm)]
+    if part.index == 1:
+        outlines[0] = compensated(outlines[0], process.elephant_foot_mm, process.line_width_mm)
     processes = strengthened(process, part.index > 1, len(outlines))
     walled = [walls(s, p.walls, p.line_width_mm, h) for s, p, h in zip(outlines, processes, at.height_mm, strict=True)]
     below = beneath(part, earlier, outlines[0])
@@ -60,7 +63,8 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
         beads += infill(region.sparse, process, density, i, float(at.tip_mm[i]), height)
         beads += support_beads(props.areas[i], props.dense[i], process, height, i == 0 and part.index == 1)
         if i == 0 and part.index == 1:
-            beads += brim(united([outline, props.areas[0]]), process, height)
+            top_mm = max(float(each.mesh.bounds_mm[1, 2]) for each in (part, *later))
+            beads += brim(united([outline, props.areas[0]]), outline, top_mm, process, height)
         around = Surroundings(rear, seams, rear if tip is None else tip, edges, float(at.cut_mm[i]), i)
         beads, seams = seamed(beads, process, around)
         bank = outlines[i - 1] if i else below
