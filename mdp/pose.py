@@ -103,13 +103,13 @@ def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tup
     rest2 = 1.0 - along_turn**2 - along_tilt**2 - 2.0 * along_turn * along_tilt * k
     if rest2 < -1e-9:
         return []
-    normal = np.cross(turn_axis, tilt_axis)
+    normal = _cross(turn_axis, tilt_axis)
     length = (max(rest2, 0.0) / determinant) ** 0.5
     solutions: list[tuple[float, float | None]] = []
     for side in (1.0, -1.0):
         c = along_turn * turn_axis + along_tilt * tilt_axis + side * length * normal
         tilt = _turn_between(tilt_axis, c, UP)
-        free = hypot(*np.cross(turn_axis, direction)) < SINGULAR
+        free = hypot(*_cross(turn_axis, direction)) < SINGULAR
         solutions.append((tilt, None if free else _turn_between(turn_axis, direction, c)))
         if length < SINGULAR:
             break
@@ -119,4 +119,10 @@ def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tup
 def _turn_between(axis: Floats, a: Floats, b: Floats) -> float:
     """Angle about `axis` that turns the part of a across it onto that of b, radians in (-pi, pi]."""
     across_a, across_b = a - axis * (axis @ a), b - axis * (axis @ b)
-    return atan2(float(axis @ np.cross(across_a, across_b)), float(across_a @ across_b))
+    return atan2(float(axis @ _cross(across_a, across_b)), float(across_a @ across_b))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Product of two single vectors: numpy's own takes longer than all else that a pose needs."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
