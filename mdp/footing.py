@@ -6,7 +6,6 @@ number for each column of each run. Only wanted columns with several pieces are 
 section.
 """
 
-
 from mdp.kernel import floats, ints, part, table
 from mdp.pieces import alone, anchor_joins, before, begin_basins, by_column, join_columns, root, saddle_joins, together, walk
 from mdp.sums import column_over
