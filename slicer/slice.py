@@ -1,6 +1,6 @@
 """Slicing: one part of a decomposition becomes layers of paths in its own frame."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -34,11 +34,18 @@ from slicer.support import supports
 from slicer.walls import Walls, wall_beads, walls
 
 
-def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> SlicedPart:
+def slice_part(
+    part: Part,
+    profile: Profile,
+    earlier: Sequence[Part] = (),
+    later: Sequence[Part] = (),
+    show: Callable[[int, int], None] | None = None,
+) -> SlicedPart:
     """The part's layers from its base plane upward.
 
     earlier, later: the parts printed before and after this one; the part with index 1 stands on the platform. The same
-    input gives the same paths. Raises SliceError when the part gives no bead at all.
+    input gives the same paths. show: hears after each layer its number and how many there are. Raises SliceError when the
+    part gives no bead at all.
     """
     process, mesh = profile.process, part.in_part_frame()
     at = heights_of(mesh, process, part.index == 1)
@@ -72,6 +79,8 @@ def slice_part(part: Part, profile: Profile, earlier: Sequence[Part] = (), later
         if layer.paths:
             tip = layer.paths[-1].points[-1]
             layers.append(layer)
+        if show is not None:
+            show(i + 1, len(outlines))
     _check(part, mesh.bounds_mm, layers, process)
     return SlicedPart(part.index, tuple(layers), props.unsupported_mm2)
 
