@@ -22,7 +22,7 @@ from mdp.search import decompose as search_parts
 from profiles.errors import ProfileError
 from profiles.profile import Profile
 from slicer.paths import SlicedPart
-from slicer.slice import slice_part
+from slicer.parts import slice_parts
 
 ORIENTATIONS_TRIED = 4
 WELL_REDUCED = 0.9
@@ -113,13 +113,14 @@ def build(decomposition: Decomposition, profile: Profile) -> Program:
     """Slice, plan, write and dry-run a decomposition."""
     ticker = Ticker()
     parts = decomposition.parts
-    sliced = []
-    for position, part in enumerate(parts):
-        ticker.tick(f"slicing part {part.index} of {len(parts)}", at_once=ticker.live)
-        sliced.append(slice_part(part, profile, parts[:position], parts[position + 1 :]))
+
+    def show(begun: int, of: int, layers: int, all_layers: int) -> None:
+        ticker.tick(f"slicing part {begun} of {of}: {min(100, 100 * layers // max(all_layers, 1))} % of the layers")
+
+    sliced = slice_parts(parts, profile, show)
     ticker.tick("planning moves", at_once=ticker.live)
     lines = tuple(write_gcode(plan(decomposition, sliced, profile), profile))
     ticker.tick("dry run", at_once=ticker.live)
     run = dry_run(lines, profile)
     ticker.close()
-    return Program(lines, run, decomposition, tuple(sliced))
+    return Program(lines, run, decomposition, sliced)
