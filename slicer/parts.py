@@ -6,6 +6,7 @@ are forked, which takes milliseconds; a fresh interpreter would spend longer loa
 """
 
 import os
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -73,6 +74,7 @@ _job: tuple[Sequence[Part], Profile, Any] | None = None  # what a forked process
 
 def _inherit(parts: Sequence[Part], profile: Profile, counts: Any) -> None:
     global _job
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C reaches the whole group: end without a word, the parent speaks
     _job = parts, profile, counts
 
 

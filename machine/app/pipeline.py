@@ -21,8 +21,8 @@ from mdp.search import Progress
 from mdp.search import decompose as search_parts
 from profiles.errors import ProfileError
 from profiles.profile import Profile
-from slicer.paths import SlicedPart
 from slicer.parts import slice_parts
+from slicer.paths import SlicedPart
 
 ORIENTATIONS_TRIED = 4
 WELL_REDUCED = 0.9
