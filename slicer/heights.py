@@ -27,11 +27,14 @@ class Heights:
 def heights_of(mesh: Mesh, process: Process, on_platform: bool, pedestal_mm: float = 0.0) -> Heights:
     """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it.
 
-    A pedestal is sliced for itself: one layer ends exactly at its height. Raises SliceError as heights().
+    A pedestal is sliced for itself and ends pedestal_gap_mm below the model. Raises SliceError as heights().
     """
     top = float(mesh.bounds_mm[1, 2])
-    if 0.0 < pedestal_mm < top:
-        low, high = heights(pedestal_mm, process, True), _upward(mesh, process, pedestal_mm, process.first_layer_height_mm)
+    if process.pedestal_gap_mm < pedestal_mm < top:
+        low, high = (
+            heights(pedestal_mm - process.pedestal_gap_mm, process, True),
+            _upward(mesh, process, pedestal_mm, process.first_layer_height_mm),
+        )
         both = ((low.tip_mm, high.tip_mm), (low.height_mm, high.height_mm), (low.cut_mm, high.cut_mm))
         return Heights(*(np.concatenate(two) for two in both))
     if process.adaptive_cusp_mm <= 0.0:
