@@ -23,6 +23,7 @@ from slicer.interface import beneath, interface_edges, strengthened
 from slicer.order import ordered
 from slicer.overhang import overhanging
 from slicer.paths import Kind, Layer, Path, SlicedPart
+from slicer.pedestal import pedestal_beads, pedestal_layers, without_pedestal
 from slicer.polygons import Polygons, cleaned, united
 from slicer.props import support_beads
 from slicer.region import Region, regions
@@ -48,14 +49,17 @@ def slice_part(
     part gives no bead at all.
     """
     process, mesh = profile.process, part.in_part_frame()
-    at = heights_of(mesh, process, part.index == 1)
+    pedestal_mm = profile.search.pedestal_mm if part.index == 1 else 0.0
+    at = heights_of(mesh, process, part.index == 1, pedestal_mm)
+    below_model = pedestal_layers(at.tip_mm, pedestal_mm)
     outlines = [cleaned(loops) for loops in sections(mesh, at.cut_mm)]
     if part.index == 1:
         outlines[0] = compensated(outlines[0], process.elephant_foot_mm, process.line_width_mm)
+    own = without_pedestal(outlines, mesh, at.cut_mm, pedestal_mm, below_model) if below_model else outlines
     processes = strengthened(process, part.index > 1, len(outlines))
-    walled = [walls(s, p.walls, p.line_width_mm, h) for s, p, h in zip(outlines, processes, at.height_mm, strict=True)]
+    walled = [walls(s, p.walls, p.line_width_mm, h) for s, p, h in zip(own, processes, at.height_mm, strict=True)]
     below = beneath(part, earlier, outlines[0])
-    filled = regions(outlines, [w.inside for w in walled], below, process)
+    filled = regions(own, [w.inside for w in walled], below, process)
     density = pattern_density([region.sparse for region in filled], process, process.layer_height_mm)
     over = contacts(mesh, outlines, at.cut_mm, process, below)
     far = far_mm(mesh)
@@ -66,9 +70,11 @@ def slice_part(
     tip, seams = None, np.zeros((0, 2))
     for i, outline in enumerate(outlines):
         height = float(at.height_mm[i])
-        region, beads = _beads(outline, walled[i], filled[i], over[i].bridges, i, processes[i], height)
+        region, beads = _beads(own[i], walled[i], filled[i], over[i].bridges, i, processes[i], height)
         beads += infill(region.sparse, process, density, i, float(at.tip_mm[i]), height)
         beads += support_beads(props.areas[i], props.dense[i], process, height, i == 0 and part.index == 1)
+        if i < below_model:
+            beads += pedestal_beads(outline, i, below_model, process, height)
         if i == 0 and part.index == 1:
             top_mm = max(float(each.mesh.bounds_mm[1, 2]) for each in (part, *later))
             beads += brim(united([outline, props.areas[0]]), outline, top_mm, process, height)
