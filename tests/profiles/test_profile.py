@@ -1,6 +1,8 @@
 """Profiles: what ships is valid, and every wrong one gets a sentence with key, value and what is allowed."""
 
 import re
+import tomllib
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -179,7 +181,7 @@ def test_an_unknown_name_is_answered_with_the_known_ones() -> None:
     ):
         load(machine="ender")
     with pytest.raises(
-        ProfileError, match=r"^profile 'ender' is not known: it must be one of draft, .*, or the path of a \.toml file$"
+        ProfileError, match=r"^profile 'ender' is not known: it must be one of abs, .*, or the path of a \.toml file$"
     ):
         load_one("ender")
 
@@ -264,3 +266,21 @@ def test_a_bare_table_names_every_key_that_is_missing(tmp_path: Path) -> None:
 
 def test_the_models_refuse_unknown_keys() -> None:
     assert all(issubclass(model, Frozen) and model.model_config["extra"] == "forbid" for model in SECTIONS.values())
+
+
+@pytest.mark.parametrize("name", ["draft", "fine"])
+def test_shipped_processes_say_only_what_differs_from_the_standard(name: str) -> None:
+    ours, standard = load(process=name).process.model_dump(), load().process.model_dump()
+    said = tomllib.loads((resources.files("profiles") / "processes" / f"{name}.toml").read_text(encoding="utf-8"))["process"]
+    assert {key for key in ours if ours[key] != standard[key]} == set(said)
+
+
+def test_layers_get_finer_from_draft_to_fine() -> None:
+    heights = [load(process=name).process.layer_height_mm for name in ("draft", "standard", "fine")]
+    assert heights == [0.3, 0.2, 0.1]
+
+
+@pytest.mark.parametrize("process", shipped("process"))
+def test_the_interface_of_every_shipped_process_is_as_high(process: str) -> None:
+    settings = load(process=process).process
+    assert settings.interface_layers * settings.layer_height_mm == pytest.approx(0.6)
