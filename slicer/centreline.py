@@ -7,7 +7,7 @@ the local width. Triangles with three inner sides are forks, those with one are 
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -15,9 +15,11 @@ import manifold3d
 import numpy as np
 
 from mdp.mesh import Floats, Ints
+from slicer.bead import length_mm
 from slicer.chords import chains
 from slicer.halfedges import opposites
 
+SMOOTHINGS = 3  # moving averages over three points
 SPUR = 1.0  # a branch shorter than this many widths is a corner of the boundary, not a limb
 
 
@@ -49,7 +51,7 @@ class _Chain:
 
     @cached_property
     def length_mm(self) -> float:
-        return float(self.steps.sum())
+        return length_mm(self.points)
 
 
 def centrelines(outlines: Sequence[Floats], step_mm: float, even: float, shortest_mm: float) -> list[Line]:
@@ -80,6 +82,13 @@ def _sampled(loop: Floats, step_mm: float) -> Floats:
     share = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
     sampled: Floats = np.repeat(loop, counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0)
     return sampled
+
+
+def _smooth(points: Floats) -> Floats:
+    """The chain without the zigzag that comes from sampling its two sides at different places; its ends stay."""
+    for _ in range(SMOOTHINGS):
+        points = np.concatenate([points[:1], 0.25 * points[:-2] + 0.5 * points[1:-1] + 0.25 * points[2:], points[-1:]])
+    return points
 
 
 def _pruned(found: list[_Chain]) -> list[_Chain]:
@@ -128,7 +137,8 @@ def _merged(found: list[_Chain]) -> list[_Chain]:
 def _lines(found: list[_Chain], areas: Floats, even: float, shortest_mm: float) -> list[Line]:
     """Chains cut where the width changes."""
     lines = []
-    for chain in sorted(found, key=lambda chain: chain.place):
+    for rough in sorted(found, key=lambda chain: chain.place):
+        chain = replace(rough, points=_smooth(rough.points))
         for a, b in _even(chain.widths, chain.steps, even, shortest_mm):
             steps = chain.steps[a:b]
             middle = 0.5 * (chain.widths[a:b] + chain.widths[a + 1 : b + 1])

@@ -18,6 +18,7 @@ LEAST_LINE = 0.35  # of the line width: a thinner place of the section stays emp
 LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empty, as PrusaSlicer's classic walls leave it
 FEW_MM2 = 0.25  # of the line width squared: a smaller place between beads stays empty
 COMPACT = 0.55  # 4 pi area / perimeter^2; a rectangle of 1:3 has 0.59: rounder places get a small ring, longer ones a line
+TAPER = 0.9  # of the middle clearance: ends of a thin wall's line with less run into a corner
 SPARE = 0.015  # of the line width by which a thin wall's bead may reach over the section where that tapers
 LEAST_FLOW, MOST_FLOW = 0.3, 1.3
 SHORTEST = 0.25  # of the line width: what is shorter is no stroke
@@ -41,7 +42,7 @@ def gaps(
     for area, strokes in _strokes(places, line_width_mm, *(LOOSE if section is None else CLOSE)):
         long = [stroke for stroke in strokes if length_mm(stroke[0]) > SHORTEST * line_width_mm]
         if borders is not None:
-            long = [(points, min(across, 2.0 * (_clearance(borders, points) + SPARE * line_width_mm))) for points, across in long]
+            long = [_kept_inside(borders, *stroke, SPARE * line_width_mm) for stroke in long]
         drawn = sum(length_mm(points) * across for points, across in long)
         for points, across in long:
             wished = width_for_mm(across, height_mm) if section is None else across
@@ -53,10 +54,20 @@ def gaps(
     return beads
 
 
+def _kept_inside(borders: Floats, points: Floats, across: float, spare_mm: float) -> Stroke:
+    """The stroke without ends that run into a corner, as wide as its way to the borders allows."""
+    clear = _clearances(borders, points)
+    fits = np.flatnonzero(clear >= TAPER * np.median(clear))
+    first, last = min(int(fits[0]), len(points) - 2), max(int(fits[-1]), 1)
+    if last <= first:
+        first, last = 0, len(points) - 1
+    return points[first : last + 1], min(across, 2.0 * (float(clear[first : last + 1].min()) + spare_mm))
+
+
 @njit(cache=True)
-def _clearance(borders: Floats, points: Floats) -> float:
-    """Least distance of points (n, 2) to (m, 4) edges."""
-    least = np.inf
+def _clearances(borders: Floats, points: Floats) -> Floats:
+    """Distance of each point (n, 2) to (m, 4) edges."""
+    least = np.full(len(points), np.inf)
     for e in range(len(borders)):
         ax, ay = borders[e, 0], borders[e, 1]
         dx, dy = borders[e, 2] - ax, borders[e, 3] - ay
@@ -64,8 +75,8 @@ def _clearance(borders: Floats, points: Floats) -> float:
         for k in range(len(points)):
             x, y = points[k, 0] - ax, points[k, 1] - ay
             share = min(max((x * dx + y * dy) / square, 0.0), 1.0)
-            least = min(least, (x - share * dx) ** 2 + (y - share * dy) ** 2)
-    return float(np.sqrt(least))
+            least[k] = min(least[k], (x - share * dx) ** 2 + (y - share * dy) ** 2)
+    return np.sqrt(least)
 
 
 def _strokes(places: Polygons, line_width_mm: float, even: float, shortest: float) -> Iterable[tuple[float, list[Stroke]]]:

@@ -15,7 +15,7 @@ TURN_DEG = 60.0
 
 def honeycomb(angle_deg: float, layer: int, spacing_mm: float, density: float) -> Bundle:
     """Zigzags of the density; spacing: of solid lines."""
-    side = side_mm(spacing_mm, density)
+    side = side_mm(spacing_mm, min(density, 1.0))
     return Bundle(angle_deg + TURN_DEG * (layer % 3), lambda box: _zigzags(box, side, spacing_mm))
 
 

@@ -8,7 +8,7 @@ from slicer.anchor import anchored
 from slicer.bead import Bead, length_mm, spacing_mm
 from slicer.bundle import Bundle, cut_to, ruled
 from slicer.clip import border_of, together
-from slicer.gyroid import gyroid
+from slicer.gyroid import LENGTH, gyroid
 from slicer.honeycomb import honeycomb
 from slicer.paths import Kind
 from slicer.polygons import Polygons, closed, contours, grown
@@ -48,11 +48,14 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     spacing = spacing_mm(process.line_width_mm, height_mm)
     drawn = asked
     for _ in range(2):
-        beads = [bead for i in chosen for bead in infill(areas[i], process, drawn, i, i * height_mm, height_mm)]
+        step = 0.25 * LENGTH * spacing / drawn / len(chosen)  # a gyroid's layers differ over a quarter of its period
+        beads = [
+            bead for k, i in enumerate(chosen) for bead in infill(areas[i], process, drawn, i, (k + 0.5) * step, height_mm)
+        ]
         got = sum(bead.length_mm for bead in beads) * spacing / sum(areas[i].area() for i in chosen)
         if got <= 0.0:
             return asked
-        drawn = min(max(drawn * asked / got, asked * (1.0 - MOST_SHIFT)), asked * (1.0 + MOST_SHIFT), 1.0)
+        drawn = min(max(drawn * asked / got, asked * (1.0 - MOST_SHIFT)), asked * (1.0 + MOST_SHIFT))
     return drawn
 
 

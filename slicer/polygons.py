@@ -28,9 +28,9 @@ def cleaned(loops: Sequence[Floats]) -> Polygons:
     return sealed(whole, CLOSING_MM)
 
 
-def grown(polygons: Polygons, distance_mm: float) -> Polygons:
-    """Every boundary moved outward (negative: inward) by the distance, corners mitred."""
-    return polygons.offset(distance_mm, JoinType.Miter, MITRE)
+def grown(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Polygons:
+    """Every boundary moved outward (negative: inward) by the distance, corners mitred up to so many distances."""
+    return polygons.offset(distance_mm, JoinType.Miter, mitre)
 
 
 def rounded(polygons: Polygons, distance_mm: float) -> Polygons:

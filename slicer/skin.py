@@ -10,13 +10,14 @@ from slicer.anchor import anchored
 from slicer.bead import Bead, length_mm, spacing_mm
 from slicer.bundle import MARGIN_MM, Box, Bundle, Lines, cut_to, straight
 from slicer.clip import border_of
-from slicer.gap import FEW_MM2, LEAST_GAP, gaps
+from slicer.gap import LEAST_GAP, gaps
 from slicer.paths import Kind
 from slicer.polygons import Polygons, grown, opened, strips
 
 JOIN = 4.0  # spacings along the border: line ends nearer than this are joined
 EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
 RANK = 2
+FEW_MM2 = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
 LEAST_FLOW, MOST_FLOW = 0.85, 1.15
 
 

@@ -11,8 +11,10 @@ from profiles.process import Process
 from slicer.bead import Bead, bulged, spacing_mm
 from slicer.gap import LEAST_GAP, LEAST_LINE
 from slicer.paths import Kind
-from slicer.polygons import Polygons, contours, grown, opened
+from slicer.polygons import Polygons, contours, grown, opened, rounded
 
+BLUNT = 1.1  # mitre limit that claims nothing beyond a corner; what it leaves there is looked at again with round beads
+LEAST_REST_MM2 = 1e-3
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
 
 
@@ -38,20 +40,35 @@ def walls(section: Polygons, count: int, width_mm: float, height_mm: float) -> W
         half = 0.5 * (width_mm if level == 0 else spacing)
         line = grown(area, -half)
         core = grown(line, -0.5 * spacing)
-        rest = _rest(area, core, half + 0.5 * spacing, (LEAST_GAP if level else LEAST_LINE) * width_mm)
+        line, rest = _split(area, line, core, half, 0.5 * spacing, (LEAST_GAP if level else LEAST_LINE) * width_mm)
         if not rest.is_empty():
-            line = line ^ grown(core, 0.5 * spacing + SLACK_MM)
             free, narrow = (rest, narrow) if level == 0 else (free, narrow + rest)
         levels.append(tuple(contours(line)))
         area = core
         if core.is_empty():
             break
     core = grown(area, -spacing)
-    rest = _rest(area, core, spacing, (LEAST_GAP if count else LEAST_LINE) * width_mm)
+    area, rest = _split(area, area, core, SLACK_MM, spacing, (LEAST_GAP if count else LEAST_LINE) * width_mm)
     if not rest.is_empty():
-        area = area ^ grown(core, spacing + SLACK_MM)
         free, narrow = (rest, narrow) if count == 0 else (free, narrow + rest)
     return Walls(tuple(levels), free, narrow, area)
+
+
+def _split(
+    area: Polygons, line: Polygons, core: Polygons, half: float, inner: float, least_mm: float
+) -> tuple[Polygons, Polygons]:
+    """What of a bead's centreline has the core behind it, and what of the area at least so wide no bead then covers.
+
+    half: reach of the bead outward from its centreline; inner: way from the centreline to the core.
+    """
+    if area.is_empty():
+        return line, area
+    rest = area - grown(core, half + inner + SLACK_MM, BLUNT)
+    if rest.area() < LEAST_REST_MM2 or opened(rest, 0.5 * least_mm).is_empty():
+        return line, Polygons()
+    line = line ^ grown(core, inner + SLACK_MM)
+    rest = area - rounded(line, half + SLACK_MM)
+    return line, rest if rest.is_empty() else opened(rest, 0.5 * least_mm)
 
 
 def wall_beads(found: Walls, process: Process, height_mm: float) -> list[Bead]:
@@ -66,11 +83,3 @@ def wall_beads(found: Walls, process: Process, height_mm: float) -> list[Bead]:
         rank = -level if process.wall_order == "inner-first" else level - process.walls
         beads += [Bead(kind, loop, width, rank, flow) for loop in loops]
     return beads
-
-
-def _rest(area: Polygons, core: Polygons, distance_mm: float, least_mm: float) -> Polygons:
-    """What of the area the core does not reach over a distance, where it is at least so wide."""
-    if area.is_empty():
-        return area
-    rest = area - grown(core, distance_mm + SLACK_MM)
-    return rest if rest.is_empty() else opened(rest, 0.5 * least_mm)

@@ -2,8 +2,9 @@
 
 import pytest
 
-from slicer.polygons import Polygons, opened
-from slicer.region import _common, regions
+from slicer.polygons import Polygons, grown, opened
+from slicer.region import _common, regions, shell_layers
+from tests.slicer.hand import profile
 
 WIDTH = 0.45
 
@@ -12,8 +13,14 @@ def square(side):
     return Polygons.square((side, side), True)
 
 
+def process(top=2, bottom=2, density=0.2, **others):
+    keys = {"top_layers": top, "bottom_layers": bottom, "infill_density": density, "solid_below_mm2": 5}
+    keys |= {"top_thickness_mm": 0, "bottom_thickness_mm": 0} | others
+    return profile(*(f"process.{key}={value}" for key, value in keys.items())).process
+
+
 def areas(sections, beneath=None, top=2, bottom=2, density=0.2):
-    found = regions(sections, sections, beneath, top, bottom, density, WIDTH)
+    found = regions(sections, sections, beneath, process(top, bottom, density))
     return [tuple(round(r.area(), 3) for r in (region.top, region.solid, region.sparse)) for region in found]
 
 
@@ -53,6 +60,36 @@ def test_full_density_has_no_infill():
 
 def test_an_island_of_infill_too_small_to_bother_with_becomes_solid():
     assert {row[2] for row in areas([square(2)] * 9)} == {0}
+
+
+@pytest.mark.parametrize(("least", "kept"), [(24.0, 25.0), (26.0, 0.0)])
+def test_sparse_places_below_the_least_area_become_solid(least, kept):
+    found = regions([square(5)] * 9, [square(5)] * 9, None, process(solid_below_mm2=least))
+    assert found[4].sparse.area() == pytest.approx(kept)
+
+
+def test_no_infill_leaves_small_places_hollow():
+    assert areas([square(2)] * 9, density=0)[4] == (0, 0, 4)
+
+
+@pytest.mark.parametrize(("height", "layers"), [(0.1, (7, 5)), (0.2, (4, 3)), (0.3, (3, 3))])
+def test_thin_layers_get_more_of_them_for_the_least_thickness(height, layers):
+    keys = process(3, 3, layer_height_mm=height, top_thickness_mm=0.7, bottom_thickness_mm=0.5)
+    assert shell_layers(keys) == layers
+
+
+def test_no_layers_asked_for_are_none_however_thick():
+    assert shell_layers(process(0, 0, top_thickness_mm=3, bottom_thickness_mm=3)) == (0, 0)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.3, 0.6, 1.5, 4.0])
+def test_every_vertical_line_meets_enough_wall_or_skin_below_a_slope(step):
+    sections = [square(60 - 2 * step * i) for i in range(12)]
+    insides = [grown(section, -1.3) for section in sections]
+    found = regions(sections, insides, None, process(3, 0, solid_below_mm2=0))
+    for i, region in enumerate(found[:-1]):
+        for above in sections[i + 1 : i + 4]:
+            assert (region.sparse - above).area() < 1e-6
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 12, 1000])
