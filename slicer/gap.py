@@ -76,7 +76,8 @@ def _clearances(borders: Floats, points: Floats) -> Floats:
             x, y = points[k, 0] - ax, points[k, 1] - ay
             share = min(max((x * dx + y * dy) / square, 0.0), 1.0)
             least[k] = min(least[k], (x - share * dx) ** 2 + (y - share * dy) ** 2)
-    return np.sqrt(least)
+    away: Floats = np.sqrt(least)
+    return away
 
 
 def _strokes(places: Polygons, line_width_mm: float, even: float, shortest: float) -> Iterable[tuple[float, list[Stroke]]]:
