@@ -9,14 +9,13 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.polygons import Polygons, contours, grown, sealed, united
-from slicer.room import EVEN_MM, SMOOTH_MM, Room, leaning, solid
+from slicer.room import EVEN_MM, FINE_MM, LEAST_MM2, SMOOTH_MM, Room, carried, leaning
 
 CORNERS = 12  # of a trunk's outline
 THICKEST_MM = 3.0  # a trunk's radius: enough for any part that fits a machine
 MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
-THIN_MM = 0.05  # radius of the places of a branch between obstacles: hardly more than one place
+THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
 DRAWN_IN = 0.7  # of the lean: then right corners move by the lean
-LEAST_MM2 = 1e-4  # places smaller than this are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,20 +146,21 @@ def _aside(branches: Sequence[Branch], room: Room, layer: int) -> list[Branch]:
         return []
     reached, lean = room.reached[layer - 1], float(room.lean_mm[layer])
     area = sealed(united([branch.area for branch in branches]), SMOOTH_MM)
-    kept = area ^ reached
-    rest = solid(area - reached)
-    rest = rest if rest.is_empty() else solid(rest - room.ground[layer])
-    kept = _thinned(kept, lean) if rest.is_empty() else kept + (leaning(rest, lean) ^ reached)
+    kept = carried(area, reached, room.ground[layer], lean)
+    kept = _thinned(kept, lean) if (area - reached).is_empty() else kept
     top = max(branch.top_mm for branch in branches)
-    islands = kept.simplify(SMOOTH_MM).decompose()
+    islands = kept.simplify(FINE_MM).decompose()
     return [branch_of(island, top) for island in islands if island.area() >= LEAST_MM2]
 
 
 def _thinned(area: Polygons, lean: float) -> Polygons:
     """The area with its edges drawn in; what is too narrow for that stays."""
-    core = grown(area, -DRAWN_IN * lean)
-    bits = (area - leaning(core, lean)).decompose()
-    return united([core, *(bit for bit in bits if bit.area() >= lean**2)])
+    thinned = []
+    for island in area.decompose():
+        core = grown(island, -DRAWN_IN * lean)
+        bits = [] if core.is_empty() else (island - leaning(core, lean)).decompose()
+        thinned += [island] if core.is_empty() else [core, *(bit for bit in bits if bit.area() >= lean**2)]
+    return united(thinned)
 
 
 def _apart(branches: list[Branch]) -> list[Branch]:

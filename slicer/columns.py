@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from slicer.polygons import Polygons, sealed
-from slicer.room import SMOOTH_MM, Room, leaning, solid
+from slicer.room import SLIVER_MM, SMOOTH_MM, Room, carried
 
 JOIN_MM = 0.8  # columns with less than twice this between them are one: sturdier, and not more plastic than two outlines
 
@@ -20,12 +20,7 @@ class Columns:
 
     def lowered(self, room: Room, layer: int) -> "Columns":
         """What carries a layer's support in the layer below."""
-        stuck = self.area - room.reached[layer - 1]
-        if stuck.is_empty():
+        if (self.area - room.reached[layer - 1]).is_empty():
             return self
-        straight = self.area ^ room.reached[layer - 1]
-        stuck = solid(stuck - room.ground[layer])
-        if stuck.is_empty():
-            return Columns(straight)
-        aside = leaning(stuck, float(room.lean_mm[layer])) ^ room.reached[layer - 1]
-        return Columns((straight + aside).simplify(SMOOTH_MM))
+        lower = carried(self.area, room.reached[layer - 1], room.ground[layer], float(room.lean_mm[layer]))
+        return Columns(lower.simplify(SLIVER_MM))

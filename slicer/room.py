@@ -17,10 +17,12 @@ from slicer.polygons import JoinType, Polygons, grown, united
 
 COARSE_MM = 0.03  # sections are simplified by this before they are grown
 MARGIN_MM = 0.08  # and grown by this more, which leaves room for simplified support
-FINE_MM = 0.005  # reached places are simplified by this, and lean by as much less
+FINE_MM = 0.005  # reached places are simplified by this
+SPARE = 0.15  # share of the lean that reached places keep in reserve, so that more than a point of the layer below is near
 SMOOTH_MM = 0.05  # support is simplified by this: its edges come from single faces, and nobody needs them
 SLIVER_MM = 0.02  # what is narrower than twice this and has no place has neighbours that do
 EVEN_MM = 1e-6  # heights nearer than this are equal
+LEAST_MM2 = 1e-5  # places smaller than this are rounding
 SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
 
 
@@ -45,6 +47,19 @@ def solid(places: Polygons) -> Polygons:
     """Without slivers."""
     core = grown(places, -SLIVER_MM)
     return core if core.is_empty() else grown(core, 1.5 * SLIVER_MM) ^ places
+
+
+def carried(places: Polygons, reached: Polygons, ground: Polygons, lean_mm: float) -> Polygons:
+    """Reached places of a layer that carry places of the layer above: straight below where that can be, aside where it
+    must. Places on ground need nothing.
+    """
+    straight = places ^ reached
+    rest = places - reached
+    if rest.area() >= LEAST_MM2:
+        rest = rest - ground
+    if rest.area() >= LEAST_MM2 and not straight.is_empty():
+        rest = rest - leaning(straight, lean_mm)
+    return straight if rest.area() < LEAST_MM2 else straight + (leaning(rest, lean_mm) ^ reached)
 
 
 def rooms(
@@ -89,4 +104,4 @@ def rooms(
 
 
 def _leant(reached: Polygons, lean_mm: float) -> Polygons:
-    return leaning(reached, lean_mm - min(FINE_MM, 0.1 * lean_mm))
+    return leaning(reached, (1.0 - SPARE) * lean_mm)

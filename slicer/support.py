@@ -13,6 +13,7 @@ from slicer.contact import RIM_MM
 from slicer.heights import Heights
 from slicer.polygons import Polygons, grown, opened, sealed, united
 from slicer.room import COARSE_MM, EVEN_MM, SMOOTH_MM, Room, leaning, rooms, solid
+from slicer.root import rooted
 from slicer.tree import Tree
 
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
@@ -57,7 +58,7 @@ def supports(
         return Supports(nothing, nothing, nothing)
     room = rooms(outlines, at, process, below, forbidden[:count], far_mm)
     bodies, contacts = _descended(wanted, room, process)
-    printed = _standing(bodies, room, process, below is None)
+    printed = _standing(rooted(bodies, outlines, room, process), room, process, below is None)
     missed = _missed(wanted, printed, outlines, room, process)
     dense = _dense(printed, contacts, room, process)
     if below is None:
@@ -77,7 +78,7 @@ def _afloat(
             drop = float(at.tip_mm[k] - at.height_mm[k]) - process.support_gap_mm
             near = list(outlines[int(np.searchsorted(at.tip_mm, drop - EVEN_MM)) : max(k - 1, 0)])
             if k and drop <= EVEN_MM:
-                place = place - united(near + [below]) if below is not None else Polygons()
+                place = place - united([*near, below]) if below is not None else Polygons()
             elif near:
                 place = place - united(near)
         found.append(place)

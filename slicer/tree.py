@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from math import floor
 
-from slicer.branch import LEAST_MM2, Branch, Growth, branch_of, lowered
+from slicer.branch import Branch, Growth, branch_of, lowered
 from slicer.columns import JOIN_MM
 from slicer.polygons import Polygons, sealed, united
-from slicer.room import SMOOTH_MM, Room
+from slicer.room import LEAST_MM2, SMOOTH_MM, Room
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
 
