@@ -62,7 +62,7 @@ def test_the_check_tells_what_exists_from_what_does_not() -> None:
     [
         "mdp.read.read_mesh(path, scale, rotate_deg)",
         "mdp.search.decompose(mesh, name, profile, ranker, on_stage, on_record)",
-        "slicer.slice.slice_part(part, profile, earlier, later)",
+        "slicer.slice.slice_part(part, profile, earlier, later, show)",
         "machine.plan.plan(decomposition, sliced, profile)",
         "machine.gcode.write_gcode(program, profile)",
         "machine.parse.parse_gcode(lines, machine)",
