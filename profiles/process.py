@@ -206,7 +206,8 @@ class Process(Frozen):
         0.0,
         ge=0,
         le=1,
-        description="depth of grooves that a part leaves for the next to flow into, mm; 0: none, their worth is not measured",
+        description="depth of grooves that a part leaves for the next to flow into, mm; 0: none, their worth is not measured; "
+        "a multiple of the layer height is met best",
     )
     outer_wall_speed_mm_s: float = Field(40.0, gt=0, le=1000, description="speed of outer walls, mm/s")
     inner_wall_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of inner walls, mm/s")
@@ -281,6 +282,11 @@ class Process(Frozen):
                     f"{key} is {getattr(self, key):g} mm: at most 0.9 of line_width_mm "
                     f"({0.9 * self.line_width_mm:g} mm) is allowed"
                 )
+        if self.interlock_mm > self.line_width_mm - self.layer_height_mm + 1e-9:
+            raise ValueError(
+                f"interlock_mm is {self.interlock_mm:g} mm: at most line_width_mm less layer_height_mm "
+                f"({self.line_width_mm - self.layer_height_mm:g} mm) is filled by one bead"
+            )
         if adaptive and self.least_layer_height_mm > self.most_layer_height_mm:
             raise ValueError(
                 f"least_layer_height_mm is {self.least_layer_height_mm:g} mm: at most most_layer_height_mm "

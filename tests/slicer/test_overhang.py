@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import Bead
-from slicer.order import NOWHERE, Placed
+from slicer.combing import NOWHERE
+from slicer.order import Placed
 from slicer.overhang import overhanging
 from slicer.paths import Kind
 from slicer.polygons import Polygons

@@ -1,0 +1,97 @@
+"""Split: beads of a layer parted where they enter and leave a place, so that they are printed otherwise there."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats
+from slicer.bead import Bead
+from slicer.combing import NOWHERE
+from slicer.order import Placed
+from slicer.paths import Kind
+from slicer.polygons import Polygons, edges
+from slicer.scanline import inside
+
+SNAP = 1e-6  # of a step's length: a crossing so near its end is at its end
+
+
+def split(
+    placed: Sequence[Placed], place: Polygons, kinds: Sequence[Kind], shortest_mm: float, other: Callable[[Bead], Bead]
+) -> list[Placed]:
+    """The beads in the same order, those of some kinds in pieces; other() makes what lies within the place.
+
+    The pieces of a bead follow each other without a travel, only the first one keeps its approach. No piece is shorter than
+    shortest_mm.
+    """
+    sides = edges(place)
+    sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]), kind="stable")]
+    out: list[Placed] = []
+    for each in placed:
+        out += _pieces(each, sides, shortest_mm, other) if each.bead.kind in kinds else [each]
+    return out
+
+
+def _pieces(placed: Placed, sides: Floats, shortest_mm: float, other: Callable[[Bead], Bead]) -> list[Placed]:
+    points, within = _cut(np.ascontiguousarray(placed.points), sides)
+    within = _steady(within, np.hypot(*np.diff(points, axis=0).T), shortest_mm)
+    if not within.any():
+        return [placed]
+    bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
+    pieces = []
+    for a, b in pairwise(bounds):
+        piece = points[a : b + 1] if len(bounds) > 2 else placed.points
+        bead = replace(placed.bead, points=piece)
+        bead = other(bead) if within[a] else bead
+        pieces.append(
+            replace(
+                placed, bead=bead, points=piece, retract=placed.retract and a == 0, approach=NOWHERE if a else placed.approach
+            )
+        )
+    return pieces
+
+
+def _steady(within: NDArray[np.bool_], lengths: Floats, shortest_mm: float) -> NDArray[np.bool_]:
+    """Runs shorter than that take after their surroundings, those within last so that none is overlooked for a gap."""
+    for value in (False, True):
+        bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
+        for a, b in pairwise(bounds):
+            if within[a] == value and float(lengths[a:b].sum()) < shortest_mm:
+                within[a:b] = not value
+    return within
+
+
+@njit(cache=True)
+def _cut(points: Floats, sides: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """The polyline (n, 2) with the places added where it crosses sides (k, 4; by rising least y), and which steps lie within."""
+    lows = np.minimum(sides[:, 1], sides[:, 3])
+    tallest = np.abs(sides[:, 3] - sides[:, 1]).max()
+    xs, ys, marks, within = [points[0, 0]], [points[0, 1]], [False], False
+    for k in range(len(points) - 1):
+        x0, y0, dx, dy = points[k, 0], points[k, 1], points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+        low, high = min(y0, y0 + dy), max(y0, y0 + dy)
+        shares = [0.0]
+        touched = k == 0
+        for e in range(np.searchsorted(lows, low - tallest), np.searchsorted(lows, high, side="right")):
+            ax, ay, bx, by = sides[e]
+            side_a, side_b = dx * (ay - y0) - dy * (ax - x0), dx * (by - y0) - dy * (bx - x0)
+            if (side_a > 0) != (side_b > 0):
+                along = side_a / (side_a - side_b)
+                share = ((ax + along * (bx - ax) - x0) * dx + (ay + along * (by - ay) - y0) * dy) / (dx * dx + dy * dy)
+                touched = touched or -SNAP <= share <= 1.0 + SNAP
+                if SNAP < share < 1.0 - SNAP:
+                    shares.append(share)
+        shares.sort()
+        shares.append(1.0)
+        for s in range(len(shares) - 1):
+            if touched:
+                middle = 0.5 * (shares[s] + shares[s + 1])
+                within = inside(sides, x0 + middle * dx, y0 + middle * dy)
+            xs.append(x0 + shares[s + 1] * dx)
+            ys.append(y0 + shares[s + 1] * dy)
+            marks.append(within)
+        xs[-1], ys[-1] = points[k + 1, 0], points[k + 1, 1]
+    return np.column_stack((np.array(xs), np.array(ys))), np.array(marks[1:])

@@ -1,0 +1,62 @@
+"""Grooves between parts: where they lie, that they are filled, and that the tip stays above them."""
+
+import numpy as np
+import pytest
+
+from profiles.errors import ProfileError
+from slicer.interlock import grooved, grooves
+from slicer.paths import Kind
+from slicer.polygons import Polygons
+from slicer.slice import slice_part
+from tests.shapes import box, branch
+from tests.slicer.hand import SOLID, as_shapely, cut, profile
+
+DEEP = "process.interlock_mm=0.2"
+WIDTH = 0.45
+
+
+def stacked():
+    return cut(box(24, 24, 20), ((0, 0, 1), 10.0))
+
+
+def test_grooves_are_half_of_the_inside_and_keep_clear_of_the_walls():
+    area = as_shapely(grooves(stacked()[1], profile(DEEP).process))
+    side = 24 - 2 * 5 * WIDTH
+    assert area.area == pytest.approx(0.5 * side**2, rel=0.05)
+    assert area.bounds[2] == pytest.approx(side / 2, abs=1e-6)
+    assert all(part.bounds[3] - part.bounds[1] <= 2 * WIDTH + 1e-4 for part in area.geoms)
+
+
+def test_what_one_part_leaves_out_the_next_one_fills_in():
+    base, top = stacked()
+    area = grooves(top, profile(DEEP).process).area()
+    pairs = [(slice_part(base, p, later=[top]), slice_part(top, p, [base])) for p in (profile(*SOLID), profile(*SOLID, DEEP))]
+    (plain, smooth), (carved, rich) = pairs
+    assert plain.volume_mm3 - carved.volume_mm3 == pytest.approx(0.2 * area, rel=0.1)
+    assert rich.volume_mm3 - smooth.volume_mm3 == pytest.approx(0.2 * area * 1.05, rel=0.1)
+
+
+def test_the_tip_stays_at_its_height_and_only_the_first_layer_is_richer():
+    base, top = stacked()
+    plain, rich = (slice_part(top, profile(*s), [base]).layers for s in (SOLID, (*SOLID, DEEP)))
+    assert [lay.z_mm for lay in rich] == [lay.z_mm for lay in plain]
+    flows = [max(p.flow for p in layers[0].paths if p.kind is Kind.SKIN) for layers in (plain, rich)]
+    assert flows[1] == pytest.approx(2 * flows[0], rel=0.05)
+    assert sum(rich[1].volume_mm3(p) for p in rich[1].paths) == pytest.approx(sum(plain[1].volume_mm3(p) for p in plain[1].paths))
+
+
+def test_grooves_of_a_leaning_part_lie_just_below_its_base_plane():
+    base, arm = cut(branch(), ((np.sin(np.pi / 3), 0, 0.5), 14.0))
+    cuts = np.arange(0.1, 40, 0.2)
+    whole = [Polygons.square((80, 80), True)] * len(cuts)
+    process = profile(DEEP).process
+    for z, left in zip(cuts, grooved(whole, base, [arm], cuts, process), strict=True):
+        gone = whole[0] - left
+        for x, _ in np.concatenate([*gone.to_polygons(), np.zeros((0, 2))]):
+            assert abs(x * np.sin(np.pi / 3) + 0.5 * z - 14.0) < 0.2 + 1e-6
+    assert sum((whole[0] - left).area() for left in grooved(whole, base, [arm], cuts, process)) > 1.0
+
+
+def test_a_bead_of_no_more_than_its_width_fills_a_groove():
+    with pytest.raises(ProfileError, match=r"interlock_mm is 0.3 mm: at most line_width_mm less layer_height_mm \(0.25 mm\)"):
+        profile("process.interlock_mm=0.3")
