@@ -20,6 +20,8 @@ from slicer.gap import gaps
 from slicer.heights import heights_of
 from slicer.infill import infill, pattern_density
 from slicer.interface import beneath, interface_edges, strengthened
+from slicer.interlock import filled as interlocked
+from slicer.interlock import grooved
 from slicer.order import ordered
 from slicer.overhang import overhanging
 from slicer.paths import Kind, Layer, Path, SlicedPart
@@ -52,7 +54,7 @@ def slice_part(
     pedestal_mm = profile.search.pedestal_mm if part.index == 1 else 0.0
     at = heights_of(mesh, process, part.index == 1, pedestal_mm)
     below_model = pedestal_layers(at.tip_mm, pedestal_mm)
-    outlines = [cleaned(loops) for loops in sections(mesh, at.cut_mm)]
+    outlines = grooved([cleaned(loops) for loops in sections(mesh, at.cut_mm)], part, later, at.cut_mm, process)
     if part.index == 1:
         outlines[0] = compensated(outlines[0], process.elephant_foot_mm, process.line_width_mm)
     own = without_pedestal(outlines, mesh, at.cut_mm, pedestal_mm, below_model) if below_model else outlines
@@ -81,7 +83,7 @@ def slice_part(
         around = Surroundings(rear, seams, rear if tip is None else tip, edges, float(at.cut_mm[i]), i)
         beads, seams = seamed(beads, process, around)
         bank = outlines[i - 1] if i else below
-        layer = _layer(beads, outline, bank, i, part.index == 1, profile, float(at.tip_mm[i]), height, tip)
+        layer = _layer(beads, outline, bank, i, part, profile, float(at.tip_mm[i]), height, tip)
         if layer.paths:
             tip = layer.paths[-1].points[-1]
             layers.append(layer)
@@ -113,7 +115,7 @@ def _layer(
     outline: Polygons,
     bank: Polygons | None,
     index: int,
-    on_platform: bool,
+    part: Part,
     profile: Profile,
     z_mm: float,
     height_mm: float,
@@ -122,6 +124,9 @@ def _layer(
     """The beads in order, with speeds, flow, fan and heat."""
     process, material = profile.process, profile.material
     placed = overhanging(ordered(beads, outline, process, tip), outline, bank, process)
+    on_platform = part.index == 1
+    if index == 0 and not on_platform and process.interlock_mm > 0.0:
+        placed = interlocked(placed, part, process, height_mm)
     flow, fixed, fan, add_c = material.flow, None, 1.0, 0.0
     if not on_platform and index < process.interface_layers:
         fan, add_c = process.interface_fan, process.interface_temperature_add_c
