@@ -112,6 +112,12 @@ def check_file(path: Path) -> list[str]:
             SECTIONS[section].model_validate(table)
         except ValidationError as error:
             problems += sentences(error.errors(), SECTIONS[section], f"{section}.")
+    for key in ("layer_height_mm", "first_layer_height_mm"):
+        if getattr(profile.process, key) > nozzle_mm:
+            problems.append(
+                f"process.{key} is {getattr(profile.process, key):g}: a {nozzle_mm:g} mm nozzle prints layers of at most "
+                f"{nozzle_mm:g} mm"
+            )
     return problems
 
 
@@ -207,4 +213,10 @@ def _check_together(profile: Profile) -> list[str]:
             f"process.line_width_mm is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of "
             f"{LEAST_WIDTH * nozzle_mm:g} to {MOST_WIDTH * nozzle_mm:g} mm"
         )
+    for key in ("layer_height_mm", "first_layer_height_mm"):
+        if getattr(profile.process, key) > nozzle_mm:
+            problems.append(
+                f"process.{key} is {getattr(profile.process, key):g}: a {nozzle_mm:g} mm nozzle prints layers of at most "
+                f"{nozzle_mm:g} mm"
+            )
     return problems
