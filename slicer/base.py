@@ -4,6 +4,7 @@ from math import inf
 
 import numpy as np
 
+from mdp.mesh import Floats
 from slicer.polygons import Polygons, contours, grown
 
 PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
@@ -45,8 +46,10 @@ def section_modulus_mm3(base: Polygons) -> float:
     return least
 
 
-def _outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
-    return a[:, :, None] * b[:, None, :]
+def _outer(a: Floats, b: Floats) -> Floats:
+    """(n, 2, 2) products of rows."""
+    products: Floats = a[:, :, None] * b[:, None, :]
+    return products
 
 
 def compensated(outline: Polygons, elephant_foot_mm: float, width_mm: float) -> Polygons:
