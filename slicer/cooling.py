@@ -24,4 +24,6 @@ def fan_share(material: Material, process: Process, time_s: float) -> float:
 
 def hanging_fan(material: Material, kind: Kind, factor: float) -> float | None:
     """Part fan of a path where it differs from the layer's: bridges and overhanging walls."""
-    return material.fan_bridge * factor if kind in HANGING and material.fan_bridge is not None else None
+    if kind not in HANGING:
+        return None
+    return factor * (material.fan if material.fan_bridge is None else material.fan_bridge)
