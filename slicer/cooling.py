@@ -15,10 +15,8 @@ def fan_share(material: Material, process: Process, time_s: float) -> float:
     """
     least = min(material.fan_least, material.fan)
     quick, slow = process.least_layer_time_s, material.fan_layer_time_s
-    if time_s <= quick:
-        share = 1.0
-    else:
-        share = max(0.0, (slow - time_s) / (slow - quick)) if slow > quick else 0.0
+    falling = max(0.0, (slow - time_s) / (slow - quick)) if slow > quick else 0.0
+    share = 1.0 if time_s <= quick else falling
     return round((least + share * (material.fan - least)) / STEP) * STEP
 
 
