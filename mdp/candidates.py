@@ -71,7 +71,12 @@ class Bounds:
 def bounds(mesh: Mesh, machine: Machine, search: Search, fixed: Floats | None = None) -> Bounds:
     """Bounds of a model's search for the sampled directions, or for `fixed` ones."""
     chosen = directions(search) if fixed is None else fixed
-    centre, radius = footprint(mesh) if search.platform_radius_mm is None else (np.zeros(2), search.platform_radius_mm)
+    return bounds_of(chosen, ground(mesh, search), mesh.volume_mm3, machine, search)
+
+
+def bounds_of(chosen: Floats, disc: tuple[Floats, float], volume_mm3: float, machine: Machine, search: Search) -> Bounds:
+    """Bounds for the chosen directions, a disc that every plane must clear, and a model's volume."""
+    centre, radius = disc
     tilt = np.hypot(chosen[:, 0], chosen[:, 1])
     heights = np.zeros(len(chosen))
     if search.clearance:
@@ -80,9 +85,14 @@ def bounds(mesh: Mesh, machine: Machine, search: Search, fixed: Floats | None = 
         directions=chosen,
         least_offset_mm=chosen[:, :2] @ centre + radius * tilt,
         least_height_mm=heights,
-        least_volume_mm3=search.least_volume_share * mesh.volume_mm3,
+        least_volume_mm3=search.least_volume_share * volume_mm3,
         least_interface_mm2=search.least_interface_mm2,
     )
+
+
+def ground(mesh: Mesh, search: Search) -> tuple[Floats, float]:
+    """Centre and radius of the disc of criterion III: the one that is asked for, or the model's footprint."""
+    return footprint(mesh) if search.platform_radius_mm is None else (np.zeros(2), search.platform_radius_mm)
 
 
 def footprint(mesh: Mesh) -> tuple[Floats, float]:

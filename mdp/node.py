@@ -22,12 +22,13 @@ class Cut:
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """What remains after some cuts, and how good that is."""
+    """What remains after some cuts, and how good that is; parent: the node before the last cut, None for the whole model."""
 
     solid: m3.Manifold
     cuts: tuple[Cut, ...]
     angle_deg: float
     count_platform_faces: bool
+    parent: "Node | None" = None
 
     @cached_property
     def remainder(self) -> Remainder:

@@ -1,12 +1,13 @@
-"""Pool: the candidates of several nodes in the order of the 2020 paper, each checked when its turn comes.
+"""Pool: the candidates of several nodes in the order of the 2020 paper or by a trade-off, each checked when its turn comes.
 
-Candidates that leave (almost) nothing risky above their plane come first, then delta is relaxed from 1e-4 by factors of 5;
-within a round the larger accumulated reduction comes first, and from the second round on only candidates that reduce at
-least as much as the best so far are taken. Near-equal planes of one parent take one place.
+Order of the paper: candidates that leave (almost) nothing risky above their plane come first, then delta is relaxed from 1e-4
+by factors of 5; within a round the larger accumulated reduction comes first, and from the second round on only candidates that
+reduce at least as much as the best so far are taken. Near-equal planes of one parent take one place.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from heapq import merge
 
 import numpy as np
 
@@ -19,6 +20,7 @@ FIRST_DELTA, DELTA_FACTOR, LAST_DELTA = 1e-4, 5.0, 1e3
 SAME_COSINE = 0.95
 LOOK_AHEAD = 128
 EQUAL = 1e-9  # shares of the risky area that differ less are equal but for rounding
+SORTED_FIRST = 256
 UNKNOWN = -1
 
 
@@ -33,6 +35,15 @@ class Table:
         self._check = check
         self.reason = np.full(len(worth.gain_mm2), UNKNOWN, np.int32)
         self._volume_mm3, self._fragile_mm = np.zeros(len(worth.gain_mm2)), np.zeros(len(worth.gain_mm2))
+        self._rankings: dict[float, _Ranking] = {}
+
+    def ranked(self, trade_off: float) -> Iterator[int]:
+        """Feasible rows by gain less trade_off times residual, best first; near-equal planes take one place."""
+        ranking = self._rankings.setdefault(trade_off, _Ranking(self, trade_off))
+        place = 0
+        while (row := ranking.at(place)) is not None:
+            yield row
+            place += 1
 
     def look(self, rows: Ints) -> None:
         """Check these rows and all others of the same directions, where that is not known."""
@@ -61,6 +72,48 @@ class Table:
         )
 
 
+class _Ranking:
+    """The feasible rows of a table by one trade-off, found as far as they are asked for."""
+
+    def __init__(self, table: Table, trade_off: float) -> None:
+        self._table = table
+        self._cost = trade_off * table.worth.residual_mm2 - table.worth.gain_mm2
+        self._order: Ints = np.zeros(0, np.int64)
+        self._next = 0
+        self._found: list[int] = []
+        self._planes: list[Plane] = []
+
+    def at(self, place: int) -> int | None:
+        """The row at a place; None when there are not so many."""
+        while len(self._found) <= place:
+            if self._next == len(self._order) and not self._more():
+                return None
+            self._take(int(self._order[self._next]))
+            self._next += 1
+        return self._found[place]
+
+    def _more(self) -> bool:
+        """Sort four times as many rows as before; False when all are sorted."""
+        known, count = len(self._order), len(self._cost)
+        if known == count:
+            return False
+        wanted = min(count, max(SORTED_FIRST, 4 * known))
+        first = np.argpartition(self._cost, wanted - 1)[:wanted] if wanted < count else np.arange(count)
+        ordered = first[np.lexsort((first, self._cost[first]))]
+        self._order = np.concatenate([self._order, ordered[~np.isin(ordered, self._order)]])
+        return True
+
+    def _take(self, row: int) -> None:
+        plane = self._table.plane(row)
+        if any(same(plane, other) for other in self._planes):
+            return
+        if self._table.reason[row] == UNKNOWN:
+            self._table.look(self._order[self._next : self._next + LOOK_AHEAD])
+        if self._table.reason[row] == Reason.FEASIBLE:
+            self._found.append(row)
+            self._planes.append(plane)
+
+
 @dataclass(frozen=True, eq=False)
 class Entry:
     """A feasible candidate: the table and row it comes from, and the round of relaxation that let it in."""
@@ -68,6 +121,21 @@ class Entry:
     table: int
     row: int
     round: int
+
+
+def traded(tables: Sequence[Table], trade_off: float, bound_mm2: float) -> Iterator[Entry]:
+    """Feasible candidates by reduction less trade_off times residual, both accumulated, best first; those that would leave
+    bound_mm2 or more for ever are left out."""
+
+    def of(index: int, table: Table) -> Iterator[tuple[float, int, int]]:
+        start = table.saved_mm2 - trade_off * table.residual_mm2
+        for row in table.ranked(trade_off):
+            gain, residual = float(table.worth.gain_mm2[row]), float(table.worth.residual_mm2[row])
+            if table.residual_mm2 + residual < bound_mm2:
+                yield trade_off * residual - gain - start, index, row
+
+    for _, index, row in merge(*(of(index, table) for index, table in enumerate(tables))):
+        yield Entry(index, row, 0)
 
 
 def entries(tables: Sequence[Table], risky_mm2: float, bound_mm2: float, least_reduction: float = 0.0) -> Iterator[Entry]:
@@ -78,7 +146,7 @@ def entries(tables: Sequence[Table], risky_mm2: float, bound_mm2: float, least_r
     """
     side = _side_by_side(tables, risky_mm2)
     waiting = side.order[(side.residual_sum_mm2 < bound_mm2)[side.order] & (side.reduction > least_reduction)[side.order]]
-    near: list[list[tuple[Floats, float]]] = [[] for _ in tables]
+    near: list[list[Plane]] = [[] for _ in tables]
     best, delta, number = -np.inf, FIRST_DELTA, 0
     while len(waiting) and delta <= LAST_DELTA:
         admitted = side.residual[waiting] < delta
@@ -86,12 +154,12 @@ def entries(tables: Sequence[Table], risky_mm2: float, bound_mm2: float, least_r
         for place, index in enumerate(turn):
             table, row = int(side.table[index]), int(side.row[index])
             plane = tables[table].plane(row)
-            if any(_same(plane, *other) for other in near[table]):
+            if any(same(plane, other) for other in near[table]):
                 continue
             if tables[table].reason[row] == UNKNOWN:
                 _look_ahead(tables, side, turn[place : place + LOOK_AHEAD])
             if tables[table].reason[row] == Reason.FEASIBLE:
-                near[table].append((plane.normal, plane.offset_mm))
+                near[table].append(plane)
                 best = max(best, float(side.reduction[index]))
                 yield Entry(table, row, number)
         waiting = waiting[~admitted]
@@ -129,7 +197,15 @@ def _look_ahead(tables: Sequence[Table], side: _Side, ahead: Ints) -> None:
         tables[table].look(side.row[ahead[side.table[ahead] == table]])
 
 
-def _same(plane: Plane, other_direction: Floats, other_offset_mm: float) -> bool:
+def round_of(residual: float) -> int:
+    """The round of relaxation that lets in a candidate with this share of the risky area left on its part."""
+    delta, number = FIRST_DELTA, 0
+    while residual >= delta and delta <= LAST_DELTA:
+        delta, number = delta * DELTA_FACTOR, number + 1
+    return number
+
+
+def same(plane: Plane, other: Plane) -> bool:
     """Whether two planes of one parent are too alike to take two places (the authors' rule)."""
-    cosine = abs(float(plane.normal @ other_direction))
-    return cosine > SAME_COSINE and abs(plane.offset_mm - other_offset_mm) < 2.0 * cosine
+    cosine = abs(float(plane.normal @ other.normal))
+    return cosine > SAME_COSINE and abs(plane.offset_mm - other.offset_mm) < 2.0 * cosine

@@ -1,0 +1,109 @@
+"""Forecast: what a sequence of planes would leave risky, summed over a solid's surface without cutting it.
+
+A piece of the surface belongs to the first part whose plane it lies above, what lies above none to the part on the platform.
+The faces that these cuts lay open are not in the sum, though later ones may turn them into overhangs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from mdp.mesh import Floats, Mesh
+from mdp.overhang import Mask, threshold
+from mdp.plane import Plane
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A solid's surface: (m, 3, 3) corners, (m, 3) normals, (m,) areas and which faces are risky upright."""
+
+    corners: Floats
+    normals: Floats
+    areas_mm2: Floats
+    risky: Mask
+    threshold: float
+
+    @classmethod
+    def of(cls, mesh: Mesh, risky: Mask, self_supporting_angle_deg: float) -> "Surface":
+        """The surface of a mesh with its faces that are risky upright; faces that no direction above the horizon finds risky
+        are left out."""
+        least = threshold(self_supporting_angle_deg)
+        may = risky | (mesh.normals[:, 2] < sqrt(max(0.0, 1.0 - least * least)))
+        return cls(mesh.vertices[mesh.faces[may]], mesh.normals[may], mesh.areas_mm2[may], risky[may], least)
+
+    def left_mm2(self, planes: Sequence[Plane]) -> float:
+        """Risky area that cuts along the planes, in this order, would leave."""
+        normals = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
+        offsets = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
+        return float(sum_left(self.corners, self.normals, self.areas_mm2, self.risky, normals, offsets, self.threshold))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def sum_left(  # type: ignore[no-untyped-def]
+    corners, normals, areas, risky, directions, offsets, threshold
+) -> Any:
+    """Risky area left by the planes (directions, offsets), cut in their order."""
+    polygon, heights = np.empty((len(offsets) + 4, 3)), np.empty(len(offsets) + 4)
+    total = 0.0
+    for face in range(len(areas)):
+        size, area = 3, areas[face]
+        for corner in range(3):
+            for axis in range(3):
+                polygon[corner, axis] = corners[face, corner, axis]
+        for part in range(len(offsets)):
+            lowest, highest = np.inf, -np.inf
+            for i in range(size):
+                heights[i] = along(polygon[i], directions[part]) - offsets[part]
+                lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
+            if highest <= 0.0:
+                continue
+            below = 0.0
+            if lowest < 0.0:
+                size = clip(polygon, heights, size)
+                below = area_of(polygon, size, normals[face])
+            if along(normals[face], directions[part]) < threshold:
+                total += area - below
+            area = below
+            if lowest >= 0.0:
+                break
+        if risky[face]:
+            total += area
+    return total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def along(point, direction):  # type: ignore[no-untyped-def]
+    """Product of two vectors."""
+    return point[0] * direction[0] + point[1] * direction[1] + point[2] * direction[2]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def clip(polygon, heights, size):  # type: ignore[no-untyped-def]
+    """Leave of a convex polygon what lies below height 0, in place; the number of corners left."""
+    whole, kept = polygon[:size].copy(), 0
+    for i in range(size):
+        j = i + 1 if i + 1 < size else 0
+        if heights[i] <= 0.0:
+            polygon[kept] = whole[i]
+            kept += 1
+        if heights[i] * heights[j] < 0.0:
+            share = heights[i] / (heights[i] - heights[j])
+            for axis in range(3):
+                polygon[kept, axis] = whole[i, axis] + share * (whole[j, axis] - whole[i, axis])
+            kept += 1
+    return kept
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def area_of(polygon, size, normal):  # type: ignore[no-untyped-def]
+    """Area of a flat convex polygon with a known unit normal."""
+    twice = 0.0
+    for i in range(1, size - 1):
+        a0, a1, a2 = polygon[i, 0] - polygon[0, 0], polygon[i, 1] - polygon[0, 1], polygon[i, 2] - polygon[0, 2]
+        b0, b1, b2 = polygon[i + 1, 0] - polygon[0, 0], polygon[i + 1, 1] - polygon[0, 1], polygon[i + 1, 2] - polygon[0, 2]
+        twice += normal[0] * (a1 * b2 - a2 * b1) + normal[1] * (a2 * b0 - a0 * b2) + normal[2] * (a0 * b1 - a1 * b0)
+    return 0.5 * twice

@@ -1,0 +1,158 @@
+"""Polish: a found sequence of cuts made shorter and better, off the grid of candidates; never worse.
+
+Cuts that save nothing any more are left out, every plane is moved as long as the forecast of what stays risky falls and the
+plane may still be cut, and where that made room further cuts are added. What counts is the cost after cutting it all again.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import cos, radians, sin
+
+import numpy as np
+
+from mdp.cut import mesh_of
+from mdp.forecast import Surface
+from mdp.mesh import Floats
+from mdp.node import Node
+from mdp.overhang import BASE_TOLERANCE_MM
+from mdp.plane import Plane
+from mdp.pool import traded
+from mdp.rules import Rules
+
+STEPS = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))  # of the offset step, and degrees: the grid's are about 4.5 apart
+ROUNDS = 4  # moves by one step before the next smaller one
+TRIES = 2  # moved planes that are cut before one stays where it is
+ENOUGH = 1e-3  # a move that saves a smaller share of the risky area is not worth a cut
+SAME_MM2 = 1e-6
+TRADE_OFF = 4.0  # of further cuts, as the beam's second place
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A sequence of cuts: the nodes from the uncut model to the last one."""
+
+    nodes: list[Node]
+
+    @classmethod
+    def to(cls, node: Node) -> "Chain":
+        """The sequence that leads to a node."""
+        nodes = [node]
+        while nodes[-1].parent is not None:
+            nodes.append(nodes[-1].parent)
+        return cls(nodes[::-1])
+
+    @property
+    def planes(self) -> list[Plane]:
+        """The planes of the cuts in the order in which they are made."""
+        return [cut.base for cut in self.nodes[-1].cuts]
+
+    @property
+    def cost_mm2(self) -> float:
+        """Risky area that the parts leave."""
+        return self.nodes[-1].cost_mm2
+
+
+def polished(rules: Rules, node: Node) -> Node:
+    """The node with its cuts polished and, where there is room, further ones."""
+    best = _moved(rules, _shortened(rules, Chain.to(node)))
+    longer = _extended(rules, best)
+    if len(longer.nodes) > len(best.nodes):
+        longer = _moved(rules, _shortened(rules, longer))
+    return min((node, best.nodes[-1], longer.nodes[-1]), key=lambda found: (found.cost_mm2, len(found.cuts)))
+
+
+def _shortened(rules: Rules, best: Chain) -> Chain:
+    """Without the cuts that save nothing, the one made first tried first."""
+    place = 0
+    while place < len(best.planes) and not rules.late():
+        surface, planes = _surface(best.nodes[place]), best.planes[place:]
+        shorter = None
+        if surface.left_mm2(planes[1:]) <= surface.left_mm2(planes) + SAME_MM2:
+            shorter = _replaced(rules, best, place, planes[1:])
+        if shorter is not None and shorter.cost_mm2 <= best.cost_mm2 + SAME_MM2:
+            best = shorter
+        else:
+            place += 1
+    return best
+
+
+def _moved(rules: Rules, best: Chain) -> Chain:
+    """With every plane moved to where less stays risky, the one cut first moved first."""
+    enough_mm2 = ENOUGH * rules.model.risky_mm2
+    for place in range(len(best.planes)):
+        node = best.nodes[place]
+        surface = _surface(node)
+        ever_better = list(_climb(rules, surface, best, place))
+        for planes in ever_better[: -TRIES - 1 : -1]:
+            if rules.late() or node.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
+                break
+            moved = _replaced(rules, best, place, planes)
+            if moved is not None and moved.cost_mm2 < best.cost_mm2:
+                best = moved
+                break
+    return best
+
+
+def _extended(rules: Rules, found: Chain) -> Chain:
+    """With further cuts, the best one at a time, while they save something."""
+    nodes = list(found.nodes)
+    while not rules.full(nodes[-1]) and not rules.late():
+        node, table = nodes[-1], rules.table(nodes[-1])
+        cuts = (
+            rules.cut(node, table.plane(entry.row), float(table.worth.residual_mm2[entry.row]))
+            for entry in traded([table], TRADE_OFF, node.cost_mm2)
+        )
+        following = next((made for made in cuts if made is not None), None)
+        if following is None or following.cost_mm2 >= node.cost_mm2:
+            break
+        nodes.append(following)
+    return Chain(nodes)
+
+
+def _replaced(rules: Rules, found: Chain, place: int, planes: Sequence[Plane]) -> Chain | None:
+    """The sequence with other planes from a place on; None when they cannot be cut."""
+    rest = rules.replay(found.nodes[place], planes)
+    return None if rest is None else Chain([*found.nodes[:place], *rest])
+
+
+def _surface(node: Node) -> Surface:
+    return Surface.of(node.remainder.mesh, node.remainder.risky, node.angle_deg)
+
+
+def _climb(rules: Rules, surface: Surface, found: Chain, place: int) -> Iterator[list[Plane]]:
+    """Ever better planes from a place on, the first of them moved, the best ones last. surface: before the cut at the place."""
+    here, *later = found.planes[place:]
+    least_mm2 = surface.left_mm2([here, *later])
+    pivot = _middle(found.nodes[place + 1])
+    for share, turn_deg in STEPS:
+        for _ in range(ROUNDS):
+            before_mm2 = least_mm2
+            for plane in _around(here, pivot, share * rules.settings.offset_step_mm, turn_deg):
+                left_mm2 = surface.left_mm2([plane, *later])
+                if left_mm2 < least_mm2 - SAME_MM2 and rules.allowed(found.nodes[place], plane):
+                    here, least_mm2 = plane, left_mm2
+                    yield [here, *later]
+            if least_mm2 == before_mm2:
+                break
+
+
+def _around(plane: Plane, pivot: Floats, step_mm: float, turn_deg: float) -> Iterator[Plane]:
+    """The planes next to one: shifted both ways, and leaning four ways about a point with and without a shift."""
+    yield from (Plane(plane.normal, plane.offset_mm + shift) for shift in (-step_mm, step_mm))
+    side = np.cross(plane.normal, np.eye(3)[int(np.argmin(np.abs(plane.normal)))])
+    side = side / np.linalg.norm(side)
+    other = np.cross(plane.normal, side)
+    height_mm = plane.offset_mm - float(plane.normal @ pivot)
+    for lean in (side, -side, other, -other):
+        normal = cos(radians(turn_deg)) * plane.normal + sin(radians(turn_deg)) * lean
+        offset_mm = float(normal @ pivot) + height_mm
+        yield from (Plane(normal, offset_mm + shift) for shift in (0.0, -step_mm, step_mm))
+
+
+def _middle(node: Node) -> Floats:
+    """(3,) middle of the corners of a node's last cut face."""
+    last = node.cuts[-1]
+    points = mesh_of(last.solid).vertices
+    resting = points[np.abs(last.base.heights_mm(points)) <= BASE_TOLERANCE_MM]
+    middle: Floats = (resting if len(resting) else points).mean(axis=0)
+    return middle

@@ -1,0 +1,107 @@
+"""Rules: what one search holds fixed, which planes may cut a node, and what a cut makes of it."""
+
+from collections.abc import Sequence
+from time import perf_counter
+
+import numpy as np
+
+from mdp.candidates import Bounds, Checked, Reason, bounds, bounds_of, check, ground, refusals, worth
+from mdp.clearance import allowed_poses
+from mdp.cut import cut, mesh_of, solid_of
+from mdp.features import Model
+from mdp.mesh import Floats, Ints, Mesh
+from mdp.node import Cut, Node
+from mdp.overhang import risky_above
+from mdp.plane import Plane
+from mdp.pool import Table
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4}
+
+
+class Rules:
+    """Settings, machine and bounds of a search, its root, and how many candidates were looked at."""
+
+    def __init__(self, mesh: Mesh, profile: Profile) -> None:
+        settings = profile.search
+        if settings.method == "published":
+            settings = settings.model_copy(update=PUBLISHED)
+        self.settings = settings
+        self.machine = profile.machine if settings.clearance else without_limits(profile.machine)
+        angle_deg = profile.process.self_supporting_angle_deg
+        self.root = Node(solid_of(mesh), (), angle_deg, settings.count_platform_faces)
+        radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
+        self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
+        self.ground = ground(mesh, settings)
+        self.limits: Bounds = bounds(mesh, self.machine, settings)
+        self.least_gain_mm2 = settings.least_gain * self.root.risky_mm2
+        self.evaluated = 0
+        self._began = perf_counter()
+
+    def late(self) -> bool:
+        """Whether the time limit is reached."""
+        limit = self.settings.time_limit_s
+        return limit is not None and perf_counter() - self._began >= limit
+
+    def full(self, node: Node) -> bool:
+        """Whether a node has as many parts as are allowed."""
+        return len(node.cuts) >= self.settings.most_parts - 1
+
+    def table(self, node: Node) -> Table:
+        """The candidates of a node that are worth a cut."""
+        found = worth(node.remainder, self.limits, self.settings, node.angle_deg, self.least_gain_mm2)
+        self.evaluated += found.evaluated
+
+        def look(direction: Ints, offset_mm: Floats) -> Checked:
+            return check(node.remainder, self.limits, self.settings, direction, offset_mm)
+
+        return Table(found, self.limits, self.model.risky_mm2 - node.cost_mm2, node.residual_mm2, look)
+
+    def refusals(self) -> dict[Reason, int]:
+        """How many of the root's candidates each reason takes."""
+        return refusals(self.root.remainder, self.limits, self.settings, self.root.angle_deg, self.least_gain_mm2)
+
+    def allowed(self, node: Node, plane: Plane) -> bool:
+        """Whether a plane, on the grid of candidates or off it, may cut a node."""
+        direction = plane.normal[None]
+        limits = bounds_of(direction, self.ground, self.model.volume_mm3, self.machine, self.settings)
+        steps = max(1, round(abs(plane.offset_mm) / self.settings.offset_step_mm))
+        step_mm = abs(plane.offset_mm) / steps or self.settings.offset_step_mm  # a grid that the plane lies on
+        own = self.settings.model_copy(update={"offset_step_mm": step_mm})
+        found = check(node.remainder, limits, own, np.zeros(1, np.int32), np.array([plane.offset_mm]))
+        return bool(found.reason[0] == Reason.FEASIBLE)
+
+    def cut(self, node: Node, plane: Plane, residual_mm2: float | None = None) -> Node | None:
+        """The node after a cut; None when nothing is cut off or no pose serves the part.
+
+        residual_mm2: what stays risky on the part, where that is known.
+        """
+        above, below = cut(node.solid, plane)
+        if above.is_empty() or below.is_empty():
+            return None
+        if self.settings.clearance and not allowed_poses(self.machine, plane.normal, mesh_of(above).vertices):
+            return None
+        if residual_mm2 is None:
+            part = mesh_of(above)
+            residual_mm2 = float(part.areas_mm2[risky_above(part, plane, node.angle_deg)].sum())
+        cuts = (*node.cuts, Cut(plane, above, residual_mm2))
+        return Node(below, cuts, node.angle_deg, node.count_platform_faces, node)
+
+    def replay(self, node: Node, planes: Sequence[Plane]) -> list[Node] | None:
+        """The nodes after cutting with the planes in turn, the given one first; None when one of them may not or cannot be
+        cut."""
+        nodes = [node]
+        for plane in planes:
+            following = self.cut(nodes[-1], plane) if self.allowed(nodes[-1], plane) else None
+            if following is None:
+                return None
+            nodes.append(following)
+        return nodes
+
+
+def without_limits(machine: Machine) -> Machine:
+    """A machine whose axes turn as far as one likes."""
+    wide = {"limits_deg": (-1e6, 1e6)}
+    tilt, turn = machine.tilt.model_copy(update=wide), machine.turn.model_copy(update=wide)
+    return machine.model_copy(update={"tilt": tilt, "turn": turn})
