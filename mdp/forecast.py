@@ -7,11 +7,11 @@ The faces that these cuts lay open are not in the sum, though later ones may tur
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
-from typing import Any
 
 import numpy as np
 from numba import njit
 
+from mdp.kernel import floats, part, table
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
@@ -42,30 +42,32 @@ class Surface:
         return float(sum_left(self.corners, self.normals, self.areas_mm2, self.risky, normals, offsets, self.threshold))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def sum_left(  # type: ignore[no-untyped-def]
     corners, normals, areas, risky, directions, offsets, threshold
-) -> Any:
+):
     """Risky area left by the planes (directions, offsets), cut in their order."""
-    polygon, heights = np.empty((len(offsets) + 4, 3)), np.empty(len(offsets) + 4)
+    polygon, spare = table(len(offsets) + 4, 3), table(len(offsets) + 4, 3)
+    heights = floats(len(offsets) + 4, 0.0)
     total = 0.0
     for face in range(len(areas)):
         size, area = 3, areas[face]
         for corner in range(3):
             for axis in range(3):
                 polygon[corner, axis] = corners[face, corner, axis]
-        for part in range(len(offsets)):
+        for cut in range(len(offsets)):
             lowest, highest = np.inf, -np.inf
             for i in range(size):
-                heights[i] = along(polygon[i], directions[part]) - offsets[part]
+                heights[i] = along(polygon, i, directions, cut) - offsets[cut]
                 lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
             if highest <= 0.0:
                 continue
             below = 0.0
             if lowest < 0.0:
-                size = clip(polygon, heights, size)
-                below = area_of(polygon, size, normals[face])
-            if along(normals[face], directions[part]) < threshold:
+                size = clip(polygon, spare, heights, size)
+                polygon, spare = spare, polygon
+                below = flat_area(polygon, size, normals, face)
+            if along(normals, face, directions, cut) < threshold:
                 total += area - below
             area = below
             if lowest >= 0.0:
@@ -75,35 +77,38 @@ def sum_left(  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def along(point, direction):  # type: ignore[no-untyped-def]
-    """Product of two vectors."""
-    return point[0] * direction[0] + point[1] * direction[1] + point[2] * direction[2]
+@part
+def along(points, row, directions, other):  # type: ignore[no-untyped-def]
+    """Product of a row with a row of another array."""
+    product = points[row, 0] * directions[other, 0] + points[row, 1] * directions[other, 1]
+    return product + points[row, 2] * directions[other, 2]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def clip(polygon, heights, size):  # type: ignore[no-untyped-def]
-    """Leave of a convex polygon what lies below height 0, in place; the number of corners left."""
-    whole, kept = polygon[:size].copy(), 0
+@part
+def clip(polygon, kept, heights, size):  # type: ignore[no-untyped-def]
+    """Put into `kept` what of a convex polygon lies below height 0; the number of its corners."""
+    count = 0
     for i in range(size):
         j = i + 1 if i + 1 < size else 0
         if heights[i] <= 0.0:
-            polygon[kept] = whole[i]
-            kept += 1
+            for axis in range(3):
+                kept[count, axis] = polygon[i, axis]
+            count += 1
         if heights[i] * heights[j] < 0.0:
             share = heights[i] / (heights[i] - heights[j])
             for axis in range(3):
-                polygon[kept, axis] = whole[i, axis] + share * (whole[j, axis] - whole[i, axis])
-            kept += 1
-    return kept
+                kept[count, axis] = polygon[i, axis] + share * (polygon[j, axis] - polygon[i, axis])
+            count += 1
+    return count
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
-def area_of(polygon, size, normal):  # type: ignore[no-untyped-def]
+@part
+def flat_area(polygon, size, normals, face):  # type: ignore[no-untyped-def]
     """Area of a flat convex polygon with a known unit normal."""
     twice = 0.0
     for i in range(1, size - 1):
         a0, a1, a2 = polygon[i, 0] - polygon[0, 0], polygon[i, 1] - polygon[0, 1], polygon[i, 2] - polygon[0, 2]
         b0, b1, b2 = polygon[i + 1, 0] - polygon[0, 0], polygon[i + 1, 1] - polygon[0, 1], polygon[i + 1, 2] - polygon[0, 2]
-        twice += normal[0] * (a1 * b2 - a2 * b1) + normal[1] * (a2 * b0 - a0 * b2) + normal[2] * (a0 * b1 - a1 * b0)
+        across = normals[face, 0] * (a1 * b2 - a2 * b1) + normals[face, 1] * (a2 * b0 - a0 * b2)
+        twice += across + normals[face, 2] * (a0 * b1 - a1 * b0)
     return 0.5 * twice

@@ -98,7 +98,7 @@ class _Ranking:
         if known == count:
             return False
         wanted = min(count, max(SORTED_FIRST, 4 * known))
-        first = np.argpartition(self._cost, wanted - 1)[:wanted] if wanted < count else np.arange(count)
+        first = np.flatnonzero(self._cost <= np.partition(self._cost, wanted - 1)[wanted - 1])
         ordered = first[np.lexsort((first, self._cost[first]))]
         self._order = np.concatenate([self._order, ordered[~np.isin(ordered, self._order)]])
         return True

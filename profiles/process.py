@@ -306,7 +306,8 @@ class Search(Frozen):
     )
     beam_width: int = Field(2, ge=1, le=1000, description="how many decompositions are followed at a time")
     polish: bool = Field(
-        True, description="the best beam_width / 2 results are shortened, their planes moved off the grid and cuts added"
+        True,
+        description="the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added",
     )
     least_volume_share: float = Field(
         0.02, ge=0, lt=1, description="criterion IV: a part has at least this share of the model's volume (published: 0.1)"

@@ -1,0 +1,86 @@
+"""Beam: what its places follow."""
+
+import numpy as np
+import pytest
+
+from mdp.beam import Beam
+from mdp.pool import Table, entries, round_of, same, traded
+from mdp.ranker import RANKERS
+from mdp.rules import Rules
+from profiles.profile import load
+from tests import shapes
+
+
+def _rules(width: int, shape: str = "tee") -> Rules:
+    return Rules(getattr(shapes, shape)(), load(settings=("search.directions=150", f"search.beam_width={width}")))
+
+
+def _beam(width: int, stages: int, shape: str = "tee") -> Beam:
+    beam = Beam(_rules(width, shape), RANKERS["classic"], None)
+    for _ in range(stages):
+        beam.advance()
+    return beam
+
+
+@pytest.mark.parametrize("shape", ["tee", "branch", "ball"])
+def test_a_wide_beam_holds_the_narrow_one(shape: str) -> None:
+    narrow, wide = _beam(3, 3, shape), _beam(6, 3, shape)
+    for mine, other in zip(narrow.bests, wide.bests, strict=False):
+        assert mine.signature == other.signature
+
+
+def test_no_solid_is_followed_twice() -> None:
+    held = [node.signature for node in _beam(8, 1, "ball").nodes if node is not None]
+    assert len(held) == len(set(held)) > 2
+
+
+def test_finalists_are_few_and_different_and_the_best_is_one_of_them() -> None:
+    beam = _beam(9, 2)
+    finalists = beam.finalists()
+    assert len(finalists) == len({id(node) for node in finalists}) == 3
+    assert beam.best in finalists
+
+
+def test_a_beam_of_one_has_no_finalist() -> None:
+    assert _beam(1, 1).finalists() == []
+
+
+@pytest.mark.parametrize("trade_off", [0.0, 1.0, 4.0])
+def test_a_trade_off_is_the_order_of_a_plain_sort(trade_off: float) -> None:
+    rules = _rules(1, "branch")
+    table = rules.table(rules.root)
+    found = [entry.row for entry in traded([table], trade_off, np.inf)]
+    assert found == _sorted_plainly(table, trade_off)
+
+
+def _sorted_plainly(table: Table, trade_off: float) -> list[int]:
+    """Feasible rows by falling score, each unless it is too like one before."""
+    everything = np.arange(len(table.reason))
+    table.look(everything)
+    cost = trade_off * table.worth.residual_mm2 - table.worth.gain_mm2
+    kept: list[int] = []
+    for row in everything[np.lexsort((everything, cost))]:
+        if table.reason[row] == 0 and not any(same(table.plane(row), table.plane(other)) for other in kept):
+            kept.append(int(row))
+    return kept
+
+
+def test_two_tables_are_merged_by_what_they_saved_before() -> None:
+    rules = _rules(1, "branch")
+    table, ahead = rules.table(rules.root), rules.table(rules.root)
+    ahead.saved_mm2 += 1000.0
+    assert next(traded([table, ahead], 1.0, np.inf)).table == 1
+
+
+def test_candidates_that_leave_too_much_for_ever_are_left_out() -> None:
+    rules = _rules(1, "ball")
+    table = rules.table(rules.root)
+    least = table.worth.residual_mm2.min()
+    assert list(traded([table], 0.0, float(least))) == []
+
+
+def test_the_round_is_the_one_in_which_the_relaxation_lets_a_candidate_in() -> None:
+    rules = _rules(1, "ball")
+    table = rules.table(rules.root)
+    for entry in entries([table], rules.model.risky_mm2, np.inf):
+        assert round_of(float(table.worth.residual_mm2[entry.row]) / rules.model.risky_mm2) == entry.round
