@@ -112,12 +112,6 @@ def check_file(path: Path) -> list[str]:
             SECTIONS[section].model_validate(table)
         except ValidationError as error:
             problems += sentences(error.errors(), SECTIONS[section], f"{section}.")
-    for key in ("layer_height_mm", "first_layer_height_mm"):
-        if getattr(profile.process, key) > nozzle_mm:
-            problems.append(
-                f"process.{key} is {getattr(profile.process, key):g}: a {nozzle_mm:g} mm nozzle prints layers of at most "
-                f"{nozzle_mm:g} mm"
-            )
     return problems
 
 
