@@ -103,7 +103,7 @@ class Process(Frozen):
     )
     support: Literal["none", "auto"] = Field("auto", description="auto: support what the decomposition left risky")
     support_style: Literal["tree", "grid"] = Field(
-        "grid",
+        "tree",
         description="tree: what hangs is gathered into branches, which saves plastic and time; grid: columns straight down where "
         "they find ground, sturdier under heavy flat places",
     )

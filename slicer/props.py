@@ -41,14 +41,9 @@ def _sparse(area: Polygons, density: float, process: Process, spacing: float) ->
 
 
 def _lines(area: Polygons, angle_deg: float, density: float, process: Process, spacing: float) -> list[Floats]:
-    """Zigzags; an island that no line meets gets its outline where there is no other."""
+    """Zigzags; where no line meets the area its outline, unless it has one already."""
     width = process.line_width_mm
     apart = spacing / density
-    lines: list[Floats] = []
-    for island in area.decompose() if not area.is_empty() else []:
-        inner = grown(island, -0.5 * width)
-        found = hatched(inner, grown(island, -0.25 * width), angle_deg, apart, JOIN * apart)
-        if not found and not process.support_walls:
-            found = [closed(loop) for loop in contours(inner)]
-        lines += found
-    return lines
+    inner = grown(area, -0.5 * width)
+    lines = hatched(inner, grown(area, -0.25 * width), angle_deg, apart, JOIN * apart) if not inner.is_empty() else []
+    return lines if lines or process.support_walls else [closed(loop) for loop in contours(inner)]
