@@ -19,7 +19,7 @@ from slicer.polygons import Polygons, cleaned
 from slicer.section import sections
 from tests.shapes import from_manifold
 
-BARE = ("process.skirt_loops=0", "process.support=none")
+BARE = ("process.skirt_loops=0", "process.small_base_brim_mm=0", "process.support=none")
 SOLID = (*BARE, "process.infill_density=1")
 
 
