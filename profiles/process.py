@@ -61,8 +61,8 @@ class Process(Frozen):
         70.0,
         ge=0,
         le=1e6,
-        description="places of sparse infill smaller than this become solid: thin limbs gain strength, and travels cost more than "
-        "the plastic saved, mm2",
+        description="places of sparse infill smaller than this become solid: thin limbs gain strength, and travels cost more "
+        "than the plastic saved, mm2",
     )
     infill_density: float = Field(0.2, ge=0, le=1, description="share of the inside that is filled")
     infill_pattern: Literal["rectilinear", "grid", "triangles", "gyroid", "honeycomb", "concentric"] = Field(
@@ -76,7 +76,7 @@ class Process(Frozen):
         2.5,
         ge=0,
         le=100,
-        description="run along the innermost wall that holds the end of a single infill line; 0: the ends only touch the wall, mm",
+        description="run along the innermost wall that holds the end of a single infill line; 0: ends only touch the wall, mm",
     )
     infill_joint_mm: float = Field(
         12.0, ge=0, le=1000, description="infill lines whose ends are nearer than this along the wall are joined there, mm"
