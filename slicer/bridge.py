@@ -15,8 +15,8 @@ from slicer.scanline import clipped
 from slicer.scanline import inside as lies_inside
 from slicer.skin import skin
 
-TURNS = 36  # directions tried over half a turn, besides those of the place's own sides
-SIDES = 12  # so many of its longest sides are tried, along and across
+TURNS = 18  # directions tried over half a turn, besides those of the place's own sides
+SIDES = 8  # so many of its longest sides are tried, along and across
 LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
 ANCHOR = 2.0  # line widths that the lines of a bridge reach over its banks
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory

@@ -6,7 +6,7 @@ from dataclasses import replace
 from profiles.process import Process
 from slicer.order import Placed
 from slicer.paths import Kind
-from slicer.polygons import Polygons, grown, opened
+from slicer.polygons import Polygons, grown
 from slicer.split import split
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
@@ -24,7 +24,6 @@ def overhanging(placed: Sequence[Placed], section: Polygons, bank: Polygons | No
         return list(placed)
     width = process.line_width_mm
     hanging = section - grown(bank, max((0.5 - process.overhang_share) * width, NOISE_MM))
-    hanging = hanging if hanging.is_empty() else opened(hanging, NOISE_MM)
-    if hanging.is_empty():
+    if hanging.area() < SHORTEST * width * NOISE_MM:
         return list(placed)
     return split(placed, hanging, WALLS, SHORTEST * width, lambda bead: replace(bead, kind=Kind.OVERHANG))
