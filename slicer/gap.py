@@ -19,7 +19,7 @@ LEAST_GAP = 0.12  # of the line width: a narrower place between beads stays empt
 FEW_MM2 = 0.25  # of the line width squared: a smaller place between beads stays empty
 COMPACT = 0.55  # 4 pi area / perimeter^2; a rectangle of 1:3 has 0.59: rounder places get a small ring, longer ones a line
 TAPER = 0.9  # of the middle clearance: ends of a thin wall's line with less run into a corner
-SPARE = 0.015  # of the line width by which a thin wall's bead may reach over the section where that tapers
+SPARE = 0.04  # of the line width by which a thin wall's bead may reach over the section where that tapers
 LEAST_FLOW, MOST_FLOW = 0.3, 1.3
 SHORTEST = 0.25  # of the line width: what is shorter is no stroke
 STEP = 0.5  # of the line width: sampling of the boundary for the centreline
@@ -42,7 +42,8 @@ def gaps(
     for area, strokes in _strokes(places, line_width_mm, *(LOOSE if section is None else CLOSE)):
         long = [stroke for stroke in strokes if length_mm(stroke[0]) > SHORTEST * line_width_mm]
         if borders is not None:
-            long = [_kept_inside(borders, *stroke, SPARE * line_width_mm) for stroke in long]
+            inside = (_kept_inside(borders, *stroke, SPARE * line_width_mm) for stroke in long)
+            long = [stroke for stroke in inside if length_mm(stroke[0]) > SHORTEST * line_width_mm]
         drawn = sum(length_mm(points) * across for points, across in long)
         for points, across in long:
             wished = width_for_mm(across, height_mm) if section is None else across
@@ -61,7 +62,9 @@ def _kept_inside(borders: Floats, points: Floats, across: float, spare_mm: float
     first, last = min(int(fits[0]), len(points) - 2), max(int(fits[-1]), 1)
     if last <= first:
         first, last = 0, len(points) - 1
-    return points[first : last + 1], min(across, 2.0 * (float(clear[first : last + 1].min()) + spare_mm))
+    kept = np.sort(clear[first : last + 1])
+    reach = min(float(kept[len(kept) // 10]), float(kept[0]) + spare_mm)
+    return points[first : last + 1], min(across, 2.0 * reach)
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ from mdp.mesh import Floats
 
 Polygons: TypeAlias = CrossSection
 
-RESOLUTION_MM = 0.0125  # PrusaSlicer's resolution of G-code; finer detail than this no printer shows
+RESOLUTION_MM = 0.004  # finer detail no printer shows; keeps outer walls within 0.005 mm and the area of a layer within 0.05 mm2
 CLOSING_MM = 0.049  # PrusaSlicer's slice closing radius: slits narrower than twice this are meshing faults
 MITRE = 3.0  # times the distance: corners sharper than 39 degrees are cut off
 ARC_SEGMENTS = 32

@@ -1,64 +1,101 @@
-"""Measures slicing in core seconds: `python tools/bench_slice.py [MODEL ...] [--height MM] [--set KEY=VALUE]`.
+"""Measures slicing beside PrusaSlicer: `python tools/bench_slice.py [MODEL ...] [--height MM] [--set KEY=VALUE] [--rival ...]`.
 
-Every model is scaled to one height (default 60 mm: 300 layers of 0.2 mm), stands as one part on the platform and is
-sliced once to warm up and then three times; the least time counts. Without a model the ones that ship are measured.
+Every model is scaled to one height (default 60 mm: 300 layers of 0.2 mm; 0: as it is), stands as one part on the platform
+and is sliced once to warm up and then three times; the least core seconds count, mesh to paths. Where PrusaSlicer is
+installed its whole command runs three times on the same mesh with the same settings (those of tools/bench_travel.py),
+and its G-code tells its lengths by kind. Memory is the largest resident set of each process; ours is the one so far.
 """
 
 import argparse
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot, pi
+from pathlib import Path
 
 import numpy as np
+from bench_travel import PRUSA, SAME, standing
 
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level
-from mdp.read import locate, read_mesh
+from mdp.save import stl
 from profiles.profile import Profile, load
-from slicer.heights import heights
-from slicer.paths import SlicedPart
+from slicer.heights import heights_of
+from slicer.paths import Kind, SlicedPart
 from slicer.section import sections
 from slicer.slice import slice_part
 
 RUNS = 3
 SHIPPED = ("demo:figure", "demo:tree", "demo:bracket", "demo:lattice")
+UNMARKED = ("process.overhang_share=0", "process.outer_bulge=0")  # walls keep their names, and both lay the same beads
+KINDS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE, Kind.GAP)
+
+METER = """import resource, subprocess, sys
+code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(used.ru_utime + used.ru_stime, used.ru_maxrss)
+sys.exit(code)"""  # in a small process of its own: a child begins with the resident set of what started it
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What one slicer makes of a model and what that costs; lengths_m by the names of PrusaSlicer's kinds."""
+
+    core_s: float
+    memory_mb: float
+    plastic_mm3: float
+    lengths_m: Mapping[str, float]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print one row per model."""
-    parser = argparse.ArgumentParser(description="slicing in core seconds")
+    """Print one table per model."""
+    parser = argparse.ArgumentParser(description="slicing in core seconds, beside PrusaSlicer")
     parser.add_argument("models", nargs="*", default=SHIPPED)
     parser.add_argument("--height", type=float, default=60.0)
     parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("--rival", default="prusa-slicer", help="PrusaSlicer's command")
     options = parser.parse_args(arguments)
-    profile = load(settings=options.set)
-    print(f"{'model':24} {'faces':>7} {'layers':>6} {'section s':>9} {'slice s':>8} {'paths':>7} {'travel m':>8} retract     cm3")
+    profile = load(settings=[*SAME, *UNMARKED, *options.set])
     for model in options.models:
-        print(row(model, standing(model, options.height), profile))
+        mesh = standing(model, options.height)
+        cuts = heights_of(mesh, profile.process, True).cut_mm
+        section_s = min(core_seconds(lambda: sections(mesh, cuts)) for _ in range(RUNS + 1))  # noqa: B023
+        print(f"\n{Path(model).name}: {len(mesh.faces)} faces, {len(cuts)} layers, sections {section_s:.3f} core s")
+        print_table(ours(mesh, profile), rival(mesh, options.rival) if shutil.which(options.rival) else None)
 
 
-def standing(model: str, height_mm: float) -> Part:
-    """The model as the only part, scaled to the height."""
-    mesh, _ = read_mesh(locate(model))
-    mesh = Mesh(mesh.vertices * (height_mm / mesh.bounds_mm[1, 2]), mesh.faces)
-    return Part(1, mesh, PLATFORM, level(load().machine), np.eye(3), mesh.volume_mm3, 0.0)
+def print_table(own: Figures, other: Figures | None) -> None:
+    """Own figures, those of the rival and own / rival."""
+    rows = [
+        ("core s", own.core_s, other and other.core_s),
+        ("memory MB", own.memory_mb, other and other.memory_mb),
+        ("plastic cm3", own.plastic_mm3 / 1000, other and other.plastic_mm3 / 1000),
+        *(
+            (f"{kind.value} m", own.lengths_m.get(kind.value, 0.0), other and other.lengths_m.get(kind.value, 0.0))
+            for kind in KINDS
+        ),
+    ]
+    print("| | ours | PrusaSlicer | ratio |\n|---|---|---|---|")
+    for name, mine, theirs in rows:
+        ratio = f"{mine / theirs:.3f}" if theirs else ""
+        print(f"| {name} | {mine:.2f} | {'' if theirs is None else f'{theirs:.2f}'} | {ratio} |")
 
 
-def row(model: str, part: Part, profile: Profile) -> str:
-    """Times and measures of one model."""
-    at = heights(float(part.mesh.bounds_mm[1, 2]), profile.process, True)
+def ours(mesh: Mesh, profile: Profile) -> Figures:
+    """Slicing in this process, mesh to paths."""
+    part = Part(1, mesh, PLATFORM, level(profile.machine), np.eye(3), mesh.volume_mm3, 0.0)
     sliced = slice_part(part, profile)
-    section_s = min(core_seconds(lambda: sections(part.mesh, at.cut_mm)) for _ in range(RUNS))
-    slice_s = min(core_seconds(lambda: slice_part(part, profile)) for _ in range(RUNS))
-    paths = [path for layer in sliced.layers for path in layer.paths]
-    retractions = sum(path.retract for path in paths)
-    return (
-        f"{model[-24:]:24} {len(part.mesh.faces):7} {len(sliced.layers):6} {section_s:9.3f} {slice_s:8.3f} {len(paths):7} "
-        f"{travel_mm(sliced) / 1000:8.2f} {retractions:7} {sliced.volume_mm3 / 1000:7.2f}\n    {metres(sliced)}"
-    )
+    seconds = min(core_seconds(lambda: slice_part(part, profile)) for _ in range(RUNS))
+    memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return Figures(seconds, memory_mb, sliced.volume_mm3, metres(sliced))
 
 
 def core_seconds(work: Callable[[], object]) -> float:
@@ -68,20 +105,47 @@ def core_seconds(work: Callable[[], object]) -> float:
     return time.process_time() - began
 
 
-def travel_mm(sliced: SlicedPart) -> float:
-    """Length of all travels."""
-    paths = [path for layer in sliced.layers for path in layer.paths]
-    hops = np.array([b.points[0] - a.points[-1] for a, b in pairwise(paths)])
-    return float(np.hypot(*hops.T).sum())
-
-
-def metres(sliced: SlicedPart) -> str:
+def metres(sliced: SlicedPart) -> dict[str, float]:
     """Length of every kind of path."""
     lengths: defaultdict[str, float] = defaultdict(float)
     for layer in sliced.layers:
         for path in layer.paths:
             lengths[path.kind.value] += path.length_mm / 1000
-    return ", ".join(f"{kind} {length:.2f} m" for kind, length in lengths.items())
+    return dict(lengths)
+
+
+def rival(mesh: Mesh, command: str) -> Figures:
+    """PrusaSlicer's whole command on the same mesh."""
+    with tempfile.TemporaryDirectory() as folder:
+        model, out = Path(folder) / "model.stl", Path(folder) / "model.gcode"
+        model.write_bytes(stl(mesh))
+        runs = []
+        for _ in range(RUNS):
+            words = [sys.executable, "-I", "-c", METER, command, *PRUSA.split(), "--no-overhangs", "-o", out, model]
+            done = subprocess.run(words, capture_output=True, text=True, check=False)
+            if done.returncode or not out.exists():
+                raise SystemExit(f"{command} failed: {(done.stderr or done.stdout).strip()[-300:]}")
+            runs.append([float(word) for word in done.stdout.split()[-2:]])
+        lengths_m, filament_mm = laid(out.read_text(encoding="utf-8"))
+    return Figures(min(run[0] for run in runs), max(run[1] for run in runs) / 1024, filament_mm * pi * 1.75**2 / 4.0, lengths_m)
+
+
+def laid(text: str) -> tuple[dict[str, float], float]:
+    """Length in m of every kind of extrusion in PrusaSlicer's G-code, and its filament in mm."""
+    lengths: defaultdict[str, float] = defaultdict(float)
+    x = y = filament = 0.0
+    kind = ""
+    for line in text.splitlines():
+        if line.startswith(";TYPE:"):
+            kind = line[6:]
+        elif line.startswith("G1 "):
+            words = {word[0]: float(word[1:]) for word in line.partition(";")[0].split()[1:]}
+            step = hypot(words.get("X", x) - x, words.get("Y", y) - y)
+            x, y = words.get("X", x), words.get("Y", y)
+            filament += words.get("E", 0.0)
+            if words.get("E", 0.0) > 0:
+                lengths[kind] += step / 1000
+    return dict(lengths), filament
 
 
 if __name__ == "__main__":

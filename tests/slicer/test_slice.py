@@ -1,12 +1,16 @@
 """Whole parts: plastic, places, frames, speeds, flow, determinism, errors."""
 
+import time
+from pathlib import Path
+
 import manifold3d as m3
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from profiles.errors import SliceError
+from mdp.read import read_mesh
+from profiles.errors import ProfileError, SliceError
 from slicer.paths import Kind
 from slicer.polygons import grown
 from slicer.slice import slice_part
@@ -155,3 +159,44 @@ def test_settings_that_leave_nothing_to_print_are_named():
     nothing = profile("process.walls=0", "process.infill_density=0", "process.top_layers=0", "process.bottom_layers=0")
     with pytest.raises(SliceError, match=r"process\.walls and process\.infill_density are 0"):
         slice_part(whole(box(20, 20, 5)), nothing)
+
+
+def sliced_quickly(mesh, *settings_):
+    began = time.process_time()
+    sliced = slice_part(whole(mesh), profile(*BARE, *settings_))
+    return sliced, time.process_time() - began
+
+
+def test_a_plate_with_a_thousand_holes_is_sliced_quickly():
+    pins = [m3.Manifold.cylinder(2, 0.8, 0.8, 12).translate((3 * i, 3 * j, -0.5)) for i in range(32) for j in range(32)]
+    plate = m3.Manifold.cube((100, 100, 0.4)).translate((-4, -4, 0)) - m3.Manifold.batch_boolean(pins, m3.OpType.Add)
+    sliced, seconds = sliced_quickly(standing(plate))
+    walls_ = [p for p in sliced.layers[1].paths if p.kind is Kind.OUTER_WALL]
+    assert len(walls_) == 1025
+    assert seconds < 60.0
+
+
+@pytest.mark.parametrize("key", ["layer_height_mm", "first_layer_height_mm"])
+def test_a_layer_higher_than_the_nozzle_is_wide_is_refused(key):
+    with pytest.raises(ProfileError, match=rf"process\.{key} is 0.5: a 0.4 mm nozzle prints layers of at most 0.4 mm"):
+        profile(f"process.{key}=0.5", "process.line_width_mm=0.8")
+
+
+def test_islands_below_one_line_are_printed_beside_larger_ones():
+    pins = m3.Manifold.cylinder(2, 0.2, 0.2, 16).translate((8, 0, 0)) + m3.Manifold.cylinder(2, 0.09, 0.09, 8).translate(
+        (-8, 0, 0)
+    )
+    sliced = slice_part(whole(standing(m3.Manifold.cube((5, 5, 2)) + pins)), profile(*BARE))
+    across = np.concatenate([p.points for p in sliced.layers[3].paths])[:, 0]
+    assert across.max() > 7.5
+    assert across.min() > -6.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("file", ["hook.stl", "fan_support.stl", "bracket.3mf", "dancinggirl.stl", "pencildome.stl", "deer.ply"])
+def test_every_solid_model_extrudes_its_volume(file):
+    path = Path(__file__).resolve().parents[3] / "shared" / "models" / file
+    if not path.exists():
+        pytest.skip(f"{file} is not here")
+    mesh, _ = read_mesh(path)
+    assert slice_part(whole(mesh), profile(*SOLID)).volume_mm3 == pytest.approx(mesh.volume_mm3, rel=0.015)

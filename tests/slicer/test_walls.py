@@ -1,18 +1,22 @@
 """Walls lie at their distances from the outline; what is too narrow for two is filled by one line."""
 
+import time
+
 import manifold3d as m3
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import length_mm, spacing_mm
 from slicer.centreline import centrelines
 from slicer.gap import gaps
-from slicer.paths import bead_area_mm2
-from slicer.polygons import Polygons, contours
-from slicer.walls import walls
-from tests.slicer.hand import distances_mm, section_at, shared
+from slicer.paths import Kind, bead_area_mm2
+from slicer.polygons import Polygons, closed, contours
+from slicer.section import sections
+from slicer.walls import wall_beads, walls
+from tests.slicer.hand import as_shapely, distances_mm, profile, section_at, shared
 
 WIDTH, HEIGHT = 0.45, 0.2
 SPACING = 0.45 - 0.2 * (1 - np.pi / 4)
@@ -43,15 +47,17 @@ def test_a_hole_gets_walls_of_its_own_running_the_other_way():
     assert across == pytest.approx([6.45, 19.55], abs=1e-6)
 
 
-def test_outer_walls_of_a_real_model_keep_half_a_width_from_its_outline():
-    mesh = shared("org_kitten", 40.0)
-    off = []
-    for z in np.arange(0.5, 40, 2.7):
-        section = section_at(mesh, z)
-        points = np.concatenate(walls(section, 3, WIDTH, HEIGHT).loops[0])
-        off.append(np.abs(distances_mm(section, points) - 0.225))
-    assert np.median(np.concatenate(off)) < 0.002
-    assert np.mean(np.concatenate(off) > 0.05) < 0.003
+def test_outer_walls_of_a_real_model_keep_half_a_width_from_its_exact_outline():
+    mesh, off = shared("org_kitten", 60.0), []
+    for z in np.arange(0.5, 60, 2.7):
+        exact = shapely.MultiLineString([np.vstack([loop, loop[:1]]) for loop in sections(mesh, np.array([z]))[0]])
+        for loop in walls(section_at(mesh, z), 3, WIDTH, HEIGHT).loops[0]:
+            line = shapely.LineString(np.vstack([loop, loop[:1]]))
+            points = shapely.line_interpolate_point(line, np.arange(0, line.length, 0.1))
+            off.append(shapely.distance(exact, points) - WIDTH / 2)
+    low, middle, high = np.percentile(np.concatenate(off), [5, 50, 95])
+    assert abs(middle) < 0.002
+    assert -0.005 < low < high < 0.005
 
 
 @pytest.mark.parametrize("thickness", [0.25, 0.4, 0.6, 0.8])
@@ -108,3 +114,56 @@ def test_walls_stay_inside_any_polygon(points):
     for level, loops in enumerate(walls(polygon, 3, WIDTH, HEIGHT).loops):
         for loop in loops:
             assert distances_mm(polygon, loop).min() > WIDTH / 2 + level * SPACING - 0.01
+
+
+def uncovered(section, found):
+    """What of a section the walls, the gaps and what they enclose leave, but for slits of 0.03 mm, by shapely."""
+    narrow = gaps(found.free, WIDTH, HEIGHT, section) + gaps(found.narrow, WIDTH, HEIGHT)
+    lines = [shapely.LineString(b.points).buffer(b.width_mm / 2) for b in narrow]
+    lines += [shapely.LineString(closed(loop)).buffer(WIDTH / 2) for loops in found.loops for loop in loops]
+    rest = as_shapely(section).difference(shapely.union_all([*lines, as_shapely(found.inside)]))
+    return rest.buffer(-0.03 * WIDTH).buffer(0.03 * WIDTH)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.3, 4.0), st.floats(0.3, 4.0), st.floats(4.0, 20.0))
+def test_no_place_of_a_tapering_plate_wider_than_half_a_line_stays_empty(start, end, length):
+    plate = Polygons([np.array([[0, -start / 2], [length, -end / 2], [length, end / 2], [0, start / 2]])])
+    rest = uncovered(plate, walls(plate, 3, WIDTH, HEIGHT))
+    assert max((part.area for part in shapely.get_parts(rest)), default=0.0) < WIDTH**2
+
+
+@pytest.mark.parametrize("arms", [3, 4, 5, 7])
+@pytest.mark.parametrize("thickness", [0.4, 0.7, 1.0, 1.6, 2.1])
+def test_no_place_where_thin_arms_meet_stays_empty(arms, thickness):
+    star = Polygons()
+    for k in range(arms):
+        star += Polygons.square((8, thickness)).translate((0, -thickness / 2)).rotate(360 * k / arms + 7)
+    rest = uncovered(star, walls(star, 3, WIDTH, HEIGHT))
+    assert max((part.area for part in shapely.get_parts(rest)), default=0.0) < WIDTH**2
+
+
+@pytest.mark.parametrize(("order", "first"), [("inner-first", Kind.INNER_WALL), ("outer-first", Kind.OUTER_WALL)])
+def test_walls_are_ranked_in_the_order_asked_for(order, first):
+    beads = wall_beads(walls(rectangle(20, 20), 3, WIDTH, HEIGHT), profile(f"process.wall_order={order}").process, HEIGHT)
+    ranked = sorted(beads, key=lambda bead: bead.rank)
+    assert ranked[0].kind is first
+    assert [b.rank <= 0 for b in ranked] == [True] * 3
+
+
+def test_outer_beads_carry_what_their_round_side_leaves_out_up_to_the_bulge():
+    found = walls(rectangle(20, 20), 3, WIDTH, HEIGHT)
+    flows = [wall_beads(found, profile(f"process.outer_bulge={b}").process, HEIGHT)[0].flow for b in (0.0, 0.04, 0.2)]
+    strip = 0.2 * (WIDTH + SPACING) / 2  # from the outline to half a spacing inside the centreline
+    assert flows == pytest.approx(
+        [1.0, 1.0 + 0.018 * HEIGHT / bead_area_mm2(WIDTH, HEIGHT), strip / bead_area_mm2(WIDTH, HEIGHT)]
+    )
+
+
+def test_five_thousand_holes_are_walled_quickly():
+    holes = [Polygons.circle(0.8, 12).translate((3 * i, 3 * j)) for i in range(71) for j in range(71)]
+    plate = Polygons.square((220, 220)).translate((-4, -4)) - Polygons.compose(holes)
+    began = time.process_time()
+    found = walls(plate, 3, WIDTH, HEIGHT)
+    assert len(found.loops[0]) == 71**2 + 1
+    assert time.process_time() - began < 6.0
