@@ -7,6 +7,7 @@ from pydantic_core import PydanticCustomError
 
 Vector = tuple[float, float, float]
 Limits = tuple[float, float]
+FOLLOWING = ("marlin", "linuxcnc", "grblhal")  # dialects whose firmware can keep the tip on the workpiece (TCP)
 Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
 
 
@@ -50,6 +51,11 @@ class RotaryAxis(Frozen):
     """
 
     letter: Letter = Field(description="the G-code word of this axis")
+    stepper: str = Field(
+        "",
+        pattern=r"^[A-Za-z0-9_]*$",
+        description="name of the axis's [manual_stepper] in Klipper; empty: stepper_ and the letter",
+    )
     axis: Vector = Field(description="direction of the axis in the machine frame (any length)")
     point_mm: Vector = Field(
         description="a point of the axis in the machine frame at tilt 0, turn 0; for the turn axis the point where it "
@@ -128,7 +134,15 @@ class Machine(Frozen):
     """A 5-DOF printer: head on X Y Z, table tilting about one axis and turning about another."""
 
     name: str = Field(description="what people call it")
-    dialect: Literal["marlin"] = Field(description="the firmware's way of writing G-code")
+    dialect: Literal["marlin", "reprapfirmware", "klipper", "klipper_steppers", "linuxcnc", "grblhal"] = Field(
+        description="the firmware's way of writing G-code; klipper: the rotary steppers are axes of G1 (GCODE_AXIS), "
+        "klipper_steppers: they are turned by MANUAL_STEPPER"
+    )
+    coordinates: Literal["table", "workpiece"] = Field(
+        "table",
+        description="what X Y Z of the file mean; table: axis positions, which any firmware with five plain axes prints; "
+        "workpiece: places on the table, for a firmware that follows the table by itself (marlin with G43.4, linuxcnc, grblhal)",
+    )
     x: LinearAxis
     y: LinearAxis
     z: LinearAxis
@@ -157,6 +171,10 @@ class Machine(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.coordinates == "workpiece" and self.dialect not in FOLLOWING:
+            raise ValueError(
+                f"coordinates is workpiece: {self.dialect} does not follow the table, only {', '.join(FOLLOWING)} do; table is left"
+            )
         if self.tilt.letter == self.turn.letter:
             raise ValueError(f"tilt.letter and turn.letter are both {self.tilt.letter}: they must differ")
         dot = sum(a * b for a, b in zip(self.tilt.axis, self.turn.axis, strict=True))
