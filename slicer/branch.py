@@ -12,8 +12,9 @@ from slicer.polygons import Polygons, contours, grown, sealed, united
 from slicer.room import EVEN_MM, FINE_MM, LEAST_MM2, SMOOTH_MM, Room, carried, leaning
 
 CORNERS = 12  # of a trunk's outline
-THICKEST_MM = 3.0  # a trunk's radius: enough for any part that fits a machine
+THICKEST_MM = 2.5  # a trunk's radius: enough for any part that fits a machine
 MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
+FATTER = 3.0  # times the usual growth: how fast a branch that had to be thin recovers
 THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
 DRAWN_IN = 0.7  # of the lean: then right corners move by the lean
 
@@ -108,7 +109,8 @@ def _wished(branches: Sequence[Branch], z_mm: float, lean: float, rise: float, g
         away = hypot(x - branch.x, y - branch.y)
         share = 1.0 if away <= lean else lean / away
         x, y = branch.x + share * (x - branch.x), branch.y + share * (y - branch.y)
-        wished.append(trunk(x, y, thick[k], branch.top_mm))
+        radius = max(growth.least_mm, branch.radius + FATTER * growth.per_mm * rise)
+        wished.append(trunk(x, y, min(thick[k], radius), branch.top_mm))
     return wished
 
 

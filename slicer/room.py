@@ -89,7 +89,8 @@ def rooms(
     for m in range(count):
         near = min(int(np.searchsorted(top, bottom[m] - process.support_bottom_gap_mm + EVEN_MM, side="right")), m)
         over = int(np.searchsorted(bottom, top[m] + process.support_gap_mm - EVEN_MM))
-        blocked = [tall[m], *wide[near:m], *wide[m + 1 : over], forbidden[m]]
+        shut = forbidden[m] if forbidden[m].is_empty() else grown(forbidden[m], radius + MARGIN_MM)
+        blocked = [tall[m], *wide[near:m], *wide[m + 1 : over], shut]
         whole = united([b for b in blocked if not b.is_empty()])
         stands = [wide[near - 1]] if near > 0 and process.support_on_part else []
         if base is not None and m == root:

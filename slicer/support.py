@@ -62,8 +62,7 @@ def supports(
     missed = _missed(wanted, printed, outlines, room, process)
     dense = _dense(printed, contacts, room, process)
     if below is None:
-        foot = leaning(printed[0], process.support_foot_mm) - grown(outlines[0], process.support_distance_mm)
-        printed[0] = foot - forbidden[0]
+        printed[0] = _foot(printed[0], outlines, room, process) - forbidden[0]
     rest = nothing[len(printed) :]
     return Supports((*printed, *rest), (*dense, *rest), missed)
 
@@ -169,6 +168,13 @@ def _standing(bodies: Sequence[Polygons], room: Room, process: Process, on_platf
             body = Polygons.compose(islands) if islands else Polygons()
         printed.append(body)
     return printed
+
+
+def _foot(area: Polygons, outlines: Sequence[Polygons], room: Room, process: Process) -> Polygons:
+    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow."""
+    over = int(np.searchsorted(room.bottom_mm, room.top_mm[0] + process.support_gap_mm - EVEN_MM))
+    beside = grown(outlines[0], process.support_distance_mm)
+    return leaning(area, process.support_foot_mm) - united([beside, *outlines[1:over]])
 
 
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], room: Room, process: Process) -> list[Polygons]:

@@ -1,36 +1,51 @@
-"""Support stands where faces hang, on something, and out of the way."""
+"""Support stands where faces hang, on something, within its lean, and out of the way."""
 
 import manifold3d as m3
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mdp.decomposition import Part
 from mdp.pose import UP, about
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from tests.shapes import branch, from_manifold, standing, tee
-from tests.slicer.hand import cut, distances_mm, of_kind, profile, section_at, whole
+from tests.slicer.hand import cut, distances_mm, of_kind, profile, section_at, volume_mm3, whole
+from tests.slicer.props import assert_sound, supported
 
-DISTANCE, GAP = 0.6, 0.2
+DISTANCE, GAP = 0.3, 0.2
+PROPS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
+COLUMNS = ("process.support_style=grid", "process.support_walls=0")
 
 
 def layers_with_support(sliced):
-    return [layer for layer in sliced.layers if any(path.kind is Kind.SUPPORT for path in layer.paths)]
+    return [layer for layer in sliced.layers if any(path.kind in PROPS for path in layer.paths)]
 
 
 def support_points(sliced):
-    return np.concatenate([path.points for path in of_kind(sliced, Kind.SUPPORT)])
+    return np.concatenate([path.points for path in of_kind(sliced, *PROPS)])
 
 
-def table(span):
+def table(span, depth=5.0, height=10.0):
     """Two posts and a plate across them, `span` mm apart."""
-    posts = m3.Manifold.cube((5, 5, 10)) + m3.Manifold.cube((5, 5, 10)).translate((5 + span, 0, 0))
-    return standing(posts + m3.Manifold.cube((10 + span, 5, 2)).translate((0, 0, 10)))
+    posts = m3.Manifold.cube((5, depth, height)) + m3.Manifold.cube((5, depth, height)).translate((5 + span, 0, 0))
+    return standing(posts + m3.Manifold.cube((10 + span, depth, 2)).translate((0, 0, height)))
 
 
 def funnel(angle):
     """A pyramid on its head whose four faces hang over by an angle from upright."""
     return standing(m3.Manifold.cylinder(6, 5, 5 + 6 * np.sqrt(2) * np.tan(np.radians(angle)), 4).rotate((0, 0, 45)))
+
+
+def mushroom():
+    """A round cap on a round stem."""
+    return standing(m3.Manifold.cylinder(20, 4, 4, 48) + m3.Manifold.cylinder(4, 15, 15, 48).translate((0, 0, 18)))
+
+
+def gallows(arm=16.0, height=20.0):
+    """A post with an arm to one side."""
+    return m3.Manifold.cube((8, 8, height)) + m3.Manifold.cube((8 + arm, 8, 4)).translate((0, 0, height))
 
 
 def test_both_arms_of_a_tee_are_supported_from_the_platform_up_to_the_gap():
@@ -44,78 +59,107 @@ def test_both_arms_of_a_tee_are_supported_from_the_platform_up_to_the_gap():
     assert sliced.unsupported_mm2 == 0.0
 
 
-def test_support_keeps_its_distance_from_the_part():
-    sliced = slice_part(whole(tee()), profile())
-    edge = np.abs(support_points(sliced)[:, 0]).min() - 0.225
-    assert edge == pytest.approx(5 + DISTANCE, abs=0.05)
+@pytest.mark.parametrize("style", ["tree", "grid"])
+@pytest.mark.parametrize("gap", [0.3, 0.6, 1.5])
+def test_support_keeps_its_distance_from_the_part(gap, style):
+    set_so = (f"process.support_distance_mm={gap}", f"process.support_style={style}")
+    points = support_points(slice_part(whole(tee(height=20)), profile(*set_so)))
+    away = np.hypot(*np.maximum(np.abs(points) - 5.0, 0.0).T).min() - 0.225
+    assert gap - 0.02 < away < gap + 0.15
 
 
-def test_support_is_as_dense_as_asked():
-    sliced = slice_part(whole(tee()), profile("process.support_density=0.2"))
+def test_columns_are_as_dense_as_asked():
+    sliced = slice_part(whole(tee()), profile("process.support_density=0.2", *COLUMNS))
     layer = sliced.layers[50]
     plastic = sum(layer.volume_mm3(path) for path in layer.paths if path.kind is Kind.SUPPORT) / layer.height_mm
     assert plastic / (2 * (15 - DISTANCE) * 10) == pytest.approx(0.2, abs=0.07)
 
 
+def test_the_layers_under_the_part_are_dense():
+    sliced = slice_part(whole(tee()), profile("process.support_interface_layers=2", "process.support_interface_density=0.7"))
+    dense = [layer for layer in sliced.layers if any(path.kind is Kind.SUPPORT_INTERFACE for path in layer.paths)]
+    assert [round(layer.z_mm, 6) for layer in dense] == [29.6, 29.8]
+    plastic = sum(dense[-1].volume_mm3(path) for path in dense[-1].paths if path.kind in PROPS) / dense[-1].height_mm
+    assert plastic / (2 * (15 - DISTANCE) * 10) == pytest.approx(0.8, abs=0.15)
+
+
+def test_dense_lines_cross_the_sparse_ones():
+    layer = slice_part(whole(tee()), profile("process.infill_angle_deg=0", *COLUMNS)).layers[148]
+    longest = {}
+    for path in (path for path in layer.paths if path.kind in PROPS):
+        steps = np.abs(np.diff(path.points, axis=0)).sum(axis=0)
+        longest[path.kind] = longest.get(path.kind, 0) + steps
+    assert longest[Kind.SUPPORT_INTERFACE][1] > 2 * longest[Kind.SUPPORT_INTERFACE][0]
+
+
+def test_a_tree_takes_less_plastic_than_columns():
+    grid, tree = (
+        volume_mm3(slice_part(whole(tee(height=30)), profile(f"process.support_style={s}")), *PROPS) for s in ("grid", "tree")
+    )
+    assert tree < 0.7 * grid
+
+
 def test_support_comes_first_in_a_layer():
     kinds = [path.kind for path in slice_part(whole(tee()), profile()).layers[50].paths]
-    assert kinds[0] is Kind.SUPPORT
-    assert Kind.SUPPORT not in kinds[kinds.index(Kind.INNER_WALL) :]
+    assert kinds[0] in PROPS
+    assert not set(PROPS) & set(kinds[kinds.index(Kind.INNER_WALL) :])
 
 
 def test_none_means_none():
-    assert of_kind(slice_part(whole(tee()), profile("process.support=none")), Kind.SUPPORT) == []
+    assert of_kind(slice_part(whole(tee()), profile("process.support=none")), *PROPS) == []
 
 
 @pytest.mark.parametrize("angle", [40.0, 44.9, 45.0])
 def test_faces_up_to_the_self_supporting_angle_need_nothing(angle):
-    assert of_kind(slice_part(whole(funnel(angle)), profile()), Kind.SUPPORT) == []
+    assert of_kind(slice_part(whole(funnel(angle)), profile()), *PROPS) == []
 
 
 @pytest.mark.parametrize("angle", [47.0, 60.0, 80.0])
 def test_flatter_faces_are_supported(angle):
-    assert len(of_kind(slice_part(whole(funnel(angle)), profile()), Kind.SUPPORT)) > 10
+    assert len(of_kind(slice_part(whole(funnel(angle)), profile()), *PROPS)) > 10
 
 
 def test_a_short_bridge_needs_no_support_and_a_long_one_does():
-    assert of_kind(slice_part(whole(table(5)), profile()), Kind.SUPPORT) == []
-    assert len(of_kind(slice_part(whole(table(12)), profile()), Kind.SUPPORT)) > 10
-
-
-@pytest.mark.parametrize(("turn", "expected"), [(0, 0), (90, 90), (30, 30)])
-def test_the_lines_of_a_bridge_run_from_bank_to_bank(turn, expected):
-    spanned = table(5).moved(about(UP, np.radians(turn)))
-    layer = slice_part(whole(spanned), profile()).layers[50]
-    along = max((p for p in layer.paths if p.kind is Kind.BRIDGE), key=lambda p: p.length_mm).points
-    steps = np.diff(along, axis=0)
-    longest = steps[np.argmax(np.hypot(*steps.T))]
-    assert np.degrees(np.arctan2(*longest[::-1])) % 180 == pytest.approx(expected, abs=0.1)
-
-
-def test_a_widening_part_on_plastic_hangs_nowhere_at_its_base():
-    base, top = cut(funnel(30.0), ((0, 0, 1), 3.0))
-    sliced = slice_part(top, profile(), [base])
-    assert sliced.unsupported_mm2 == 0.0
-    assert of_kind(sliced, Kind.SUPPORT) == []
+    assert of_kind(slice_part(whole(table(5)), profile()), *PROPS) == []
+    assert len(of_kind(slice_part(whole(table(12)), profile()), *PROPS)) > 10
+    assert len(of_kind(slice_part(whole(table(5)), profile("process.bridge_longest_mm=0")), *PROPS)) > 10
 
 
 def test_a_tiny_overhang_needs_no_support():
     nose = m3.Manifold.cube((10, 10, 10)) + m3.Manifold.cube((0.6, 0.6, 1)).translate((10, 4, 5))
-    assert of_kind(slice_part(whole(standing(nose)), profile()), Kind.SUPPORT) == []
+    assert of_kind(slice_part(whole(standing(nose)), profile()), *PROPS) == []
+    assert of_kind(slice_part(whole(standing(nose)), profile("process.support_least_mm2=0")), *PROPS) != []
 
 
-def test_support_on_the_part_itself_leaves_the_gap_above_it_too():
+@pytest.mark.parametrize(("bottom", "top"), [(0.2, 0.2), (0.4, 0.2), (0.2, 0.6), (0.0, 0.0)])
+def test_support_on_the_part_itself_leaves_the_gaps_below_and_above_it(bottom, top):
     hook = m3.Manifold.cube((20, 8, 3)) + m3.Manifold.cube((5, 8, 20)) + m3.Manifold.cube((20, 8, 3)).translate((0, 0, 17))
-    held = layers_with_support(slice_part(whole(standing(hook)), profile()))
-    assert held[0].z_mm - held[0].height_mm == pytest.approx(3.0 + GAP)
-    assert held[-1].z_mm == pytest.approx(17.0 - GAP)
+    gaps = (f"process.support_bottom_gap_mm={bottom}", f"process.support_gap_mm={top}")
+    held = layers_with_support(slice_part(whole(standing(hook)), profile(*gaps)))
+    assert held[0].z_mm - held[0].height_mm == pytest.approx(3.0 + bottom)
+    assert held[-1].z_mm == pytest.approx(17.0 - top)
 
 
-def test_a_plate_wider_than_the_plastic_beneath_it_cannot_be_supported():
+def test_support_that_may_not_stand_on_the_part_leans_out_to_the_platform():
+    hook = m3.Manifold.cube((14, 8, 3)) + m3.Manifold.cube((5, 8, 30)) + m3.Manifold.cube((14, 8, 3)).translate((0, 0, 27))
+    sliced = slice_part(whole(standing(hook)), profile("process.support_on_part=false"))
+    assert layers_with_support(sliced)[0].z_mm == pytest.approx(0.2)
+    assert sliced.unsupported_mm2 == 0.0
+
+
+def test_a_hanging_face_that_no_support_fits_under_is_told_unless_the_plastic_below_is_as_near():
+    slit = m3.Manifold.cube((30, 30, 10)) - m3.Manifold.cube((20, 20, 0.2)).translate((5, 5, 5))
+    assert slice_part(whole(standing(slit)), profile("process.bridge_longest_mm=0")).unsupported_mm2 == 0.0
+    drawer = m3.Manifold.cube((30, 30, 10)) - m3.Manifold.cube((20, 20, 0.5)).translate((5, 5, 5))
+    sliced = slice_part(whole(standing(drawer)), profile("process.bridge_longest_mm=0"))
+    assert sliced.unsupported_mm2 == pytest.approx(400.0, rel=0.02)
+
+
+def test_a_plate_on_its_own_base_plane_cannot_be_supported():
     base, plate = cut(tee(), ((0, 0, 1), 30.0))
     sliced = slice_part(plate, profile(), [base])
     assert sliced.unsupported_mm2 == pytest.approx(300.0, abs=5)
-    assert of_kind(sliced, Kind.SUPPORT) == []
+    assert of_kind(sliced, *PROPS) == []
 
 
 def test_support_of_a_later_part_roots_on_earlier_plastic():
@@ -126,21 +170,101 @@ def test_support_of_a_later_part_roots_on_earlier_plastic():
     assert layers_with_support(sliced)[0].z_mm < 0.6
 
 
-def test_support_stays_out_of_the_place_of_a_later_part():
+def test_support_leans_over_the_edge_of_what_it_stands_on():
+    foot = m3.Manifold.cube((16, 8, 10)) + gallows(18.0, 34.0)
+    base, top = cut(standing(foot), ((0, 0, 1), 10.0))
+    sliced = slice_part(top, profile(), [base])
+    edge = base.mesh.bounds_mm[1, 0]
+    assert sliced.unsupported_mm2 == 0.0
+    assert np.concatenate([p.points for p in of_kind(sliced, *PROPS)])[:, 0].max() > edge + 9.0
+    low = [p.points[:, 0].max() for layer in layers_with_support(sliced)[:3] for p in layer.paths if p.kind in PROPS]
+    assert max(low) < edge + 1.0
+
+
+def test_what_the_lean_does_not_reach_is_told():
+    foot = m3.Manifold.cube((16, 8, 10)) + gallows(18.0, 18.0)
+    base, top = cut(standing(foot), ((0, 0, 1), 10.0))
+    sliced = slice_part(top, profile("process.support_branch_angle_deg=30"), [base])
+    reach = (8.0 - 0.2) * np.tan(np.radians(30.0))
+    assert sliced.unsupported_mm2 == pytest.approx((26.0 - 16.0 - reach) * 8.0, rel=0.2)
+
+
+@pytest.mark.parametrize("tilt", [30.0, -30.0, 90.0])
+def test_support_stays_below_the_base_plane_of_every_later_part(tilt):
     part = whole(tee())
-    guest = from_manifold(m3.Manifold.cube((4, 10, 6)).translate((10, -5, 8)))
-    later = Part(2, guest, part.base, part.pose, part.rotation, guest.volume_mm3, 0.0)
-    sliced = slice_part(part, profile(), later=[later])
-    inside = [p for p in support_points(sliced) if 10 - DISTANCE < p[0] < 14 + DISTANCE]
-    assert inside == []
-    assert sliced.unsupported_mm2 == pytest.approx((4 + 2 * DISTANCE) * 10, rel=0.1)
+    guest = from_manifold(m3.Manifold.cube((4, 4, 4)).translate((30, 0, 30)))
+    normal = about(np.array([0.0, 1.0, 0.0]), np.radians(tilt)) @ UP
+    base = type(part.base)(normal, float(normal @ (14.0, 0.0, 24.0)))
+    sliced = slice_part(part, profile(), later=[Part(2, guest, base, part.pose, part.rotation, 64.0, 0.0)])
+    for layer in layers_with_support(sliced):
+        points = np.concatenate([path.points for path in layer.paths if path.kind in PROPS])
+        for z in (layer.z_mm, layer.z_mm - layer.height_mm):
+            highest = (np.column_stack([points, np.full(len(points), z)]) @ normal).max() + 0.225 * np.hypot(*normal[:2])
+            assert highest < base.offset_mm - DISTANCE
+    assert sliced.unsupported_mm2 > 10.0
 
 
 def test_support_of_a_leaning_arm_never_touches_the_part():
     mesh = branch()
     sliced = slice_part(whole(mesh), profile())
     for layer in sliced.layers[5:150:12]:
-        points = [path.points for path in layer.paths if path.kind is Kind.SUPPORT]
+        points = [path.points for path in layer.paths if path.kind in PROPS]
         section = section_at(mesh, layer.z_mm - 0.5 * layer.height_mm)
         if points:
             assert distances_mm(section, np.concatenate(points)).max() < -(DISTANCE + 0.2)
+
+
+def test_support_gets_a_foot_on_the_platform():
+    wide, narrow = (
+        slice_part(whole(tee(height=16)), profile(f"process.support_foot_mm={mm}", "process.skirt_loops=0")).layers[0]
+        for mm in (3, 0)
+    )
+    reach = [max(p.points[:, 0].max() for p in layer.paths if p.kind is Kind.SUPPORT) for layer in (wide, narrow)]
+    assert reach[0] - reach[1] == pytest.approx(3.0, abs=0.3)
+
+
+SOLIDS = {
+    "a table": lambda: table(30, 12, 16),
+    "a mushroom": mushroom,
+    "a funnel": lambda: funnel(65.0),
+    "a leaning arm": branch,
+    "a gallows": lambda: standing(gallows()),
+    "a cone on its tip": lambda: standing(m3.Manifold.cylinder(8, 2, 14, 40)),
+    "a ball": lambda: standing(m3.Manifold.sphere(9, 40)),
+}
+
+
+@pytest.mark.parametrize("style", ["tree", "grid"])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_every_hanging_place_is_held_or_told_and_every_support_stands(name, style):
+    assert_sound(*supported(whole(SOLIDS[name]()), f"process.support_style={style}"))
+
+
+@pytest.mark.parametrize("style", ["tree", "grid"])
+def test_so_it_is_on_a_tilted_base_with_air_beside_it(style):
+    mesh = standing(gallows(20.0, 26.0))
+    base, top = cut(mesh, ((0.3, 0.0, 1.0), 9.0))
+    assert_sound(*supported(top, f"process.support_style={style}", earlier=[base]))
+
+
+@settings(max_examples=5, deadline=None)
+@given(
+    boxes=st.lists(
+        st.tuples(*[st.integers(-8, 8)] * 2, st.integers(4, 14), *[st.integers(3, 14)] * 2, st.integers(1, 4)),
+        min_size=1,
+        max_size=4,
+    ),
+    style=st.sampled_from(["tree", "grid"]),
+)
+def test_so_it_is_for_any_heap_of_boxes(boxes, style):
+    heap = m3.Manifold.cube((6, 6, 20), False).translate((-3, -3, 0))
+    for x, y, z, a, b, c in boxes:
+        heap += m3.Manifold.cube((a, b, c), True).translate((x, y, z + c / 2))
+    heap = max(heap.decompose(), key=lambda piece: piece.volume())
+    assert_sound(*supported(whole(standing(heap)), f"process.support_style={style}"))
+
+
+def test_the_reported_area_is_that_of_the_missed_places():
+    values, found = supported(whole(tee()), "process.support_branch_angle_deg=20")
+    assert found.unsupported_mm2 == pytest.approx(sum(place.area() for place in found.missed))
+    assert len(found.areas) == len(values["outlines"])

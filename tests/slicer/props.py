@@ -1,0 +1,73 @@
+"""What every support must obey, judged by shapely from the printed areas alone."""
+
+from collections.abc import Sequence
+from math import radians, tan
+from typing import Any
+
+import numpy as np
+import shapely
+
+from mdp.decomposition import Part
+from slicer.contact import contacts
+from slicer.forbidden import far_mm, forbidden
+from slicer.heights import heights_of
+from slicer.interface import beneath
+from slicer.polygons import cleaned
+from slicer.section import sections
+from slicer.support import Supports, supports
+from tests.slicer.hand import as_shapely, profile
+
+ROUNDING_MM = 0.03
+SPECK_MM2 = 0.02
+
+
+def supported(part: Part, *settings: str, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> tuple[Any, Supports]:
+    """What the support of a part is made from, and the support."""
+    process, mesh = profile(*settings).process, part.in_part_frame()
+    at = heights_of(mesh, process, part.index == 1)
+    outlines = [cleaned(loops) for loops in sections(mesh, at.cut_mm)]
+    below = beneath(part, earlier, outlines[0])
+    shut = forbidden(part, later, at.tip_mm - at.height_mm, at.tip_mm, process.support_distance_mm, far_mm(mesh))
+    hanging = [contact.hanging for contact in contacts(mesh, outlines, at.cut_mm, process, below)]
+    values = {"hanging": hanging, "outlines": outlines, "at": at, "process": process, "below": below, "forbidden": shut}
+    return values, supports(**values, far_mm=far_mm(mesh))
+
+
+def assert_sound(values: Any, found: Supports) -> None:
+    """Gaps are kept, everything stands within the lean, every hanging place is held or told."""
+    process, at = values["process"], values["at"]
+    solid, printed, missed, hanging = (
+        [shapely.make_valid(as_shapely(place)) for place in places]
+        for places in (values["outlines"], found.areas, found.missed, values["hanging"])
+    )
+    top = at.tip_mm
+    bottom = top - at.height_mm
+    slope = tan(radians(min(process.support_branch_angle_deg, process.self_supporting_angle_deg)))
+    width = process.line_width_mm
+    for m in np.flatnonzero([not place.is_empty for place in printed]).tolist():
+        _keeps_gaps(m, printed[m], solid, bottom, top, process)
+        if m or values["below"] is not None:
+            carried = [printed[m - 1].buffer(slope * at.height_mm[m] + ROUNDING_MM)] if m else []
+            stands = [solid[j].buffer(width + 4 * ROUNDING_MM) for j in range(m) if top[j] <= bottom[m] + 1e-6]
+            base = [as_shapely(values["below"]).buffer(width + 4 * ROUNDING_MM)] if values["below"] is not None else []
+            loose = printed[m] - shapely.union_all([*carried, *stands[-6:], *base])
+            assert loose.buffer(-ROUNDING_MM).area < SPECK_MM2, f"layer {m} hangs in the air: {loose.bounds}"
+    for k in np.flatnonzero([not place.is_empty for place in hanging]).tolist():
+        rest = hanging[k] - missed[k].buffer(0.02)
+        deep = process.support_gap_mm + process.support_distance_mm + 2 * process.layer_height_mm
+        near = [printed[m] for m in range(k) if 0 <= bottom[k] - top[m] + 1e-6 <= deep + 1e-6]
+        held = shapely.union_all(near).buffer(0.5 * width + ROUNDING_MM)
+        reach = 0.5 * process.support_distance_mm + 0.06
+        wall = solid[k - 1] if k else shapely.Polygon()
+        spanned = shapely.union_all([held, wall]).buffer(reach, join_style="mitre").buffer(-reach, join_style="mitre")
+        bare = rest - shapely.union_all([held, spanned.buffer(0.02)])
+        bare = bare.buffer(-ROUNDING_MM) if bottom[k] > process.support_gap_mm + 1e-6 else shapely.Polygon()
+        assert bare.area <= process.support_least_mm2, f"layer {k}: {bare.area} mm2 are neither held nor told {bare.bounds}"
+
+
+def _keeps_gaps(m: int, area: Any, solid: list[Any], bottom: Any, top: Any, process: Any) -> None:
+    assert area.distance(solid[m]) > process.support_distance_mm - ROUNDING_MM, f"layer {m} touches the part"
+    for k in range(len(solid)):
+        over = -1e-6 < bottom[k] - top[m] < process.support_gap_mm - 1e-6
+        under = -1e-6 < bottom[m] - top[k] < process.support_bottom_gap_mm - 1e-6
+        assert not (over or under) or (area & solid[k]).area < SPECK_MM2, f"layer {m} is too near layer {k}"
