@@ -74,8 +74,8 @@ def poses(machine: Machine, direction: Floats, near_turn_deg: float | None = Non
     for tilt_rad, turn_rad in _angles(unit(machine.tilt.axis), unit(machine.turn.axis), direction):
         tilt = machine.tilt.zero_deg - machine.tilt.sign * degrees(tilt_rad)
         turn = near if turn_rad is None else machine.turn.zero_deg - machine.turn.sign * degrees(turn_rad)
-        tilt_inside = nearest_turn(tilt, machine.tilt.limits_deg, machine.tilt.zero_deg)
-        turn_inside = nearest_turn(turn, machine.turn.limits_deg, near)
+        tilt_inside = nearest_turn(tilt, machine.tilt.reach_deg, machine.tilt.zero_deg)
+        turn_inside = nearest_turn(turn, machine.turn.reach_deg, near)
         if tilt_inside is not None and turn_inside is not None:
             found.append(Pose(tilt_inside, turn_inside))
     return found
@@ -94,26 +94,35 @@ def nearest_turn(value_deg: float, limits_deg: tuple[float, float], near_deg: fl
 def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tuple[float, float | None]]:
     """Rotations (tilt, turn), radians, with R_tilt R_turn direction = up: subproblem 2 of Paden and Kahan.
 
-    The turned direction c has the same turn_axis component as `direction` and the same tilt_axis component as up.
+    The turned direction c has the same turn_axis component as `direction` and the same tilt_axis component as up. Its third
+    component is the height of the corner c of a spherical triangle whose sides are angles; taken from their sines it keeps its
+    digits where c comes near to the plane of the axes (L'Huilier's way of writing the triple product).
     """
     k = float(tilt_axis @ turn_axis)
     p, q = float(turn_axis @ direction), float(tilt_axis @ UP)
     determinant = 1.0 - k * k
     along_turn, along_tilt = (p - k * q) / determinant, (q - k * p) / determinant
-    rest2 = 1.0 - along_turn**2 - along_tilt**2 - 2.0 * along_turn * along_tilt * k
-    if rest2 < -1e-9:
+    a, b, c = _angle(turn_axis, direction), _angle(tilt_axis, UP), _angle(tilt_axis, turn_axis)
+    s = 0.5 * (a + b + c)
+    triple2 = 4.0 * sin(s) * sin(s - a) * sin(s - b) * sin(s - c)
+    if triple2 < -1e-9:
         return []
     normal = _cross(turn_axis, tilt_axis)
-    length = (max(rest2, 0.0) / determinant) ** 0.5
+    length = max(triple2, 0.0) ** 0.5 / determinant
     solutions: list[tuple[float, float | None]] = []
     for side in (1.0, -1.0):
-        c = along_turn * turn_axis + along_tilt * tilt_axis + side * length * normal
-        tilt = _turn_between(tilt_axis, c, UP)
+        turned = along_turn * turn_axis + along_tilt * tilt_axis + side * length * normal
+        tilt = _turn_between(tilt_axis, turned, UP)
         free = hypot(*_cross(turn_axis, direction)) < SINGULAR
-        solutions.append((tilt, None if free else _turn_between(turn_axis, direction, c)))
+        solutions.append((tilt, None if free else _turn_between(turn_axis, direction, turned)))
         if length < SINGULAR:
             break
     return solutions
+
+
+def _angle(a: Floats, b: Floats) -> float:
+    """Angle between two unit vectors, radians, exact for small ones too."""
+    return atan2(hypot(*_cross(a, b)), float(a @ b))
 
 
 def _turn_between(axis: Floats, a: Floats, b: Floats) -> float:

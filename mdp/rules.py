@@ -101,7 +101,9 @@ class Rules:
 
 
 def without_limits(machine: Machine) -> Machine:
-    """A machine whose axes turn as far as one likes."""
-    wide = {"limits_deg": (-1e6, 1e6)}
+    """A machine whose rotary axes, if it has any, turn as far as one likes."""
+    if not machine.tilts:
+        return machine
+    wide = {"limits_deg": (-1e6, 1e6), "budget_deg": None}
     tilt, turn = machine.tilt.model_copy(update=wide), machine.turn.model_copy(update=wide)
     return machine.model_copy(update={"tilt": tilt, "turn": turn})

@@ -1,13 +1,19 @@
 """The machine: linear axes, the tilt and turn axes of the table, the head's bodies, the table, its G-code blocks."""
 
+from collections.abc import Iterable
+from math import acos, cos, degrees, hypot, radians
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from profiles.wording import keys, nearest
+
 Vector = tuple[float, float, float]
 Limits = tuple[float, float]
 FOLLOWING = ("marlin", "linuxcnc", "grblhal")  # dialects whose firmware can keep the tip on the workpiece (TCP)
+LEAST_LEAN_DEG = 1.0  # a table that leans less can print nothing but upright parts
+UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
 Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
 
 
@@ -25,9 +31,15 @@ class Frozen(BaseModel):
         return value
 
 
-def _ordered(limits: Limits, name: str) -> None:
-    if limits[0] >= limits[1]:
-        raise ValueError(f"{name} is {list(limits)}: the first number must be below the second")
+def _refuse(problems: Iterable[str]) -> None:
+    """Raise all problems of a table at once, one a line: profiles.wording makes a sentence of each."""
+    found = list(problems)
+    if found:
+        raise ValueError("\n".join(found))
+
+
+def _reversed(limits: Limits, name: str) -> list[str]:
+    return [f"{name} is {list(limits)}: the first number must be below the second"] if limits[0] >= limits[1] else []
 
 
 class LinearAxis(Frozen):
@@ -39,7 +51,7 @@ class LinearAxis(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _ordered(self.limits_mm, "limits_mm")
+        _refuse(_reversed(self.limits_mm, "limits_mm"))
         return self
 
 
@@ -64,17 +76,40 @@ class RotaryAxis(Frozen):
     sign: Literal[-1, 1] = Field(description="-1: positive values turn the table right-handed about axis; 1: the other way")
     zero_deg: float = Field(0.0, ge=-360, le=360, description="axis value at which the table is level (tilt) or unturned")
     limits_deg: Limits = Field(description="least and greatest value the firmware accepts, deg")
+    budget_deg: float | None = Field(
+        None,
+        ge=180,
+        le=100000,
+        description="how far cables let the axis wind to either side of zero_deg, deg: it is unwound before; left out: no cable",
+    )
     speed_deg_s: float = Field(gt=0, le=3600, description="greatest speed, deg/s")
     acceleration_deg_s2: float = Field(gt=0, le=100000, description="acceleration, deg/s2")
 
+    @property
+    def reach_deg(self) -> Limits:
+        """Least and greatest value a print may use: the firmware's limits, and what the cables let the axis wind."""
+        if self.budget_deg is None:
+            return self.limits_deg
+        least, most = self.limits_deg
+        return max(least, self.zero_deg - self.budget_deg), min(most, self.zero_deg + self.budget_deg)
+
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _ordered(self.limits_deg, "limits_deg")
+        problems = _reversed(self.limits_deg, "limits_deg")
         if sum(x * x for x in self.axis) < 1e-12:
-            raise ValueError(f"axis is {list(self.axis)}: a direction must not be zero")
-        if not self.limits_deg[0] <= self.zero_deg <= self.limits_deg[1]:
-            raise ValueError(f"zero_deg is {self.zero_deg:g}: it must lie inside limits_deg {list(self.limits_deg)}")
+            problems.append(f"axis is {list(self.axis)}: a direction must not be zero")
+        if not problems and not self.limits_deg[0] <= self.zero_deg <= self.limits_deg[1]:
+            problems.append(f"zero_deg is {self.zero_deg:g}: it must lie inside limits_deg {list(self.limits_deg)}")
+        _refuse(problems)
         return self
+
+
+def _still(letter: str, axis: Vector) -> RotaryAxis:
+    """The rotary axis of a machine that has none: it stands at 0."""
+    return RotaryAxis.model_construct(
+        letter=letter, axis=axis, point_mm=(0.0, 0.0, 0.0), sign=-1, limits_deg=(0.0, 0.0), speed_deg_s=1.0,
+        acceleration_deg_s2=1.0,
+    )  # fmt: skip
 
 
 class Box(Frozen):
@@ -86,11 +121,35 @@ class Box(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if any(a >= b for a, b in zip(self.min_mm, self.max_mm, strict=True)):
-            raise ValueError(f"box {self.name}: min_mm must be below max_mm on every axis")
+        problems = _inverted(self.name, self.min_mm, self.max_mm)
         if self.min_mm[2] < 0:
-            raise ValueError(f"box {self.name}: min_mm z is {self.min_mm[2]:g}: no body may hang below the tip")
+            problems.append(f"box {self.name}: min_mm z is {self.min_mm[2]:g}: no body may hang below the tip")
+        _refuse(problems)
         return self
+
+
+def _inverted(name: str, least_mm: Vector, most_mm: Vector) -> list[str]:
+    wrong = any(a >= b for a, b in zip(least_mm, most_mm, strict=True))
+    return [f"box {name}: min_mm must be below max_mm on every axis"] if wrong else []
+
+
+class CradleBox(Frozen):
+    """A body that tilts with the table but does not turn with it: a yoke's arm, a motor, the bearing's plate."""
+
+    name: str = Field(description="what it is, for messages")
+    min_mm: Vector = Field(description="least x, y, z from the workpiece origin at tilt 0, mm; the plate's surface is z = 0")
+    max_mm: Vector = Field(description="greatest x, y, z from the workpiece origin at tilt 0, mm")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _refuse(_inverted(self.name, self.min_mm, self.max_mm))
+        return self
+
+    @property
+    def nearest_mm(self) -> float:
+        """Least distance of the box from the turn axis, mm."""
+        across, along = (max(a, -b, 0.0) for a, b in zip(self.min_mm[:2], self.max_mm[:2], strict=True))
+        return hypot(across, along)
 
 
 class Head(Frozen):
@@ -104,21 +163,39 @@ class Head(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for (r0, h0), (r1, h1) in zip(self.silhouette_mm, self.silhouette_mm[1:], strict=False):
-            if r1 <= r0 or h1 < h0:
-                raise ValueError(
-                    f"silhouette_mm: [{r1:g}, {h1:g}] follows [{r0:g}, {h0:g}]: radii must rise and heights must not fall"
-                )
+        problems = [
+            f"silhouette_mm: [{r1:g}, {h1:g}] follows [{r0:g}, {h0:g}]: radii must rise and heights must not fall"
+            for (r0, h0), (r1, h1) in zip(self.silhouette_mm, self.silhouette_mm[1:], strict=False)
+            if r1 <= r0 or h1 < h0
+        ]
         if self.silhouette_mm[0][0] < 0 or self.silhouette_mm[0][1] < 0:
-            raise ValueError("silhouette_mm: radius and height must not be negative")
+            problems.append("silhouette_mm: radius and height must not be negative")
+        _refuse(problems)
         return self
 
 
 class Table(Frozen):
-    """The turning plate."""
+    """The turning plate: a disc, or a rectangle about the turn axis."""
 
-    radius_mm: float = Field(gt=0, le=2000, description="radius of the plate, mm")
+    radius_mm: float = Field(gt=0, le=2000, description="radius of a round plate, mm; size_mm makes it half a diagonal")
+    size_mm: tuple[float, float] | None = Field(
+        None, description="x and y size of a rectangular plate at turn 0, its middle on the turn axis, mm; left out: round"
+    )
     thickness_mm: float = Field(gt=0, le=200, description="thickness of the plate, mm")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _circumscribed(cls, given: Any) -> Any:
+        """A rectangle's radius is that of the circle about it, so that who knows only discs stays on the safe side."""
+        size = given.get("size_mm") if isinstance(given, dict) else None
+        numbers = isinstance(size, list | tuple) and all(isinstance(x, int | float) for x in size)
+        return given | {"radius_mm": hypot(*size) / 2.0} if size and numbers else given
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.size_mm is not None and min(self.size_mm) <= 0:
+            _refuse([f"size_mm is {list(self.size_mm)}: both numbers must be above 0"])
+        return self
 
 
 class Blocks(Frozen):
@@ -131,9 +208,13 @@ class Blocks(Frozen):
 
 
 class Machine(Frozen):
-    """A 5-DOF printer: head on X Y Z, table tilting about one axis and turning about another."""
+    """A printer whose head moves on X Y Z over a table that tilts about one axis and turns about another, or stands still."""
 
     name: str = Field(description="what people call it")
+    shape: Literal["table", "fixed"] = Field(
+        "table",
+        description="table: it tilts and turns; fixed: three axes only, tilt and turn are left out, all is printed in one part",
+    )
     dialect: Literal["marlin", "reprapfirmware", "klipper", "klipper_steppers", "linuxcnc", "grblhal"] = Field(
         description="the firmware's way of writing G-code; klipper: the rotary steppers are axes of G1 (GCODE_AXIS), "
         "klipper_steppers: they are turned by MANUAL_STEPPER"
@@ -161,26 +242,77 @@ class Machine(Frozen):
         0.025, ge=0.003, le=0.5, description="an arc stays so near to the path it replaces, mm; 0.025 is an eighteenth of a bead"
     )
     table: Table
+    cradle: list[CradleBox] = Field(default=[], description="what tilts with the table but does not turn with it")
     head: Head
     clearance_mm: float = Field(1.0, ge=0, le=100, description="least distance kept between head and table, mm")
     lift_mm: float = Field(10.0, ge=0, le=500, description="extra height above everything printed while the table moves, mm")
     nozzle_limit_c: float = Field(300.0, gt=0, le=600, description="greatest nozzle temperature, deg C")
     bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed")
     uncalibrated: list[str] = Field(default=[], description="keys whose values no source gives; the dry run names them")
+    sources: dict[str, str] = Field(default={}, description="for a key or a table of keys: where its value comes from")
     gcode: Blocks
+
+    @property
+    def tilts(self) -> bool:
+        """False for a machine with three axes only."""
+        return self.shape == "table"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _stand_still(cls, given: Any) -> Any:
+        """A fixed machine gets rotary axes that stand at 0, so that one chain serves both shapes."""
+        if not isinstance(given, dict) or given.get("shape") != "fixed":
+            return given
+        return given | {"tilt": _still("A", (1.0, 0.0, 0.0)), "turn": _still("C", (0.0, 0.0, 1.0))}
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.coordinates == "workpiece" and self.dialect not in FOLLOWING:
-            raise ValueError(
-                f"coordinates is workpiece: {self.dialect} does not follow the table, only {', '.join(FOLLOWING)} do; table is left"
-            )
-        if self.tilt.letter == self.turn.letter:
-            raise ValueError(f"tilt.letter and turn.letter are both {self.tilt.letter}: they must differ")
-        dot = sum(a * b for a, b in zip(self.tilt.axis, self.turn.axis, strict=True))
-        norm = (sum(a * a for a in self.tilt.axis) * sum(b * b for b in self.turn.axis)) ** 0.5
-        if abs(dot) > 0.999 * norm:
-            raise ValueError("tilt.axis and turn.axis are parallel: the table could not be tilted to any side")
-        if self.turn.axis[2] ** 2 < 0.999 * sum(a * a for a in self.turn.axis):
-            raise ValueError(f"turn.axis is {list(self.turn.axis)}: it must be vertical at tilt 0")
+        _refuse([*self._words(), *(self._axes() if self.tilts else []), *self._named(), *self._in_the_plate()])
         return self
+
+    def _words(self) -> Iterable[str]:
+        if self.coordinates == "workpiece" and self.dialect not in FOLLOWING:
+            able = ", ".join(FOLLOWING)
+            yield f"coordinates is workpiece: {self.dialect} does not follow the table, only {able} do; table is left"
+        if self.tilt.letter == self.turn.letter:
+            yield f"tilt.letter and turn.letter are both {self.tilt.letter}: they must differ"
+
+    def _axes(self) -> Iterable[str]:
+        """What no single axis can know: that the two of them can bring the table to lean."""
+        dot = sum(a * b for a, b in zip(self.tilt.axis, self.turn.axis, strict=True))
+        norm = hypot(*self.tilt.axis) * hypot(*self.turn.axis)
+        if self.turn.axis[2] ** 2 < UPRIGHT**2 * sum(a * a for a in self.turn.axis):
+            yield f"turn.axis is {list(self.turn.axis)}: it must be vertical at tilt 0"
+        elif abs(dot) > 0.999 * norm:
+            yield "tilt.axis and turn.axis are parallel: the table could not be tilted to any side"
+        elif (lean := self._greatest_lean_deg(dot / norm)) < LEAST_LEAN_DEG:
+            yield (
+                f"tilt.limits_deg is {list(self.tilt.limits_deg)}: the table would lean by at most {lean:.2g} deg, at least "
+                f'{LEAST_LEAN_DEG:g} is needed; a machine that does not tilt has shape = "fixed"'
+            )
+
+    def _greatest_lean_deg(self, cosine: float) -> float:
+        """How far the turn axis leans at the limits of the tilt; cosine: of the angle between the two axes."""
+        turned = (min(abs(limit - self.tilt.zero_deg), 180.0) for limit in self.tilt.limits_deg)
+        leans = (cosine**2 + (1.0 - cosine**2) * cos(radians(angle)) for angle in turned)
+        return max(degrees(acos(max(-1.0, min(1.0, lean)))) for lean in leans)
+
+    def _named(self) -> Iterable[str]:
+        """Names of keys that are none."""
+        known = [key for key, _ in keys(Machine, "machine.")]
+        places = {key.rsplit(".", k)[0] for key in known for k in range(key.count(".") + 1)} - {"machine"}
+        for field, named in (("uncalibrated", self.uncalibrated), ("sources", self.sources)):
+            for key in named:
+                if key not in places:
+                    near = nearest(key, known)
+                    yield f"{field} names {key}, which is not a key of a machine" + (f": did you mean {near}?" if near else "")
+
+    def _in_the_plate(self) -> Iterable[str]:
+        """Bodies of the cradle that the turning plate, or a print on it, would run into."""
+        radius = self.table.radius_mm if self.table.size_mm is None else min(self.table.size_mm) / 2.0
+        for box in self.cradle:
+            if box.max_mm[2] > -self.table.thickness_mm and box.nearest_mm < radius:
+                yield (
+                    f"cradle: box {box.name} reaches z {box.max_mm[2]:g} mm within {box.nearest_mm:g} mm of the turn axis: "
+                    f"there the plate turns (radius {radius:g} mm, {self.table.thickness_mm:g} mm thick)"
+                )

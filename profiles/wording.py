@@ -14,7 +14,7 @@ LONGEST_VALUE = 60
 
 def sentences(problems: list[Any], root: type[BaseModel], prefix: str = "") -> list[str]:
     """One sentence for each problem of a ValidationError: key, value, what is allowed; keys are dotted after the prefix."""
-    found = dict.fromkeys(_sentence(problem, root, prefix) for problem in problems)
+    found = dict.fromkeys(sentence for problem in problems for sentence in _each(problem, root, prefix))
     return list(found)
 
 
@@ -32,15 +32,21 @@ def keys(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, FieldInfo]]
             yield f"{prefix}{name}", field
 
 
-def _sentence(problem: Any, root: type[BaseModel], prefix: str) -> str:
+def _each(problem: Any, root: type[BaseModel], prefix: str) -> Iterator[str]:
+    """The sentences of one problem: a check of a whole table may tell several, one a line."""
+    for text in problem["msg"].removeprefix("Value error, ").splitlines():
+        yield _sentence(problem, text, root, prefix)
+
+
+def _sentence(problem: Any, text: str, root: type[BaseModel], prefix: str) -> str:
     steps = tuple(problem["loc"])
-    key, text = prefix + ".".join(str(step) for step in steps), problem["msg"].removeprefix("Value error, ")
+    key = (prefix + ".".join(str(step) for step in steps)).rstrip(".")
     if problem["type"] == "value_error":
         table = _table(root, steps)
         dot = "." if key and table is not None and text.split(" ")[0].split(".")[0].rstrip(":") in table.model_fields else ": "
         return f"{key}{dot}{text}" if key else text
     if problem["type"] == "extra_forbidden":
-        near = _nearest(key, [name for name, _ in keys(root, prefix)])
+        near = nearest(key, [name for name, _ in keys(root, prefix)])
         return f"{key} is not a key of a profile" + (f": did you mean {near}?" if near else " (`profiles show` lists them)")
     if problem["type"] == "missing" and not isinstance(steps[-1], int):
         field = _field(root, steps)
@@ -52,7 +58,7 @@ def _sentence(problem: Any, root: type[BaseModel], prefix: str) -> str:
     return f"{key} is {_shown(problem['input'])}: it must be {expected}"
 
 
-def _nearest(key: str, known: list[str]) -> str | None:
+def nearest(key: str, known: list[str]) -> str | None:
     """The known key most like a mistyped one: of the same table by its last word, else of any table."""
     table, _, word = key.rpartition(".")
     same = {name.rpartition(".")[2]: name for name in known if name.rpartition(".")[0] == table}

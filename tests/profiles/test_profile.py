@@ -83,7 +83,23 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
             "machine.head.silhouette_mm: [1, 3] follows [2, 0]: radii must rise and heights must not fall",
         ),
         ("machine.head.silhouette_mm=[]", "machine.head.silhouette_mm is []: it must be a list of one or more pairs of numbers"),
-        ("machine.table=5", "machine.table is 5: it must be a table with the keys radius_mm, thickness_mm"),
+        ("machine.table=5", "machine.table is 5: it must be a table with the keys radius_mm, size_mm, thickness_mm"),
+        (
+            "machine.tilt.limits_deg=[-0.5,0.25]",
+            "machine.tilt.limits_deg is [-0.5, 0.25]: the table would lean by at most 0.5 deg, at least 1 is needed; "
+            'a machine that does not tilt has shape = "fixed"',
+        ),
+        ("machine.turn.budget_deg=90", "machine.turn.budget_deg is 90: it must be a number from 180 to 100000"),
+        ("machine.table.size_mm=[200,0]", "machine.table.size_mm is [200.0, 0.0]: both numbers must be above 0"),
+        (
+            'machine.uncalibrated=["machine.tilt.zero_dg"]',
+            "machine.uncalibrated names machine.tilt.zero_dg, which is not a key of a machine: did you mean machine.tilt.zero_deg?",
+        ),
+        (
+            'machine.cradle=[{name="arm",min_mm=[90,-9,-40],max_mm=[120,9,1]}]',
+            "machine.cradle: box arm reaches z 1 mm within 90 mm of the turn axis: there the plate turns "
+            "(radius 100 mm, 4 mm thick)",
+        ),
         (
             'machine.head.boxes=[{name="fan",min_mm=[0,0,-1],max_mm=[1,1,1]}]',
             "machine.head.boxes.0: box fan: min_mm z is -1: no body may hang below the tip",
