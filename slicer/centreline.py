@@ -7,14 +7,16 @@ the local width. Triangles with three inner sides are forks, those with one are 
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import manifold3d
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
-from mdp.mesh import Floats, Ints
+from mdp.mesh import Floats
 from slicer.bead import length_mm
 from slicer.chords import chains
 from slicer.halfedges import opposites
@@ -43,11 +45,6 @@ class _Chain:
     @property
     def reversed(self) -> "_Chain":
         return _Chain(self.points[::-1], self.widths[::-1], self.ends[::-1], self.place)
-
-    @cached_property
-    def steps(self) -> Floats:
-        lengths: Floats = np.hypot(*np.diff(self.points, axis=0).T)
-        return lengths
 
     @cached_property
     def length_mm(self) -> float:
@@ -84,11 +81,15 @@ def _sampled(loop: Floats, step_mm: float) -> Floats:
     return sampled
 
 
+@njit(cache=True)
 def _smooth(points: Floats) -> Floats:
     """The chain without the zigzag that comes from sampling its two sides at different places; its ends stay."""
+    out = points.copy()
     for _ in range(SMOOTHINGS):
-        points = np.concatenate([points[:1], 0.25 * points[:-2] + 0.5 * points[1:-1] + 0.25 * points[2:], points[-1:]])
-    return points
+        before = out.copy()
+        for i in range(1, len(points) - 1):
+            out[i] = 0.25 * before[i - 1] + 0.5 * before[i] + 0.25 * before[i + 1]
+    return out
 
 
 def _pruned(found: list[_Chain]) -> list[_Chain]:
@@ -137,25 +138,38 @@ def _merged(found: list[_Chain]) -> list[_Chain]:
 def _lines(found: list[_Chain], areas: Floats, even: float, shortest_mm: float) -> list[Line]:
     """Chains cut where the width changes."""
     lines = []
-    for rough in sorted(found, key=lambda chain: chain.place):
-        chain = replace(rough, points=_smooth(rough.points))
-        for a, b in _even(chain.widths, chain.steps, even, shortest_mm):
-            steps = chain.steps[a:b]
-            middle = 0.5 * (chain.widths[a:b] + chain.widths[a + 1 : b + 1])
-            if steps.sum() > 0:
-                lines.append(
-                    Line(chain.points[a : b + 1], float(steps @ middle / steps.sum()), chain.place, float(areas[chain.place]))
-                )
+    for chain in sorted(found, key=lambda chain: chain.place):
+        points = _smooth(chain.points)
+        cuts, widths = _even(points, chain.widths, np.log(even), shortest_mm)
+        for a, b, width in zip(cuts[:-1], cuts[1:], widths, strict=True):
+            lines.append(Line(points[a : b + 1], float(width), chain.place, float(areas[chain.place])))
     return lines
 
 
-def _even(widths: Floats, steps: Floats, even: float, shortest_mm: float) -> list[tuple[int, int]]:
-    """Ranges of steps with nearly one width, none shorter than shortest_mm but where the whole chain is."""
+@njit(cache=True)
+def _even(points: Floats, widths: Floats, grade: float, shortest_mm: float) -> tuple[NDArray[np.int64], Floats]:
+    """Where pieces of nearly one width begin and end, none shorter than shortest_mm but where the whole chain is.
+
+    Widths are alike within one step of `grade` of their logarithm. Also the mean width of each piece.
+    """
+    n = len(points) - 1
+    way, level = np.zeros(n + 1), np.empty(n, np.int64)
     middle = 0.5 * (widths[1:] + widths[:-1])
-    smooth = np.convolve(np.pad(middle, 2, mode="edge"), np.full(5, 0.2), mode="valid")
-    level: Ints = np.round(np.log(np.maximum(smooth, 1e-3)) / np.log(even)).astype(np.int32)
-    way, cuts = np.concatenate([[0.0], np.cumsum(steps)]), [0]
-    for cut in (np.flatnonzero(np.diff(level)) + 1).tolist():
-        if way[cut] - way[cuts[-1]] >= shortest_mm <= way[-1] - way[cut]:
-            cuts.append(cut)
-    return list(pairwise([*cuts, len(middle)]))
+    for i in range(n):
+        way[i + 1] = way[i] + np.hypot(points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1])
+        around = 0.0
+        for k in range(i - 2, i + 3):
+            around += 0.2 * middle[min(max(k, 0), n - 1)]
+        level[i] = int(np.round(np.log(max(around, 1e-3)) / grade))
+    cuts = [0]
+    for i in range(1, n):
+        if level[i] != level[i - 1] and way[i] - way[cuts[-1]] >= shortest_mm and way[n] - way[i] >= shortest_mm:
+            cuts.append(i)
+    cuts.append(n)
+    means = np.empty(len(cuts) - 1)
+    for k in range(len(means)):
+        total = 0.0
+        for i in range(cuts[k], cuts[k + 1]):
+            total += (way[i + 1] - way[i]) * middle[i]
+        means[k] = total / max(way[cuts[k + 1]] - way[cuts[k]], 1e-12)
+    return np.array(cuts), means
