@@ -20,7 +20,7 @@ def filled(block: str, name: str, values: Mapping[str, object], longest: int) ->
         command = text.partition(";")[0].strip()
         if len(command) + FRAME > longest:
             raise ProfileError(
-                f"machine.gcode.{name}: the line {command[:40]!r}... has {len(command)} characters, "
+                f"{name}: the line {command[:40]!r}... has {len(command)} characters, "
                 f"at most {longest - FRAME} are allowed (the firmware's {longest} less line number and checksum)"
             )
         if text:
@@ -30,7 +30,7 @@ def filled(block: str, name: str, values: Mapping[str, object], longest: int) ->
 
 def _value(word: str, name: str, values: Mapping[str, object]) -> str:
     if word not in values:
-        raise ProfileError(f"machine.gcode.{name}: placeholder {{{word}}} is not known: allowed are {', '.join(sorted(values))}")
+        raise ProfileError(f"{name}: placeholder {{{word}}} is not known: allowed are {', '.join(sorted(values))}")
     value = values[word]
     if isinstance(value, float):
         return f"{value:.4f}".rstrip("0").rstrip(".") if abs(value) >= 5e-5 else "0"

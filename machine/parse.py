@@ -250,7 +250,7 @@ Action = Callable[[Reader, str, list[tuple[str, float]]], None]
 ACTIONS: tuple[tuple[Action, str], ...] = (
     (_mode, "G20 G21 G90 G91 M82 M83"),
     (_note, "G4 M0 M1 M18 M84 M104 M106 M107 M109 M140 M190 M400"),
-    (_nothing, "G17 G94 M73 M105 M110 M115 M117 M118 M155 M201 M203 M205 M220 M221 T0"),
+    (_nothing, "G17 G94 M486 M73 M105 M110 M115 M117 M118 M155 M201 M203 M205 M220 M221 T0"),
     (_accelerate, "M204"),
     (_home, "G28"),
     (_set, "G92"),

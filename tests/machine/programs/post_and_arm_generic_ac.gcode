@@ -4,6 +4,7 @@
 ; material = PLA
 ; process = standard
 ;TYPE:Custom
+M486 T2
 G21
 G90
 M83
@@ -14,6 +15,10 @@ G92 A0 C0
 M190 S60
 M109 S215
 G92 E0
+G21
+G90
+M83
+G92 E0
 G0 Z10.000 F600
 G0 X-4.775 Y-4.775 F9000
 ;TYPE:Custom
@@ -21,6 +26,7 @@ G0 A0.0000 C0.0000 F1800
 ;PART:1 of 2
 ;POSE:A0.0000 C0.0000
 G0 Z0.200 F600
+M486 S0
 ;LAYER_CHANGE
 ;Z:0.2
 ;HEIGHT:0.2
@@ -43,9 +49,12 @@ G1 Y-4.325 E0.29279
 M104 S210
 M106 S255
 M73 P5 R1
-G1 E-0.80000 F2100
-G0 Z0.400 F600
+;WIPE_START
+G1 X-2.325 E-0.80000 F5250
+;WIPE_END
+G0 Z0.600 F600
 G0 X-4.775 Y-4.775 F9000
+G0 Z0.400 F600
 G1 E0.80000 F2100
 ;TYPE:External perimeter
 G1 X4.775 E0.32326 F2400
@@ -61,10 +70,13 @@ G1 Y-4.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P9 R1
-G1 E-0.80000 F2100
-G0 Z0.600 F600
+M73 P10 R1
+;WIPE_START
+G1 X-2.325 E-0.80000 F5250
+;WIPE_END
+G0 Z0.800 F600
 G0 X-4.775 Y-4.775 F9000
+G0 Z0.600 F600
 G1 E0.80000 F2100
 ;TYPE:External perimeter
 G1 X4.775 E0.32325 F2400
@@ -77,7 +89,10 @@ G1 X4.325 E0.29279 F2400
 G1 Y4.325 E0.29280
 G1 X-4.325 E0.29279
 G1 Y-4.325 E0.29279
-G1 E-0.80000 F2100
+M486 S-1
+;WIPE_START
+G1 X-2.325 E-0.80000 F5250
+;WIPE_END
 G0 Z98.726 F600
 ;TYPE:Custom
 G0 A90.0000 C90.0000 F2546
@@ -85,11 +100,12 @@ G0 A90.0000 C90.0000 F2546
 ;POSE:A90.0000 C90.0000
 G0 X-4.775 Y-71.775 F9000
 G0 Z-6.800 F600
+M486 S1
 ;LAYER_CHANGE
 ;Z:0.2
 ;HEIGHT:0.2
 M107
-M73 P61 R1
+M73 P60 R1
 G1 E1.20000 F2100
 ;TYPE:External perimeter
 ;WIDTH:0.45
@@ -108,9 +124,12 @@ G1 Y-71.325 E0.29279
 ;HEIGHT:0.2
 M106 S255
 M73 P64 R1
-G1 E-0.80000 F2100
-G0 Z-6.600 F600
+;WIPE_START
+G1 X-2.325 E-0.80000 F5250
+;WIPE_END
+G0 Z-6.400 F600
 G0 X-4.775 Y-71.775 F9000
+G0 Z-6.600 F600
 G1 E0.80000 F2100
 ;TYPE:External perimeter
 G1 X4.775 E0.32326 F2400
@@ -127,9 +146,12 @@ G1 Y-71.325 E0.29280
 ;Z:0.6
 ;HEIGHT:0.2
 M73 P69 R1
-G1 E-0.80000 F2100
-G0 Z-6.400 F600
+;WIPE_START
+G1 X-2.325 E-0.80000 F5250
+;WIPE_END
+G0 Z-6.200 F600
 G0 X-4.775 Y-71.775 F9000
+G0 Z-6.400 F600
 G1 E0.80000 F2100
 ;TYPE:External perimeter
 G1 X4.775 E0.32325 F2400
@@ -142,7 +164,10 @@ G1 X4.325 E0.29279 F2400
 G1 Y-62.675 E0.29280
 G1 X-4.325 E0.29279
 G1 Y-71.325 E0.29279
-G1 E-0.80000 F2100
+M486 S-1
+;WIPE_START
+G1 X-2.325 E-0.80000 F5250
+;WIPE_END
 G0 Z98.726 F600
 ;TYPE:Custom
 G0 A0.0000 C0.0000 F2546
@@ -158,7 +183,9 @@ M73 P100 R0
 ; estimated printing time (normal mode) = 52s
 ; tiltprint_config = begin
 ; machine.name = generic A/C table
+; machine.shape = table
 ; machine.dialect = marlin
+; machine.coordinates = table
 ; machine.x.limits_mm = [-160.0, 160.0]
 ; machine.x.speed_mm_s = 300.0
 ; machine.x.acceleration_mm_s2 = 1500.0
@@ -169,26 +196,33 @@ M73 P100 R0
 ; machine.z.speed_mm_s = 15.0
 ; machine.z.acceleration_mm_s2 = 200.0
 ; machine.tilt.letter = A
+; machine.tilt.stepper = 
 ; machine.tilt.axis = [1.0, 0.0, 0.0]
 ; machine.tilt.point_mm = [0.0, 0.0, -12.0]
 ; machine.tilt.sign = -1
 ; machine.tilt.zero_deg = 0.0
 ; machine.tilt.limits_deg = [-95.0, 95.0]
+; machine.tilt.budget_deg = None
 ; machine.tilt.speed_deg_s = 30.0
 ; machine.tilt.acceleration_deg_s2 = 200.0
 ; machine.turn.letter = C
+; machine.turn.stepper = 
 ; machine.turn.axis = [0.0, 0.0, 1.0]
 ; machine.turn.point_mm = [0.0, 0.0, 0.0]
 ; machine.turn.sign = -1
 ; machine.turn.zero_deg = 0.0
 ; machine.turn.limits_deg = [-3600.0, 3600.0]
+; machine.turn.budget_deg = None
 ; machine.turn.speed_deg_s = 60.0
 ; machine.turn.acceleration_deg_s2 = 400.0
 ; machine.tool_mm = [0.0, 0.0, 0.0]
 ; machine.junction_speed_mm_s = 8.0
 ; machine.extruder_speed_mm_s = 60.0
 ; machine.extruder_acceleration_mm_s2 = 1500.0
+; machine.arcs = False
+; machine.arc_tolerance_mm = 0.025
 ; machine.table.radius_mm = 100.0
+; machine.table.size_mm = None
 ; machine.table.thickness_mm = 4.0
 ; machine.head.nozzle_mm = 0.4
 ; machine.head.silhouette_mm[0] = [0.6, 0.0]
@@ -231,9 +265,16 @@ M73 P100 R0
 ; material.first_layer_nozzle_c = 215.0
 ; material.bed_c = 60.0
 ; material.fan = 1.0
+; material.fan_least = 0.35
+; material.fan_layer_time_s = 60.0
+; material.fan_bridge = None
+; material.fan_off_layers = 1
 ; material.flow = 1.0
 ; material.retract_mm = 0.8
 ; material.retract_speed_mm_s = 35.0
+; material.wipe_mm = 2.0
+; material.coast_mm = 0.0
+; material.retract_prime_extra_mm = 0.0
 ; material.prime_extra_mm = 0.4
 ; material.volumetric_limit_mm3_s = 12.0
 ; process.name = standard
@@ -242,33 +283,88 @@ M73 P100 R0
 ; process.self_supporting_angle_deg = 45.0
 ; process.layer_height_mm = 0.2
 ; process.first_layer_height_mm = 0.2
+; process.adaptive_cusp_mm = 0.0
+; process.least_layer_height_mm = 0.08
+; process.most_layer_height_mm = 0.28
 ; process.line_width_mm = 0.45
 ; process.walls = 3
+; process.wall_order = inner-first
+; process.outer_bulge = 0.04
 ; process.top_layers = 4
 ; process.bottom_layers = 4
+; process.top_thickness_mm = 0.7
+; process.bottom_thickness_mm = 0.5
+; process.solid_below_mm2 = 70.0
 ; process.infill_density = 0.2
 ; process.infill_pattern = grid
 ; process.infill_angle_deg = 45.0
 ; process.infill_overlap = 0.15
+; process.infill_anchor_mm = 2.5
+; process.infill_joint_mm = 12.0
+; process.seam = aligned
+; process.seam_gap = 0.1
+; process.overhang_share = 0.5
+; process.bridge_longest_mm = 6.0
+; process.bridge_flow = 1.0
 ; process.support = auto
+; process.support_style = tree
+; process.support_on_part = True
+; process.support_branch_angle_deg = 40.0
+; process.support_branch_mm = 2.0
+; process.support_branch_growth_deg = 2.0
+; process.support_pattern = lines
 ; process.support_density = 0.15
+; process.support_walls = 1
+; process.support_interface_layers = 3
+; process.support_bottom_interface_layers = 2
+; process.support_interface_density = 0.7
 ; process.support_gap_mm = 0.2
-; process.support_distance_mm = 0.6
+; process.support_bottom_gap_mm = 0.2
+; process.support_distance_mm = 0.3
+; process.support_foot_mm = 2.0
+; process.support_foot_density = 0.7
+; process.support_least_mm2 = 1.0
 ; process.skirt_loops = 1
 ; process.skirt_distance_mm = 4.0
 ; process.brim_mm = 0.0
+; process.small_base_brim_mm = 5.0
+; process.brim_gap_mm = 0.0
+; process.elephant_foot_mm = 0.0
+; process.pedestal_gap_mm = 0.1
 ; process.interface_overlap = 0.5
 ; process.interface_flow = 1.05
 ; process.interface_speed_mm_s = 25.0
+; process.interface_layers = 3
+; process.interface_temperature_add_c = 5.0
+; process.interface_fan = 0.3
+; process.interface_extra_walls = 1
+; process.interface_seam_mm = 1.0
+; process.interlock_mm = 0.0
 ; process.outer_wall_speed_mm_s = 40.0
 ; process.inner_wall_speed_mm_s = 60.0
 ; process.skin_speed_mm_s = 60.0
+; process.overhang_speed_mm_s = 20.0
+; process.bridge_speed_mm_s = 30.0
 ; process.infill_speed_mm_s = 80.0
 ; process.support_speed_mm_s = 60.0
+; process.support_interface_speed_mm_s = 40.0
 ; process.first_layer_speed_mm_s = 20.0
+; process.gap_speed_mm_s = 30.0
+; process.top_skin_speed_mm_s = 40.0
+; process.small_wall_mm = 40.0
+; process.small_wall_speed_mm_s = 25.0
 ; process.travel_speed_mm_s = 150.0
 ; process.lift_speed_mm_s = 10.0
 ; process.retract_travel_mm = 1.5
+; process.combing = True
+; process.combing_detour_mm = 8.0
+; process.lift_mm = 0.2
+; process.acceleration_mm_s2 = None
+; process.outer_wall_acceleration_mm_s2 = None
+; process.infill_acceleration_mm_s2 = None
+; process.bridge_acceleration_mm_s2 = None
+; process.first_layer_acceleration_mm_s2 = None
+; process.travel_acceleration_mm_s2 = None
 ; process.least_layer_time_s = 5.0
 ; process.least_speed_mm_s = 10.0
 ; search.directions = 600
@@ -276,11 +372,13 @@ M73 P100 R0
 ; search.offset_step_mm = 1.0
 ; search.method = best
 ; search.beam_width = 2
+; search.polish = True
 ; search.least_volume_share = 0.02
 ; search.least_interface_mm2 = 4.0
+; search.fragile_mm = 0.3
+; search.pedestal_mm = 0.0
 ; search.most_parts = 12
 ; search.time_limit_s = None
-; search.polish = True
 ; search.least_gain = 0.005
 ; search.platform_radius_mm = None
 ; search.count_platform_faces = False

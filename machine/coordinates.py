@@ -1,0 +1,39 @@
+"""Coordinates: axis positions and the places on the table that a following firmware (TCP) calls X Y Z."""
+
+import numpy as np
+
+from machine.dialects import DIALECTS
+from machine.kinematics.table import machine_points, workpiece_points
+from mdp.mesh import Floats
+from mdp.pose import Pose, level, shift
+from profiles.machine import Machine
+
+
+def origin_mm(machine: Machine) -> Floats:
+    """(3,) the workpiece origin as a following firmware calls it.
+
+    LinuxCNC and Marlin: where X Y Z stand there with the table level, for their kinematics change nothing at tilt 0, turn 0.
+    grblHAL: zero, the turn axis on the table.
+    """
+    if DIALECTS[machine.dialect].follow_from_turn_axis:
+        return np.zeros(3)
+    return shift(machine, level(machine))
+
+
+def followed(machine: Machine, pose: Pose, points_mm: Floats) -> Floats:
+    """(n, 3) places on the table for (n, 3) axis positions at a pose."""
+    places: Floats = workpiece_points(machine, pose, points_mm) + origin_mm(machine)
+    return places
+
+
+def axis_positions(machine: Machine, rows: Floats) -> Floats:
+    """(n, 3) axis positions for (n, 5) rows of a followed X Y Z and tilt, turn in degrees."""
+    places = rows[:, :3] - origin_mm(machine)
+    positions = np.empty_like(places)
+    angles, pose_of = np.unique(rows[:, 3:5], axis=0, return_inverse=True)
+    order = np.argsort(pose_of.ravel(), kind="stable")
+    begins = np.searchsorted(pose_of.ravel()[order], np.arange(len(angles) + 1))
+    for k, (tilt_deg, turn_deg) in enumerate(angles.tolist()):
+        mine = order[begins[k] : begins[k + 1]]
+        positions[mine] = machine_points(machine, Pose(tilt_deg, turn_deg), places[mine])
+    return positions

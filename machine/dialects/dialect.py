@@ -1,0 +1,47 @@
+"""Dialect: what differs between the firmware families, as one row of words and rules."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """Words and rules of a firmware; an empty word means that the firmware has none and nothing is written.
+
+    {} takes the value, {name} a placeholder of the profile's blocks. A block is a tuple of lines.
+    """
+
+    firmware: str  # what people call it
+    longest_line: int  # characters the firmware keeps, line number and checksum included
+    nozzle: str  # {} deg C, without waiting
+    nozzle_wait: str  # {} deg C, waiting
+    fan_on: str  # {} 0 to fan_full
+    fan_off: str = "M107"
+    fan_full: int = 255
+    travel: str = "G0"
+    stroke: str = "G1"
+    arc_right: str = "G2"
+    arc_left: str = "G3"
+    filament: str = "E"  # the first of these letters that no rotary axis has
+    filament_relative: bool = True
+    modes: tuple[str, ...] = ("G21", "G90", "M83")  # said again after the start block, whatever that has left
+    progress: str = ""  # {} percent, {} minutes left
+    acceleration: str = ""  # {} of strokes, {} of travels, mm/s2
+    layer: str = ""  # {} layer of all layers, from 1
+    before_start: tuple[str, ...] = ()
+    after_start: tuple[str, ...] = ()
+    before_end: tuple[str, ...] = ()
+    last: str = ""
+    parts: str = ""  # {parts}: how many parts come
+    part: str = ""  # {index} from 0, {number} from 1: said before the first stroke for every part
+    part_begin: str = ""
+    part_end: str = ""
+    steppers: bool = False  # rotary axes are turned by MANUAL_STEPPER, not by words of G1
+    follow_on: str = ""  # X Y Z mean places on the table from here on (TCP)
+    follow_off: str = ""
+    follow_from_turn_axis: bool = False  # those places count from where the turn axis meets the table, else from machine zero
+    inverse_time: bool = False  # knows G93
+    largest_delta: bool = False  # F of a pure turn is the speed of the axis that goes farthest, else along sqrt(tilt^2 + turn^2)
+    rapid: bool = False  # G0 goes as fast as the axes can, whatever F says
+    distance_sets_filament: bool = False  # G90 and G91 set the filament's mode too
+    value_word: str = "S"  # of temperatures and fans
+    serial: bool = True  # takes numbered lines with checksums over a serial line and answers ok

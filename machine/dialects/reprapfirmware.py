@@ -1,0 +1,21 @@
+"""RepRapFirmware 3: the words are those of M584 (A C, B C or U V); fans count 0 to 1, M568 sets a tool's temperature.
+
+Mainline has no TCP, so coordinates are the table's.
+"""
+
+from machine.dialects.dialect import Dialect
+
+REPRAPFIRMWARE = Dialect(
+    firmware="RepRapFirmware",
+    longest_line=160,  # its buffer is longer since 3.4, older boards keep 161 with the closing zero
+    nozzle="M568 P0 S{}",
+    nozzle_wait="M109 S{}",
+    fan_on="M106 P0 S{}",
+    fan_off="M106 P0 S0",
+    fan_full=1,
+    progress="M73 P{} R{}",
+    acceleration="M204 P{} T{}",
+    parts="M486 T{parts}",
+    part_begin='M486 S{index} A"part {number}"',
+    part_end="M486 S-1",
+)
