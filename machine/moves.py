@@ -11,13 +11,14 @@ from slicer.paths import Kind
 class BeginPart:
     """The moves after this print part `index` at `pose`; turn and tilt have been reached by a Reorient.
 
-    unsupported_mm2: area of its risky faces that no support could be given.
+    unsupported_mm2: area of its risky faces that no support could be given; unsupported_layer: the layer with most of it.
     """
 
     index: int
     pose: Pose
     layers: int
     unsupported_mm2: float = 0.0
+    unsupported_layer: int = 0
 
 
 @dataclass(frozen=True)

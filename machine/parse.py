@@ -48,7 +48,7 @@ class Reader:
     rows: list[tuple[float, ...]] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
-    unsupported: list[tuple[int, int, float]] = field(default_factory=list)
+    unsupported: list[tuple[int, int, float, int]] = field(default_factory=list)
 
 
 def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
@@ -276,7 +276,9 @@ def _remark(reader: Reader, remark: str) -> None:
     elif key == "PART":
         _part(reader, value)
     elif key == "UNSUPPORTED":
-        reader.unsupported.append((reader.number, reader.part, _positive(value)))
+        area, _, layer = value.partition("@")
+        worst = int(layer) if re.fullmatch("[0-9]{1,6}", layer) else 0
+        reader.unsupported.append((reader.number, reader.part, _positive(area), worst))
 
 
 def _part(reader: Reader, value: str) -> None:

@@ -38,7 +38,7 @@ class ParsedProgram:
     F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
     type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
     acceleration: mm/s2 told by M204, inf where the axes decide. layers: number of layer changes. parts: numbers of the parts
-    in order. unsupported: (line, part, mm2).
+    in order. unsupported: (line, part, mm2, layer).
     """
 
     line: NDArray[np.int64]
@@ -59,4 +59,4 @@ class ParsedProgram:
     ignored: dict[str, tuple[int, int]]
     layers: int
     parts: tuple[int, ...]
-    unsupported: tuple[tuple[int, int, float], ...]
+    unsupported: tuple[tuple[int, int, float, int], ...]

@@ -37,7 +37,7 @@ def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Pr
     for piece in pieces:
         part = parts[piece.index]
         shift = part_shift(machine, part.pose, part.base.offset_mm)
-        begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported_mm2)
+        begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported_mm2, piece.unsupported_layer)
         moves += _reach(tip, begin, _first_point(piece) + shift, together(printed), profile, first=not printed)
         for number, layer in enumerate(piece.layers, start=1):
             if layer.paths:

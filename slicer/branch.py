@@ -139,7 +139,7 @@ def _narrowed(branch: Branch, reached: Polygons, lean: float) -> Branch | None:
 
 def _rests(branch: Branch, ground: Polygons) -> bool:
     """Whether most of a branch has come to ground."""
-    return 2.0 * (branch.area - ground).area() < branch.area.area()
+    return bool(2.0 * (branch.area - ground).area() < branch.area.area())
 
 
 def _aside(branches: Sequence[Branch], room: Room, layer: int) -> list[Branch]:

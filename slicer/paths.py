@@ -76,12 +76,14 @@ class Layer:
 class SlicedPart:
     """A part's layers from its base plane upward; index and pose are those of the Part.
 
-    unsupported_mm2: area of risky faces that no support could be given, reported as a finding.
+    unsupported_mm2: area of risky faces that no support could be given, reported as a finding; unsupported_layer: number
+    of the layer with most of it, counted from 1.
     """
 
     index: int
     layers: tuple[Layer, ...]
     unsupported_mm2: float = 0.0
+    unsupported_layer: int = 0
 
     @property
     def volume_mm3(self) -> float:

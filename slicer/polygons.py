@@ -33,9 +33,9 @@ def grown(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Polyg
     return polygons.offset(distance_mm, JoinType.Miter, mitre)
 
 
-def rounded(polygons: Polygons, distance_mm: float) -> Polygons:
-    """Every boundary moved outward (negative: inward) by the distance, corners round."""
-    return polygons.offset(distance_mm, JoinType.Round, MITRE, ARC_SEGMENTS)
+def rounded(polygons: Polygons, distance_mm: float, segments: int = ARC_SEGMENTS) -> Polygons:
+    """Every boundary moved outward (negative: inward) by the distance, corners round, a full turn in so many segments."""
+    return polygons.offset(distance_mm, JoinType.Round, MITRE, segments)
 
 
 def opened(polygons: Polygons, radius_mm: float) -> Polygons:

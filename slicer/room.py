@@ -13,7 +13,7 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.heights import Heights
-from slicer.polygons import JoinType, Polygons, grown, united
+from slicer.polygons import Polygons, grown, rounded, united
 
 COARSE_MM = 0.03  # sections are simplified by this before they are grown
 MARGIN_MM = 0.08  # and grown by this more, which leaves room for simplified support
@@ -40,7 +40,7 @@ class Room:
 
 def leaning(area: Polygons, distance_mm: float) -> Polygons:
     """The area grown with round corners by at most a distance."""
-    return area.offset(distance_mm, JoinType.Round, 2.0, SEGMENTS) if distance_mm > 0.0 else area
+    return rounded(area, distance_mm, SEGMENTS) if distance_mm > 0.0 else area
 
 
 def solid(places: Polygons) -> Polygons:

@@ -90,7 +90,8 @@ def slice_part(
         if show is not None:
             show(i + 1, len(outlines))
     _check(part, mesh.bounds_mm, layers, process)
-    return SlicedPart(part.index, tuple(layers), props.unsupported_mm2)
+    worst = sum(layer.z_mm <= at.tip_mm[props.worst_layer] for layer in layers) if props.unsupported_mm2 > 0 else 0
+    return SlicedPart(part.index, tuple(layers), props.unsupported_mm2, worst)
 
 
 def _beads(

@@ -33,6 +33,11 @@ class Supports:
         """Hanging area, seen from above, that none could reach."""
         return float(sum(place.area() for place in self.missed))
 
+    @property
+    def worst_layer(self) -> int:
+        """The layer with most of it, counted from 0."""
+        return int(np.argmax([place.area() for place in self.missed]))
+
 
 def supports(
     hanging: Sequence[Polygons],

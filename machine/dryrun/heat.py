@@ -58,9 +58,10 @@ def _profile(program: ParsedProgram, profile: Profile) -> list[Finding]:
     if profile.machine.uncalibrated:
         keys = ", ".join(profile.machine.uncalibrated)
         found.append(Finding("warning", "uncalibrated", 0, 0, 0, f"no source gives these numbers, measure them: {keys}"))
-    for line, part, area in program.unsupported:
-        message = f"{area:g} mm2 of risky faces could be given no support"
-        found.append(Finding("warning", "unsupported", line, part, 0, message))
+    for line, part, area, layer in program.unsupported:
+        where = f", most of them in layer {layer}" if layer else ""
+        message = f"{area:g} mm2 of risky faces of part {part} could be given no support{where}"
+        found.append(Finding("warning", "unsupported", line, part, layer, message))
     return found
 
 
