@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.collide import Body, Printed, bodies, directions, gaps_of, hull, refined_gap, sweep_gaps, swept, table_reach
-from machine.dryrun.contact import stretches
 from machine.dryrun.findings import MOST, Finding, cut_short
+from machine.dryrun.stretches import stretches
 from machine.parsed import MoveKind, ParsedProgram
 from machine.reorient import poses_between
 from mdp.mesh import Floats

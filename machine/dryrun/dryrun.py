@@ -1,6 +1,6 @@
 """Dryrun: a G-code text played through the machine's kinematics, without a machine."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import pi
 from typing import Any
@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, contact, heat, motion, plate
+from machine.dryrun import clearance, heat, laying, made, motion, plate, sequence
 from machine.dryrun.findings import Finding
+from machine.dryrun.ground import Ground, Laid, beads, walk
 from machine.dryrun.timeline import move_times
 from machine.kinematics.table import workpiece_path
 from machine.limits import axis_limits
@@ -27,7 +28,7 @@ class DryRun:
 
     times_s: (n,) seconds of each row of program; dwell_s: waiting told by G4 (heating and homing are not counted).
     segments_mm: (m, 2, 3) deposited segments, workpiece frame; segment_row: (m,) their rows in program, which hold line,
-    part, layer, type, width and height; segment_mm3: (m,) their volumes.
+    part, layer, type, width and height; segment_mm3: (m,) their volumes. ground: what lay under each row.
     """
 
     program: ParsedProgram
@@ -36,6 +37,7 @@ class DryRun:
     segments_mm: Floats
     segment_row: NDArray[np.int64]
     segment_mm3: Floats
+    ground: Ground
     findings: tuple[Finding, ...]
     letters: tuple[str, ...]
 
@@ -57,18 +59,22 @@ class DryRun:
 
 def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     """Read G-code lines and play them: times, deposited plastic, findings. Raises GcodeError for what is not G-code."""
-    machine = profile.machine
-    program = parse_gcode(lines, machine)
+    machine, text = profile.machine, lines if isinstance(lines, Sequence) else list(lines)
+    program = parse_gcode(text, machine)
     rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
     ends = [workpiece_path(machine, side[rows]) for side in (program.start, program.end)]
     segments = np.stack(ends, axis=1)
     area = pi * profile.material.diameter_mm**2 / 4.0
     stop = np.zeros(len(program.line), dtype=np.bool_)
     stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
+    deposited = beads(program, segments, rows, profile)
+    ground = walk(program, deposited, profile)
     found = [
         *motion.findings(program, machine),
         *clearance.findings(program, segments, rows, machine),
-        *contact.findings(program, segments, rows, machine),
+        *laying.findings(program, deposited, ground),
+        *sequence.findings(program, profile),
+        *made.findings(text, program, profile),
         *plate.findings(program, segments, rows, profile),
         *heat.findings(program, profile),
     ]
@@ -80,6 +86,7 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
         segments_mm=segments,
         segment_row=rows,
         segment_mm3=program.e_mm[rows] * area,
+        ground=ground,
         findings=tuple(found),
         letters=tuple(axis_limits(machine)),
     )

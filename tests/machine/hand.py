@@ -69,3 +69,12 @@ def text(machine: str = "generic_ac", layers: int = 3) -> tuple[str, ...]:
     """The G-code of the post and the arm."""
     profile, _, _, program = printed(machine, layers)
     return tuple(write_gcode(program, profile))
+
+
+@cache
+def whole(machine: str = "generic_ac") -> tuple[Profile, tuple[str, ...]]:
+    """Profile and G-code of a post printed to its top, 60 mm, and the arm on its side."""
+    profile = load(machine=machine)
+    decomposition = post_and_arm(profile.machine)
+    sliced = [squares(piece, profile, layers) for piece, layers in zip(decomposition.parts, (300, 5), strict=True)]
+    return profile, tuple(write_gcode(plan(decomposition, sliced, profile), profile))

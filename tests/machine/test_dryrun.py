@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from machine.dryrun import DryRun, dry_run, summary
 from machine.dryrun.timeline import move_times
 from profiles.profile import load
-from tests.machine.hand import printed, text
+from tests.machine.hand import printed, text, whole
 
 PROFILE = load()
 MACHINE = PROFILE.machine.model_copy(update={"uncalibrated": []})
@@ -96,7 +96,7 @@ def _codes(text: str) -> list[str]:
 )
 def test_a_planted_fault_is_found_by_its_own_code_and_line(moves: str, code: str, line: int) -> None:
     found = dry_run((BEGIN + moves + END).splitlines(), CLEAN).findings
-    assert {(finding.code, finding.line) for finding in found} == {(code, line)}
+    assert {(finding.code, finding.line) for finding in found if finding.code != "air"} == {(code, line)}
 
 
 @pytest.mark.parametrize("moves", ["G0 X90 F3000\nG0 Z0.2 F600\nG1 X99 E0.1", "G0 X101 F3000\nG0 Z5 F600\nG1 X110 E0.1"])
@@ -124,7 +124,7 @@ def test_moves_before_homing_are_found() -> None:
 
 
 def test_extruding_before_the_nozzle_was_waited_for_is_found() -> None:
-    assert _codes("G28\nM104 S210\nM83\nG1 Z5 F600\nG1 X10 E0.1\nM104 S0") == ["cold-extrusion"]
+    assert _codes("G28\nM104 S210\nM83\nG1 Z5 F600\nG1 X5 E0.1\nM104 S0") == ["cold-extrusion"]
 
 
 @pytest.mark.parametrize(("heat", "message"), [("M109 S210", "nozzle"), ("M140 S60", "bed")])
@@ -142,8 +142,8 @@ def test_uncalibrated_numbers_are_named_as_a_warning() -> None:
 
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
 def test_our_own_program_has_no_errors(machine: str) -> None:
-    profile = printed(machine)[0]
-    assert [finding.code for finding in dry_run(text(machine), profile).findings] == ["uncalibrated"]
+    profile, lines = whole(machine)
+    assert [finding.code for finding in dry_run(lines, profile).findings] == ["uncalibrated"]
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])

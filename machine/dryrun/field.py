@@ -1,0 +1,170 @@
+"""Field: the heights of what lies under the head at one pose of the table, on a lattice over X and Y of the machine.
+
+A coarse lattice of the greatest heights settles most moves; near the head every cell is tried at its distance from the move.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernel import part
+from mdp.mesh import Floats
+
+NOTHING = -1e9
+BLOCK = 16  # cells of the fine lattice to a side of a coarse one
+CELL_MM, MOST_CELLS = 0.15, 6_000_000
+PIECE_MM = 0.25
+
+
+class Field(NamedTuple):
+    """(n,) cells, row by row, n = shape[0] shape[1]: height of the plastic, what it was below this layer, which row laid it."""
+
+    origin: Floats
+    cell: float
+    shape: NDArray[np.int64]
+    top: NDArray[np.float32]
+    below: NDArray[np.float32]
+    owner: NDArray[np.int32]
+    coarse: Floats
+    highest: Floats
+
+
+def empty(low: Floats, high: Floats) -> Field:
+    """A field over a rectangle with nothing in it; its cells grow with the rectangle."""
+    size = np.maximum(high - low, 1.0)
+    cell = max(CELL_MM, float(np.sqrt(size.prod() / MOST_CELLS)))
+    shape = np.ceil(size / cell).astype(np.int64) + 1
+    count, blocks = int(shape.prod()), (shape + BLOCK - 1) // BLOCK
+    heights = (np.full(count, NOTHING, np.float32), np.full(count, NOTHING, np.float32), np.full(count, -1, np.int32))
+    return Field(np.asarray(low, np.float64), cell, shape, *heights, np.full(int(blocks.prod()), NOTHING), np.full(1, NOTHING))
+
+
+@part
+def raised(i, j, z, row, field):  # type: ignore[no-untyped-def]
+    """Raise one cell to z; `below` keeps what it was before."""
+    k = i * field.shape[1] + j
+    if z > field.top[k] + 1e-4:
+        field.below[k], field.top[k] = field.top[k], z
+        field.owner[k] = row
+        c = (i // BLOCK) * ((field.shape[1] + BLOCK - 1) // BLOCK) + j // BLOCK
+        field.coarse[c] = max(field.coarse[c], z)
+        field.highest[0] = max(field.highest[0], z)
+
+
+@part
+def laid(a, b, half, row, field):  # type: ignore[no-untyped-def]
+    """Add a straight bead that reaches `half` to each side: one run of cells across for every cell along."""
+    along = 0 if abs(b[0] - a[0]) >= abs(b[1] - a[1]) else 1
+    if a[along] > b[along]:
+        a, b = b, a
+    other = 1 - along
+    length = b[along] - a[along]
+    slope = (b[other] - a[other]) / length if length > 1e-9 else 0.0
+    rise = (b[2] - a[2]) / length if length > 1e-9 else 0.0
+    across, cell = half * np.sqrt(1.0 + slope * slope), field.cell
+    first = max(int(np.floor((a[along] - field.origin[along]) / cell)), 0)
+    last = min(int(np.floor((b[along] - field.origin[along]) / cell)), field.shape[along] - 1)
+    for p in range(first, last + 1):
+        u = min(max(field.origin[along] + (p + 0.5) * cell, a[along]), b[along]) - a[along]
+        v, z = a[other] + slope * u - field.origin[other], a[2] + rise * u
+        low = max(int(np.floor((v - across) / cell + 0.5)), 0)
+        high = min(int(np.floor((v + across) / cell - 0.5)), field.shape[other] - 1)
+        if high < low:
+            low = high = min(max(int(np.floor(v / cell)), 0), field.shape[other] - 1)
+        for q in range(low, high + 1):
+            if along == 0:
+                raised(p, q, z, row, field)
+            else:
+                raised(q, p, z, row, field)
+
+
+@part
+def hanging(radius, silhouette):  # type: ignore[no-untyped-def]
+    """Height above the tip of the hot end's lowest point at a radius; a great number beyond its widest."""
+    if radius <= silhouette[0, 0]:
+        return silhouette[0, 1]
+    for k in range(len(silhouette) - 1):
+        if radius <= silhouette[k + 1, 0]:
+            share = (radius - silhouette[k, 0]) / (silhouette[k + 1, 0] - silhouette[k, 0])
+            return silhouette[k, 1] + share * (silhouette[k + 1, 1] - silhouette[k, 1])
+    return 1e9
+
+
+@part
+def aside(px, py, a, b):  # type: ignore[no-untyped-def]
+    """Distance across, in X and Y alone, of a point from a move."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    size = dx * dx + dy * dy
+    t = min(max(((px - a[0]) * dx + (py - a[1]) * dy) / size, 0.0), 1.0) if size > 0.0 else 0.0
+    ex, ey = px - a[0] - t * dx, py - a[1] - t * dy
+    return np.sqrt(ex * ex + ey * ey)
+
+
+@part
+def over(px, py, half, a, b, box):  # type: ignore[no-untyped-def]
+    """True when a box that goes with the tip from a to b comes over a square of half a side `half` about a point."""
+    low, high = 0.0, 1.0
+    for k in range(2):
+        delta, p = b[k] - a[k], (px if k == 0 else py) - a[k]
+        least, most = p - box[3 + k] - half, p - box[k] + half
+        if abs(delta) < 1e-12:
+            if least > 0.0 or most < 0.0:
+                return False
+        else:
+            low = max(low, min(least / delta, most / delta))
+            high = min(high, max(least / delta, most / delta))
+    return low <= high
+
+
+@part
+def depth_at(px, py, half, rise, slack, a, b, silhouette, boxes):  # type: ignore[no-untyped-def]
+    """How deep the head, its tip `rise` below the top of a column, goes into it during a level move; 0 up to `slack`."""
+    deepest = 0.0
+    depth = rise - hanging(max(aside(px, py, a, b) - 1.4143 * half, 0.0), silhouette)
+    if depth > slack:
+        deepest = depth
+    for k in range(len(boxes)):
+        if rise - boxes[k, 2] > max(deepest, slack) and over(px, py, half, a, b, boxes[k]):
+            deepest = rise - boxes[k, 2]
+    return deepest
+
+
+@part
+def depth_of(a, b, slack, field, silhouette, boxes):  # type: ignore[no-untyped-def]
+    """How deep the head goes into the field at most during a level move; 0 up to `slack`."""
+    deepest, size, cell = 0.0, BLOCK * field.cell, field.cell
+    wide = (field.shape[1] + BLOCK - 1) // BLOCK
+    for c in range(len(field.coarse)):
+        if field.coarse[c] - a[2] <= slack:
+            continue
+        i, j = c // wide, c % wide
+        px, py = field.origin[0] + (i + 0.5) * size, field.origin[1] + (j + 0.5) * size
+        if depth_at(px, py, 0.5 * size, field.coarse[c] - a[2], slack, a, b, silhouette, boxes) == 0.0:
+            continue
+        for p in range(i * BLOCK, min((i + 1) * BLOCK, field.shape[0])):
+            for q in range(j * BLOCK, min((j + 1) * BLOCK, field.shape[1])):
+                rise = field.top[p * field.shape[1] + q] - a[2]
+                if rise > slack and rise > deepest:
+                    x, y = field.origin[0] + (p + 0.5) * cell, field.origin[1] + (q + 0.5) * cell
+                    deepest = max(deepest, depth_at(x, y, 0.0, rise, slack, a, b, silhouette, boxes))
+    return deepest
+
+
+@part
+def sloped_depth(a, b, slack, field, silhouette, boxes):  # type: ignore[no-untyped-def]
+    """depth_of for any move: a slanting one in pieces, each at its lowest place."""
+    if min(a[2], b[2]) + slack >= field.highest[0]:
+        return 0.0
+    across = max(abs(b[0] - a[0]), abs(b[1] - a[1]))
+    pieces = 1
+    if abs(b[2] - a[2]) > 1e-6 and across > 1e-6:
+        pieces = int(max(across, abs(b[2] - a[2])) / PIECE_MM) + 1
+    deepest = 0.0
+    for k in range(pieces):
+        s, t = k / pieces, (k + 1) / pieces
+        z = min(a[2] + s * (b[2] - a[2]), a[2] + t * (b[2] - a[2]))
+        c = (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), z)
+        d = (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), z)
+        deepest = max(deepest, depth_of(c, d, slack, field, silhouette, boxes))
+    return deepest

@@ -1,0 +1,79 @@
+"""Sequence: findings about the order of parts and layers, and about filament pulled back and pushed again."""
+
+import numpy as np
+
+from machine.dryrun.findings import Finding
+from machine.parsed import MoveKind, ParsedProgram
+from profiles.profile import Profile
+
+PURGE = "Custom"
+SLACK_MM = 0.02
+
+
+def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
+    """Errors of code order and retraction."""
+    return [*_parts(program), *_layers(program), *_pulled(program, profile)]
+
+
+def _place(program: ParsedProgram, row: int) -> tuple[int, int, int]:
+    return int(program.line[row]), int(program.part[row]), int(program.layer[row])
+
+
+def _parts(program: ParsedProgram) -> list[Finding]:
+    """The first part that comes after a part with a greater number."""
+    laid = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
+    falling = np.flatnonzero(np.diff(program.part[laid]) < 0)
+    if not len(falling):
+        return []
+    row, before = int(laid[falling[0] + 1]), int(program.part[laid[falling[0]]])
+    message = f"part {program.part[row]} is printed after part {before}: parts are printed in the order of their numbers"
+    return [Finding("error", "order", *_place(program, row), message)]
+
+
+def _layers(program: ParsedProgram) -> list[Finding]:
+    """In every part the first layer that lies lower than the one before it."""
+    purge = np.array([name == PURGE for name in program.types], dtype=np.bool_)[program.type]
+    rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~purge)
+    z, height = program.end[rows, 2], program.height_mm[rows]
+    same = (np.diff(program.part[rows]) == 0) & np.all(program.end[rows[1:], 3:] == program.end[rows[:-1], 3:], axis=1)
+    lower = np.flatnonzero(same & (np.diff(program.layer[rows]) != 0) & (np.diff(z) < -0.25 * height[1:] - SLACK_MM))
+    found = []
+    for part in np.unique(program.part[rows[lower + 1]]):
+        k = int(lower[program.part[rows[lower + 1]] == part][0])
+        message = f"layer {program.layer[rows[k + 1]]} lies {z[k] - z[k + 1]:.2f} mm lower than the layer before it"
+        found.append(Finding("error", "order", *_place(program, int(rows[k + 1])), message))
+    return found
+
+
+def _pulled(program: ParsedProgram, profile: Profile) -> list[Finding]:
+    """Filament pushed at standstill that was not pulled back before, and beads begun with filament still pulled back.
+
+    Nothing is said of a program that never pulls back; what the start block does is its own affair.
+    """
+    e, extra = program.e_mm, max(profile.material.prime_extra_mm, profile.material.retract_prime_extra_mm)
+    rows = np.flatnonzero((np.abs(e) > 1e-9) & (program.part > 0))
+    back = rows[e[rows] < 0.0]
+    if not len(back):
+        return []
+    pushing = program.kind[rows] == MoveKind.EXTRUDE
+    state = np.where(pushing, 0.0, -e[rows])
+    # Runs between beads: what they pull back and push again must come to nothing, or to the extra push after it.
+    run = np.cumsum(pushing)
+    balance = np.bincount(run, weights=state)
+    has = np.bincount(run, weights=~pushing) > 0
+    ends = np.searchsorted(run, np.arange(len(balance)), side="right") < len(run)
+    over = has & (balance < -extra - SLACK_MM) & (np.arange(len(balance)) > 0)
+    under = has & ends & (balance > SLACK_MM)
+    found = []
+    for wrong, said in (
+        (over, "{:.3f} mm more filament is pushed than was pulled back"),
+        (under, "{:.3f} mm of filament stay pulled back"),
+    ):
+        runs = np.flatnonzero(wrong)
+        for part in np.unique(program.part[rows[np.searchsorted(run, runs)]]):
+            mine = [r for r in runs if program.part[rows[np.searchsorted(run, r)]] == part]
+            worst = max(abs(balance[r]) for r in mine)
+            row = int(rows[np.searchsorted(run, mine[0], side="right") - 1])
+            message = f"{said.format(worst)} before the next bead (places: {len(mine)})"
+            found.append(Finding("error", "retraction", *_place(program, row), message))
+    return found
