@@ -24,7 +24,7 @@ from mdp.pedestal import on_pedestal
 from mdp.plane import PLATFORM
 from mdp.polish import polished
 from mdp.pool import entries
-from mdp.pose import level, poses, rotation
+from mdp.pose import Pose, level, poses, rotation
 from mdp.ranker import RANKERS
 from mdp.record import Trace
 from mdp.rules import Rules
@@ -166,8 +166,13 @@ def _parts(node: Node, machine: Machine, angle_deg: float, clearance: bool) -> t
     options = [[level(machine)]]
     for base, mesh in solids[1:]:
         options.append(allowed_poses(machine, base.normal, mesh.vertices) if clearance else poses(machine, base.normal))
+
+    def fits(place: int, pose: Pose) -> bool:
+        base, mesh = solids[place]
+        return not clearance or pose in allowed_poses(machine, base.normal, mesh.vertices, pose.turn_deg)
+
     parts = []
-    for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options), strict=True)):
+    for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options, fits), strict=True)):
         risky = risky_above(mesh, base, angle_deg) if position else node.remainder.risky
         parts.append(
             Part(

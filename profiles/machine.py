@@ -95,7 +95,7 @@ class RotaryAxis(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        problems = _reversed(self.limits_deg, "limits_deg")
+        problems = _reversed(self.limits_deg, "limits_deg") if not isinstance(self, StillAxis) else []
         if sum(x * x for x in self.axis) < 1e-12:
             problems.append(f"axis is {list(self.axis)}: a direction must not be zero")
         if not problems and not self.limits_deg[0] <= self.zero_deg <= self.limits_deg[1]:
@@ -104,12 +104,20 @@ class RotaryAxis(Frozen):
         return self
 
 
-def _still(letter: str, axis: Vector) -> RotaryAxis:
+class StillAxis(RotaryAxis):
     """The rotary axis of a machine that has none: it stands at 0."""
-    return RotaryAxis.model_construct(
-        letter=letter, axis=axis, point_mm=(0.0, 0.0, 0.0), sign=-1, limits_deg=(0.0, 0.0), speed_deg_s=1.0,
-        acceleration_deg_s2=1.0,
-    )  # fmt: skip
+
+    point_mm: Vector = (0.0, 0.0, 0.0)
+    sign: Literal[-1, 1] = -1
+    limits_deg: Limits = (0.0, 0.0)
+    speed_deg_s: float = 1.0
+    acceleration_deg_s2: float = 1.0
+
+
+STANDING = {
+    "tilt": StillAxis.model_validate({"letter": "A", "axis": (1.0, 0.0, 0.0)}),
+    "turn": StillAxis.model_validate({"letter": "C", "axis": (0.0, 0.0, 1.0)}),
+}
 
 
 class Box(Frozen):
@@ -263,7 +271,7 @@ class Machine(Frozen):
         """A fixed machine gets rotary axes that stand at 0, so that one chain serves both shapes."""
         if not isinstance(given, dict) or given.get("shape") != "fixed":
             return given
-        return given | {"tilt": _still("A", (1.0, 0.0, 0.0)), "turn": _still("C", (0.0, 0.0, 1.0))}
+        return given | STANDING
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -3,16 +3,43 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from machine.kinematics.table import machine_points, workpiece_path, workpiece_points
-from mdp.pose import UP, Pose, poses, rotation
+from mdp.mesh import Floats
+from mdp.pose import SINGULAR, UP, Pose, axis_rotation, level, poses, rotation, unit
 from profiles.machine import Machine
-from profiles.profile import load, shipped
+from profiles.profile import load, load_one, shipped
 
-VECTORS = Path(__file__).parents[2].parent / "shared" / "reference" / "xyzac_trt_vectors.json"
+Place = tuple[float, float, float]
+TRT_VECTORS = Path(__file__).parents[2].parent / "shared" / "reference" / "xyzac_trt_vectors.json"
 ANGLES = st.floats(-180, 180)
+PLACES = st.tuples(*[st.floats(-300, 300)] * 3)
+VECTORS = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
+TILTING = [name for name in shipped("machine") if load_one(name)["machine"].tilts]  # type: ignore[attr-defined]
+
+
+def _chain(
+    axes: tuple[Place, Place], points: tuple[Place, Place, Place], signs: tuple[int, int], zeros: tuple[float, float]
+) -> Machine:
+    """A table with any two axes through any two points, any signs, zeros and tool vector."""
+    generic = load().machine
+    turning = [
+        axis.model_copy(update={"axis": v, "point_mm": p, "sign": s, "zero_deg": z, "limits_deg": (-1000.0, 1000.0)})
+        for axis, v, p, s, z in zip((generic.tilt, generic.turn), axes, points[:2], signs, zeros, strict=True)
+    ]
+    return generic.model_copy(update={"tilt": turning[0], "turn": turning[1], "tool_mm": points[2]})
+
+
+def _apart(axes: tuple[Place, Place]) -> bool:
+    return float(np.linalg.norm(np.cross(unit(axes[0]), unit(axes[1])))) > 0.2
+
+
+SIGNS = st.tuples(*[st.sampled_from([-1, 1])] * 2)
+CHAINS = st.builds(
+    _chain, st.tuples(VECTORS, VECTORS).filter(_apart), st.tuples(PLACES, PLACES, PLACES), SIGNS, st.tuples(ANGLES, ANGLES)
+)
 
 
 def _trt(params: dict[str, float]) -> Machine:
@@ -26,9 +53,9 @@ def _trt(params: dict[str, float]) -> Machine:
     return generic.model_copy(update={"tilt": tilt, "turn": turn, "tool_mm": (0.0, 0.0, params["tool_offset"])})
 
 
-@pytest.mark.skipif(not VECTORS.exists(), reason="the independent test vectors lie beside the project")
+@pytest.mark.skipif(not TRT_VECTORS.exists(), reason="the independent test vectors lie beside the project")
 def test_linuxcnc_vectors_come_out_to_a_millionth_of_a_millimetre() -> None:
-    for vector in json.loads(VECTORS.read_text())["vectors"]:
+    for vector in json.loads(TRT_VECTORS.read_text())["vectors"]:
         machine = _trt(vector["params"])
         world, joints = ([vector[name][axis] for axis in "XYZ"] for name in ("world", "joints"))
         pose = Pose(vector["world"]["A"], vector["world"]["C"])
@@ -37,24 +64,79 @@ def test_linuxcnc_vectors_come_out_to_a_millionth_of_a_millimetre() -> None:
         assert pytest.approx(vector["nozzle_axis_in_part_frame"], abs=1e-6) == rotation(machine, pose).T @ UP
 
 
-@given(ANGLES, ANGLES, st.lists(st.floats(-300, 300), min_size=3, max_size=3))
-def test_back_from_the_machine_gives_the_same_workpiece_point(tilt: float, turn: float, point: list[float]) -> None:
-    machine = load().machine
-    there = machine_points(machine, Pose(tilt, turn), np.array([point]))
-    row = np.concatenate([there, [[tilt, turn]]], axis=1)
-    assert workpiece_points(machine, Pose(tilt, turn), there)[0] == pytest.approx(point, abs=1e-9)
-    assert workpiece_path(machine, row)[0] == pytest.approx(point, abs=1e-9)
+@given(st.data())
+def test_back_from_the_machine_gives_the_same_workpiece_point(data: st.DataObject) -> None:
+    machine, pose, point = data.draw(CHAINS), Pose(data.draw(ANGLES), data.draw(ANGLES)), np.array([data.draw(PLACES)])
+    there = machine_points(machine, pose, point)
+    row = np.concatenate([there, [[pose.tilt_deg, pose.turn_deg]]], axis=1)
+    assert workpiece_points(machine, pose, there)[0] == pytest.approx(point[0], abs=1e-9)
+    assert workpiece_path(machine, row)[0] == pytest.approx(point[0], abs=1e-9)
 
 
-@pytest.mark.parametrize("name", shipped("machine"))
-@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.05, 1))
-def test_every_pose_brings_its_direction_upright(name: str, x: float, y: float, z: float) -> None:
+@given(st.data())
+def test_back_from_the_workpiece_gives_the_same_axes(data: st.DataObject) -> None:
+    machine, axes = data.draw(CHAINS), [*data.draw(PLACES), data.draw(ANGLES), data.draw(ANGLES)]
+    point = workpiece_path(machine, np.array([axes]))
+    assert machine_points(machine, Pose(axes[3], axes[4]), point)[0] == pytest.approx(axes[:3], abs=1e-9)
+
+
+@given(CHAINS, VECTORS.map(unit))
+def test_every_pose_of_any_chain_brings_its_direction_upright(machine: Machine, direction: Floats) -> None:
+    for pose in poses(machine, direction):
+        far = np.linalg.norm(np.cross(unit(machine.turn.axis), direction)) > SINGULAR
+        assert rotation(machine, pose) @ direction == pytest.approx(UP, abs=1e-9 if far else 2 * SINGULAR)
+
+
+@given(CHAINS, st.floats(-170, 170), st.floats(-170, 170))
+def test_the_pose_that_a_direction_was_made_with_is_among_its_poses(machine: Machine, tilt: float, turn: float) -> None:
+    made = Pose(machine.tilt.zero_deg + tilt, machine.turn.zero_deg + turn)
+    direction = rotation(machine, made).T @ UP
+    turned = axis_rotation(machine.turn, made.turn_deg) @ direction
+    corner = abs(np.linalg.det([unit(machine.turn.axis), unit(machine.tilt.axis), turned]))
+    assume(corner > 0.02)  # nearer to where both branches meet a digit of the direction is many of the angles
+    apart = [max(abs(p.tilt_deg - made.tilt_deg), abs(p.turn_deg - made.turn_deg)) for p in poses(machine, direction)]
+    assert min(apart) < 1e-9
+
+
+@pytest.mark.parametrize("name", TILTING)
+@given(st.floats(1e-6, 80), st.floats(-180, 180))
+def test_small_tilts_keep_their_digits(name: str, lean_deg: float, around_deg: float) -> None:
     machine = load(machine=name).machine
-    direction = np.array([x, y, z]) / np.linalg.norm([x, y, z])
+    a, b = np.radians([lean_deg, around_deg])
+    direction = np.array([np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)])
+    for pose in poses(machine, direction):
+        assert abs(abs(pose.tilt_deg - machine.tilt.zero_deg) - lean_deg) < 1e-9
+
+
+@pytest.mark.parametrize("name", TILTING)
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.75, 1))
+def test_every_machine_reaches_every_direction_that_leans_a_little(name: str, x: float, y: float, z: float) -> None:
+    machine = load(machine=name).machine
+    direction = unit([x, y, z])
     found = poses(machine, direction)
     assert found
     for pose in found:
         assert rotation(machine, pose) @ direction == pytest.approx(UP, abs=2e-7)
+
+
+@given(VECTORS.map(unit))
+def test_a_machine_with_three_axes_prints_upright_and_nothing_else(direction: Floats) -> None:
+    machine = load(settings=["machine.shape=fixed"]).machine
+    assert poses(machine, UP) == [Pose(0.0, 0.0)]
+    assert poses(machine, direction) == [] or direction[2] == pytest.approx(1.0)
+    assert machine_points(machine, level(machine), np.array([[1.0, 2.0, 3.0]]))[0] == pytest.approx([1.0, 2.0, 3.0])
+
+
+@given(st.floats(-5000, 5000))
+def test_a_level_table_keeps_the_turn_it_has(turn_deg: float) -> None:
+    assume(abs(turn_deg) <= 3600)
+    assert poses(load().machine, UP, turn_deg) == [Pose(0.0, turn_deg)]
+
+
+def test_both_branches_are_found() -> None:
+    found = poses(load().machine, unit([0.0, 1.0, 1.0]))
+    assert [round(pose.tilt_deg, 9) for pose in found] == [45.0, -45.0]
+    assert [round(pose.turn_deg, 9) % 360.0 for pose in found] == [0.0, 180.0]
 
 
 def test_a_known_pose_tilts_the_rear_edge_up() -> None:

@@ -1,10 +1,8 @@
 import io
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mdp.candidates import directions
 from mdp.clearance import least_tip_height_mm
@@ -14,7 +12,6 @@ from mdp.overhang import facing_down
 from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.search import decompose, folded_mm3
-from mdp.sequence import least_rotation
 from profiles.errors import DecompositionError
 from profiles.profile import load
 from tests import shapes
@@ -181,17 +178,3 @@ def test_directions_are_spread_over_the_cap() -> None:
     assert len(found) == 600
     assert found[:, 2].min() >= np.sin(np.radians(10.0))
     assert np.degrees(nearest).min() > 3.5
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.tuples(st.floats(0, 80), st.floats(-180, 180)), min_size=1, max_size=6))
-def test_the_pose_sequence_turns_no_more_than_the_best_of_all_branches(angles: list[tuple[float, float]]) -> None:
-    machine = load().machine
-    options = [[Pose(0.0, 0.0)], *([Pose(a, c), Pose(-a, c + 180.0)] for a, c in angles)]
-    chosen = least_rotation(machine, options)
-    turned = [[Pose(p.tilt_deg, p.turn_deg + 360.0 * k) for p in poses for k in (-1, 0, 1)] for poses in options[1:]]
-    assert _total(chosen) <= min(_total([options[0][0], *poses]) for poses in product(*turned[:3])) + 1e-6 or len(angles) > 3
-
-
-def _total(poses: list[Pose]) -> float:
-    return sum(abs(a.tilt_deg - b.tilt_deg) + abs(a.turn_deg - b.turn_deg) for a, b in pairwise(poses))
