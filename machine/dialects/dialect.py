@@ -1,6 +1,10 @@
 """Dialect: what differs between the firmware families, as one row of words and rules."""
 
 from dataclasses import dataclass
+from typing import Literal
+
+# What G90 and G91 mean for the filament: they set its mode too; nothing; G91 makes it relative while it lasts.
+FilamentMode = Literal["set", "apart", "carried"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,7 @@ class Dialect:
     inverse_time: bool = False  # knows G93
     largest_delta: bool = False  # F of a pure turn is the speed of the axis that goes farthest, else along sqrt(tilt^2 + turn^2)
     rapid: bool = False  # G0 goes as fast as the axes can, whatever F says
-    distance_sets_filament: bool = False  # G90 and G91 set the filament's mode too
+    filament_mode: FilamentMode = "apart"
+    macros: bool = False  # knows lines of NAME KEY=VALUE
     value_word: str = "S"  # of temperatures and fans
     serial: bool = True  # takes numbered lines with checksums over a serial line and answers ok

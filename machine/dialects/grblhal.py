@@ -16,6 +16,7 @@ GRBLHAL = Dialect(
     travel="G1",
     filament="UVW",
     filament_relative=False,
+    filament_mode="set",
     modes=("G17 G21 G90 G94",),
     last="M2",
     follow_on="M851",

@@ -23,6 +23,8 @@ KLIPPER_STEPPERS = Dialect(
     part_end="EXCLUDE_OBJECT_END NAME=part_{number}",
     steppers=True,
     largest_delta=True,
+    filament_mode="carried",
+    macros=True,
 )
 
 _FREE = ("MANUAL_STEPPER STEPPER={tilt_stepper} GCODE_AXIS=", "MANUAL_STEPPER STEPPER={turn_stepper} GCODE_AXIS=")

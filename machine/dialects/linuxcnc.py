@@ -15,6 +15,7 @@ LINUXCNC = Dialect(
     travel="G1",
     filament="UVW",
     filament_relative=False,
+    filament_mode="set",
     modes=("G17 G21 G90 G94", "G64 P0.02"),
     last="M2",
     follow_on="M428",

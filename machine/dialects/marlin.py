@@ -18,5 +18,5 @@ MARLIN = Dialect(
     part_end="M486 S-1",
     follow_on="G43.4",
     follow_off="G49",
-    distance_sets_filament=True,
+    filament_mode="set",
 )

@@ -13,7 +13,8 @@ from machine.dryrun import dry_run
 from machine.gcode import write_gcode
 from machine.link.firmware import Firmware
 from machine.moves import MachineProgram, Stroke, Travel
-from machine.parse import CHORD_MM, parse_gcode
+from machine.parse import parse_gcode
+from machine.reader.motion import CHORD_MM
 from mdp.mesh import Floats
 from profiles.profile import Profile, load
 from slicer.paths import Kind

@@ -115,7 +115,7 @@ def test_parts_layers_and_types_come_from_the_comments() -> None:
         ("G3 X1", "line 2: G3 is no arc"),
         ("G2 X9 R1", "line 2: G2 is no arc"),
         ("G5 X1", "line 2: G5 is not supported"),
-        ("G43.4", "line 2: G43.4 is not supported"),
+        ("M428\nG43.5", "line 3: G43.5 is not supported: motion codes are .*, G43.4$"),
         ("G1 X1 U4", "line 2: word U4 of a move is not known: this machine has X Y Z A C E F"),
         ("G1 X1 F0", "line 2: F is 0: a feed must be above 0"),
         ("X1", "line 2: 'X1' begins with no command"),

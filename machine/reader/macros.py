@@ -1,0 +1,113 @@
+"""Macros: Klipper's commands of a name and KEY=VALUE words."""
+
+import re
+from collections.abc import Callable
+from math import inf
+
+from machine.placeholders import stepper
+from machine.reader.motion import flush
+from machine.reader.state import Reader
+from profiles.errors import GcodeError
+
+VALUE = re.compile(r"([A-Z_]+) *= *(\"[^\"]*\"|[^ ]*)")
+Values = dict[str, str]
+
+
+def macro(reader: Reader, code: str) -> bool:
+    """Do one line in capitals; False when its name is not known."""
+    name, _, rest = code.partition(" ")
+    action = MACROS.get(name) if reader.dialect.macros else None
+    if action is None:
+        return False
+    if reader.turning and name != "MANUAL_STEPPER":
+        flush(reader)
+    action(reader, dict(VALUE.findall(rest)))
+    return True
+
+
+def _number(reader: Reader, values: Values, key: str, default: float | None = None) -> float:
+    text = values.get(key)
+    if text is None and default is not None:
+        return default
+    if text is None or not re.fullmatch(r"[-+]?[0-9]{1,12}(\.[0-9]{0,20})?", text):
+        raise GcodeError(f"line {reader.number}: {key} is {text!r}: a number is expected"[:200])
+    return float(text)
+
+
+def _turn(reader: Reader, values: Values) -> None:
+    """MANUAL_STEPPER of a rotary axis: MOVE, SET_POSITION, homing by STOP_ON_ENDSTOP; SYNC=0 lets the next one begin too."""
+    machine = reader.machine
+    names = {stepper(machine.tilt).upper(): (3, machine.tilt), stepper(machine.turn).upper(): (4, machine.turn)}
+    found = names.get(values.get("STEPPER", ""))
+    if found is None:
+        reader.ignore("MANUAL_STEPPER")
+        return
+    index, axis = found
+    if "SET_POSITION" in values:
+        reader.at[index] = _number(reader, values, "SET_POSITION")
+        reader.note("G92", 0.0, axis.letter)
+    if "MOVE" not in values:
+        if reader.turning and values.get("SYNC") == "1":
+            flush(reader)
+        return
+    value, speed = _number(reader, values, "MOVE"), _number(reader, values, "SPEED", axis.speed_deg_s)
+    if speed <= 0:
+        raise GcodeError(f"line {reader.number}: SPEED is {speed:g}: it must be above 0")
+    if values.get("STOP_ON_ENDSTOP", "0") != "0":
+        reader.note("G28", 0.0, axis.letter)
+        reader.at[index] = reader.home[index]
+        return
+    if any(index == other for other, _, _ in reader.turning):
+        flush(reader)
+    reader.turning.append((index, value, speed))
+    if values.get("SYNC", "1") != "0":
+        flush(reader)
+
+
+def _heat(reader: Reader, values: Values) -> None:
+    target = _number(reader, values, "TARGET", 0.0)
+    if values.get("HEATER") == "EXTRUDER":
+        reader.nozzle_c = target
+        reader.note("M104", target, "S")
+    elif values.get("HEATER") == "HEATER_BED":
+        reader.bed_c = target
+        reader.note("M140", target, "S")
+
+
+def _wait(reader: Reader, values: Values) -> None:
+    """TEMPERATURE_WAIT: the heater's target counts, for MINIMUM stands a little below it."""
+    if values.get("SENSOR") == "EXTRUDER" and reader.nozzle_c > 0:
+        reader.note("M109", reader.nozzle_c, "S")
+    elif values.get("SENSOR") == "HEATER_BED" and reader.bed_c > 0:
+        reader.note("M190", reader.bed_c, "S")
+
+
+def _off(reader: Reader, values: Values) -> None:
+    reader.nozzle_c = reader.bed_c = 0.0
+    reader.note("M104", 0.0, "S")
+    reader.note("M140", 0.0, "S")
+
+
+def _limit(reader: Reader, values: Values) -> None:
+    accel = _number(reader, values, "ACCEL", inf)
+    if 0 < accel < inf:
+        reader.printing = reader.travelling = accel
+
+
+def _nothing(reader: Reader, values: Values) -> None:
+    """Commands without a bearing on motion or heat."""
+
+
+MACROS: dict[str, Callable[[Reader, Values], None]] = {
+    "MANUAL_STEPPER": _turn,
+    "SET_HEATER_TEMPERATURE": _heat,
+    "TEMPERATURE_WAIT": _wait,
+    "TURN_OFF_HEATERS": _off,
+    "SET_VELOCITY_LIMIT": _limit,
+    "SET_PRINT_STATS_INFO": _nothing,
+    "EXCLUDE_OBJECT": _nothing,
+    "EXCLUDE_OBJECT_DEFINE": _nothing,
+    "EXCLUDE_OBJECT_START": _nothing,
+    "EXCLUDE_OBJECT_END": _nothing,
+    "SET_DISPLAY_TEXT": _nothing,
+}

@@ -1,0 +1,110 @@
+"""Motion: straight moves, arcs and turns of steppers become rows."""
+
+from math import hypot, inf
+
+import numpy as np
+
+from machine.arcs import centre_of, chord_count, chords, sweep_rad
+from machine.coordinates import axis_positions, followed
+from machine.reader.state import E_AXIS, Reader, Words
+from mdp.pose import Pose
+from profiles.errors import GcodeError
+
+CHORD_MM = 0.005  # arcs are read as chords that stay so near
+ROUND_MM = 0.1  # by how much an arc's radius may differ at its ends
+
+
+def straight(reader: Reader, words: Words, rapid: bool = False) -> None:
+    """G0 and G1: a row, unless only F is given."""
+    if reader.turning:
+        flush(reader)
+    at, letters, before = reader.at, reader.letters, reader.at.copy()
+    moved, told = False, not reader.inverse
+    for letter, value in words:
+        axis = letters.get(letter)
+        if axis is None:
+            if letter != "F":
+                known = " ".join(letters)
+                raise GcodeError(
+                    f"line {reader.number}: word {letter}{value:g} of a move is not known: this machine has {known} F"
+                )
+            if value <= 0:
+                raise GcodeError(f"line {reader.number}: F is {value:g}: a feed must be above 0")
+            reader.feed = value if reader.inverse else value * reader.scale
+            told = True
+        else:
+            moved = True
+            if axis == E_AXIS:
+                value *= reader.scale
+                at[5] = at[5] + value if _steps(reader) else value + reader.e_shift
+            else:
+                if axis < 3:
+                    value *= reader.scale
+                at[axis] = at[axis] + value if reader.relative else value
+    if moved:
+        rapid = rapid and reader.dialect.rapid
+        if not told and not rapid:
+            raise GcodeError(f"line {reader.number}: after G93 every move needs its own F")
+        reader.row(before, inf if rapid else -reader.feed if reader.inverse else reader.feed)
+
+
+def _steps(reader: Reader) -> bool:
+    """Whether a filament word is a step."""
+    return reader.relative_e or (reader.relative and reader.dialect.filament_mode == "carried")
+
+
+def arc(reader: Reader, name: str, words: Words) -> None:
+    """G2 and G3 in the X Y plane, by I J or R: rows of chords, the other axes going along evenly."""
+    clockwise, before = name == "G2", reader.at.copy()
+    shape = {letter: value * reader.scale for letter, value in words if letter in "IJR" and letter not in reader.letters}
+    known = len(reader.rows)
+    straight(reader, [(letter, value) for letter, value in words if letter not in shape])
+    after = reader.at.copy()
+    del reader.rows[known:]
+    start, end = (before[0], before[1]), (after[0], after[1])
+    if "R" in shape:
+        centre = centre_of(start, end, shape["R"], clockwise)
+    else:
+        centre = (start[0] + shape.get("I", 0.0), start[1] + shape.get("J", 0.0)) if shape else None
+    radii = [0.0, 0.0] if centre is None else [hypot(p[0] - centre[0], p[1] - centre[1]) for p in (start, end)]
+    if centre is None or min(radii) == 0.0 or abs(radii[0] - radii[1]) > ROUND_MM:
+        raise GcodeError(
+            f"line {reader.number}: {name} is no arc: I and J, or R, must give a centre as far from its beginning as from its end"
+        )
+    sweep = sweep_rad(start, end, centre, clockwise)
+    points = chords(start, end, centre, sweep, chord_count(max(radii), sweep, CHORD_MM))
+    reader.at[:] = before
+    feed = -reader.feed * len(points) if reader.inverse else reader.feed
+    for k, point in enumerate(points, start=1):
+        row_before, share = reader.at.copy(), k / len(points)
+        others = [a + share * (b - a) for a, b in zip(before[2:], after[2:], strict=True)]
+        reader.at[:] = after if k == len(points) else [*point, *others]
+        reader.row(row_before, feed)
+
+
+def flush(reader: Reader) -> None:
+    """The turns of steppers that go on together become one row, as long as the slowest of them."""
+    before, minutes = reader.at.copy(), 0.0
+    for axis, value, speed_deg_s in reader.turning:
+        minutes = max(minutes, abs(value - before[axis]) / speed_deg_s / 60.0)
+        reader.at[axis] = value
+    reader.turning.clear()
+    reader.row(before, -1.0 / minutes if minutes > 0 else inf)
+
+
+def push(reader: Reader, filament_mm: float, feed: float) -> None:
+    """Filament alone: what G10 and G11 do."""
+    before = reader.at.copy()
+    reader.at[E_AXIS] += filament_mm
+    reader.e_shift += filament_mm
+    reader.row(before, feed)
+
+
+def follow(reader: Reader, on: bool) -> None:
+    """From here on X Y Z are places on the table (TCP), or axis positions again; nothing moves."""
+    if on != reader.followed:
+        reader.followed = on
+        place = np.array([reader.at[:5]])
+        pose = Pose(reader.at[3], reader.at[4])
+        moved = followed(reader.machine, pose, place[:, :3]) if on else axis_positions(reader.machine, place)
+        reader.at[:3] = moved[0].tolist()

@@ -1,0 +1,41 @@
+"""Remarks: the comments from which a text tells its parts, layers and kinds of line."""
+
+import re
+
+from machine.reader.state import Reader
+
+
+def remark(reader: Reader, text: str) -> None:
+    """What a comment says, the sign taken off: PrusaSlicer's words, Cura's LAYER and our own PART and UNSUPPORTED."""
+    text = text.strip()
+    if text == "LAYER_CHANGE":
+        _layer(reader)
+        return
+    key, colon, value = text.partition(":")
+    if not colon:
+        return
+    if key == "TYPE":
+        reader.type = reader.types.setdefault(value, len(reader.types))
+    elif key == "WIDTH":
+        reader.width = _positive(value)
+    elif key == "HEIGHT":
+        reader.height = _positive(value)
+    elif key == "PART":
+        number = value.split()[0] if value.split() else ""
+        if re.fullmatch("[0-9]{1,6}", number):
+            reader.part, reader.layer = int(number), 0
+            reader.parts.append(reader.part)
+    elif key == "UNSUPPORTED":
+        reader.unsupported.append((reader.number, reader.part, _positive(value)))
+    elif key == "LAYER" and re.fullmatch("-?[0-9]{1,6}", value):
+        _layer(reader)
+
+
+def _layer(reader: Reader) -> None:
+    reader.layer += 1
+    reader.layers += 1
+
+
+def _positive(text: str) -> float:
+    """The number of a comment; 0 when it is none, for a comment must not stop a print."""
+    return float(text) if re.fullmatch(r" *[0-9]{1,9}(?:\.[0-9]{1,12})? *", text) else 0.0

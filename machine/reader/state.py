@@ -1,0 +1,85 @@
+"""State: what the firmware knows while a text is read, and the rows and events read so far."""
+
+from array import array
+from dataclasses import dataclass, field
+from math import inf
+
+from machine.dialects import DIALECTS, Dialect
+from machine.parsed import Event
+from profiles.machine import Machine
+
+DEFAULT_FEED = 1500.0
+E_AXIS = 5
+ROW = 21  # line, 6 places before, 6 after, feed, part, layer, type, width, height, acceleration, followed
+Words = list[tuple[str, float]]
+
+
+@dataclass(slots=True)
+class Reader:
+    """Position X Y Z tilt turn E, modes, and what the comments said.
+
+    A row's feed below 0 is one over its minutes (G93), inf: as fast as the axes can.
+    """
+
+    machine: Machine
+    dialect: Dialect
+    letters: dict[str, int]
+    home: list[float]
+    at: list[float]
+    e_shift: float = 0.0
+    relative: bool = False
+    relative_e: bool = False
+    scale: float = 1.0
+    feed: float = DEFAULT_FEED
+    inverse: bool = False
+    followed: bool = False
+    printing: float = inf
+    travelling: float = inf
+    motion: str = ""
+    retraction_mm: float = 3.0  # of G10 until M207 tells: Marlin's default
+    retraction_feed: float = 2700.0
+    retracted: bool = False
+    nozzle_c: float = 0.0
+    bed_c: float = 0.0
+    ended: int = 0
+    part: int = 0
+    layer: int = 0
+    layers: int = 0
+    type: int = 0
+    width: float = 0.0
+    height: float = 0.0
+    number: int = 0
+    turning: list[tuple[int, float, float]] = field(default_factory=list)
+    types: dict[str, int] = field(default_factory=lambda: {"": 0})
+    parts: list[int] = field(default_factory=list)
+    rows: "array[float]" = field(default_factory=lambda: array("d"))
+    events: list[Event] = field(default_factory=list)
+    ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
+    unsupported: list[tuple[int, int, float]] = field(default_factory=list)
+
+    def row(self, before: list[float], feed: float) -> None:
+        """A move from a place to where the machine is now."""
+        at = self.at
+        acceleration = self.printing if at[5] != before[5] else self.travelling
+        told = (feed, self.part, self.layer, self.type, self.width, self.height, acceleration, self.followed)
+        self.rows.extend((self.number, *before, *at, *told))
+
+    def note(self, code: str, value: float, letters: str) -> None:
+        """Put an event on record, before the next row."""
+        self.events.append(Event(self.number, code, value, letters, len(self.rows) // ROW))
+
+    def ignore(self, code: str) -> None:
+        """Count what is not understood and does not move."""
+        first, count = self.ignored.get(code, (self.number, 0))
+        self.ignored[code] = (first, count + 1)
+
+
+def begun(machine: Machine) -> Reader:
+    """A reader that has read nothing: the machine stands at home."""
+    dialect = DIALECTS[machine.dialect]
+    rotary = () if dialect.steppers else (machine.tilt.letter, machine.turn.letter)
+    filament = next(each for each in dialect.filament if each not in rotary)
+    letters = {"X": 0, "Y": 1, "Z": 2, **{letter: 3 + k for k, letter in enumerate(rotary)}, filament: E_AXIS}
+    linear = [min(max(0.0, axis.limits_mm[0]), axis.limits_mm[1]) for axis in (machine.x, machine.y, machine.z)]
+    home = [*linear, machine.tilt.zero_deg, machine.turn.zero_deg, 0.0]
+    return Reader(machine, dialect, letters, home, home.copy())
