@@ -66,7 +66,7 @@ def _lines(
         if isinstance(move, Stroke):
             yield from _stroke(move, profile, pen)
             if place in last_strokes:
-                yield from _told(pen.dialect.part_end, pen)
+                yield from _told(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"])
         elif isinstance(move, Travel):
             yield from _travel(move, pen)
         elif isinstance(move, Wipe):
