@@ -9,7 +9,7 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.polygons import Polygons, contours, grown, sealed, united
-from slicer.room import EVEN_MM, FINE_MM, LEAST_MM2, SMOOTH_MM, Room, carried, leaning
+from slicer.room import EVEN_MM, FINE_MM, LEAST_MM2, SMOOTH_MM, Room, carried, leaning, solid
 
 CORNERS = 12  # of a trunk's outline
 THICKEST_MM = 2.5  # a trunk's radius: enough for any part that fits a machine
@@ -151,7 +151,9 @@ def _aside(branches: Sequence[Branch], room: Room, layer: int) -> list[Branch]:
     kept = carried(area, reached, room.ground[layer], lean)
     kept = _thinned(kept, lean) if (area - reached).is_empty() else kept
     top = max(branch.top_mm for branch in branches)
-    islands = kept.simplify(FINE_MM).decompose()
+    thick = solid(kept)
+    thin = leaning(kept - thick, THIN_MM) ^ reached
+    islands = (thick.simplify(FINE_MM) + thin).decompose()
     return [branch_of(island, top) for island in islands if island.area() >= LEAST_MM2]
 
 

@@ -57,8 +57,8 @@ def carried(places: Polygons, reached: Polygons, ground: Polygons, lean_mm: floa
     rest = places - reached
     if rest.area() >= LEAST_MM2:
         rest = rest - ground
-    if rest.area() >= LEAST_MM2 and not straight.is_empty():
-        rest = rest - leaning(straight, lean_mm)
+    if rest.area() >= LEAST_MM2:
+        rest = rest - leaning(grown(straight, -SLIVER_MM), lean_mm)
     return straight if rest.area() < LEAST_MM2 else straight + (leaning(rest, lean_mm) ^ reached)
 
 
