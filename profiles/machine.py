@@ -46,7 +46,7 @@ class LinearAxis(Frozen):
     """One of X, Y, Z as the firmware means it."""
 
     limits_mm: Limits = Field(description="least and greatest position the firmware accepts, mm")
-    speed_mm_s: float = Field(gt=0, le=2000, description="greatest speed, mm/s")
+    speed_mm_s: float = Field(gt=0, le=5000, description="greatest speed, mm/s")
     acceleration_mm_s2: float = Field(gt=0, le=100000, description="acceleration, mm/s2")
 
     @model_validator(mode="after")
@@ -255,7 +255,7 @@ class Machine(Frozen):
     clearance_mm: float = Field(1.0, ge=0, le=100, description="least distance kept between head and table, mm")
     lift_mm: float = Field(10.0, ge=0, le=500, description="extra height above everything printed while the table moves, mm")
     nozzle_limit_c: float = Field(300.0, gt=0, le=600, description="greatest nozzle temperature, deg C")
-    bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed")
+    bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed, bed_c is not used")
     uncalibrated: list[str] = Field(default=[], description="keys whose values no source gives; the dry run names them")
     sources: dict[str, str] = Field(default={}, description="for a key or a table of keys: where its value comes from")
     gcode: Blocks

@@ -200,7 +200,7 @@ def _check_together(profile: Profile) -> list[str]:
         for key in ("nozzle_c", "first_layer_nozzle_c")
         if getattr(material, key) > machine.nozzle_limit_c
     ]
-    if material.bed_c > machine.bed_limit_c:
+    if material.bed_c > machine.bed_limit_c > 0:
         problems.append(f"material.bed_c is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} deg C")
     if not LEAST_WIDTH * nozzle_mm <= width_mm <= MOST_WIDTH * nozzle_mm:
         problems.append(
