@@ -30,10 +30,9 @@ def axis_positions(machine: Machine, rows: Floats) -> Floats:
     """(n, 3) axis positions for (n, 5) rows of a followed X Y Z and tilt, turn in degrees."""
     places = rows[:, :3] - origin_mm(machine)
     positions = np.empty_like(places)
-    angles, pose_of = np.unique(rows[:, 3:5], axis=0, return_inverse=True)
-    order = np.argsort(pose_of.ravel(), kind="stable")
-    begins = np.searchsorted(pose_of.ravel()[order], np.arange(len(angles) + 1))
-    for k, (tilt_deg, turn_deg) in enumerate(angles.tolist()):
-        mine = order[begins[k] : begins[k + 1]]
-        positions[mine] = machine_points(machine, Pose(tilt_deg, turn_deg), places[mine])
+    changes = np.flatnonzero((rows[1:, 3:5] != rows[:-1, 3:5]).any(axis=1)) + 1
+    bounds = [0, *changes.tolist(), len(rows)]
+    for first, last in zip(bounds, bounds[1:], strict=False):
+        pose = Pose(float(rows[first, 3]), float(rows[first, 4])) if last > first else level(machine)
+        positions[first:last] = machine_points(machine, pose, places[first:last])
     return positions
