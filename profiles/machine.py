@@ -255,7 +255,7 @@ class Machine(Frozen):
     clearance_mm: float = Field(1.0, ge=0, le=100, description="least distance kept between head and table, mm")
     lift_mm: float = Field(10.0, ge=0, le=500, description="extra height above everything printed while the table moves, mm")
     nozzle_limit_c: float = Field(300.0, gt=0, le=600, description="greatest nozzle temperature, deg C")
-    bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed, bed_c is not used")
+    bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed")
     uncalibrated: list[str] = Field(default=[], description="keys whose values no source gives; the dry run names them")
     sources: dict[str, str] = Field(default={}, description="for a key or a table of keys: where its value comes from")
     gcode: Blocks

@@ -5,13 +5,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from profiles.profile import KINDS, check_file, load_one, rows, shipped
+from profiles.check import check_file
+from profiles.errors import ProfileError
+from profiles.machine import Frozen, Machine
+from profiles.places import own, own_folder
+from profiles.profile import KINDS, kind_of, load, load_one, rows, shipped
 
 
 def list_profiles() -> int:
-    """Print the shipped profiles of every kind."""
+    """Print the shipped profiles of every kind and the user's own."""
     for kind in KINDS:
         sys.stdout.write(f"{kind}: {', '.join(shipped(kind))}\n")
+        if own(kind):
+            sys.stdout.write(f"{kind}, yours ({own_folder(kind)}): {', '.join(own(kind))}\n")
     return 0
 
 
@@ -32,8 +38,29 @@ def show(name: str, as_json: bool, settings: Sequence[str]) -> int:
 def check(file: Path) -> int:
     """Print every problem of a profile file; 1 when there are any."""
     problems = check_file(file)
+    if not problems and kind_of(str(file)) == "machine":
+        problems = _block_problems(load_one(str(file))["machine"])
     for problem in problems:
         sys.stderr.write(f"tiltprint: {file}: {problem}\n")
     if not problems:
         sys.stdout.write(f"{file}: no problem found\n")
     return 1 if problems else 0
+
+
+def _block_problems(machine: Frozen) -> list[str]:
+    """What cannot be filled in of the machine's G-code blocks, each block by itself."""
+    from machine.gcode import BLOCKS, write_gcode
+    from machine.moves import MachineProgram
+
+    problems: list[str] = []
+    if not isinstance(machine, Machine):
+        return problems
+    for name in BLOCKS:
+        empty = dict.fromkeys(BLOCKS, "")
+        blocks = machine.gcode.model_copy(update=empty | {name: getattr(machine.gcode, name)})
+        profile = load().model_copy(update={"machine": machine.model_copy(update={"gcode": blocks})})
+        try:
+            write_gcode(MachineProgram("check", ()), profile)
+        except ProfileError as error:
+            problems.append(str(error))
+    return problems

@@ -80,7 +80,8 @@ def _print(profile: Profile) -> None:
     above, below = cut(_tee(), plane)
     parts = []
     for index, (base, solid) in enumerate(((PLATFORM, below), (plane, above)), start=1):
-        pose = level(profile.machine) if index == 1 else poses(profile.machine, LEANING)[0]
+        leaning = poses(profile.machine, LEANING)
+        pose = leaning[0] if leaning and index > 1 else level(profile.machine)
         mesh = mesh_of(solid)
         parts.append(Part(index, mesh, base, pose, rotation(profile.machine, pose), mesh.volume_mm3, 0.0))
     found = Decomposition("warm", mesh_of(_tee()), tuple(parts), 1, "classic", 0.0, 0.0, 0, 0, 0.0)

@@ -1,0 +1,139 @@
+"""Places: where profiles stand (shipped with the program, the user's own folder, any file) and what they inherit."""
+
+import os
+import sys
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from profiles.errors import ProfileError
+
+KINDS = {"machine": "machines", "material": "materials", "process": "processes"}
+OF_KIND = {"machine": ("machine",), "material": ("material",), "process": ("process", "search")}
+PARENT = "inherits"
+
+
+def shipped(kind: str) -> list[str]:
+    """Names of the shipped profiles of a kind ("machine", "material" or "process"), sorted."""
+    folder = resources.files("profiles") / KINDS[kind]
+    return sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
+
+
+def own_folder(kind: str) -> Path:
+    """The user's folder for profiles of a kind: in $XDG_CONFIG_HOME, else where the platform keeps settings."""
+    home = os.environ.get("XDG_CONFIG_HOME") or {
+        "win32": os.environ.get("APPDATA", ""),
+        "darwin": str(Path.home() / "Library" / "Application Support"),
+    }.get(sys.platform)
+    return Path(home or Path.home() / ".config") / "tiltprint" / "profiles" / KINDS[kind]
+
+
+def own(kind: str) -> list[str]:
+    """Names of the user's own profiles of a kind, sorted; one named as a shipped profile stands in its place."""
+    return sorted(file.stem for file in own_folder(kind).glob("*.toml"))
+
+
+def known(kind: str) -> list[str]:
+    """All names of a kind, shipped and the user's own, sorted."""
+    return sorted({*shipped(kind), *own(kind)})
+
+
+def kind_of(name: str) -> str:
+    """The kind of a profile by name, or of a profile file: machine, material or process."""
+    for kind in KINDS:
+        if name in known(kind):
+            return kind
+    if not _is_path(name):
+        names = ", ".join(sorted(each for kind in KINDS for each in known(kind)))
+        raise ProfileError(f"profile {name!r} is not known: it must be one of {names}, or the path of a .toml file")
+    return kind_in(Path(name))
+
+
+def kind_in(path: Path) -> str:
+    """The kind of a profile file by its tables."""
+    document = parse(path)
+    found = next((kind for kind, sections in OF_KIND.items() if any(section in document for section in sections)), None)
+    if found is None:
+        raise ProfileError(f"{path}: no [machine], [material], [process] or [search] table")
+    return found
+
+
+def tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The tables of a profile by name or path, with those it inherits; ProfileError when there is no such profile."""
+    document, place = _document(kind, name, seen)
+    if place in seen:
+        raise ProfileError(f"{name} inherits itself by way of {', '.join(seen[seen.index(place) + 1 :]) or 'its own name'}")
+    problem = strangers(kind, name, document)
+    if problem:
+        raise ProfileError(problem)
+    return merged(inherited(kind, name, document, (*seen, place)), own_tables(document))
+
+
+def inherited(kind: str, name: str, document: Mapping[str, Any], seen: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The tables of the profile that a document inherits; none when it inherits nothing."""
+    parent = document.get(PARENT)
+    if parent is None:
+        return {}
+    if not isinstance(parent, str):
+        raise ProfileError(f"{name}: inherits is {parent!r}: the name of one profile or the path of one .toml file is expected")
+    if Path(parent).suffix == ".toml":
+        parent = str(Path(name).parent / parent)
+    return tables(kind, parent, seen)
+
+
+def strangers(kind: str, name: str, document: Mapping[str, Any]) -> str | None:
+    """What a document holds that a profile of its kind cannot hold, as a sentence."""
+    unknown = [key for key in document if key not in (*OF_KIND[kind], PARENT)]
+    if not unknown and own_tables(document):
+        return None
+    what = f"[{'], ['.join(unknown)}] cannot stand in a {kind} profile" if unknown else f"this is not a {kind} profile"
+    return f"{name}: {what}: its tables are {' and '.join(f'[{section}]' for section in OF_KIND[kind])}"
+
+
+def own_tables(document: Mapping[str, Any]) -> dict[str, Any]:
+    """A document without the name of what it inherits."""
+    return {key: value for key, value in document.items() if key != PARENT}
+
+
+def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables merged key by key; what is no table is replaced as a whole."""
+    out = dict(base)
+    for key, value in over.items():
+        below = out.get(key)
+        out[key] = merged(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    return out
+
+
+def parse(path: Path) -> dict[str, Any]:
+    """A TOML file; ProfileError says what is wrong with it."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ProfileError(f"profile {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+    except UnicodeDecodeError:
+        raise ProfileError(f"profile {path} is not a text file: TOML in UTF-8 is expected") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ProfileError(f"profile {path} is not valid TOML: {error}") from None
+
+
+def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, Any], str]:
+    """A profile's own tables and where they stand: the shipped name or the file's full path.
+
+    An own profile that inherits its own name means the shipped one, in whose place it stands.
+    """
+    file = own_folder(kind) / f"{name}.toml"
+    if name in own(kind) and not (str(file.resolve()) in seen and name in shipped(kind)):
+        return parse(file), str(file.resolve())
+    if name in shipped(kind):
+        source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
+        return tomllib.loads(source.read_text(encoding="utf-8")), name
+    if _is_path(name):
+        return parse(Path(name)), str(Path(name).resolve())
+    names = ", ".join(known(kind))
+    raise ProfileError(f"{kind} profile {name!r} is not known: it must be one of {names}, or the path of a .toml file")
+
+
+def _is_path(name: str) -> bool:
+    return Path(name).suffix == ".toml" or Path(name).exists()

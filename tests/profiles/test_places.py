@@ -1,0 +1,123 @@
+"""The user's own folder: found, listed, inherited from, and in the place of shipped profiles of the same name."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from machine.app.cli import main
+from profiles.check import check_file
+from profiles.errors import ProfileError
+from profiles.places import known, own, own_folder, shipped
+from profiles.profile import load, load_one
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder for settings."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    return tmp_path
+
+
+def keep(kind: str, name: str, text: str) -> Path:
+    own_folder(kind).mkdir(parents=True, exist_ok=True)
+    (own_folder(kind) / f"{name}.toml").write_text(text, encoding="utf-8")
+    return own_folder(kind) / f"{name}.toml"
+
+
+def test_the_folder_is_where_the_platform_keeps_settings(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert own_folder("machine") == folder / "tiltprint" / "profiles" / "machines"
+    monkeypatch.delenv("XDG_CONFIG_HOME")
+    monkeypatch.setattr("sys.platform", "linux")
+    assert own_folder("material") == Path(os.path.expanduser("~")) / ".config" / "tiltprint" / "profiles" / "materials"
+
+
+def test_without_own_profiles_only_the_shipped_ones_are_known() -> None:
+    assert [own(kind) for kind in ("machine", "material", "process")] == [[], [], []]
+    assert known("machine") == shipped("machine")
+
+
+def test_an_own_profile_is_taken_by_its_name_and_listed_as_yours(capsys: pytest.CaptureFixture[str]) -> None:
+    keep("machine", "mine", 'inherits = "generic_ac"\n[machine.tilt]\npoint_mm = [0, 1, -18]\n')
+    assert load("mine").machine.tilt.point_mm == (0.0, 1.0, -18.0)
+    assert main(["profiles", "list"]) == 0
+    assert f"machine, yours ({own_folder('machine')}): mine\n" in capsys.readouterr().out
+
+
+def test_an_own_profile_stands_in_the_place_of_the_shipped_one_it_inherits() -> None:
+    keep("machine", "gen5x", 'inherits = "gen5x"\n[machine.tilt]\nzero_deg = 1.5\n')
+    machine = load("gen5x").machine
+    assert (machine.tilt.zero_deg, machine.x.limits_mm) == (1.5, (-126.0, 125.0))
+    assert known("machine").count("gen5x") == 1
+
+
+def test_an_own_material_and_process_inherit_from_shipped_and_own_ones() -> None:
+    keep("material", "shop", 'inherits = "petg"\n[material]\nflow = 0.97\n')
+    keep("material", "shop_red", 'inherits = "shop"\n[material]\nnozzle_c = 231\n')
+    material = load(material="shop_red").material
+    assert (material.flow, material.nozzle_c, material.name) == (0.97, 231.0, load(material="petg").material.name)
+
+
+def test_own_profiles_that_inherit_each_other_are_refused() -> None:
+    keep("machine", "a", 'inherits = "b"\n[machine]\nlift_mm = 1\n')
+    keep("machine", "b", 'inherits = "a"\n[machine]\nlift_mm = 1\n')
+    with pytest.raises(ProfileError, match="a inherits itself by way of"):
+        load_one("a")
+
+
+def test_an_unknown_name_is_answered_with_the_own_ones_too() -> None:
+    keep("machine", "mine", 'inherits = "generic_ac"\n[machine]\nlift_mm = 1\n')
+    with pytest.raises(ProfileError, match=r"gen5x, generic_ac, linuxcnc_xyzac, mine, open5x"):
+        load("yours")
+
+
+def test_all_problems_of_a_machine_are_told_at_once(tmp_path: Path) -> None:
+    file = keep(
+        "machine",
+        "bad",
+        """
+inherits = "generic_ac"
+[machine]
+lift = 3
+uncalibrated = ["machine.tilt.sign", "machine.nix"]
+[machine.x]
+limits_mm = [10, -10]
+speed_mm_s = 0
+[machine.y]
+limits_mm = [10, -10]
+[machine.tilt]
+limits_deg = [-0.1, 0.1]
+[machine.turn]
+letter = "A"
+[machine.head]
+silhouette_mm = [[1, 0], [0.5, 2], [3, 1]]
+[matrial]
+""",
+    )
+    problems = check_file(file)
+    assert [problem.split(":")[0] for problem in problems[1:]] == [
+        "machine.x.speed_mm_s is 0",
+        "machine.y.limits_mm is [10.0, -10.0]",
+        "machine.head.silhouette_mm",
+        "machine.head.silhouette_mm",
+        "machine.lift is not a key of a profile",
+        "machine.x.limits_mm is [10.0, -10.0]",
+        "machine.tilt.letter and turn.letter are both A",
+        "machine.tilt.limits_deg is [-0.1, 0.1]",
+        "machine.uncalibrated names machine.nix, which is not a key of a machine",
+    ]
+    assert "[matrial] cannot stand in a machine profile" in problems[0]
+
+
+def test_a_missing_parent_does_not_hide_the_other_problems() -> None:
+    problems = check_file(keep("process", "bad", 'inherits = "nix"\n[process]\nwalls = -1\n'))
+    assert "'nix' is not known" in problems[0]
+    assert problems[1:] == ["process.walls is -1: it must be a whole number from 0 to 50"]
+
+
+def test_checking_a_machine_tells_every_block_that_cannot_be_filled_in(capsys: pytest.CaptureFixture[str]) -> None:
+    file = keep("machine", "bad", 'inherits = "generic_ac"\n[machine.gcode]\nstart = "M104 S{heat}"\nend = "G1 {tlit}0"\n')
+    assert main(["profiles", "check", str(file)]) == 1
+    told = capsys.readouterr().err
+    assert "machine.gcode.start: placeholder {heat} is not known" in told
+    assert "machine.gcode.end: placeholder {tlit} is not known" in told
