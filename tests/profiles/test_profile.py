@@ -191,7 +191,7 @@ def test_setting_one_key_leaves_all_others_alone() -> None:
 
 def test_a_loaded_profile_does_not_change() -> None:
     with pytest.raises(ValueError, match="frozen"):
-        load().process.walls = 3  # type: ignore[misc]
+        load().process.walls = 3
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones() -> None:

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from profiles.toml import toml
 
-SCALARS = (
-    st.booleans() | st.integers(-(2**60), 2**60) | st.floats(allow_nan=False) | st.text(st.characters(exclude_categories=["Cs"]))
-)
+LETTERS = st.characters(exclude_categories=["Cs"])
+SCALARS = st.booleans() | st.integers(-(2**60), 2**60) | st.floats(allow_nan=False) | st.text(LETTERS)
 VALUES = SCALARS | st.lists(SCALARS, max_size=3)
 KEYS = st.text(LETTERS, max_size=8)
 TABLES = st.recursive(
