@@ -1,11 +1,14 @@
-"""Collide: how far the head's bodies stay from the table and from what is printed, by separating directions.
+"""Collide: how far the head's bodies stay from table, cradle and what is printed, by separating directions.
 
 The distance of two convex bodies is the greatest gap over all unit directions d, where the gap is the least d . x of the one
 minus the greatest d . x of the other. Trying some directions gives a lower bound of the distance: a verdict "clear" is always
 right. A move along a line is tried as the convex body it sweeps: one direction must part both ends from the obstacle.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import product
 from math import pi
 
 import numpy as np
@@ -14,7 +17,7 @@ from manifold3d import Manifold
 from machine.kinematics.table import machine_points
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
-from profiles.machine import Machine, Vector
+from profiles.machine import CradleBox, Machine, Vector
 
 FIELD = 120
 FAR_MM = 1e9
@@ -91,11 +94,31 @@ def spread(count: int) -> Floats:
 
 def table_reach(machine: Machine, pose: Pose, tried: Floats) -> Floats:
     """(k,) greatest d . x over the table's plate at a pose, in the frame of X Y Z, for (k, 3) directions."""
+    table = machine.table
+    if table.size_mm is not None:
+        x, y = (0.5 * size for size in table.size_mm)
+        return _corner_reach(machine_points(machine, pose, corners((-x, -y, -table.thickness_mm), (x, y, 0.0))), tried)
     normal = rotation(machine, pose) @ UP
     centre = machine_points(machine, pose, np.zeros((1, 3)))[0]
     along = tried @ normal
     across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
-    reach: Floats = tried @ centre + machine.table.radius_mm * across + np.maximum(0.0, -along) * machine.table.thickness_mm
+    reach: Floats = tried @ centre + table.radius_mm * across + np.maximum(0.0, -along) * table.thickness_mm
+    return reach
+
+
+def cradle_reach(machine: Machine, box: CradleBox, pose: Pose, tried: Floats) -> Floats:
+    """(k,) greatest d . x over a body of the cradle, which tilts with the table and does not turn with it."""
+    tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
+    return _corner_reach(machine_points(machine, tilted, corners(box.min_mm, box.max_mm)), tried)
+
+
+def corners(least_mm: Vector, most_mm: Vector) -> Floats:
+    """(8, 3) corners of a box."""
+    return np.array(list(product(*zip(least_mm, most_mm, strict=True))))
+
+
+def _corner_reach(points: Floats, tried: Floats) -> Floats:
+    reach: Floats = (tried @ points.T).max(axis=1)
     return reach
 
 
@@ -128,6 +151,28 @@ def together(pieces: list[Printed]) -> Printed:
     return Printed(np.vstack([np.zeros((0, 3)), *points]), max((piece.bead_mm for piece in pieces), default=0.0))
 
 
+Reach = Callable[[Floats], Floats]  # (k, 3) directions -> (k,) how far a solid reaches along each
+
+
+def solids(machine: Machine, pose: Pose, printed: Printed | None = None) -> list[tuple[str, Reach]]:
+    """What the head can meet at a pose: the table, the cradle's bodies, what is printed; names for messages."""
+    found: list[tuple[str, Reach]] = [("the table", partial(table_reach, machine, pose))]
+    found += [(f"the cradle's {box.name}", partial(cradle_reach, machine, box, pose)) for box in machine.cradle]
+    if printed is not None and len(printed.points_mm):
+        found.append(("the print", partial(printed.reach, machine, pose)))
+    return found
+
+
+def swing_mm(machine: Machine, printed: Printed) -> float:
+    """Greatest distance of a point of table, cradle and print from either rotary axis, at most."""
+    between = float(np.linalg.norm(np.array(machine.tilt.point_mm) - np.array(machine.turn.point_mm)))
+    reach = float(np.hypot(machine.table.radius_mm, machine.table.thickness_mm))
+    reach = max(reach, float(np.linalg.norm(printed.points_mm, axis=1).max(initial=0.0)) + printed.bead_mm)
+    for box in machine.cradle:
+        reach = max(reach, float(np.linalg.norm(corners(box.min_mm, box.max_mm), axis=1).max()))
+    return reach + between
+
+
 def sweep_gaps(body: Body, start: Floats, end: Floats, tried: Floats, reach: Floats) -> Floats:
     """(n,) lower bounds of the distance of a body from an obstacle while the tip goes from (n, 3) start to (n, 3) end."""
     return gaps_of(body, swept(start, end, tried), tried, reach)
@@ -144,16 +189,15 @@ def gaps_of(body: Body, least: Floats, tried: Floats, reach: Floats) -> Floats:
     return best
 
 
-def refined_gap(body: Body, start: Floats, end: Floats, machine: Machine, pose: Pose) -> float:
-    """The distance of one swept body from the table, improved from the best tried direction by ever smaller steps.
+def refined_gap(body: Body, start: Floats, end: Floats, normal: Floats, reach: Reach) -> float:
+    """The distance of one swept body from a solid, improved from the best tried direction by ever smaller steps.
 
-    The gap is a concave function of the direction, so going uphill cannot get stuck.
+    normal: the table's. The gap is a concave function of the direction, so going uphill cannot get stuck.
     """
-    tried = directions(rotation(machine, pose) @ UP)
+    tried = directions(normal)
     step, best, gap = 0.2, tried[0], -np.inf
     for _ in range(REFINEMENTS):
-        reach = table_reach(machine, pose, tried)
-        gaps = np.minimum(tried @ start, tried @ end) + body.least(tried) - reach
+        gaps = np.minimum(tried @ start, tried @ end) + body.least(tried) - reach(tried)
         k = int(np.argmax(gaps))
         if gaps[k] > gap + 1e-6:
             gap, best = float(gaps[k]), tried[k]

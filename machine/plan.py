@@ -10,7 +10,7 @@ from machine.acceleration import of_kind_mm_s2
 from machine.collide import Printed, hull, together
 from machine.kinematics.table import part_shift, workpiece_points
 from machine.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel
-from machine.reorient import approach_z, safe_pose
+from machine.reorient import Route, Speeds, route, top_z
 from machine.rows import rows
 from machine.travel import Tip, go, lift_speed, prime, retract, to_path, trail_of, travel_speed
 from mdp.decomposition import Decomposition, Part
@@ -56,24 +56,32 @@ def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile:
     Where the start block leaves the tip is not known: the first two travels stand for going up, then across.
     """
     if first:
-        tip.at_mm = target.copy()
+        tip.at_mm = np.array([*target[:2], min(top_z(profile.machine, tip.pose), profile.machine.z.limits_mm[1])])
     else:
         yield from retract(tip, profile)
-    safe = safe_pose(profile.machine, printed, tip.at_mm, tip.pose, part.pose, part.index)
+    way = route(profile.machine, printed, tip.at_mm, target, tip.pose, part.pose, _speeds(profile), part.index)
     if first:
-        tip.at_mm[2] = safe.z_mm
+        tip.at_mm = np.array([*way.over_mm, way.z_mm])
         for speed in (lift_speed(profile), travel_speed(profile)):
             yield Travel(np.array([tip.at_mm, tip.at_mm]), speed)
-    yield from go(tip, [*tip.at_mm[:2], safe.z_mm], profile)
-    if safe.over_mm is not None:
-        yield from go(tip, [*safe.over_mm, safe.z_mm], profile)
+    yield from _to_stand(tip, way, profile)
     if first or tip.pose != part.pose:
         yield _reorient(tip, part.pose, profile)
         tip.prime_extra_mm = 0.0 if first else profile.material.prime_extra_mm
     yield part
-    across_z = approach_z(profile.machine, printed, part.pose, safe, target, part.index)
-    yield from go(tip, [*target[:2], across_z], profile)
+    yield from go(tip, [*tip.at_mm[:2], way.across_z_mm], profile)
+    yield from go(tip, [*target[:2], way.across_z_mm], profile)
     yield from go(tip, list(target), profile)
+
+
+def _to_stand(tip: Tip, way: Route, profile: Profile) -> Iterator[Move]:
+    """Straight up, then across to where the tip stands while the table turns."""
+    yield from go(tip, [*tip.at_mm[:2], way.z_mm], profile)
+    yield from go(tip, [*way.over_mm, way.z_mm], profile)
+
+
+def _speeds(profile: Profile) -> Speeds:
+    return Speeds(lift_speed(profile), travel_speed(profile))
 
 
 def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
@@ -132,10 +140,8 @@ def _finish(tip: Tip, part: int, printed: Printed, profile: Profile) -> Iterator
         z = min(float(tip.at_mm[2]) + profile.machine.lift_mm, profile.machine.z.limits_mm[1])
         yield from go(tip, [*tip.at_mm[:2], z], profile)
         return
-    safe = safe_pose(profile.machine, printed, tip.at_mm, tip.pose, home, part)
-    yield from go(tip, [*tip.at_mm[:2], safe.z_mm], profile)
-    if safe.over_mm is not None:
-        yield from go(tip, [*safe.over_mm, safe.z_mm], profile)
+    way = route(profile.machine, printed, tip.at_mm, None, tip.pose, home, _speeds(profile), part)
+    yield from _to_stand(tip, way, profile)
     yield _reorient(tip, home, profile)
 
 

@@ -1,33 +1,51 @@
-"""Reorient: a safe place for the head while the table turns, and the moves there and back down.
+"""Reorient: where the tip stands while the table turns, how high, and the quickest way there and on to the next part.
 
-Safe means: through the whole turn nothing of the table's plate and nothing printed reaches higher than lift_mm below the tip; no
-body of the head hangs lower than the tip. Where the Z axis is too short for that, the head stands aside of what turns.
+A route: straight up, across to the stand, the table turns, across to above the next part's first point, straight down. For every
+stand the least safe height follows from separating directions in closed form; the stand with the quickest route is taken.
+Safe means that through the whole turn every body of the head keeps lift_mm (or clearance_mm, where that is more) from plate,
+cradle and print, swept: between two poses that are tried each direction's reach is bounded by its greater end and the sagitta.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
-from math import ceil, hypot, radians
+from math import ceil, hypot, inf, radians
 
 import numpy as np
 
-from machine.collide import Printed, bodies, directions, sweep_gaps, table_reach
+from machine.collide import Printed, bodies, directions, solids, spread, sweep_gaps, swing_mm
+from machine.dryrun.timeline import move_times
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.errors import MoveError
 from profiles.machine import Machine
 
-STEP_DEG = 1.0
+STEP_DEG = 0.5
 MOST_STEPS = 1500
-PARKING_PLACES = 7
+STANDS = 7
+FIELD = 60
+TRIED = 12
+COARSE = 16
 
 
 @dataclass(frozen=True)
-class SafePose:
-    """The tip stands at over_mm (X, Y) and z_mm while the table turns; over_mm None: where it is, straight up."""
+class Speeds:
+    """mm/s that the process asks for: straight up and down, and across."""
 
+    lift_mm_s: float
+    travel_mm_s: float
+
+
+@dataclass(frozen=True)
+class Route:
+    """The tip stands at X, Y of over_mm and at z_mm while the table turns, and crosses to the next part at across_z_mm.
+
+    seconds: for all moves of the way, the turn itself left out.
+    """
+
+    over_mm: tuple[float, float]
     z_mm: float
-    over_mm: tuple[float, float] | None
+    across_z_mm: float
+    seconds: float
 
 
 def poses_between(start: Pose, end: Pose, step_deg: float = STEP_DEG) -> list[Pose]:
@@ -37,83 +55,143 @@ def poses_between(start: Pose, end: Pose, step_deg: float = STEP_DEG) -> list[Po
     return [Pose(start.tilt_deg + tilt * k / count, start.turn_deg + turn * k / count) for k in range(count + 1)]
 
 
-def highest_z(machine: Machine, printed: Printed, turning: list[Pose]) -> float:
-    """Greatest machine Z that the plate's rim or anything printed reaches during a turn, between its poses included.
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What turns under the head during a whole turn: (p, s, k) reaches of s solids along k directions, in p short turns."""
 
-    Between two poses that differ by a (radians, both axes together) a point at radius r rises above its places at the two
-    by at most r a^2 / 4: its second derivative along the turn is at most 2 r a^2.
-    """
-    up = UP[None]
-    top = max(max(float(table_reach(machine, p, up)[0]), float(printed.reach(machine, p, up)[0])) for p in turning)
-    reach = max(
-        machine.table.radius_mm + machine.table.thickness_mm, float(np.linalg.norm(printed.points_mm, axis=1).max(initial=0.0))
-    )
-    radius = reach + float(np.linalg.norm(np.array(machine.tilt.point_mm) - np.array(machine.turn.point_mm)))
-    step = max((hypot(b.tilt_deg - a.tilt_deg, b.turn_deg - a.turn_deg) for a, b in pairwise(turning)), default=0.0)
-    return top + radius * radians(step) ** 2 / 4.0
+    machine: Machine
+    tried: Floats
+    reach: Floats
+
+    def least_z(self, x: float, y: float, every: int = 1) -> float:
+        """Least Z from which on upward the tip may stand at X, Y through the whole turn; infinite when there is none.
+
+        Along a direction d that leans upward the gap grows with Z, so each direction gives a least Z of its own.
+        every: only so many of the short turns are looked at, which gives a lower bound.
+        """
+        need = max(self.machine.lift_mm, self.machine.clearance_mm)
+        across, up = self.tried[:, :2] @ np.array([x, y]), self.tried[:, 2]
+        highest = -inf
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for body in bodies(self.machine):
+                missing = self.reach[::every] + need - (body.least(self.tried) + across)
+                z = np.where(up > 1e-9, missing / up, np.where(missing <= 0.0, -inf, inf))
+                highest = max(highest, float(z.min(axis=-1).max()))
+        return highest
 
 
-def safe_pose(machine: Machine, printed: Printed, at_mm: Floats, start: Pose, end: Pose, part: int) -> SafePose:
-    """Where to hold the tip, now at at_mm (machine X Y Z), while the table turns from start to end for a part.
-
-    Raises MoveError when neither above nor aside is inside the axis limits.
-    """
+def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> Sweep:
+    """All that turns between two poses, print included."""
     turning = poses_between(start, end)
-    need = highest_z(machine, printed, turning) + max(machine.lift_mm, machine.clearance_mm)
-    allowed = machine.z.limits_mm[1]
-    if need <= allowed:
-        return SafePose(max(need, float(at_mm[2])), None)
-    for over in _aside(machine, at_mm):
-        if _clear_aside(machine, printed, np.array([*over, allowed]), at_mm, turning):
-            return SafePose(allowed, over)
-    raise MoveError(
-        f"part {part}: turning the table to {machine.tilt.letter}{end.tilt_deg:.3f} {machine.turn.letter}{end.turn_deg:.3f} "
-        f"needs the tip at Z {need:.1f} mm, {machine.name} allows at most {allowed:g} mm, and no place aside is clear"
-    )
+    tried = _upward(machine, turning)
+    reach = np.array([[reach_of(tried) for _, reach_of in solids(machine, pose, printed)] for pose in turning])
+    step = radians(hypot(turning[1].tilt_deg - turning[0].tilt_deg, turning[1].turn_deg - turning[0].turn_deg))
+    # d . x changes along the turn with a second derivative of at most 2 r a^2, a the angle of both axes together
+    sagitta = swing_mm(machine, printed) * step**2 / 4.0
+    return Sweep(machine, tried, np.maximum(reach[:-1], reach[1:]) + sagitta)
 
 
-def _aside(machine: Machine, at_mm: Floats) -> Iterator[tuple[float, float]]:
-    """Places to stand: where the tip is, then a lattice over X and Y, the farthest from the turn axis first."""
-    yield float(at_mm[0]), float(at_mm[1])
-    xs, ys = (np.linspace(*axis.limits_mm, PARKING_PLACES) for axis in (machine.x, machine.y))
-    lattice = [(float(x), float(y)) for x in xs for y in ys]
-    centre = machine.turn.point_mm
-    yield from sorted(lattice, key=lambda p: (-hypot(p[0] - centre[0], p[1] - centre[1]), p))
+def _upward(machine: Machine, turning: list[Pose]) -> Floats:
+    """(k, 3) directions to try: those of some poses' normals and a field, as far as they do not point down."""
+    chosen = turning[:: max(1, len(turning) // TRIED)]
+    fans = [directions(rotation(machine, pose) @ UP)[:27] for pose in chosen]
+    tried = np.vstack([UP[None], *fans, spread(2 * FIELD)])
+    around = np.radians(np.arange(0.0, 360.0, 15.0))
+    tried = np.vstack([tried, np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])])
+    kept: Floats = tried[tried[:, 2] >= -1e-12]
+    return np.unique(np.round(kept, 12), axis=0)
 
 
-def _clear_aside(machine: Machine, printed: Printed, stand: Floats, at_mm: Floats, turning: list[Pose]) -> bool:
-    """True when the way from above at_mm to `stand`, and standing there through all poses, is clear of table and print."""
-    above = np.array([at_mm[0], at_mm[1], stand[2]])
-    if not _clear(machine, printed, turning[-1], stand, stand, machine.clearance_mm):
-        return False
-    if not _clear(machine, printed, turning[0], above, stand, 0.0):
-        return False
-    return all(_clear(machine, printed, pose, stand, stand, machine.clearance_mm) for pose in turning)
+def route(
+    machine: Machine, printed: Printed, at_mm: Floats, target_mm: Floats | None, start: Pose, end: Pose, speeds: Speeds, part: int
+) -> Route:
+    """The quickest safe route from at_mm (machine X Y Z) at one pose to target_mm at another; None: the turn is the end of it.
 
-
-def _clear(machine: Machine, printed: Printed, pose: Pose, start: Floats, end: Floats, keep_mm: float) -> bool:
-    """True when each body keeps keep_mm, and what it must keep anyway, while the tip goes from start to end."""
-    tried = directions(rotation(machine, pose) @ UP)
-    reaches = [table_reach(machine, pose, tried), printed.reach(machine, pose, tried)]
-    return all(
-        float(sweep_gaps(body, start[None], end[None], tried, reach)[0]) >= max(body.need_mm, keep_mm)
-        for body in bodies(machine)
-        for reach in reaches
-    )
-
-
-def approach_z(machine: Machine, printed: Printed, pose: Pose, safe: SafePose, target_mm: Floats, part: int) -> float:
-    """Machine Z at which the tip may cross to above target_mm at a pose: safe.z_mm unless the head stood aside.
-
-    Raises MoveError when the way in from aside is not clear.
+    Raises MoveError when no stand is safe inside the axis limits.
     """
-    if safe.over_mm is None:
-        return safe.z_mm
-    stand = np.array([*safe.over_mm, safe.z_mm])
-    above = np.array([target_mm[0], target_mm[1], safe.z_mm])
-    if not _clear(machine, printed, pose, stand, above, 0.0):
-        raise MoveError(
-            f"part {part}: the way from aside (X {stand[0]:.1f} Y {stand[1]:.1f}) to its first point at "
-            f"{machine.tilt.letter}{pose.tilt_deg:.3f} is not clear at Z {safe.z_mm:g} mm, the greatest on {machine.name}"
-        )
-    return safe.z_mm
+    swept = sweep(machine, printed, start, end)
+    best: Route | None = None
+    lowest = inf
+    for x, y in stands(machine, at_mm, target_mm):
+        for every in (COARSE, 1):
+            least = swept.least_z(x, y, every)
+            found = _at(machine, (x, y), least, at_mm, target_mm, speeds)
+            if found.across_z_mm > machine.z.limits_mm[1] or (best is not None and found.seconds >= best.seconds):
+                break
+        else:
+            best = found if _ways_clear(machine, at_mm, found, target_mm, start, end) else best
+        lowest = min(lowest, least)
+    if best is not None:
+        return best
+    where = f"{machine.tilt.letter}{end.tilt_deg:.3f} {machine.turn.letter}{end.turn_deg:.3f}"
+    raise MoveError(
+        f"part {part}: turning the table to {where} needs the tip at Z {lowest:.1f} mm, "
+        f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm, and no way aside is clear"
+    )
+
+
+def _at(machine: Machine, over: tuple[float, float], least_z: float, at: Floats, target: Floats | None, speeds: Speeds) -> Route:
+    """The route that stands at a place as low as it may; the print just left and the one to come are crossed with clearance."""
+    z = max(least_z, min(float(at[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
+    across = z if target is None else max(z, min(float(target[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
+    seconds = way_s(machine, at, over, (z, across), target, speeds) if across < inf else inf
+    return Route(over, z, across, seconds)
+
+
+def stands(machine: Machine, at_mm: Floats, target_mm: Floats | None) -> Iterator[tuple[float, float]]:
+    """Places to stand: where the tip is, above the next first point, half way, then a lattice over X and Y."""
+    here = at_mm[:2]
+    there = here if target_mm is None else target_mm[:2]
+    for place in (here, there, 0.5 * (here + there)):
+        yield float(place[0]), float(place[1])
+    xs, ys = (np.linspace(*axis.limits_mm, STANDS) for axis in (machine.x, machine.y))
+    for x in xs:
+        for y in ys:
+            yield float(x), float(y)
+
+
+def way_s(
+    machine: Machine, at: Floats, over: tuple[float, float], z_mm: tuple[float, float], target: Floats | None, speeds: Speeds
+) -> float:
+    """Seconds of a route: up to the first of z_mm, to `over`, (turn,) at the second across, down; it stops between its moves."""
+    turning, across = z_mm
+    places = [at, [*at[:2], turning], [*over, turning]]
+    if target is not None:
+        places += [[*over, across], [*target[:2], across], target]
+    steps = np.zeros((len(places) - 1, 6))
+    steps[:, :3] = np.diff(np.array(places), axis=0)
+    upright = np.hypot(steps[:, 0], steps[:, 1]) < 1e-9
+    speed = np.where(upright, speeds.lift_mm_s, speeds.travel_mm_s)
+    return float(move_times(steps, speed, np.ones(len(steps), dtype=np.bool_), machine).sum())
+
+
+def _ways_clear(machine: Machine, at: Floats, found: Route, target: Floats | None, start: Pose, end: Pose) -> bool:
+    """True when the ways to the stand, at the first pose, and from it, at the second, keep off table and cradle.
+
+    Of what is printed nothing stands higher than the tip in either pose, so the ways need not be tried against it.
+    """
+    stand = np.array([*found.over_mm, found.z_mm])
+    ways = [(start, at, np.array([*at[:2], found.z_mm])), (start, np.array([*at[:2], found.z_mm]), stand)]
+    if target is not None:
+        raised, over = np.array([*found.over_mm, found.across_z_mm]), np.array([*target[:2], found.across_z_mm])
+        ways += [(end, stand, raised), (end, raised, over), (end, over, target)]
+    return all(_clear(machine, pose, a, b) for pose, a, b in ways if float(np.linalg.norm(b - a)) > 1e-9)
+
+
+def _clear(machine: Machine, pose: Pose, start: Floats, end: Floats) -> bool:
+    """True when each body keeps what it must from table and cradle while the tip goes from start to end."""
+    normal = rotation(machine, pose) @ UP
+    for tried in (np.array([UP, normal]), directions(normal)):
+        reaches = [reach_of(tried) for _, reach_of in solids(machine, pose)]
+        if all(
+            float(sweep_gaps(body, start[None], end[None], tried, reach)[0]) >= body.need_mm - 1e-6
+            for body in bodies(machine)
+            for reach in reaches
+        ):
+            return True
+    return False
+
+
+def top_z(machine: Machine, pose: Pose) -> float:
+    """Machine Z at which the tip is lift_mm above all of table and cradle at a pose, wherever it stands."""
+    return max(float(reach_of(UP[None])[0]) for _, reach_of in solids(machine, pose)) + machine.lift_mm

@@ -1,20 +1,37 @@
-"""Clearance: every move of the head against the table's plate, and every turn of the table against the head, print included."""
+"""Clearance: every move of the head against the table and its cradle, every turn of them against the head."""
+
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.collide import Body, Printed, bodies, directions, gaps_of, hull, refined_gap, sweep_gaps, swept, table_reach
+from machine.collide import (
+    Body,
+    Printed,
+    Reach,
+    bodies,
+    directions,
+    gaps_of,
+    hull,
+    refined_gap,
+    solids,
+    sweep_gaps,
+    swept,
+    swing_mm,
+)
 from machine.dryrun.findings import MOST, Finding, cut_short
 from machine.dryrun.stretches import stretches
 from machine.parsed import MoveKind, ParsedProgram
-from machine.reorient import poses_between
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
 
-STEP_DEG = 0.5
+FIRST_MM = 20.0  # of way between the poses tried first
+MOST_LEFT_MM = 0.05
+MOST_POSES = 4000
+AT_ONCE = 20_000  # moves times directions fill memory
+CONFIRMED = 200
 ROUNDING_MM = 2e-3  # three coordinates rounded to a thousandth
-CONFIRMED = 12
 MOST_TURNS = 2000
 
 
@@ -33,44 +50,42 @@ def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
             return [*found, cut_short(program, int(stretch.rows[0]), "straight moves")]
         tried = np.array([rotation(machine, stretch.pose) @ UP, UP])
         least = swept(program.start[stretch.rows, :3], program.end[stretch.rows, :3], tried)
-        reach = table_reach(machine, stretch.pose, tried)
-        for body in bodies(machine):
-            close = gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM
-            if close.any():
-                found += _body(program, stretch.rows[close], body, machine, stretch.pose)
+        for solid in solids(machine, stretch.pose):
+            reach = solid[1](tried)
+            for body in bodies(machine):
+                close = gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM
+                if close.any():
+                    found += _body(program, stretch.rows[close], body, machine, stretch.pose, solid)
     return found
 
 
-def _body(program: ParsedProgram, rows: NDArray[np.int64], body: Body, machine: Machine, pose: Pose) -> list[Finding]:
-    """One body in one pose: the moves that two directions left open, by all directions and a search."""
+def _body(
+    program: ParsedProgram, rows: NDArray[np.int64], body: Body, machine: Machine, pose: Pose, solid: tuple[str, Reach]
+) -> list[Finding]:
+    """One body and one solid in one pose: the moves that two directions left open, by all directions and a search."""
     start, end = program.start[rows, :3], program.end[rows, :3]
     need = body.need_mm - ROUNDING_MM
-    tried = directions(rotation(machine, pose) @ UP)
-    gaps = sweep_gaps(body, start, end, tried, table_reach(machine, pose, tried))
+    normal = rotation(machine, pose) @ UP
+    tried = directions(normal)
+    reach = solid[1](tried)
+    pieces = [slice(k, k + AT_ONCE) for k in range(0, len(rows), AT_ONCE)]
+    gaps = np.concatenate([sweep_gaps(body, start[piece], end[piece], tried, reach) for piece in pieces])
     close = np.flatnonzero(gaps < need)
-    if not len(close):
-        return []
-    worst = _confirmed(start, end, close, gaps, need, body, machine, pose)
+    for k in close[np.argsort(gaps[close])][:CONFIRMED]:
+        gaps[k] = max(gaps[k], refined_gap(body, start[k], end[k], normal, solid[1]))
+        if gaps[k] < need:
+            break
     close = close[gaps[close] < need]
     if not len(close):
         return []
-    row = int(rows[close[0]])
+    row, worst = int(rows[close[0]]), float(gaps[close].min())
     where = f"{machine.tilt.letter}{pose.tilt_deg:.3f} {machine.turn.letter}{pose.turn_deg:.3f}"
     message = (
-        f"{body.name} comes to {worst:.2f} mm from the table at {where}, {body.need_mm:g} mm are needed (moves: {len(close)})"
+        f"{body.name} comes to {worst:.2f} mm from {solid[0]} at {where}, {body.need_mm:g} mm are needed (moves: {len(close)})"
         if worst > 0
-        else f"{body.name} runs into the table at {where} (moves: {len(close)})"
+        else f"{body.name} runs into {solid[0]} at {where} (moves: {len(close)})"
     )
     return [Finding("error", "collision", int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)]
-
-
-def _confirmed(
-    start: Floats, end: Floats, close: NDArray[np.int64], gaps: Floats, need: float, body: Body, machine: Machine, pose: Pose
-) -> float:
-    """Improve the lower bounds of the worst moves; returns the least distance of all moves still too close."""
-    for row in close[np.argsort(gaps[close])][:CONFIRMED]:
-        gaps[row] = max(gaps[row], refined_gap(body, start[row], end[row], machine, pose))
-    return float(gaps[close].min())
 
 
 def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
@@ -95,16 +110,42 @@ def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.
 
 
 def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) -> list[Finding]:
-    """One turn of the table, in steps: all bodies against the plate and against the hull of what is printed."""
+    """One turn of the table, swept: no pose is farther from a tried one than what its gaps leave room for.
+
+    Between two poses every point of what turns moves, against the tip, by at most `_way_mm`; where the gaps at both ends do not
+    leave half of that, the pose between them is tried too, until the way is MOST_LEFT_MM.
+    """
     start, end = program.start[row], program.end[row]
-    poses = poses_between(Pose(*map(float, start[3:])), Pose(*map(float, end[3:])), STEP_DEG)
-    share = np.linspace(0.0, 1.0, len(poses))[:, None]
-    tips = start[:3] + share * (end[:3] - start[:3])
+    way = _way_mm(start, end, printed, machine)
     least: dict[tuple[str, str], tuple[float, Pose]] = {}
-    for pose, tip in zip(poses, tips, strict=True):
-        for meeting, gap in _meetings(machine, printed, pose, tip).items():
+
+    def pose_at(share: float) -> Pose:
+        tilt, turn = start[3:] + share * (end[3:] - start[3:])
+        return Pose(float(tilt), float(turn))
+
+    def room(share: float, most: float) -> float:
+        """How much more than needed is left at a share of the turn, at most `most`; what is too near is noted."""
+        pose = pose_at(share)
+        left, met = _room(machine, printed, pose, start[:3] + share * (end[:3] - start[:3]), most)
+        for meeting, gap in met.items():
             if gap < least.get(meeting, (np.inf, pose))[0]:
                 least[meeting] = (gap, pose)
+        return left
+
+    steps = max(1, ceil(way / FIRST_MM))
+    shares = [k / steps for k in range(steps + 1)]
+    rooms = [room(share, way / steps) for share in shares]
+    open_intervals = list(zip(shares, shares[1:], rooms, rooms[1:], strict=False))
+    for _ in range(MOST_POSES):
+        if not open_intervals:
+            break
+        low, high, left, right = open_intervals.pop()
+        distance = (high - low) * way
+        if left + right >= distance or distance <= MOST_LEFT_MM or min(left, right) <= 0.0:
+            continue
+        middle = 0.5 * (low + high)
+        between = room(middle, 0.5 * distance)
+        open_intervals += [(low, middle, left, between), (middle, high, between, right)]
     return [
         Finding(
             "error", "collision", int(program.line[row]), int(program.part[row]), int(program.layer[row]),
@@ -115,17 +156,26 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
     ]  # fmt: skip
 
 
-def _meetings(machine: Machine, printed: Printed, pose: Pose, tip: Floats) -> dict[tuple[str, str], float]:
-    """The gaps that are too small in one pose: (body, obstacle) -> mm. Most often all stands below the tip, seen by UP alone."""
+def _way_mm(start: Floats, end: Floats, printed: Printed, machine: Machine) -> float:
+    """A bound on the way of any point of table, cradle and print against the tip during a turn."""
+    turned = np.abs(np.radians(end[3:] - start[3:])).sum()
+    return float(np.linalg.norm(end[:3] - start[:3]) + turned * swing_mm(machine, printed))
+
+
+def _room(machine: Machine, printed: Printed, pose: Pose, tip: Floats, most: float) -> tuple[float, dict[tuple[str, str], float]]:
+    """By how much all gaps in one pose exceed what is needed (at most `most`), and those that do not: (body, solid) -> mm."""
     normal = rotation(machine, pose) @ UP
-    found: dict[tuple[str, str], float] = {}
-    for tried in (UP[None], directions(normal)):
-        found = {}
-        for name, reach in (("the table", table_reach(machine, pose, tried)), ("the print", printed.reach(machine, pose, tried))):
-            for body in bodies(machine):
-                gap = float(sweep_gaps(body, tip[None], tip[None], tried, reach)[0])
-                if gap < body.need_mm - ROUNDING_MM:
-                    found[body.name, name] = min(gap, found.get((body.name, name), np.inf))
-        if not found:
-            break
-    return found
+    met: dict[tuple[str, str], float] = {}
+    left = most
+    for name, reach_of in solids(machine, pose, printed):
+        for body in bodies(machine):
+            need, gap = body.need_mm - ROUNDING_MM, -np.inf
+            for tried in (UP[None], directions(normal)):
+                if gap - need < most:
+                    gap = max(gap, float(sweep_gaps(body, tip[None], tip[None], tried, reach_of(tried))[0]))
+            if gap < need:
+                gap = max(gap, refined_gap(body, tip, tip, normal, reach_of))
+            if gap < need:
+                met[body.name, name] = min(gap, met.get((body.name, name), np.inf))
+            left = min(left, gap - need)
+    return left, met

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun import clearance, heat, laying, made, motion, plate, sequence
 from machine.dryrun.findings import Finding
-from machine.dryrun.ground import Ground, Laid, beads, walk
+from machine.dryrun.ground import Ground, beads, walk
 from machine.dryrun.timeline import move_times
 from machine.kinematics.table import workpiece_path
 from machine.limits import axis_limits

@@ -191,9 +191,7 @@ def _carried(x, y, z, nx, ny, row, first, gap, at, height, path, done, held, hal
 
 
 @njit(cache=True)
-def _walked(
-    rows, start, end, extruded, half, height, path, done, held, first, gap, plate, field, silhouette, boxes, depth, air, taken
-):  # type: ignore[no-untyped-def]
+def _walked(rows, start, end, extruded, half, height, path, done, held, first, gap, plate, field, silhouette, boxes, depth, air, taken):  # type: ignore[no-untyped-def] # fmt: skip # noqa: E501
     """Try each row of a stretch against the field, then lay it."""
     for row in rows:
         a, b = start[row], end[row]

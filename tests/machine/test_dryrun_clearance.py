@@ -1,3 +1,4 @@
+from functools import partial
 from math import cos, pi, radians, sin
 
 import numpy as np
@@ -98,7 +99,8 @@ def test_refining_never_loses_to_the_tried_directions(tilt: float, radius: float
     tip = np.array([30.0, -20.0, 60.0])
     tried = directions(rotation(machine, pose) @ UP)
     lower = sweep_gaps(body, tip[None], tip[None], tried, table_reach(machine, pose, tried))[0]
-    assert refined_gap(body, tip, tip, machine, pose) >= lower - 1e-9
+    reach = partial(table_reach, machine, pose)
+    assert refined_gap(body, tip, tip, rotation(machine, pose) @ UP, reach) >= lower - 1e-9
 
 
 def test_the_hull_of_beads_reaches_as_far_as_their_points() -> None:
