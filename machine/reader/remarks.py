@@ -26,7 +26,9 @@ def remark(reader: Reader, text: str) -> None:
             reader.part, reader.layer = int(number), 0
             reader.parts.append(reader.part)
     elif key == "UNSUPPORTED":
-        reader.unsupported.append((reader.number, reader.part, _positive(value)))
+        area, _, layer = value.partition("@")
+        worst = int(layer) if re.fullmatch("[0-9]{1,6}", layer) else 0
+        reader.unsupported.append((reader.number, reader.part, _positive(area), worst))
     elif key == "LAYER" and re.fullmatch("-?[0-9]{1,6}", value):
         _layer(reader)
 
