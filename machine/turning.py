@@ -15,6 +15,8 @@ STEP_DEG = 1.0  # a followed turn goes in steps: between them the tip leaves its
 
 def turn(to: Pose, speed_deg_s: float, pen: Pen) -> Iterator[str]:
     """Turn the table from pen.pose to a pose at a speed along sqrt(tilt^2 + turn^2), the head standing still."""
+    if pen.machine.shape == "fixed":
+        return
     tilt_deg, turn_deg = to.tilt_deg - pen.pose.tilt_deg, to.turn_deg - pen.pose.turn_deg
     if pen.dialect.steppers:
         yield from _stepped(to, tilt_deg, turn_deg, speed_deg_s, pen)

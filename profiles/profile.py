@@ -72,6 +72,14 @@ def load_one(name: str, settings: Iterable[str] = ()) -> dict[str, Frozen]:
     return models
 
 
+def section(name: str, table: Any) -> Frozen:
+    """One section made of a plain table, whose values may be text. Raises ProfileError."""
+    try:
+        return SECTIONS[name].model_validate(table)
+    except ValidationError as error:
+        raise ProfileError("; ".join(sentences(error.errors(), SECTIONS[name], f"{name}."))) from None
+
+
 def rows(prefix: str, model: Frozen) -> Iterator[tuple[str, Any, str]]:
     """Every key of a model with its plain value and what it means, tables flattened with dots."""
     for key, field in type(model).model_fields.items():

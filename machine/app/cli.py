@@ -29,6 +29,11 @@ ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a
 MachineName = Annotated[str, typer.Option("--machine", metavar="NAME|FILE", help="machine profile")]
 MaterialName = Annotated[str, typer.Option("--material", metavar="NAME|FILE", help="material profile")]
 ProcessName = Annotated[str, typer.Option("--process", metavar="NAME|FILE", help="process profile")]
+MachineGiven = Annotated[
+    str | None, typer.Option("--machine", metavar="NAME|FILE", help="machine profile; else the G-code file's own")
+]
+MaterialGiven = Annotated[str | None, typer.Option("--material", metavar="NAME|FILE", help="material profile; else the file's")]
+ProcessGiven = Annotated[str | None, typer.Option("--process", metavar="NAME|FILE", help="process profile; else the file's")]
 Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
 BeamWidth = Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")]
@@ -104,16 +109,19 @@ def simulate(
     ranker: RankerName = "classic",
     orient: Orient = False,
     json: JsonFile = None,
-    machine: MachineName = "generic_ac",
-    material: MaterialName = "pla",
-    process: ProcessName = "standard",
+    machine: MachineGiven = None,
+    material: MaterialGiven = None,
+    process: ProcessGiven = None,
     settings: Settings = None,
 ) -> int:
     """Dry-run a model or a G-code file; exit 1 when a finding is an error."""
     from machine.app import commands
 
-    profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
-    return commands.simulate(model, profile, ranker, orient, json)
+    profile = _profile(
+        machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
+    )
+    named = _named(machine=machine, material=material, process=process, settings=settings)
+    return commands.simulate(model, profile, ranker, orient, json, named)
 
 
 @app.command("print")
@@ -128,16 +136,19 @@ def print_(
     orient: Orient = False,
     speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
     force: Force = False,
-    machine: MachineName = "generic_ac",
-    material: MaterialName = "pla",
-    process: ProcessName = "standard",
+    machine: MachineGiven = None,
+    material: MaterialGiven = None,
+    process: ProcessGiven = None,
     settings: Settings = None,
 ) -> int:
     """Print a model or a G-code file over a serial port, or on the simulated printer."""
     from machine.app import commands
 
-    profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
-    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force)
+    profile = _profile(
+        machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
+    )
+    named = _named(machine=machine, material=material, process=process, settings=settings)
+    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named)
 
 
 @profiles_app.command("list")
@@ -181,6 +192,12 @@ def _options(
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version")] = False,
 ) -> None:
     del version
+
+
+def _named(settings: list[str] | None, **given: str | None) -> frozenset[str]:
+    """The sections of the profile that the user has said something about."""
+    sections = {kind for kind, name in given.items() if name is not None}
+    return frozenset(sections | {setting.partition(".")[0] for setting in settings or []})
 
 
 def _profile(  # type: ignore[no-untyped-def]

@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
+from machine.app.foot import in_words, told_in
 from machine.app.layer_picture import asked, drawn
 from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
 from machine.app.picture import contact_sheet, parts_picture
 from machine.app.pipeline import Program, build, decompose_model
 from machine.app.png import write_png
-from machine.app.printing import check_port, print_program
+from machine.app.printing import check_dialect, check_port, print_program
 from machine.app.progress import say
 from machine.app.report import parts_table, run_table, show
 from machine.app.warmup import warm
@@ -81,31 +82,45 @@ def export(
     return 0
 
 
-def simulate(model: str, profile: Profile, ranker: str, orient: bool, json: Path | None) -> int:
-    """Dry-run a model or a G-code file; 1 when a finding is an error."""
+def simulate(
+    model: str, profile: Profile, ranker: str, orient: bool, json: Path | None, named: frozenset[str] = frozenset()
+) -> int:
+    """Dry-run a model or a G-code file; 1 when a finding is an error. named: profiles given, not taken from the file."""
     _check(json)
-    program = _program(model, profile, ranker, orient)
+    program, _ = _program(model, profile, ranker, orient, named)
     _tell(program, json)
     return 1 if _errors(program) else 0
 
 
 def print_model(
-    model: str, profile: Profile, ranker: str, orient: bool, port: str, baud: int, sim_speed: float, force: bool
+    model: str,
+    profile: Profile,
+    ranker: str,
+    orient: bool,
+    port: str,
+    baud: int,
+    sim_speed: float,
+    force: bool,
+    named: frozenset[str] = frozenset(),
 ) -> int:
     """Dry-run, then stream a model or a G-code file to a printer, whose port is tried before any work is done."""
     check_port(port, baud, sim_speed)
-    program = _program(model, profile, ranker, orient)
+    program, profile = _program(model, profile, ranker, orient, named)
+    check_dialect(profile.machine, port)
     _refuse_errors(program, force)
     show(run_table(program.run))
     return print_program(program, profile, port, baud, sim_speed)
 
 
-def _program(model: str, profile: Profile, ranker: str, orient: bool) -> Program:
+def _program(model: str, profile: Profile, ranker: str, orient: bool, named: frozenset[str]) -> tuple[Program, Profile]:
     if Path(model).suffix.lower() in GCODE_SUFFIXES:
         lines = _gcode_lines(Path(model))
+        profile, taken = told_in(lines, profile, named)
+        if taken:
+            say(f"{Path(model).name}: {in_words(taken, profile)}, as the file itself tells")
         warm(profile)
-        return Program(lines, dry_run(lines, profile), None)
-    return build(decompose_model(model, profile, ranker, orient).decomposition, profile)
+        return Program(lines, dry_run(lines, profile), None), profile
+    return build(decompose_model(model, profile, ranker, orient).decomposition, profile), profile
 
 
 def _gcode_lines(path: Path) -> tuple[str, ...]:

@@ -10,11 +10,13 @@ from types import FrameType
 from machine.app.pipeline import Program
 from machine.app.progress import Ticker, say
 from machine.app.report import duration, show
+from machine.dialects import DIALECTS
 from machine.link.port import open_port
 from machine.link.progress import Progress
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import Outcome, print_lines
 from profiles.errors import PrinterError
+from profiles.machine import Machine
 from profiles.profile import Profile
 
 SIMULATED = "sim"
@@ -27,6 +29,19 @@ def check_port(port: str, baud: int, sim_speed: float) -> None:
     if port != SIMULATED:
         with open_port(port, baud):
             pass
+
+
+def check_dialect(machine: Machine, port: str) -> None:
+    """Refuse a machine whose firmware takes no lines over a serial port, or that the simulated printer cannot stand for."""
+    if not DIALECTS[machine.dialect].serial:
+        streamed = ", ".join(name for name, dialect in DIALECTS.items() if dialect.serial)
+        raise PrinterError(
+            f"{machine.name} speaks {machine.dialect}, which opens files itself: use export; print serves the dialects {streamed}"
+        )
+    if port == SIMULATED and machine.coordinates == "workpiece":
+        raise PrinterError(
+            f"{machine.name}: the simulated printer does not follow the table: machine.coordinates must be table, not workpiece"
+        )
 
 
 def print_program(program: Program, profile: Profile, port: str, baud: int, sim_speed: float) -> int:

@@ -55,7 +55,7 @@ class Reader:
     rows: "array[float]" = field(default_factory=lambda: array("d"))
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
-    unsupported: list[tuple[int, int, float]] = field(default_factory=list)
+    unsupported: list[tuple[int, int, float, int]] = field(default_factory=list)
 
     def row(self, before: list[float], feed: float) -> None:
         """A move from a place to where the machine is now."""
@@ -77,7 +77,7 @@ class Reader:
 def begun(machine: Machine) -> Reader:
     """A reader that has read nothing: the machine stands at home."""
     dialect = DIALECTS[machine.dialect]
-    rotary = () if dialect.steppers else (machine.tilt.letter, machine.turn.letter)
+    rotary = () if dialect.steppers or machine.shape == "fixed" else (machine.tilt.letter, machine.turn.letter)
     filament = next(each for each in dialect.filament if each not in rotary)
     letters = {"X": 0, "Y": 1, "Z": 2, **{letter: 3 + k for k, letter in enumerate(rotary)}, filament: E_AXIS}
     linear = [min(max(0.0, axis.limits_mm[0]), axis.limits_mm[1]) for axis in (machine.x, machine.y, machine.z)]
