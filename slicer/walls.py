@@ -15,6 +15,7 @@ from slicer.polygons import Polygons, contours, grown, opened, rounded
 
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner; what it leaves there is looked at again with round beads
 LEAST_REST_MM2 = 1e-3
+INNER_RESOLUTION_MM = 0.0125  # behind the outer wall detail is unseen and costs time: PrusaSlicer's resolution of G-code
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
 
 
@@ -44,7 +45,7 @@ def walls(section: Polygons, count: int, width_mm: float, height_mm: float) -> W
         if not rest.is_empty():
             free, narrow = (rest, narrow) if level == 0 else (free, narrow + rest)
         levels.append(tuple(contours(line)))
-        area = core
+        area = core.simplify(INNER_RESOLUTION_MM)
         if core.is_empty():
             break
     core = grown(area, -spacing)
