@@ -19,6 +19,8 @@ from profiles.profile import Profile
 
 PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4}
 
+FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the origin would have too many planes
+
 
 class Rules:
     """Settings, machine and bounds of a search, its root, and how many candidates were looked at."""
@@ -66,8 +68,10 @@ class Rules:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""
         direction = plane.normal[None]
         limits = bounds_of(direction, self.ground, self.model.volume_mm3, self.machine, self.settings)
-        steps = max(1, round(abs(plane.offset_mm) / self.settings.offset_step_mm))
-        step_mm = abs(plane.offset_mm) / steps or self.settings.offset_step_mm  # a grid that the plane lies on
+        step_mm, offset_mm = self.settings.offset_step_mm, abs(plane.offset_mm)
+        if 0.0 < offset_mm < FINEST * step_mm:
+            return False
+        step_mm = offset_mm / max(1, round(offset_mm / step_mm)) or step_mm  # a grid that the plane lies on
         own = self.settings.model_copy(update={"offset_step_mm": step_mm})
         found = check(node.remainder, limits, own, np.zeros(1, np.int32), np.array([plane.offset_mm]))
         return bool(found.reason[0] == Reason.FEASIBLE)

@@ -66,3 +66,11 @@ def test_a_time_limit_of_nothing_leaves_all_as_it_is() -> None:
     rules = _rules("search.time_limit_s=0")
     node = _after(rules, _through(30.0, 9.0))
     assert polished(rules, node).cost_mm2 == node.cost_mm2
+
+
+def test_a_plane_a_hairs_breadth_from_the_origin_is_refused_and_one_through_it_is_looked_at() -> None:
+    rules = _rules()
+    beside, through = Plane(ALONG_X, 1e-17), Plane(ALONG_X, 0.0)
+    assert not rules.allowed(rules.root, beside)
+    assert not rules.allowed(rules.root, through)  # it would cut the platform
+    assert rules.allowed(rules.root, _through(30.0, 9.0))
