@@ -47,9 +47,9 @@ def check_dialect(machine: Machine, port: str) -> None:
 def print_program(program: Program, profile: Profile, port: str, baud: int, sim_speed: float) -> int:
     """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible."""
     if port != SIMULATED:
-        return _ended(_stream(program, port, baud))
+        return _ended(_stream(program, profile, port, baud))
     with SimulatedPrinter(profile.machine, sim_speed or inf) as printer:
-        outcome = _stream(program, printer.path, baud)
+        outcome = _stream(program, profile, printer.path, baud)
         record = printer.record
     if outcome.cancelled:
         return _ended(outcome)
@@ -65,11 +65,19 @@ def print_program(program: Program, profile: Profile, port: str, baud: int, sim_
     return 0
 
 
-def _stream(program: Program, port: str, baud: int) -> Outcome:
+def _stream(program: Program, profile: Profile, port: str, baud: int) -> Outcome:
     ticker = Ticker()
     stop = threading.Event()
     with _stopping(stop):
-        outcome = print_lines(program.lines, port, baud, lambda progress: ticker.tick(status(progress)), stop, program.run.time_s)
+        outcome = print_lines(
+            program.lines,
+            port,
+            baud,
+            lambda progress: ticker.tick(status(progress)),
+            stop,
+            program.run.time_s,
+            limit=DIALECTS[profile.machine.dialect].longest_line,
+        )
     ticker.close()
     return outcome
 

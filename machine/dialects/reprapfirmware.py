@@ -7,7 +7,7 @@ from machine.dialects.dialect import Dialect
 
 REPRAPFIRMWARE = Dialect(
     firmware="RepRapFirmware",
-    longest_line=160,  # its buffer is longer since 3.4, older boards keep 161 with the closing zero
+    longest_line=120,  # it keeps more; the stream's checksum is made for no longer ones
     nozzle="M568 P0 S{}",
     nozzle_wait="M109 S{}",
     fan_on="M106 P0 S{}",

@@ -23,26 +23,26 @@ def checksum(body: bytes) -> int:
     return x & 0xFF
 
 
-def frame(number: int, command: str) -> bytes:
-    """The bytes of one numbered line, newline included. LocalProtocolError when it is longer than LINE_LIMIT."""
+def frame(number: int, command: str, limit: int = LINE_LIMIT) -> bytes:
+    """The bytes of one numbered line, newline included. LocalProtocolError when it is longer than the firmware keeps."""
     body = b"N%d %s" % (number, command.encode("ascii"))
-    if len(body) > LINE_LIMIT:
-        raise too_long(command)
+    if len(body) > limit:
+        raise too_long(command, limit)
     framed = b"%s*%d\n" % (body, checksum(body))
-    if len(framed) > LINE_LIMIT + 1:
-        raise too_long(command)
+    if len(framed) > limit + 1:
+        raise too_long(command, limit)
     return framed
 
 
-def too_long(command: str) -> LocalProtocolError:
+def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
     """The error for a command that does not fit in a line."""
     return LocalProtocolError(
         f"the command {command[:40]!r}... is {len(command)} characters long: with number and checksum "
-        f"at most {LINE_LIMIT} are allowed"
+        f"at most {limit} are allowed"
     )
 
 
-def command_of(line: str, place: int) -> str:
+def command_of(line: str, place: int, limit: int = LINE_LIMIT) -> str:
     """The command in a line of a program, without comment and blanks; "" when there is none.
 
     place is the line's number in the program, for messages. Raises LocalProtocolError for a character outside printable
@@ -60,10 +60,10 @@ def command_of(line: str, place: int) -> str:
         raise LocalProtocolError(f"line {place} ({command[:40]!r}) holds a '*': checksums are added by the sender")
     if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
         raise LocalProtocolError(f"line {place} holds {name_of(command)}, which {reason}: remove it from the program")
-    if len(command) > LINE_LIMIT - 6 and len(command) + len(str(place + 3)) + 6 > LINE_LIMIT:
+    if len(command) > limit - 6 and len(command) + len(str(place + 3)) + 6 > limit:
         raise LocalProtocolError(
             f"line {place} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
-            f"{LINE_LIMIT} are allowed"
+            f"{limit} are allowed"
         )
     return command
 

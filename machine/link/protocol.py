@@ -18,6 +18,7 @@ from machine.link.events import (
     Wait,
     read_event,
 )
+from machine.link.framing import LINE_LIMIT
 from machine.link.states import TABLE, Signal, State
 from machine.link.window import Window
 from profiles.errors import FirmwareError, LocalProtocolError, PrinterError, RemoteProtocolError, SilenceError
@@ -49,10 +50,10 @@ class Timing:
 class Protocol:
     """One conversation. `fault` is the error that ended it, None while it lasts; `window` counts its lines."""
 
-    def __init__(self, timing: Timing | None = None, now_s: float = 0.0) -> None:
+    def __init__(self, timing: Timing | None = None, now_s: float = 0.0, limit: int = LINE_LIMIT) -> None:
         self.state = State.DRAIN
         self.fault: PrinterError | None = None
-        self.window = Window()
+        self.window = Window(limit)
         self.repeated = 0
         self.strays = 0
         self.advanced = False

@@ -6,7 +6,7 @@ from threading import Event as Flag
 from time import monotonic
 
 from machine.link.events import Echo, Event, Identity, Ok, Temperature
-from machine.link.framing import command_of
+from machine.link.framing import LINE_LIMIT, command_of
 from machine.link.port import Port, open_port
 from machine.link.progress import Place, Progress
 from machine.link.protocol import Protocol, Timing
@@ -53,12 +53,13 @@ def print_lines(
     total_s: float | None = None,
     total: int | None = None,
     timing: Timing | None = None,
+    limit: int = LINE_LIMIT,
 ) -> Outcome:
     """Print a program: send every line's command, wait until the last one is done.
 
     A sequence is checked wholly before the port is opened, any other iterable line by line as it is reached; it is consumed
     lazily. A plain string is taken as its lines. total_s is the expected duration, total the number of commands where
-    `lines` does not tell.
+    `lines` does not tell; limit: characters of a line, number and checksum included, that the firmware keeps.
 
     A set `stop` flag ends the print: feeding stops, moves are stopped, heaters and fan go off, nothing homes or turns; the
     Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises LocalProtocolError for a line that
@@ -68,9 +69,9 @@ def print_lines(
     if isinstance(lines, str):
         lines = lines.splitlines()
     if isinstance(lines, Sequence):
-        total = sum(1 for place, line in enumerate(lines, 1) if command_of(line, place))
+        total = sum(1 for place, line in enumerate(lines, 1) if command_of(line, place, limit))
     with open_port(port, baud) as wire:
-        talk = _Talk(wire, timing or Timing(), on_progress, stop, total, total_s)
+        talk = _Talk(wire, timing or Timing(), on_progress, stop, total, total_s, limit)
         try:
             talk.greet()
             talk.feed(lines)
@@ -108,11 +109,13 @@ class _Talk:
         stop: Flag | None,
         total: int | None,
         total_s: float | None,
+        limit: int = LINE_LIMIT,
     ) -> None:
+        self._limit = limit
         self._wire, self._on_progress, self._stop = wire, on_progress, stop
         self._total, self._total_s = total, total_s
         self._began_s = monotonic()
-        self._protocol = Protocol(timing, self._began_s)
+        self._protocol = Protocol(timing, self._began_s, limit)
         self._place, self._temperature = Place(), Temperature()
         self.greeted = False
         self._jobs = 0
@@ -158,7 +161,7 @@ class _Talk:
 
     def _commands(self, lines: Iterable[str]) -> Iterator[str]:
         for place, line in enumerate(lines, 1):
-            command = command_of(line, place)
+            command = command_of(line, place, self._limit)
             if command:
                 if command.startswith("M73"):
                     self._place.told(command, monotonic() - self._began_s)

@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 
-from machine.link.framing import frame, name_of
+from machine.link.framing import LINE_LIMIT, frame, name_of
 
 RX_BYTES = 127  # an AVR's 128-byte receive ring holds one byte less; a fuller one loses bytes without a word
 HISTORY = 512  # lines kept for a repeat: far more than any printer's buffers hold
@@ -33,9 +33,13 @@ class Sent:
 
 
 class Window:
-    """Wire numbers run from 1; `sent` is the last one given, `acknowledged` the last one known to have arrived."""
+    """Wire numbers run from 1; `sent` is the last one given, `acknowledged` the last one known to have arrived.
 
-    def __init__(self) -> None:
+    limit: characters of a line that the firmware keeps.
+    """
+
+    def __init__(self, limit: int = LINE_LIMIT) -> None:
+        self._limit = limit
         self.sent = 0
         self.acknowledged = 0
         self.flight: deque[Sent] = deque()
@@ -59,7 +63,7 @@ class Window:
 
     def launch(self, command: str) -> bytes:
         """Give a command the next number, keep it for repeats; its bytes."""
-        framed = frame(self.sent + 1, command)
+        framed = frame(self.sent + 1, command, self._limit)
         self.sent += 1
         self._history[self.sent] = framed
         self._history.pop(self.sent - HISTORY, None)
