@@ -1,56 +1,101 @@
-"""Print every model of a folder on the simulated printer and tell where its plastic went.
+"""Print every model of a folder and tell where its plastic goes.
 
-    python tools/check_models.py FOLDER [--machine NAME] [--set KEY=VALUE ...]
+    python tools/check_models.py FOLDER [--machine NAME ...] [--set KEY=VALUE ...] [--only NAME ...] [--stream] [--log FILE]
 
-One row a model: parts, relative error of the parts' volumes, share of the extruded length that the simulated printer itself
-recorded inside the model within one line width (support and skirt aside), recorded over planned volume, planned over
-sliced volume, findings that are errors, seconds.
+One row a model and machine: parts, relative error of the parts' volumes, reduction; share of the model that its beads fill (at
+100 % infill unless --set says otherwise) and plastic over the model's volume; share of the extruded length that lies more
+than half a line outside the model (support and skirt aside) and the farthest; unsupported length beyond what the slicer itself
+reported, and what it reported, over the extruded length; errors of the dry run; seconds of search and of slicing to dry run.
+--stream also sends the program to the simulated printer and judges by what that recorded. --log appends each row at once
+and skips the rows that the file already has.
 """
 
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
-from machine.app.pipeline import build, decompose_model
+from machine.app.pipeline import Program, build, decompose_model
 from machine.dryrun.deposit import inside_share
+from machine.dryrun.fill import filled_share
+from machine.dryrun.ground import beads
+from machine.dryrun.laying import unsupported_mm
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import print_lines
+from mdp.decomposition import Decomposition
+from profiles.errors import UserError
 from profiles.profile import Profile, load
 
 SUFFIXES = {".stl", ".obj", ".off", ".ply", ".3mf", ".glb"}
+HEAD = ("model", "machine", "parts", "volume error", "reduction", "filled", "plastic / model", "outside", "farthest mm")
+HEAD += ("unsupported", "reported", "errors", "search s", "print s")
 
 
 def main() -> None:
     """Read the options, print the table."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("folder", type=Path)
-    options.add_argument("--machine", default="generic_ac")
+    options.add_argument("--machine", nargs="+", default=["generic_ac"])
     options.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    options.add_argument("--only", nargs="+", default=[], metavar="NAME")
+    options.add_argument("--stream", action="store_true")
+    options.add_argument("--log", type=Path)
     given = options.parse_args()
-    profile = load(machine=given.machine, settings=given.set)
-    print("| model | parts | volume error | reduction | inside | recorded / planned | errors | s |")
-    print("|---|---|---|---|---|---|---|---|")
+    done = given.log.read_text() if given.log and given.log.exists() else ""
+    print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|")
     for file in sorted(given.folder.iterdir()):
-        if file.suffix.lower() in SUFFIXES:
-            print(row(file, profile), flush=True)
+        if file.suffix.lower() not in SUFFIXES or (given.only and file.stem not in given.only):
+            continue
+        for machine in given.machine:
+            if f"| {file.name} | {machine} |" in done:
+                continue
+            text = row(file, machine, given.set, given.stream)
+            print(text, flush=True)
+            if given.log:
+                with given.log.open("a") as log:
+                    log.write(text + "\n")
 
 
-def row(file: Path, profile: Profile) -> str:
-    """One model's line of the table."""
-    began = perf_counter()
-    found = decompose_model(str(file), profile, "classic").decomposition
-    program = build(found, profile)
+def row(file: Path, machine: str, settings: list[str], stream: bool) -> str:
+    """One model's line of the table on one machine."""
+    began = process_time()
+    try:
+        profile = load(machine=machine, settings=["process.infill_density=1", *settings])
+        found = decompose_model(str(file), profile, "classic").decomposition
+        searched = process_time()
+        program = build(found, profile)
+    except UserError as error:
+        return f"| {file.name} | {machine} | refused: {error} |"
+    if stream:
+        program = streamed(program, profile)
+    told = [*figures(found, program, profile), round(searched - began), round(process_time() - searched)]
+    return "| " + " | ".join(str(cell) for cell in [file.name, machine, *told]) + " |"
+
+
+def figures(found: Decomposition, program: Program, profile: Profile) -> list[object]:
+    """The columns between the machine and the seconds."""
+    run, mesh = program.run, found.mesh
+    share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm)
+    fill = filled_share(run, mesh, profile)
+    deposited = beads(run.program, run.segments_mm, run.segment_row, profile)
+    length, loose, told = unsupported_mm(run.program, deposited, run.ground)
+    codes = sorted({finding.code for finding in run.findings if finding.severity == "error"})
+    error = abs(found.volume_mm3 / mesh.volume_mm3 - 1.0)
+    plastic = run.segment_mm3.sum() / mesh.volume_mm3
+    return [
+        len(found.parts), f"{error:.1e}", f"{found.reduction:.3f}", f"{fill.share:.4f}", f"{plastic:.3f}",
+        f"{1.0 - share.share:.4f}", f"{share.farthest_mm:.2f}", f"{loose / length:.4f}", f"{told / length:.4f}",
+        " ".join(codes) or "0",
+    ]  # fmt: skip
+
+
+def streamed(program: Program, profile: Profile) -> Program:
+    """The program with the segments that the simulated printer recorded."""
     with SimulatedPrinter(profile.machine) as printer:
         print_lines(program.lines, printer.path)
         record = printer.record
-    segments, volumes = record.deposited(profile.material.diameter_mm)
-    share = inside_share(replace(program.run, segments_mm=segments), found.mesh, profile.process.line_width_mm).share
-    error = abs(found.volume_mm3 / found.mesh.volume_mm3 - 1.0)
-    errors = sum(finding.severity == "error" for finding in program.run.findings)
-    laid = volumes.sum() / program.run.segment_mm3.sum()
-    told = [file.name, len(found.parts), f"{error:.1e}", f"{found.reduction:.3f}", f"{share:.4f}", f"{laid:.5f}", errors]
-    return "| " + " | ".join(str(cell) for cell in [*told, round(perf_counter() - began)]) + " |"
+    segments, _ = record.deposited(profile.material.diameter_mm)
+    return replace(program, run=replace(program.run, segments_mm=segments))
 
 
 if __name__ == "__main__":

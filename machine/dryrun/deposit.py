@@ -56,13 +56,24 @@ def _pieces(segments: Floats) -> tuple[Floats, Floats]:
 def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:
     """(n,) distances of (n, 3) points from a closed mesh's solid: 0 inside, at most most_mm (farther is not looked for)."""
     corners = mesh.vertices[mesh.faces]
-    column = float(np.sqrt(np.ptp(mesh.vertices[:, :2], axis=0).prod() / max(len(corners), 1)))
-    columns = _Cells.over(corners, max(column, float(np.ptp(mesh.vertices[:, :2], axis=0).max()) / 400.0), 0.0)
     distances = np.zeros(len(points))
-    out = np.flatnonzero(_winding(points, corners, *columns.arrays, ASIDE) <= 0)
-    near = _Cells.over(corners, max(most_mm, column), most_mm)
+    out = np.flatnonzero(~inside(points, mesh))
+    near = _Cells.over(corners, max(most_mm, _column_mm(mesh)), most_mm)
     distances[out] = _nearest(points[out], corners, *near.arrays, most_mm)
     return distances
+
+
+def inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
+    """(n,) whether (n, 3) points lie in a closed mesh's solid."""
+    corners = mesh.vertices[mesh.faces]
+    size = max(_column_mm(mesh), float(np.ptp(mesh.vertices[:, :2], axis=0).max()) / 400.0)
+    found: NDArray[np.bool_] = _winding(points, corners, *_Cells.over(corners, size, 0.0).arrays, ASIDE) > 0
+    return found
+
+
+def _column_mm(mesh: Mesh) -> float:
+    """Side of a column in which few faces lie one above the other."""
+    return float(np.sqrt(np.ptp(mesh.vertices[:, :2], axis=0).prod() / max(len(mesh.faces), 1)))
 
 
 @dataclass(frozen=True, eq=False)
