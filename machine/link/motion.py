@@ -3,7 +3,7 @@
 from array import array
 from collections import deque
 from collections.abc import Mapping, Sequence
-from math import ceil, pi
+from math import ceil, inf, pi
 
 from machine.arcs import centre_of, chords, sweep_rad
 from profiles.machine import Machine
@@ -36,6 +36,7 @@ class Motion:
             machine.extruder_acceleration_mm_s2,
         ]
         self._junction = machine.junction_speed_mm_s
+        self._printing = self._travelling = inf  # mm/s2 told by M204 for X Y Z; inf: what the axes allow
         self.native = [0.0] * 6
         self.shift = [0.0] * 6
         self.relative = self.filament_relative = self.inches = False
@@ -140,6 +141,8 @@ class Motion:
                 size = abs(delta)
                 slowest_s = max(slowest_s, size / speed)
                 acceleration = min(acceleration, most * length / size)
+        if linear:
+            acceleration = min(acceleration, self._printing if filament else self._travelling)
         speed = length / slowest_s
         corner = min(speed, self._junction) if linear else 0.0
         ramps = (speed * speed - corner * corner) / acceleration
@@ -154,6 +157,15 @@ class Motion:
         for axis in axes:
             self.native[axis], self.shift[axis] = self._home[axis], 0.0
         return 2.0 * travel_s + 1.0
+
+    def accelerate(self, words: Mapping[str, float]) -> None:
+        """M204: P for moves that push filament, T for those that do not, S for both; what is not above 0 tells nothing."""
+        scale = INCH_MM if self.inches else 1.0
+        for letter, value in words.items():
+            if value > 0 and letter in "PS":
+                self._printing = value * scale
+            if value > 0 and letter in "TS":
+                self._travelling = value * scale
 
     def call_it(self, words: Mapping[str, float]) -> None:
         """G92: the place where the axes stand gets these coordinates."""
