@@ -22,6 +22,7 @@ SPARE = 0.15  # share of the lean that reached places keep in reserve, so that m
 SMOOTH_MM = 0.05  # support is simplified by this: its edges come from single faces, and nobody needs them
 SLIVER_MM = 0.02  # what is narrower than twice this and has no place has neighbours that do
 EVEN_MM = 1e-6  # heights nearer than this are equal
+SPECK_MM2 = 4.0 * SLIVER_MM**2  # no place that is no sliver is smaller
 LEAST_MM2 = 1e-5  # places smaller than this are rounding
 SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
 
@@ -43,9 +44,14 @@ def leaning(area: Polygons, distance_mm: float) -> Polygons:
     return rounded(area, distance_mm, SEGMENTS) if distance_mm > 0.0 else area
 
 
+def slivers(places: Polygons) -> bool:
+    """Whether the places are nothing but slivers."""
+    return bool(places.area() < SPECK_MM2 or grown(places, -SLIVER_MM).is_empty())
+
+
 def solid(places: Polygons) -> Polygons:
     """Without slivers."""
-    core = grown(places, -SLIVER_MM)
+    core = Polygons() if places.area() < SPECK_MM2 else grown(places, -SLIVER_MM)
     return core if core.is_empty() else grown(core, 1.5 * SLIVER_MM) ^ places
 
 

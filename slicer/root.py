@@ -7,7 +7,7 @@ import numpy as np
 
 from profiles.process import Process
 from slicer.polygons import Polygons, grown, united
-from slicer.room import COARSE_MM, EVEN_MM, Room, leaning, solid
+from slicer.room import COARSE_MM, EVEN_MM, SPECK_MM2, Room, leaning, slivers, solid
 
 
 def rooted(bodies: Sequence[Polygons], outlines: Sequence[Polygons], room: Room, process: Process) -> list[Polygons]:
@@ -27,7 +27,7 @@ def rooted(bodies: Sequence[Polygons], outlines: Sequence[Polygons], room: Room,
         if roots:
             barred = _barred(united([root for root, _ in roots]), outlines, room, process, m)
             left = [(root - barred, last) for root, last in roots if room.bottom_mm[m] >= last]
-            roots = [(root, last) for root, last in left if not solid(root).is_empty()]
+            roots = [(root, last) for root, last in left if not slivers(root)]
             grown_bodies[m] = united([bodies[m], *(root for root, _ in roots)])
     return grown_bodies
 
@@ -36,8 +36,8 @@ def _ended(bodies: Sequence[Polygons], room: Room, m: int) -> Polygons:
     """What of a layer's support nothing in the layer below carries, but ground is near."""
     if bodies[m].is_empty() or room.ground[m].is_empty():
         return Polygons()
-    loose = solid(bodies[m] - bodies[m - 1])
-    if loose.is_empty() or (loose ^ room.ground[m]).is_empty():
+    loose = bodies[m] - bodies[m - 1]
+    if loose.area() < SPECK_MM2 or (loose ^ room.ground[m]).area() < SPECK_MM2:
         return Polygons()
     return solid(loose - leaning(bodies[m - 1], float(room.lean_mm[m])))
 

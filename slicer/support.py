@@ -12,7 +12,7 @@ from slicer.columns import Columns
 from slicer.contact import RIM_MM
 from slicer.heights import Heights
 from slicer.polygons import Polygons, grown, opened, sealed, united
-from slicer.room import COARSE_MM, EVEN_MM, SMOOTH_MM, Room, leaning, rooms, solid
+from slicer.room import COARSE_MM, EVEN_MM, SMOOTH_MM, Room, leaning, rooms, slivers, solid
 from slicer.root import rooted
 from slicer.tree import Tree
 
@@ -165,9 +165,9 @@ def _standing(bodies: Sequence[Polygons], room: Room, process: Process, on_platf
             printed.append(body)
             continue
         carried = printed[-1] if m else Polygons()
-        if not solid(body - carried).is_empty():
+        if not slivers(body - carried):
             carried = leaning(carried, float(room.lean_mm[m]) + SLACK_MM)
-        if not solid(body - carried).is_empty():
+        if not slivers(body - carried):
             stands = opened((body ^ (carried + room.ground[m])).simplify(COARSE_MM), 0.45 * process.line_width_mm)
             islands = [island for island in stands.decompose() if island.area() >= least]
             body = Polygons.compose(islands) if islands else Polygons()

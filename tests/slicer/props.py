@@ -48,8 +48,14 @@ def assert_sound(values: Any, found: Supports) -> None:
         _keeps_gaps(m, printed[m], solid, bottom, top, process)
         if m or values["below"] is not None:
             carried = [printed[m - 1].buffer(slope * at.height_mm[m] + ROUNDING_MM)] if m else []
-            stands = [solid[j].buffer(width + 4 * ROUNDING_MM) for j in range(m) if top[j] <= bottom[m] + 1e-6]
-            base = [as_shapely(values["below"]).buffer(width + 4 * ROUNDING_MM)] if values["below"] is not None else []
+            stands = [
+                solid[j].buffer(width + 4 * ROUNDING_MM, join_style="mitre") for j in range(m) if top[j] <= bottom[m] + 1e-6
+            ]
+            base = (
+                [as_shapely(values["below"]).buffer(width + 4 * ROUNDING_MM, join_style="mitre")]
+                if values["below"] is not None
+                else []
+            )
             loose = printed[m] - shapely.union_all([*carried, *stands[-6:], *base])
             assert loose.buffer(-ROUNDING_MM).area < SPECK_MM2, f"layer {m} hangs in the air: {loose.bounds}"
     for k in np.flatnonzero([not place.is_empty for place in hanging]).tolist():
