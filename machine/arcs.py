@@ -3,9 +3,9 @@
 from math import acos, atan2, ceil, cos, hypot, pi, sin
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import kernel, part
 from mdp.mesh import Floats
 
 FEWEST_CHORDS = 3  # fewer straight moves are not worth an arc
@@ -63,16 +63,15 @@ def fitted(points: Floats, pushed: Floats, tolerance_mm: float) -> tuple[NDArray
     Returns (m, 2) the first and last point of each run, in order, and (m, 3) its centre x, y and 1 (clockwise) or 0.
     """
     steps = np.hypot(*np.diff(points, axis=0).T)
-    found: tuple[NDArray[np.int64], Floats] = _fitted(
-        np.ascontiguousarray(points), pushed / np.maximum(steps, 1e-9), tolerance_mm
-    )
-    return found
+    runs, arcs = np.empty((len(points), 2), np.int64), np.empty((len(points), 3))
+    count = _fitted(np.ascontiguousarray(points), pushed / np.maximum(steps, 1e-9), tolerance_mm, runs, arcs)
+    return runs[:count], arcs[:count]
 
 
-@njit(cache=True)
-def _fitted(points: Floats, density: Floats, tolerance: float) -> tuple[NDArray[np.int64], Floats]:
+@kernel
+def _fitted(points: Floats, density: Floats, tolerance: float, runs: NDArray[np.int64], arcs: Floats) -> int:
+    """Fills in the runs and their arcs; returns how many there are."""
     n = len(points)
-    runs, arcs = np.empty((n, 2), np.int64), np.empty((n, 3))
     count, i = 0, 0
     while i + FEWEST_CHORDS < n:
         best, x, y, turn = -1, 0.0, 0.0, 0.0
@@ -86,16 +85,17 @@ def _fitted(points: Floats, density: Floats, tolerance: float) -> tuple[NDArray[
         if best < 0:
             i += 1
             continue
-        runs[count], arcs[count] = (i, best), (x, y, turn)
+        runs[count, 0], runs[count, 1] = i, best
+        arcs[count, 0], arcs[count, 1], arcs[count, 2] = x, y, turn
         count += 1
         i = best
-    return runs[:count], arcs[:count]
+    return count
 
 
-@njit(cache=True)
+@part
 def _circle(points: Floats, density: Floats, i: int, j: int, tolerance: float) -> tuple[bool, float, float, float]:
     """The circle through the first, middle and last of points i..j, and whether all chords keep to it, all one way round."""
-    ax, ay = points[i]
+    ax, ay = points[i, 0], points[i, 1]
     bx, by = points[(i + j) // 2, 0] - ax, points[(i + j) // 2, 1] - ay
     cx, cy = points[j, 0] - ax, points[j, 1] - ay
     doubled = 2.0 * (bx * cy - by * cx)

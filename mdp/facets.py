@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import floats, ints, kernel, longs, part, table
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask
 
@@ -108,10 +108,10 @@ def facets(mesh: Mesh, risky: Mask) -> Facets:
     return Facets(Mesh(mesh.vertices[order], number[mesh.faces[turn]]), risky[turn])
 
 
-@njit(cache=True)
+@kernel
 def _morton(points, low, scale):  # type: ignore[no-untyped-def]
     """Position along Morton's curve: near points get near numbers."""
-    codes = np.zeros(len(points), np.int64)
+    codes = longs(len(points), 0)
     for v in range(len(points)):
         for axis in range(3):
             cell = int((points[v, axis] - low[axis]) * scale)
@@ -120,17 +120,17 @@ def _morton(points, low, scale):  # type: ignore[no-untyped-def]
     return codes
 
 
-@njit(cache=True)
+@kernel
 def _links(faces, size):  # type: ignore[no-untyped-def]
     """Neighbours of every vertex, in cyclic order where they form a single ring, and whether they do."""
-    starts = np.zeros(size + 1, np.int32)
+    starts, place = ints(size + 1, 0), ints(size + 1, 0)
     for f in range(len(faces)):
         for k in range(3):
             starts[faces[f, k] + 1] += 1
     for v in range(size):
         starts[v + 1] += starts[v]
-    place = starts[:-1].copy()
-    first, second = np.empty(3 * len(faces), np.int32), np.empty(3 * len(faces), np.int32)
+        place[v + 1] = starts[v + 1]
+    first, second = ints(3 * len(faces), 0), ints(3 * len(faces), 0)
     for f in range(len(faces)):
         for k in range(3):
             v = faces[f, k]
@@ -151,9 +151,9 @@ def _links(faces, size):  # type: ignore[no-untyped-def]
     return starts, first, single
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _flatness(vertices, faces, normals, vertex_normals, least):  # type: ignore[no-untyped-def]
-    flat = np.ones(len(vertices))
+    flat = floats(len(vertices), 1.0)
     for f in range(len(faces)):
         altitude = _altitude(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]])
         for k in range(3):
@@ -165,7 +165,7 @@ def _flatness(vertices, faces, normals, vertex_normals, least):  # type: ignore[
     return flat
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _altitude(p, q, r):  # type: ignore[no-untyped-def]
     """Least altitude of a triangle."""
     ax, ay, az = q[0] - p[0], q[1] - p[1], q[2] - p[2]
@@ -176,9 +176,9 @@ def _altitude(p, q, r):  # type: ignore[no-untyped-def]
     return np.sqrt((x * x + y * y + z * z) / longest) if longest > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _vertex_normals(vertices, faces, normals):  # type: ignore[no-untyped-def]
-    total = np.zeros((len(vertices), 3))
+    total = table(len(vertices), 3)
     for f in range(len(faces)):
         for k in range(3):
             o, p, q = faces[f, k], faces[f, (k + 1) % 3], faces[f, (k + 2) % 3]

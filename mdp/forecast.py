@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
-from numba import njit
 
-from mdp.kernel import floats, part, table
+from mdp.kernel import floats, kernel, part, table
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
@@ -42,7 +41,7 @@ class Surface:
         return float(sum_left(self.corners, self.normals, self.areas_mm2, self.risky, normals, offsets, self.threshold))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def sum_left(  # type: ignore[no-untyped-def]
     corners, normals, areas, risky, directions, offsets, threshold
 ):

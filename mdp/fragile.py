@@ -6,9 +6,8 @@ that looks the other way; near an acute edge the other face looks aside, that is
 """
 
 import numpy as np
-from numba import njit
 
-from mdp.kernel import floats, inlined, part
+from mdp.kernel import flags, floats, inlined, kernel, part
 from mdp.mesh import Floats
 from mdp.plane import Plane
 from mdp.rays import first_hit
@@ -54,13 +53,15 @@ def find_slivers(cosines, flatness, sharp, corners, normals, d, heights, n, step
         fragile[column] = min(fragile[column], (column - nearest) * step)
 
 
-@njit(cache=True)
+@kernel
 def thin_faces(vertices, faces, normals, low, high, thickness):  # type: ignore[no-untyped-def]
     """(m,) whether the solid is thinner than `thickness` mm under the middle of a face. low, high: boxes over the faces."""
-    thin = np.zeros(len(faces), np.bool_)
+    thin, middle, ray = flags(len(faces)), floats(3, 0.0), floats(3, 0.0)
     for f in range(len(faces)):
-        middle = (vertices[faces[f, 0]] + vertices[faces[f, 1]] + vertices[faces[f, 2]]) / 3.0
-        thin[f] = first_hit(middle, -normals[f], thickness, -1, OPPOSITE_COSINE, vertices, faces, normals, low, high) >= 0
+        for axis in range(3):
+            total = vertices[faces[f, 0], axis] + vertices[faces[f, 1], axis] + vertices[faces[f, 2], axis]
+            middle[axis], ray[axis] = total / 3.0, -normals[f, axis]
+        thin[f] = first_hit(middle, ray, thickness, -1, OPPOSITE_COSINE, vertices, faces, normals, low, high) >= 0
     return thin
 
 

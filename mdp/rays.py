@@ -1,9 +1,8 @@
 """Rays: the first face that a ray meets, over a tree of boxes."""
 
 import numpy as np
-from numba import njit
 
-from mdp.kernel import floats, inlined, ints, part
+from mdp.kernel import floats, inlined, ints, kernel, part, table
 from mdp.mesh import Mesh
 
 LEAF_FACES = 4
@@ -20,9 +19,12 @@ class Tree:
         self.low, self.high = _boxes(mesh.vertices, mesh.faces, self.leaves)
 
 
-@njit(cache=True)
+@kernel
 def _boxes(vertices, faces, leaves):  # type: ignore[no-untyped-def]
-    low, high = np.full((2 * leaves, 3), np.inf), np.full((2 * leaves, 3), -np.inf)
+    low, high = table(2 * leaves, 3), table(2 * leaves, 3)
+    for node in range(2 * leaves):
+        for axis in range(3):
+            low[node, axis], high[node, axis] = np.inf, -np.inf
     for f in range(len(faces)):
         leaf = leaves + f // LEAF_FACES
         for corner in range(3):
@@ -35,7 +37,8 @@ def _boxes(vertices, faces, leaves):  # type: ignore[no-untyped-def]
             high[node, axis] = max(high[2 * node, axis], high[2 * node + 1, axis])
     for node in range(2 * leaves):
         if low[node, 0] > high[node, 0]:
-            high[node] = np.inf  # an empty box that no ray enters
+            for axis in range(3):
+                high[node, axis] = np.inf  # an empty box that no ray enters
     return low, high
 
 

@@ -17,12 +17,11 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from mdp.facets import Facets, facets
 from mdp.footing import find_footing
 from mdp.fragile import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
-from mdp.kernel import floats, ints
+from mdp.kernel import floats, ints, kernel
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.pieces import UNKNOWN, count_pieces, find_critical
@@ -180,7 +179,7 @@ def _in_threads(kernel: Callable[..., None], count: int, *arguments: Any) -> Non
         done.result()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _gains(begin_row, end_row, surface, directions, step, risky_below, out):  # type: ignore[no-untyped-def]
     points, corners, normals, areas, risky = surface
     first, count, up, residual = out
@@ -192,7 +191,7 @@ def _gains(begin_row, end_row, surface, directions, step, risky_below, out):  # 
             sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, up[row], residual[row])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def sweep_kernel(begin_row, end_row, rows, solid, directions, watched, needed, crumb, step, out):  # type: ignore[no-untyped-def]
     points, corners, normals, vectors, edges, vertex_normals, flatness = rows
     surface, standing, sharp, links, tree, anchor = solid

@@ -5,8 +5,8 @@ is beyond a limit; an end left alone gets a short run along the border, towards 
 """
 
 import numpy as np
-from numba import njit
 
+from mdp.kernel import flags, floats, kernel, longs, part, rising
 from mdp.mesh import Floats
 from slicer.clip import Border, Indices, Pieces
 
@@ -21,30 +21,33 @@ def anchored(pieces: Pieces, border: Border, hook_mm: float, most_mm: float, apa
     if not len(pieces.starts):
         return []
     bounds = np.append(pieces.starts, len(pieces.points))
-    points, starts = _anchored(pieces.points, bounds, pieces.ends, border.edges, border.offsets, hook_mm, most_mm, apart_mm)
-    return np.split(points, starts[1:])
+    contour = np.searchsorted(border.offsets, pieces.ends.ravel(), side="right") - 1
+    out = np.empty((len(pieces.points) + 2 * len(border.edges) + 4 * len(pieces.ends) + 8, 2))
+    starts = np.empty(len(pieces.ends), np.int64)
+    limits_mm = (hook_mm, most_mm, apart_mm)
+    n, count = _anchored(pieces.points, bounds, pieces.ends, border.edges, border.offsets, contour, limits_mm, out, starts)
+    return np.split(out[:n].copy(), starts[1:count])
 
 
-@njit(cache=True)
+@part
 def _places(points: Floats, bounds: Indices, ends: Indices, edges: Floats) -> tuple[Floats, Floats]:
     """Way along all contours to the beginning of each edge (m + 1,) and to each end (2 k,)."""
-    way = np.zeros(len(edges) + 1)
+    way, place = floats(len(edges) + 1, 0.0), floats(2 * len(ends), 0.0)
     for e in range(len(edges)):
         way[e + 1] = way[e] + np.hypot(edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1])
-    place = np.empty(2 * len(ends))
     for k in range(len(ends)):
         for side in range(2):
-            p, e = points[bounds[k + 1] - 1 if side else bounds[k]], ends[k, side]
-            along = np.hypot(p[0] - edges[e, 0], p[1] - edges[e, 1])
+            p, e = bounds[k + 1] - 1 if side else bounds[k], ends[k, side]
+            along = np.hypot(points[p, 0] - edges[e, 0], points[p, 1] - edges[e, 1])
             place[2 * k + side] = min(way[e] + along, way[e + 1])
     return way, place
 
 
-@njit(cache=True)
+@part
 def _following(place: Floats, contour: Indices, way: Floats, offsets: Indices) -> tuple[Indices, Floats]:
     """Of each end the next one on its contour, which may be itself, and how far it is."""
-    order = np.argsort(place, kind="mergesort")
-    after, gap = np.empty(len(place), np.int64), np.empty(len(place))
+    order = rising(place)
+    after, gap = longs(len(place), 0), floats(len(place), 0.0)
     i = 0
     while i < len(order):
         c, j = contour[order[i]], i
@@ -60,12 +63,16 @@ def _following(place: Floats, contour: Indices, way: Floats, offsets: Indices) -
     return after, gap
 
 
-@njit(cache=True)
+@part
 def _joined(after: Indices, gap: Floats, most_mm: float) -> tuple[Indices, Indices]:
     """Of each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
-    partner, sense = np.full(len(after), -1, np.int64), np.zeros(len(after), np.int64)
-    root = np.arange(len(after) // 2)
-    for here in np.argsort(np.round(gap / TIE_MM), kind="mergesort"):
+    partner, sense, ties = longs(len(after), -1), longs(len(after), 0), floats(len(after), 0.0)
+    for here in range(len(after)):
+        ties[here] = np.rint(gap[here] / TIE_MM)
+    order, root = rising(ties), longs(len(after) // 2, 0)
+    for k in range(len(root)):
+        root[k] = k
+    for here in order:
         there = after[here]
         if gap[here] > most_mm:
             break
@@ -84,15 +91,14 @@ def _joined(after: Indices, gap: Floats, most_mm: float) -> tuple[Indices, Indic
     return partner, sense
 
 
-@njit(cache=True)
+@part
 def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, hook_mm: float, apart_mm: float) -> Floats:
     """Of each end the length of its hook, negative for a way back along the border."""
-    room, before = gap - apart_mm, np.empty(len(after), np.int64)
+    hooks: Floats = floats(len(after), 0.0)
+    room, before = floats(len(after), 0.0), longs(len(after), 0)
     for here in range(len(after)):
         before[after[here]] = here
-        if sense[here] == 1:
-            room[here] = 0.0
-    hooks = np.zeros(len(after))
+        room[here] = 0.0 if sense[here] == 1 else gap[here] - apart_mm
     for here in range(len(after)):
         if partner[here] < 0:
             back = before[here]
@@ -104,45 +110,41 @@ def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, hook_m
     return hooks
 
 
-@njit(cache=True)
-def _run(out: Floats, n: int, e: int, place: float, length: float, sense: int, edges: Floats, way: Floats, a: int, b: int) -> int:
-    """Appends the vertices of contour a..b-1 passed on a run from `place` on edge e, and its last point; the new n."""
-    left = length
-    at = place - way[e] if sense > 0 else way[e + 1] - place
+@part
+def _run(out: Floats, n: int, e: int, place: float, length: float, edges: Floats, way: Floats, a: int, b: int) -> int:
+    """Appends the vertices of contour a..b-1 passed on a run from `place` on edge e, backward where the length is negative.
+
+    Also its last point; returns the new n.
+    """
+    left, forward = abs(length), length > 0.0
+    at = place - way[e] if forward else way[e + 1] - place
     step = way[e + 1] - way[e]
+    corner = 2 if forward else 0
     while left > step - at:
         left -= step - at
-        out[n, 0], out[n, 1] = (edges[e, 2], edges[e, 3]) if sense > 0 else (edges[e, 0], edges[e, 1])
+        out[n, 0], out[n, 1] = edges[e, corner], edges[e, corner + 1]
         n += 1
-        e += sense
+        e += 1 if forward else -1
         e = a if e == b else b - 1 if e < a else e
         step, at = way[e + 1] - way[e], 0.0
     share = (at + left) / step if step > 0.0 else 0.0
-    share = share if sense > 0 else 1.0 - share
+    share = share if forward else 1.0 - share
     out[n, 0] = edges[e, 0] + share * (edges[e, 2] - edges[e, 0])
     out[n, 1] = edges[e, 1] + share * (edges[e, 3] - edges[e, 1])
     return n + 1
 
 
-@njit(cache=True)
-def _anchored(
-    points: Floats,
-    bounds: Indices,
-    ends: Indices,
-    edges: Floats,
-    offsets: Indices,
-    hook_mm: float,
-    most_mm: float,
-    apart_mm: float,
-) -> tuple[Floats, Indices]:
+@kernel
+def _anchored(  # type: ignore[no-untyped-def]
+    points, bounds, ends, edges, offsets, contour, limits_mm, out, starts
+):
+    """Fills in the lines and where each begins; returns the number of points and of lines. limits_mm: hook, most, apart."""
+    hook_mm, most_mm, apart_mm = limits_mm
     way, place = _places(points, bounds, ends, edges)
-    on = ends.ravel()
-    contour = np.searchsorted(offsets, on, side="right") - 1
     after, gap = _following(place, contour, way, offsets)
     partner, sense = _joined(after, gap, most_mm)
     hooks = _hooks(partner, sense, after, gap, hook_mm, apart_mm)
-    out = np.empty((len(points) + 2 * len(edges) + 4 * len(ends) + 8, 2))
-    starts, done = np.empty(len(ends), np.int64), np.zeros(len(ends), np.bool_)
+    done = flags(len(ends))
     n = count = 0
     for seed in range(len(ends)):
         if done[seed]:
@@ -153,14 +155,17 @@ def _anchored(
         starts[count] = n
         count += 1
         if hooks[end] != 0.0:
-            a, b = offsets[contour[end]], offsets[contour[end] + 1]
-            n = _run(out, n, on[end], place[end], abs(hooks[end]), 1 if hooks[end] > 0 else -1, edges, way, a, b)
-            out[starts[count - 1] : n] = out[starts[count - 1] : n][::-1].copy()
+            begun, a, b = n, offsets[contour[end]], offsets[contour[end] + 1]
+            n = _run(out, n, ends[end // 2, end % 2], place[end], hooks[end], edges, way, a, b)
+            for k in range((n - begun) // 2):
+                for axis in range(2):
+                    out[begun + k, axis], out[n - 1 - k, axis] = out[n - 1 - k, axis], out[begun + k, axis]
         while True:
             k = end // 2
             done[k] = True
             for i in range(bounds[k], bounds[k + 1]):
-                out[n] = points[i if end % 2 == 0 else bounds[k] + bounds[k + 1] - 1 - i]
+                p = i if end % 2 == 0 else bounds[k] + bounds[k + 1] - 1 - i
+                out[n, 0], out[n, 1] = points[p, 0], points[p, 1]
                 n += 1
             end ^= 1
             length = hooks[end]
@@ -168,9 +173,9 @@ def _anchored(
                 length = gap[end] if sense[end] > 0 else -gap[partner[end]]
             if length != 0.0:
                 a, b = offsets[contour[end]], offsets[contour[end] + 1]
-                n = _run(out, n, on[end], place[end], abs(length), 1 if length > 0 else -1, edges, way, a, b)
+                n = _run(out, n, ends[end // 2, end % 2], place[end], length, edges, way, a, b)
             if partner[end] < 0:
                 break
             n -= 1  # the run's last point is the partner itself
             end = partner[end]
-    return out[:n], starts[:count]
+    return n, count

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numba import njit
 
+from mdp.kernel import kernel
 from mdp.mesh import Floats
 from slicer.paths import Kind, bead_area_mm2
 
@@ -48,7 +48,7 @@ def length_mm(points: Floats) -> float:
     return float(_length(points))
 
 
-@njit(cache=True)
+@kernel
 def _length(points: Floats) -> float:
     total = 0.0
     for i in range(1, len(points)):

@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import kernel, longs
 from mdp.mesh import Floats
 from slicer.bead import Bead
 from slicer.paths import Kind
@@ -76,10 +76,10 @@ def _angles(sides: Floats) -> list[float]:
     return [*np.unique(own).tolist(), *(np.pi * np.arange(TURNS) / TURNS).tolist()]
 
 
-@njit(cache=True)
+@kernel
 def _held(banks: Floats, rows: Floats, turn: Floats) -> NDArray[np.int64]:
     """(m,) how many ends of each line lie on a bank."""
-    held = np.zeros(len(rows), np.int64)
+    held: NDArray[np.int64] = longs(len(rows), 0)
     for r in range(len(rows)):
         for end in range(2):
             x, y = rows[r, end], rows[r, 2]

@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import manifold3d
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import kernel, table
 from mdp.mesh import Floats
 from slicer.bead import length_mm
 from slicer.chords import chains
@@ -81,14 +81,19 @@ def _sampled(loop: Floats, step_mm: float) -> Floats:
     return sampled
 
 
-@njit(cache=True)
+@kernel
 def _smooth(points: Floats) -> Floats:
     """The chain without the zigzag that comes from sampling its two sides at different places; its ends stay."""
-    out = points.copy()
-    for _ in range(SMOOTHINGS):
-        before = out.copy()
-        for i in range(1, len(points) - 1):
-            out[i] = 0.25 * before[i - 1] + 0.5 * before[i] + 0.25 * before[i + 1]
+    out: Floats = table(len(points), 2)
+    for axis in range(2):
+        for i in range(len(points)):
+            out[i, axis] = points[i, axis]
+        for _ in range(SMOOTHINGS):
+            before = out[0, axis]
+            for i in range(1, len(points) - 1):
+                here = out[i, axis]
+                out[i, axis] = 0.25 * before + 0.5 * here + 0.25 * out[i + 1, axis]
+                before = here
     return out
 
 
@@ -146,7 +151,7 @@ def _lines(found: list[_Chain], areas: Floats, even: float, shortest_mm: float) 
     return lines
 
 
-@njit(cache=True)
+@kernel
 def _even(points: Floats, widths: Floats, grade: float, shortest_mm: float) -> tuple[NDArray[np.int64], Floats]:
     """Where pieces of nearly one width begin and end, none shorter than shortest_mm but where the whole chain is.
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import floats, kernel, longs, part
 from mdp.mesh import Floats
 from slicer.polygons import Polygons, contours
 
@@ -63,7 +63,15 @@ def trimmed(points: Floats, starts: Indices, edges: Floats) -> Pieces:
     """
     if not len(edges) or not len(starts):
         return NO_PIECES
-    return Pieces(*_trimmed(points, np.append(starts, len(points)), edges, *_bands(edges)))
+    low, high = float(edges[:, 1::2].min()), float(edges[:, 1::2].max())
+    count = max(len(edges) // EDGES_A_BAND, 1)
+    bounds, height = np.append(starts, len(points)), max((high - low) / count, 1e-9)
+    n, room = -1, 4 * len(points) + 2 * len(edges) + 64
+    while n < 0:
+        out, begins, ends = np.empty((room, 2)), np.empty(room, np.int64), np.empty((room, 2), np.int64)
+        n, pieces = _trimmed(points, bounds, edges, low, height, count, out, begins, ends)
+        room *= 4
+    return Pieces(out[:n].copy(), begins[:pieces].copy(), ends[:pieces].copy())
 
 
 def together(several: list[Pieces]) -> Pieces:
@@ -75,94 +83,98 @@ def together(several: list[Pieces]) -> Pieces:
     return Pieces(np.concatenate([p.points for p in several]), starts, np.concatenate([p.ends for p in several]))
 
 
-@njit(cache=True)
-def _bands(edges: Floats) -> tuple[float, float, Indices, Indices]:
-    """Lower end and height of horizontal bands, offsets of each band's edges and the edges listed."""
-    low, high = min(edges[:, 1].min(), edges[:, 3].min()), max(edges[:, 1].max(), edges[:, 3].max())
-    count = max(len(edges) // EDGES_A_BAND, 1)
-    height = max((high - low) / count, 1e-9)
-    offsets = np.zeros(count + 1, np.int64)
-    first, last = np.empty(len(edges), np.int64), np.empty(len(edges), np.int64)
+@part
+def _bands(edges: Floats, low: float, height: float, count: int) -> tuple[Indices, Indices]:
+    """Where each horizontal band's edges begin in the list, and the edges listed."""
+    offsets, place = longs(count + 1, 0), longs(count + 1, 0)
+    first, last = longs(len(edges), 0), longs(len(edges), 0)
     for e in range(len(edges)):
         first[e] = min(int((min(edges[e, 1], edges[e, 3]) - low) / height), count - 1)
         last[e] = min(int((max(edges[e, 1], edges[e, 3]) - low) / height), count - 1)
         for band in range(first[e], last[e] + 1):
             offsets[band + 1] += 1
-    offsets = np.cumsum(offsets)
-    listed, place = np.empty(offsets[-1], np.int64), offsets.copy()
+    for band in range(count):
+        offsets[band + 1] += offsets[band]
+        place[band + 1] = offsets[band + 1]
+    listed = longs(offsets[count], 0)
     for e in range(len(edges)):
         for band in range(first[e], last[e] + 1):
             listed[place[band]] = e
             place[band] += 1
-    return low, height, offsets, listed
+    return offsets, listed
 
 
-@njit(cache=True)
+@part
 def _side(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> bool:
     """Whether a point lies to the left of a line; the same for both edges, or both segments, that meet in the point."""
     return bool((bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0)
 
 
-@njit(cache=True)
-def _crossings(
-    a: Floats, b: Floats, edges: Floats, low: float, height: float, offsets: Indices, listed: Indices, seen: Indices, mark: int
-) -> list[tuple[float, int]]:
-    """Where a segment crosses edges: shares of its length, rising, with the edges."""
-    found = [(0.0, 0) for _ in range(0)]
-    bands = len(offsets) - 1
-    first, last = int(np.floor((min(a[1], b[1]) - low) / height)), int(np.floor((max(a[1], b[1]) - low) / height))
-    left, right = min(a[0], b[0]), max(a[0], b[0])
-    if last < 0 or first > bands:
-        return found
-    for band in range(min(max(first, 0), bands - 1), min(last, bands - 1) + 1):
-        for at in range(offsets[band], offsets[band + 1]):
-            e = listed[at]
-            if seen[e] == mark:
-                continue
-            seen[e] = mark
-            px, py, qx, qy = edges[e]
-            if max(px, qx) < left or min(px, qx) > right:
-                continue
-            if _side(a[0], a[1], b[0], b[1], px, py) == _side(a[0], a[1], b[0], b[1], qx, qy):
-                continue
-            if _side(px, py, qx, qy, a[0], a[1]) == _side(px, py, qx, qy, b[0], b[1]):
-                continue
-            along_a = (qx - px) * (a[1] - py) - (qy - py) * (a[0] - px)
-            along_b = (qx - px) * (b[1] - py) - (qy - py) * (b[0] - px)
-            found.append((along_a / (along_a - along_b), e))
-    found.sort()
-    return found
+@part
+def _crossing(ax: float, ay: float, bx: float, by: float, edges: Floats, e: int) -> float:
+    """Where (0..1) a segment crosses an edge; -1 where it does not."""
+    px, py, qx, qy = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+    if max(px, qx) < min(ax, bx) or min(px, qx) > max(ax, bx):
+        return -1.0
+    if _side(ax, ay, bx, by, px, py) == _side(ax, ay, bx, by, qx, qy):
+        return -1.0
+    if _side(px, py, qx, qy, ax, ay) == _side(px, py, qx, qy, bx, by):
+        return -1.0
+    along_a = (qx - px) * (ay - py) - (qy - py) * (ax - px)
+    along_b = (qx - px) * (by - py) - (qy - py) * (bx - px)
+    return float(along_a / (along_a - along_b))
 
 
-@njit(cache=True)
+@kernel
 def _trimmed(
-    points: Floats, bounds: Indices, edges: Floats, low: float, height: float, offsets: Indices, listed: Indices
-) -> tuple[Floats, Indices, Indices]:
-    seen = np.full(len(edges), -1, np.int64)
-    room = 2 * len(points) + 64
-    out, starts, ends = np.empty((room, 2)), np.empty(room, np.int64), np.empty((room, 2), np.int64)
+    points: Floats,
+    bounds: Indices,
+    edges: Floats,
+    low: float,
+    height: float,
+    bands: int,
+    out: Floats,
+    starts: Indices,
+    ends: Indices,
+) -> tuple[int, int]:
+    """Fills in the pieces; returns the number of points and of pieces, -1 where there is no room for them."""
+    offsets, listed = _bands(edges, low, height, bands)
+    seen, shares, crossed = longs(len(edges), -1), floats(len(edges), 0.0), longs(len(edges), 0)
     n = count = 0
     for line in range(len(bounds) - 1):
         within = False
         for k in range(bounds[line], bounds[line + 1] - 1):
-            a, b = points[k], points[k + 1]
-            found = _crossings(a, b, edges, low, height, offsets, listed, seen, k)
-            if n + 2 * len(found) + 2 > len(out):
-                more = len(out) + 2 * len(found)
-                out, starts = np.concatenate((out, np.empty((more, 2)))), np.concatenate((starts, np.empty(more, np.int64)))
-                ends = np.concatenate((ends, np.empty((more, 2), np.int64)))
-            for share, e in found:
+            ax, ay, bx, by = points[k, 0], points[k, 1], points[k + 1, 0], points[k + 1, 1]
+            first, last = int(np.floor((min(ay, by) - low) / height)), int(np.floor((max(ay, by) - low) / height))
+            if last < 0 or first > bands:
+                first, last = 0, -1
+            many = 0
+            for band in range(min(max(first, 0), bands - 1), min(last, bands - 1) + 1):
+                for at in range(offsets[band], offsets[band + 1]):
+                    e = listed[at]
+                    share = _crossing(ax, ay, bx, by, edges, e) if seen[e] != k else -1.0
+                    seen[e] = k
+                    if share >= 0.0:
+                        i = many
+                        while i > 0 and (shares[i - 1] > share or (shares[i - 1] == share and crossed[i - 1] > e)):
+                            shares[i], crossed[i] = shares[i - 1], crossed[i - 1]
+                            i -= 1
+                        shares[i], crossed[i] = share, e
+                        many += 1
+            if n + many + 1 > len(out):
+                return -1, 0
+            for i in range(many):
                 within = not within
                 if within:
-                    starts[count], ends[count, 0] = n, e
+                    starts[count], ends[count, 0] = n, crossed[i]
                 else:
-                    ends[count, 1] = e
+                    ends[count, 1] = crossed[i]
                     count += 1
-                out[n] = a + share * (b - a)
+                out[n, 0], out[n, 1] = ax + shares[i] * (bx - ax), ay + shares[i] * (by - ay)
                 n += 1
             if within:
-                out[n] = b
+                out[n, 0], out[n, 1] = bx, by
                 n += 1
         if within:
             n = starts[count]
-    return out[:n], starts[:count], ends[:count]
+    return n, count

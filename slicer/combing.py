@@ -7,9 +7,9 @@ way round, and is then pulled taut. Every segment of it is tested against the bo
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import floats, kernel, longs, part
 from mdp.mesh import Floats
 from slicer.lattice import Lattice, crossings, free, lattice, nearest, within
 from slicer.polygons import Polygons, grown
@@ -42,146 +42,153 @@ class Ground:
 
     def leaves(self, since: Floats, to: Floats) -> NDArray[np.bool_]:
         """(n, 2) by two whether the travels between these points leave the safe inside."""
-        out: NDArray[np.bool_] = _leaves(self.safe, since, to)
+        out: NDArray[np.bool_] = _leaves(self.safe, since, to, True)
+        return out
+
+    def crosses(self, since: Floats, to: Floats) -> NDArray[np.bool_]:
+        """(n, 2) by two whether the travels between these points cross the border of the safe inside, wherever they begin."""
+        out: NDArray[np.bool_] = _leaves(self.safe, since, to, False)
         return out
 
     def way(self, start: Floats, end: Floats, detour_mm: float) -> Floats | None:
         """Points (k, 2) between start and end of a way inside, at most detour_mm longer than the straight line; or None."""
         longest = float(np.hypot(*(end - start))) + detour_mm
         for track in (self._behind, self._among):
-            found = _way(self.safe, track, start[0], start[1], end[0], end[1], longest, 2.0 * self._width_mm)
-            if len(found) > 1:
-                return np.ascontiguousarray(found[1:-1])
+            way = np.empty((len(track.sides) + 2 * len(track.begins) + 4, 2))
+            count = _way(self.safe, track, start[0], start[1], end[0], end[1], longest, 2.0 * self._width_mm, way)
+            if count > 1:
+                return way[1 : count - 1].copy()
         return None
 
 
-@njit(cache=True)
-def _leaves(safe: Lattice, since: Floats, to: Floats) -> NDArray[np.bool_]:
+@kernel
+def _leaves(safe: Lattice, since: Floats, to: Floats, begins_within: bool) -> NDArray[np.bool_]:
+    """Which segments cross the border, or begin outside where that counts."""
     out = np.empty(len(to), np.bool_)
     for k in range(len(to)):
-        x, y = since[k]
-        out[k] = not within(safe, x, y) or not free(safe, x, y, to[k, 0], to[k, 1])
+        x, y = since[k, 0], since[k, 1]
+        out[k] = (begins_within and not within(safe, x, y)) or not free(safe, x, y, to[k, 0], to[k, 1])
     return out
 
 
-@njit(cache=True)
-def _way(safe: Lattice, track: Lattice, x0: float, y0: float, x1: float, y1: float, longest: float, reach: float) -> Floats:
-    """The way from one point to the other, both included; empty where there is none."""
-    none = np.zeros((0, 2))
-    ax, ay, bx, by = x0, y0, x1, y1
-    if not within(track, x0, y0):
-        ax, ay, side = nearest(track, x0, y0, reach)
-        if side < 0 or not free(safe, x0, y0, ax, ay):
-            return none
-        ax, ay = ax + 1e-7 * (ax - x0), ay + 1e-7 * (ay - y0)
-    if not within(track, x1, y1):
-        bx, by, side = nearest(track, x1, y1, reach)
-        if side < 0 or not free(safe, x1, y1, bx, by):
-            return none
-        bx, by = bx + 1e-7 * (bx - x1), by + 1e-7 * (by - y1)
-    points = _along(track, ax, ay, bx, by, TAUT * longest)
-    if len(points) == 0:
-        return none
-    way = np.empty((len(points) + 2, 2))
-    way[0], way[1:-1], way[-1] = (x0, y0), points, (x1, y1)
-    taut = _pulled(safe, way)
-    return taut if len(taut) and _length(taut) <= longest else none
+@part
+def _reached(safe: Lattice, track: Lattice, x: float, y: float, reach: float) -> tuple[float, float, bool]:
+    """Where a way from a point begins: there, or where it reaches the track's inside; and whether it does."""
+    if within(track, x, y):
+        return x, y, True
+    ax, ay, side = nearest(track, x, y, reach)
+    return ax + 1e-7 * (ax - x), ay + 1e-7 * (ay - y), side >= 0 and free(safe, x, y, ax, ay)
 
 
-@njit(cache=True)
-def _length(points: Floats) -> float:
+@kernel
+def _way(
+    safe: Lattice, track: Lattice, x0: float, y0: float, x1: float, y1: float, longest: float, reach: float, way: Floats
+) -> int:
+    """Fills in the way from one point to the other, both included; returns how many points it has, 0 where there is none."""
+    ax, ay, begins = _reached(safe, track, x0, y0, reach)
+    if not begins:
+        return 0
+    bx, by, ends = _reached(safe, track, x1, y1, reach)
+    if not ends:
+        return 0
+    way[0, 0], way[0, 1] = x0, y0
+    n = _along(track, ax, ay, bx, by, TAUT * longest, way)
+    if n == 0:
+        return 0
+    way[n, 0], way[n, 1] = x1, y1
+    n += 1
+    for _ in range(2):
+        n = _pulled(safe, way, n)
+        if n == 0:
+            return 0
     total = 0.0
-    for i in range(1, len(points)):
-        total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
-    return total
+    for i in range(1, n):
+        total += np.hypot(way[i, 0] - way[i - 1, 0], way[i, 1] - way[i - 1, 1])
+    return n if total <= longest else 0
 
 
-@njit(cache=True)
-def _along(track: Lattice, x0: float, y0: float, x1: float, y1: float, longest: float) -> Floats:
-    """The straight line, each stretch outside replaced by the way along the loop that it leaves through and returns by."""
-    at, which = crossings(track, x0, y0, x1, y1, 1 << 30)
-    points = np.empty((2 + 2 * len(at), 2))
-    pieces = [np.array([[x0, y0]])]
-    left = longest
-    k = 0
-    while k < len(at):
-        loop = track.loop[which[k]]
+@part
+def _along(track: Lattice, x0: float, y0: float, x1: float, y1: float, longest: float, way: Floats) -> int:
+    """Appends the straight line, each stretch outside replaced by the way along the loop that it leaves through and returns by.
+
+    From row 1 on; returns the number of rows, 0 where there is no such way.
+    """
+    room = 16
+    at, which = floats(room, 0.0), longs(room, 0)
+    many = crossings(track, x0, y0, x1, y1, at, which)
+    while many < 0:
+        room *= 4
+        at, which = floats(room, 0.0), longs(room, 0)
+        many = crossings(track, x0, y0, x1, y1, at, which)
+    way[1, 0], way[1, 1] = x0, y0
+    n, left, k = 2, longest, 0
+    while k < many:
         last = k
-        for j in range(k + 1, len(at)):
-            if track.loop[which[j]] == loop:
+        for j in range(k + 1, many):
+            if track.loop[which[j]] == track.loop[which[k]]:
                 last = j
         if last == k:  # the end lies beyond this loop: in another island
-            return points[:0]
-        leave = np.array([x0 + at[k] * (x1 - x0), y0 + at[k] * (y1 - y0)])
-        back = np.array([x0 + at[last] * (x1 - x0), y0 + at[last] * (y1 - y0)])
-        piece = _round(track, which[k], leave, which[last], back, left)
-        if len(piece) == 0:
-            return points[:0]
-        left -= _length(piece)
-        pieces.append(piece)
+            return 0
+        way[n, 0], way[n, 1] = x0 + at[k] * (x1 - x0), y0 + at[k] * (y1 - y0)
+        bx, by = x0 + at[last] * (x1 - x0), y0 + at[last] * (y1 - y0)
+        n, length = _round(track, which[k], which[last], bx, by, left, way, n)
+        if n == 0:
+            return 0
+        left -= length
         k = last + 1
-    pieces.append(np.array([[x1, y1]]))
-    n = 0
-    for piece in pieces:
-        n += len(piece)
-    out = np.empty((n, 2))
-    n = 0
-    for piece in pieces:
-        out[n : n + len(piece)] = piece
-        n += len(piece)
-    return out
+    way[n, 0], way[n, 1] = x1, y1
+    return n + 1
 
 
-@njit(cache=True)
-def _round(track: Lattice, leaving: int, leave: Floats, coming: int, back: Floats, longest: float) -> Floats:
-    """Along a loop from a point of one side to a point of another, the shorter way round; empty when that is too long."""
+@part
+def _round(
+    track: Lattice, leaving: int, coming: int, bx: float, by: float, longest: float, way: Floats, n: int
+) -> tuple[int, float]:
+    """Appends the shorter way along a loop from row n, on the side `leaving`, to a point bx, by of another side, `coming`.
+
+    Returns the new number of rows, 0 when the way is too long, and its length.
+    """
+    least, shorter = np.inf, 1
+    for sense in range(1, -2, -2):
+        _, length = _walk(track, leaving, coming, bx, by, longest, way, n, sense)
+        if length < least:
+            least, shorter = length, sense
+    if least > longest:
+        return 0, least
+    end, least = _walk(track, leaving, coming, bx, by, longest, way, n, shorter)
+    return end, least
+
+
+@part
+def _walk(
+    track: Lattice, leaving: int, coming: int, bx: float, by: float, longest: float, way: Floats, n: int, sense: int
+) -> tuple[int, float]:
+    """Appends the way along a loop forward (1) or backward (-1) until it is too long; the new number of rows and the length."""
     begin, end = track.begins[track.loop[leaving]], track.begins[track.loop[leaving] + 1]
-    n = end - begin
-    ways = np.empty((2, n + 2, 2))
-    counts, lengths = np.empty(2, np.int64), np.empty(2)
-    for backward in range(2):
-        way = ways[backward]
-        way[0] = leave
-        count, side, length = 1, leaving, 0.0
-        forward_on_one = leaving == coming and (
-            np.hypot(leave[0] - track.sides[leaving, 0], leave[1] - track.sides[leaving, 1])
-            <= np.hypot(back[0] - track.sides[leaving, 0], back[1] - track.sides[leaving, 1])
-        )
-        around = n if leaving == coming and forward_on_one == (backward == 1) else 0
-        while (side != coming or around > 0) and length <= longest:
-            around -= 1
-            if backward:
-                way[count] = track.sides[side, :2]
-                side = begin + (side - begin - 1) % n
-            else:
-                way[count] = track.sides[side, 2:]
-                side = begin + (side - begin + 1) % n
-            length += np.hypot(way[count, 0] - way[count - 1, 0], way[count, 1] - way[count - 1, 1])
-            count += 1
-            if side == coming:
-                around = 0
-        way[count] = back
-        lengths[backward] = length + np.hypot(back[0] - way[count - 1, 0], back[1] - way[count - 1, 1])
-        counts[backward] = count + 1
-    shorter = 1 if lengths[1] < lengths[0] else 0
-    return ways[shorter, : counts[shorter] if lengths[shorter] <= longest else 0]
+    side, length, corner = leaving, 0.0, 1 + sense
+    while side != coming and length <= longest:
+        way[n + 1, 0], way[n + 1, 1] = track.sides[side, corner], track.sides[side, corner + 1]
+        length += np.hypot(way[n + 1, 0] - way[n, 0], way[n + 1, 1] - way[n, 1])
+        side = begin + (side - begin + sense) % (end - begin)
+        n += 1
+    way[n + 1, 0], way[n + 1, 1] = bx, by
+    return n + 2, length + np.hypot(bx - way[n, 0], by - way[n, 1])
 
 
-@njit(cache=True)
-def _pulled(safe: Lattice, way: Floats) -> Floats:
-    """The way with as few of its points as the border allows, tried from both ends; empty when it crosses the border itself."""
-    for _ in range(2):
-        kept = np.empty_like(way)
-        kept[0] = way[0]
-        n, i, last = 1, 0, len(way) - 1
-        while i < last:
-            step = last - i
-            while step > 1 and not free(safe, way[i, 0], way[i, 1], way[i + step, 0], way[i + step, 1]):
-                step = step - 1 if step <= 8 else (3 * step) // 4
-            if step == 1 and not free(safe, way[i, 0], way[i, 1], way[i + 1, 0], way[i + 1, 1]):
-                return way[:0]
-            i += step
-            kept[n] = way[i]
-            n += 1
-        way = kept[:n][::-1].copy()
-    return way
+@part
+def _pulled(safe: Lattice, way: Floats, count: int) -> int:
+    """Leaves as few points of a way as the border allows, in reverse order; returns how many, 0 when it crosses the border."""
+    n, i, last = 1, 0, count - 1
+    while i < last:
+        step = last - i
+        while step > 1 and not free(safe, way[i, 0], way[i, 1], way[i + step, 0], way[i + step, 1]):
+            step = step - 1 if step <= 8 else (3 * step) // 4
+        if step == 1 and not free(safe, way[i, 0], way[i, 1], way[i + 1, 0], way[i + 1, 1]):
+            return 0
+        i += step
+        way[n, 0], way[n, 1] = way[i, 0], way[i, 1]
+        n += 1
+    for k in range(n // 2):
+        for axis in range(2):
+            way[k, axis], way[n - 1 - k, axis] = way[n - 1 - k, axis], way[k, axis]
+    return n

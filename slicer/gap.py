@@ -5,8 +5,8 @@ from itertools import groupby
 from math import pi
 
 import numpy as np
-from numba import njit
 
+from mdp.kernel import floats, kernel
 from mdp.mesh import Floats
 from slicer.bead import Bead, bulged, length_mm, width_for_mm
 from slicer.centreline import centrelines
@@ -67,10 +67,10 @@ def _kept_inside(borders: Floats, points: Floats, across: float, spare_mm: float
     return points[first : last + 1], min(across, 2.0 * reach)
 
 
-@njit(cache=True)
+@kernel
 def _clearances(borders: Floats, points: Floats) -> Floats:
     """Distance of each point (n, 2) to (m, 4) edges."""
-    least = np.full(len(points), np.inf)
+    least: Floats = floats(len(points), np.inf)
     for e in range(len(borders)):
         ax, ay = borders[e, 0], borders[e, 1]
         dx, dy = borders[e, 2] - ax, borders[e, 3] - ay
@@ -79,8 +79,9 @@ def _clearances(borders: Floats, points: Floats) -> Floats:
             x, y = points[k, 0] - ax, points[k, 1] - ay
             share = min(max((x * dx + y * dy) / square, 0.0), 1.0)
             least[k] = min(least[k], (x - share * dx) ** 2 + (y - share * dy) ** 2)
-    away: Floats = np.sqrt(least)
-    return away
+    for k in range(len(points)):
+        least[k] = np.sqrt(least[k])
+    return least
 
 
 def _strokes(places: Polygons, line_width_mm: float, even: float, shortest: float) -> Iterable[tuple[float, list[Stroke]]]:

@@ -1,9 +1,9 @@
 """Half-edges: which triangle lies across an edge; half-edge 3 f + k runs from vertex k to vertex k + 1 of triangle f."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import ints, kernel
 from mdp.mesh import Ints
 
 
@@ -20,9 +20,9 @@ def opposites(faces: Ints) -> Ints:
     return paired
 
 
-@njit(cache=True)
+@kernel
 def _paired(order: NDArray[np.int64], keys: NDArray[np.int64], forward: NDArray[np.bool_]) -> Ints:
-    paired = np.full(len(keys), -1, np.int32)
+    paired: Ints = ints(len(keys), -1)
     start = 0
     while start < len(order):
         end = start

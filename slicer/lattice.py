@@ -4,9 +4,9 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import kernel, longs, part
 from mdp.mesh import Floats
 from slicer.polygons import Polygons, contours
 
@@ -45,7 +45,12 @@ def lattice(polygons: Polygons) -> Lattice:
     return Lattice(sides, loop, begins, float(low[0]), float(low[1]), float(size), columns, rows, first, listed)
 
 
-@njit(cache=True)
+@part
+def _side(sides: Floats, s: int) -> tuple[float, float, float, float]:
+    return sides[s, 0], sides[s, 1], sides[s, 2], sides[s, 3]
+
+
+@part
 def _columns(
     x0: float, y0: float, x1: float, y1: float, low: float, high: float, x: float, size: float, columns: int
 ) -> tuple[int, int]:
@@ -61,21 +66,20 @@ def _columns(
     return max(int((left - MARGIN_MM - x) / size), 0), min(int((right + MARGIN_MM - x) / size), columns - 1)
 
 
-@njit(cache=True)
+@part
 def _rows(y0: float, y1: float, y: float, size: float, rows: int) -> tuple[int, int]:
     return max(int((min(y0, y1) - MARGIN_MM - y) / size), 0), min(int((max(y0, y1) + MARGIN_MM - y) / size), rows - 1)
 
 
-@njit(cache=True)
+@kernel
 def _sorted_in(
     sides: Floats, x: float, y: float, size: float, columns: int, rows: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    first = np.zeros(columns * rows + 1, np.int64)
-    listed = np.zeros(0, np.int64)
-    place = first
+    cells = columns * rows
+    first, place, listed = longs(cells + 1, 0), longs(cells + 1, 0), longs(0, 0)
     for filling in range(2):
         for s in range(len(sides)):
-            x0, y0, x1, y1 = sides[s]
+            x0, y0, x1, y1 = _side(sides, s)
             low, high = _rows(y0, y1, y, size, rows)
             for r in range(low, high + 1):
                 bottom = y + r * size
@@ -87,16 +91,17 @@ def _sorted_in(
                     else:
                         first[c + 1] += 1
         if not filling:
-            first = np.cumsum(first)
-            place = first.copy()
-            listed = np.empty(first[-1], np.int64)
+            for c in range(cells):
+                first[c + 1] += first[c]
+                place[c + 1] = first[c + 1]
+            listed = longs(first[cells], 0)
     return first, listed
 
 
-@njit(cache=True)
+@part
 def _meets(sides: Floats, s: int, x0: float, y0: float, x1: float, y1: float) -> float:
     """Where (0..1) the segment crosses side s; -1 when it does not. An end on the segment's line counts as its right side."""
-    ax, ay, bx, by = sides[s]
+    ax, ay, bx, by = _side(sides, s)
     a = (x1 - x0) * (ay - y0) - (y1 - y0) * (ax - x0)
     b = (x1 - x0) * (by - y0) - (y1 - y0) * (bx - x0)
     if (a > 0) == (b > 0):
@@ -108,42 +113,54 @@ def _meets(sides: Floats, s: int, x0: float, y0: float, x1: float, y1: float) ->
     return float(start / (start - end))
 
 
-@njit(cache=True)
-def crossings(lattice: Lattice, x0: float, y0: float, x1: float, y1: float, most: int) -> tuple[Floats, NDArray[np.int64]]:
-    """Where (0..1, rising) and which sides the segment crosses; the search ends at `most` crossings."""
+@part
+def _near(lattice: Lattice, r: int, x0: float, y0: float, x1: float, y1: float) -> tuple[int, int]:
+    """Which of the listed sides lie in the cells that a segment touches in a row: from and to."""
+    bottom = lattice.y + r * lattice.size
+    top = bottom + lattice.size + MARGIN_MM
+    a, b = _columns(x0, y0, x1, y1, bottom - MARGIN_MM, top, lattice.x, lattice.size, lattice.columns)
+    return (lattice.first[r * lattice.columns + a], lattice.first[r * lattice.columns + b + 1]) if a <= b else (0, 0)
+
+
+@part
+def crossings(lattice: Lattice, x0: float, y0: float, x1: float, y1: float, at: Floats, which: NDArray[np.int64]) -> int:
+    """Fills in where (0..1, rising) and which sides the segment crosses; returns how many, -1 where there is no room for them."""
     low, high = _rows(y0, y1, lattice.y, lattice.size, lattice.rows)
-    at, which = np.empty(16), np.empty(16, np.int64)
     n = 0
     for r in range(low, high + 1):
-        bottom = lattice.y + r * lattice.size
-        top = bottom + lattice.size + MARGIN_MM
-        a, b = _columns(x0, y0, x1, y1, bottom - MARGIN_MM, top, lattice.x, lattice.size, lattice.columns)
-        for c in range(r * lattice.columns + a, r * lattice.columns + b + 1):
-            for k in range(lattice.first[c], lattice.first[c + 1]):
-                s = lattice.listed[k]
-                share = _meets(lattice.sides, s, x0, y0, x1, y1)
-                known = share < 0.0
-                for i in range(n):
-                    known = known or which[i] == s
-                if known:
-                    continue
-                if n == len(at):
-                    at, which = np.concatenate((at, at)), np.concatenate((which, which))
-                at[n], which[n] = share, s
-                n += 1
-                if n == most:
-                    return at[:n], which[:n]
-    order = np.argsort(at[:n])
-    return at[:n][order], which[:n][order]
+        begin, end = _near(lattice, r, x0, y0, x1, y1)
+        for k in range(begin, end):
+            s = lattice.listed[k]
+            share = _meets(lattice.sides, s, x0, y0, x1, y1)
+            known = share < 0.0
+            for i in range(n):
+                known = known or which[i] == s
+            if known:
+                continue
+            if n == len(at):
+                return -1
+            i = n
+            while i > 0 and at[i - 1] > share:
+                at[i], which[i] = at[i - 1], which[i - 1]
+                i -= 1
+            at[i], which[i] = share, s
+            n += 1
+    return n
 
 
-@njit(cache=True)
+@part
 def free(lattice: Lattice, x0: float, y0: float, x1: float, y1: float) -> bool:
     """Whether the segment crosses no side."""
-    return len(crossings(lattice, x0, y0, x1, y1, 1)[0]) == 0
+    low, high = _rows(y0, y1, lattice.y, lattice.size, lattice.rows)
+    for r in range(low, high + 1):
+        begin, end = _near(lattice, r, x0, y0, x1, y1)
+        for k in range(begin, end):
+            if _meets(lattice.sides, lattice.listed[k], x0, y0, x1, y1) >= 0.0:
+                return False
+    return True
 
 
-@njit(cache=True)
+@part
 def within(lattice: Lattice, x: float, y: float) -> bool:
     """Whether a point lies in the polygons: the sides that a ray to the right crosses, each counted in one cell."""
     row, column = int((y - lattice.y) / lattice.size), max(int((x - lattice.x) / lattice.size), 0)
@@ -153,7 +170,7 @@ def within(lattice: Lattice, x: float, y: float) -> bool:
     for c in range(column, lattice.columns):
         cell = row * lattice.columns + c
         for k in range(lattice.first[cell], lattice.first[cell + 1]):
-            ax, ay, bx, by = lattice.sides[lattice.listed[k]]
+            ax, ay, bx, by = _side(lattice.sides, lattice.listed[k])
             if (ay > y) != (by > y):
                 cut = ax + (y - ay) / (by - ay) * (bx - ax)
                 if cut > x and int((cut - lattice.x) / lattice.size) == c:
@@ -161,7 +178,7 @@ def within(lattice: Lattice, x: float, y: float) -> bool:
     return odd
 
 
-@njit(cache=True)
+@part
 def nearest(lattice: Lattice, x: float, y: float, reach: float) -> tuple[float, float, int]:
     """The nearest point of any side within reach, and its side; side -1: none."""
     best, side, nx, ny = reach, -1, x, y
@@ -171,7 +188,7 @@ def nearest(lattice: Lattice, x: float, y: float, reach: float) -> tuple[float, 
     for r in range(low, high + 1):
         for c in range(r * lattice.columns + left, r * lattice.columns + right + 1):
             for k in range(lattice.first[c], lattice.first[c + 1]):
-                ax, ay, bx, by = lattice.sides[lattice.listed[k]]
+                ax, ay, bx, by = _side(lattice.sides, lattice.listed[k])
                 dx, dy = bx - ax, by - ay
                 along = dx * dx + dy * dy
                 share = min(max(((x - ax) * dx + (y - ay) * dy) / along, 0.0), 1.0) if along > 0.0 else 0.0

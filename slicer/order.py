@@ -9,14 +9,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import kernel, longs
 from mdp.mesh import Floats, Ints
 from profiles.process import Process
 from slicer.bead import Bead
 from slicer.combing import NOWHERE, Ground
-from slicer.lattice import free
 from slicer.paths import Kind
 from slicer.polygons import Polygons, area_mm2, contours
 from slicer.scanline import inside
@@ -66,7 +65,7 @@ def _travels(
     ways: dict[int, Floats] = {}
     for k in np.flatnonzero(retracts):
         if k and props[k] and props[k - 1]:
-            retracts[k] = not free(ground.safe, since[k, 0], since[k, 1], to[k, 0], to[k, 1])
+            retracts[k] = ground.crosses(since[k : k + 1], to[k : k + 1])[0]
         elif process.combing:
             way = ground.way(since[k], to[k], process.combing_detour_mm)
             if way is not None:
@@ -152,20 +151,30 @@ def _starts(beads: Sequence[Bead]) -> Floats:
     return np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
 
 
-@njit(cache=True)
+@kernel
 def _nearest(points: Floats, places: Floats) -> NDArray[np.int64]:
     """The point nearest to each place; points sorted into square cells, searched ring by ring."""
-    x, y = points[:, 0].min(), points[:, 1].min()
-    wide = max(points[:, 0].max() - x, points[:, 1].max() - y) + 1e-6
+    low_x, high_x, low_y, high_y = points[0, 0], points[0, 0], points[0, 1], points[0, 1]
+    for k in range(len(points)):
+        low_x, high_x = min(low_x, points[k, 0]), max(high_x, points[k, 0])
+        low_y, high_y = min(low_y, points[k, 1]), max(high_y, points[k, 1])
     cells = max(int(np.sqrt(len(points) / 2.0)), 1)
-    size = wide / cells
-    cell = (points[:, 0] - x) // size * cells + (points[:, 1] - y) // size
-    order = np.argsort(cell, kind="mergesort")
-    first = np.searchsorted(cell[order], np.arange(cells * cells + 1))
-    out = np.empty(len(places), np.int64)
+    size = (max(high_x - low_x, high_y - low_y) + 1e-6) / cells
+    cell, order = longs(len(points), 0), longs(len(points), 0)
+    first, place = longs(cells * cells + 1, 0), longs(cells * cells + 1, 0)
+    out: NDArray[np.int64] = longs(len(places), 0)
+    for k in range(len(points)):
+        cell[k] = int((points[k, 0] - low_x) / size) * cells + int((points[k, 1] - low_y) / size)
+        first[cell[k] + 1] += 1
+    for c in range(cells * cells):
+        first[c + 1] += first[c]
+        place[c + 1] = first[c + 1]
+    for k in range(len(points)):
+        order[place[cell[k]]] = k
+        place[cell[k]] += 1
     for p in range(len(places)):
-        px, py = places[p]
-        column, row = min(max(int((px - x) / size), 0), cells - 1), min(max(int((py - y) / size), 0), cells - 1)
+        px, py = places[p, 0], places[p, 1]
+        column, row = min(max(int((px - low_x) / size), 0), cells - 1), min(max(int((py - low_y) / size), 0), cells - 1)
         best, least, ring = 0, np.inf, 0
         while ring <= cells and (ring - 1) * size < least:
             for c in range(max(column - ring, 0), min(column + ring, cells - 1) + 1):
@@ -193,11 +202,11 @@ def _islands(starts: Floats, ranks: Ints, section: Polygons) -> Ints:
     return np.where(ranks <= OUTSIDE, -1, found).astype(np.int32)
 
 
-@njit(cache=True)
+@kernel
 def _containing(sides: Floats, offsets: NDArray[np.int64], boxes: Floats, points: Floats) -> Ints:
     found = np.full(len(points), len(boxes), np.int32)
     for p in range(len(points)):
-        x, y = points[p]
+        x, y = points[p, 0], points[p, 1]
         for k in range(len(boxes)):
             near = boxes[k, 0] <= x <= boxes[k, 2] and boxes[k, 1] <= y <= boxes[k, 3]
             if near and inside(sides[offsets[k] : offsets[k + 1]], x, y):

@@ -8,8 +8,8 @@ from typing import TypeAlias
 
 import numpy as np
 from manifold3d import CrossSection, FillRule, JoinType, OpType
-from numba import njit
 
+from mdp.kernel import kernel
 from mdp.mesh import Floats
 
 Polygons: TypeAlias = CrossSection
@@ -96,9 +96,9 @@ def area_mm2(loop: Floats) -> float:
     return float(_shoelace(loop))
 
 
-@njit(cache=True)
+@kernel
 def _shoelace(loop: Floats) -> float:
-    x0, y0 = loop[0]
+    x0, y0 = loop[0, 0], loop[0, 1]
     doubled = 0.0
     for i in range(1, len(loop) - 1):
         doubled += (loop[i, 0] - x0) * (loop[i + 1, 1] - y0) - (loop[i + 1, 0] - x0) * (loop[i, 1] - y0)

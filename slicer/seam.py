@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
+from mdp.kernel import kernel, part
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead
@@ -138,7 +138,7 @@ def _inward(loop: Floats) -> Floats:
     return np.array([-along[1], along[0]])
 
 
-@njit(cache=True)
+@kernel
 def _along(loop: Floats, share: float) -> tuple[float, float]:
     """The point at a share of a loop's length, counted from its least point, so that it does not depend on the loop's start."""
     n = len(loop)
@@ -151,16 +151,17 @@ def _along(loop: Floats, share: float) -> tuple[float, float]:
         total += np.hypot(loop[i, 0] - loop[i - 1, 0], loop[i, 1] - loop[i - 1, 1])
     left = share * total
     for i in range(first, first + n):
-        a, b = loop[i % n], loop[(i + 1) % n]
-        step = np.hypot(b[0] - a[0], b[1] - a[1])
+        ax, ay = loop[i % n, 0], loop[i % n, 1]
+        dx, dy = loop[(i + 1) % n, 0] - ax, loop[(i + 1) % n, 1] - ay
+        step = np.hypot(dx, dy)
         if step >= left:
-            part = left / step if step > 0.0 else 0.0
-            return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
+            along = left / step if step > 0.0 else 0.0
+            return ax + along * dx, ay + along * dy
         left -= step
     return loop[first, 0], loop[first, 1]
 
 
-@njit(cache=True)
+@part
 def _projected(loop: Floats, x: float, y: float) -> tuple[float, int, float]:
     """Distance from a point to a loop, the side that is nearest and how far along it."""
     least, at, share = np.inf, 0, 0.0
@@ -176,10 +177,13 @@ def _projected(loop: Floats, x: float, y: float) -> tuple[float, int, float]:
     return least, at, share
 
 
-@njit(cache=True)
+@kernel
 def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, float, float]:
     """The point nearest to a loop as (distance, x, y); the distance is infinite when none is within reach."""
-    low_x, high_x, low_y, high_y = loop[:, 0].min(), loop[:, 0].max(), loop[:, 1].min(), loop[:, 1].max()
+    low_x, high_x, low_y, high_y = loop[0, 0], loop[0, 0], loop[0, 1], loop[0, 1]
+    for i in range(len(loop)):
+        low_x, high_x = min(low_x, loop[i, 0]), max(high_x, loop[i, 0])
+        low_y, high_y = min(low_y, loop[i, 1]), max(high_y, loop[i, 1])
     best, bx, by = np.inf, 0.0, 0.0
     for p in range(len(points)):
         x, y = points[p, 0], points[p, 1]
@@ -191,7 +195,7 @@ def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, floa
     return best, bx, by
 
 
-@njit(cache=True)
+@kernel
 def _best(
     loop: Floats, x: float, y: float, inner_mm: float, outer_mm: float, edges: Floats, z: float, keep: float, smooth: float
 ) -> tuple[int, float, bool]:
@@ -226,11 +230,12 @@ def _best(
     return at, share, free
 
 
-@njit(cache=True)
+@part
 def _reward(loop: Floats, i: int, inner_mm: float, outer_mm: float, smooth: float) -> float:
     """What the corner at a vertex is worth: nothing up to SMOOTH_DEG of turn, all from SHARP_DEG on."""
-    bx, by = loop[i, 0] - _arm(loop, i, -1)[0], loop[i, 1] - _arm(loop, i, -1)[1]
-    cx, cy = _arm(loop, i, 1)[0] - loop[i, 0], _arm(loop, i, 1)[1] - loop[i, 1]
+    px, py = _arm(loop, i, -1)
+    qx, qy = _arm(loop, i, 1)
+    bx, by, cx, cy = loop[i, 0] - px, loop[i, 1] - py, qx - loop[i, 0], qy - loop[i, 1]
     cross, dot = bx * cy - by * cx, bx * cx + by * cy
     if dot > smooth * np.hypot(bx, by) * np.hypot(cx, cy):
         return 0.0
@@ -239,25 +244,26 @@ def _reward(loop: Floats, i: int, inner_mm: float, outer_mm: float, smooth: floa
     return float(strength * (inner_mm if cross < 0.0 else outer_mm))
 
 
-@njit(cache=True)
+@part
 def _arm(loop: Floats, i: int, way: int) -> tuple[float, float]:
     """The point ARM_MM along the loop from a vertex, forward or backward."""
     n, left, at = len(loop), ARM_MM, i
     for _ in range(n):
-        a, b = loop[at % n], loop[(at + way) % n]
-        step = np.hypot(b[0] - a[0], b[1] - a[1])
+        ax, ay = loop[at % n, 0], loop[at % n, 1]
+        dx, dy = loop[(at + way) % n, 0] - ax, loop[(at + way) % n, 1] - ay
+        step = np.hypot(dx, dy)
         if step >= left:
-            return a[0] + left / step * (b[0] - a[0]), a[1] + left / step * (b[1] - a[1])
+            return ax + left / step * dx, ay + left / step * dy
         left -= step
         at += way
     return loop[at % n, 0], loop[at % n, 1]
 
 
-@njit(cache=True)
+@part
 def _near(edges: Floats, x: float, y: float, z: float, keep: float) -> bool:
     """Whether a point in space lies within a distance of any of the (n, 6) segments."""
     for e in range(len(edges)):
-        ax, ay, az, bx, by, bz = edges[e]
+        ax, ay, az, bx, by, bz = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3], edges[e, 4], edges[e, 5]
         dx, dy, dz = bx - ax, by - ay, bz - az
         square = dx * dx + dy * dy + dz * dz
         t = min(max(((x - ax) * dx + (y - ay) * dy + (z - az) * dz) / square, 0.0), 1.0) if square > 0.0 else 0.0

@@ -8,9 +8,9 @@ A vertex exactly in a plane counts as above it: the section of a flat top is tak
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import ints, kernel, longs, part, rank, table
 from mdp.mesh import Floats, Ints, Mesh
 from profiles.errors import SliceError
 from slicer.halfedges import opposites
@@ -26,32 +26,34 @@ def sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
     if open_edges:
         raise SliceError(f"the mesh is not closed: {open_edges} edges have a face on one side only")
     points, ends, counts = _walk(mesh.vertices, mesh.faces, across, np.ascontiguousarray(cuts_mm, dtype=np.float64))
+    ends = ends[: counts.sum()]
     loops = np.split(points, ends[:-1]) if len(ends) else []
     bounds = np.concatenate([[0], np.cumsum(counts)])
     return [[loop for loop in loops[a:b] if len(loop) > 2] for a, b in pairwise(bounds)]
 
 
-@njit(cache=True)
+@part
 def _spans(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Ints, Ints]:
     """Per face the first layer it crosses and the one after the last."""
-    first, last = np.empty(len(faces), np.int32), np.empty(len(faces), np.int32)
+    first, last = ints(len(faces), 0), ints(len(faces), 0)
     for f in range(len(faces)):
         a, b, c = vertices[faces[f, 0], 2], vertices[faces[f, 1], 2], vertices[faces[f, 2], 2]
-        first[f] = np.searchsorted(cuts, min(a, b, c), side="right")
-        last[f] = np.searchsorted(cuts, max(a, b, c), side="right")
+        first[f] = rank(cuts, min(a, b, c), True)
+        last[f] = rank(cuts, max(a, b, c), True)
     return first, last
 
 
-@njit(cache=True)
+@part
 def _by_layer(first: Ints, last: Ints, layers: int) -> tuple[NDArray[np.int64], Ints]:
     """Faces listed layer after layer: (layers + 1,) offsets and the list."""
-    offsets = np.zeros(layers + 1, np.int64)
+    offsets, place = longs(layers + 1, 0), longs(layers + 1, 0)
     for f in range(len(first)):
         for layer in range(first[f], last[f]):
             offsets[layer + 1] += 1
-    offsets = np.cumsum(offsets)
-    listed = np.empty(offsets[-1], np.int32)
-    place = offsets.copy()
+    for layer in range(layers):
+        offsets[layer + 1] += offsets[layer]
+        place[layer + 1] = offsets[layer + 1]
+    listed = ints(offsets[layers], 0)
     for f in range(len(first)):
         for layer in range(first[f], last[f]):
             listed[place[layer]] = f
@@ -59,15 +61,13 @@ def _by_layer(first: Ints, last: Ints, layers: int) -> tuple[NDArray[np.int64], 
     return offsets, listed
 
 
-@njit(cache=True)
+@kernel
 def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
-    """Points of all loops, the end of each loop in them, the number of loops of each layer."""
+    """Points of all loops, the end of each loop in them (with room for more), the number of loops of each layer."""
     first, last = _spans(vertices, faces, cuts)
     offsets, listed = _by_layer(first, last, len(cuts))
-    points = np.empty((offsets[-1], 2))
-    ends = np.empty(offsets[-1], np.int64)
-    counts = np.zeros(len(cuts), np.int64)
-    seen = np.full(len(faces), -1, np.int32)
+    points, ends = table(len(listed), 2), longs(len(listed), 0)
+    counts, seen = longs(len(cuts), 0), ints(len(faces), -1)
     n = loop = 0
     for layer in range(len(cuts)):
         z = cuts[layer]
@@ -92,4 +92,4 @@ def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Fl
             ends[loop] = n
             loop += 1
             counts[layer] += 1
-    return points, ends[:loop], counts
+    return points, ends, counts

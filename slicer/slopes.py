@@ -7,8 +7,8 @@ A layer of height h leaves steps of depth h |n_z| on a surface with normal n, me
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from mdp.kernel import floats, kernel
 from mdp.mesh import Floats, Ints, Mesh
 from profiles.process import Process
 
@@ -43,10 +43,10 @@ def slopes(mesh: Mesh, process: Process) -> Slopes:
     )
 
 
-@njit(cache=True)
+@kernel
 def _worst(z: Floats, faces: Ints, leaning: Floats, bin_mm: float, bins: int) -> Floats:
     """(bins,) greatest |n_z| of the faces that reach into each bin."""
-    worst = np.zeros(bins)
+    worst: Floats = floats(bins, 0.0)
     for f in range(len(faces)):
         a, b, c = z[faces[f, 0]], z[faces[f, 1]], z[faces[f, 2]]
         first = max(int(np.floor(min(a, b, c) / bin_mm)), 0)

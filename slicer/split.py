@@ -5,9 +5,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import floats, kernel, rank, sort
 from mdp.mesh import Floats
 from slicer.bead import Bead
 from slicer.combing import NOWHERE
@@ -64,34 +64,49 @@ def _steady(within: NDArray[np.bool_], lengths: Floats, shortest_mm: float) -> N
     return within
 
 
-@njit(cache=True)
 def _cut(points: Floats, sides: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """The polyline (n, 2) with the places added where it crosses sides (k, 4; by rising least y), and which steps lie within."""
     lows = np.minimum(sides[:, 1], sides[:, 3])
-    tallest = np.abs(sides[:, 3] - sides[:, 1]).max()
-    xs, ys, marks, within = [points[0, 0]], [points[0, 1]], [False], False
+    tallest = float(np.abs(sides[:, 3] - sides[:, 1]).max())
+    size, room = -1, 2 * len(points) + 64
+    while size < 0:
+        out, within = np.empty((room, 2)), np.empty(room, np.bool_)
+        size = _cut_into(points, sides, lows, tallest, out, within)
+        room *= 4
+    return out[:size], within[: size - 1]
+
+
+@kernel
+def _cut_into(points: Floats, sides: Floats, lows: Floats, tallest: float, out: Floats, marks: NDArray[np.bool_]) -> int:
+    """Fills in the points and which steps lie within; returns how many points there are, -1 where there is no room for them."""
+    shares, within = floats(len(sides) + 2, 0.0), False
+    out[0, 0], out[0, 1] = points[0, 0], points[0, 1]
+    n = 1
     for k in range(len(points) - 1):
         x0, y0, dx, dy = points[k, 0], points[k, 1], points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
         low, high = min(y0, y0 + dy), max(y0, y0 + dy)
-        shares = [0.0]
+        many = 1  # the first share stays 0
         touched = k == 0
-        for e in range(np.searchsorted(lows, low - tallest), np.searchsorted(lows, high, side="right")):
-            ax, ay, bx, by = sides[e]
+        for e in range(rank(lows, low - tallest, False), rank(lows, high, True)):
+            ax, ay, bx, by = sides[e, 0], sides[e, 1], sides[e, 2], sides[e, 3]
             side_a, side_b = dx * (ay - y0) - dy * (ax - x0), dx * (by - y0) - dy * (bx - x0)
             if (side_a > 0) != (side_b > 0):
                 along = side_a / (side_a - side_b)
                 share = ((ax + along * (bx - ax) - x0) * dx + (ay + along * (by - ay) - y0) * dy) / (dx * dx + dy * dy)
                 touched = touched or -SNAP <= share <= 1.0 + SNAP
                 if SNAP < share < 1.0 - SNAP:
-                    shares.append(share)
-        shares.sort()
-        shares.append(1.0)
-        for s in range(len(shares) - 1):
+                    shares[many] = share
+                    many += 1
+        if n + many > len(out):
+            return -1
+        sort(shares, 1, many)
+        shares[many] = 1.0
+        for s in range(many):
             if touched:
                 middle = 0.5 * (shares[s] + shares[s + 1])
                 within = inside(sides, x0 + middle * dx, y0 + middle * dy)
-            xs.append(x0 + shares[s + 1] * dx)
-            ys.append(y0 + shares[s + 1] * dy)
-            marks.append(within)
-        xs[-1], ys[-1] = points[k + 1, 0], points[k + 1, 1]
-    return np.column_stack((np.array(xs), np.array(ys))), np.array(marks[1:])
+            out[n, 0], out[n, 1] = x0 + shares[s + 1] * dx, y0 + shares[s + 1] * dy
+            marks[n - 1] = within
+            n += 1
+        out[n - 1, 0], out[n - 1, 1] = points[k + 1, 0], points[k + 1, 1]
+    return n

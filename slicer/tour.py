@@ -5,9 +5,9 @@ turned or not), with true lengths also where a thing must not be turned.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import flags, kernel, longs, part, table
 from mdp.mesh import Floats
 
 REACH = 200  # exchanges reach so far along the tour, less far in a tour of more than a thousand things
@@ -19,21 +19,25 @@ MOST_MOVED = 3
 Tour = tuple[NDArray[np.int64], NDArray[np.bool_]]
 
 
-@njit(cache=True)
+@kernel
 def tour(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: float, goal: Floats) -> Tour:
     """Order and turns of n things from the place x, y; starts, ends: (n, 2) mm; fixed: (n,) must not be turned.
 
     goal: (1, 2) where the tour should end up, or (0, 2).
     """
-    order, flips = _greedy(starts, ends, fixed, x, y)
-    ways = np.zeros((len(order) + len(goal), 4))  # in x, in y, out x, out y of each thing in its place, then the goal
-    ways[len(order) :, :2] = goal
-    for k in range(len(order)):
-        _enter(ways, k, starts[order[k]], ends[order[k]], flips[k])
-    still = fixed[order]
-    many = len(order) > MANY
-    reach = max(REACH * MANY // len(order), 20) if many else REACH
-    for _ in range(FEW_PASSES if many else PASSES):
+    n = len(starts)
+    order, flips, still = longs(n, 0), flags(n), flags(n)
+    _greedy(starts, ends, fixed, x, y, order, flips)
+    ways = table(n + len(goal), 4)  # in x, in y, out x, out y of each thing in its place, then the goal
+    for k in range(n):
+        i, into, out = order[k], 2 * int(flips[k]), 2 - 2 * int(flips[k])
+        still[k] = fixed[i]
+        for axis in range(2):
+            ways[k, into + axis], ways[k, out + axis] = starts[i, axis], ends[i, axis]
+    for k in range(len(goal)):
+        ways[n + k, 0], ways[n + k, 1] = goal[k, 0], goal[k, 1]
+    reach = max(REACH * MANY // n, 20) if n > MANY else REACH
+    for _ in range(FEW_PASSES if n > MANY else PASSES):
         gained = _turn_round(order, flips, ways, still, x, y, reach)
         gained += _move(order, flips, ways, still, x, y, reach)
         if gained < GAIN_MM:
@@ -41,21 +45,16 @@ def tour(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: fl
     return order, flips
 
 
-@njit(cache=True)
-def _enter(ways: Floats, k: int, start: Floats, end: Floats, flip: bool) -> None:
-    if flip:
-        ways[k, :2], ways[k, 2:] = end, start
-    else:
-        ways[k, :2], ways[k, 2:] = start, end
-
-
-@njit(cache=True)
-def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: float) -> Tour:
-    n = len(starts)
-    order, flips = np.arange(n), np.zeros(n, np.bool_)
-    for place in range(n):
+@part
+def _greedy(
+    starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: float, order: NDArray[np.int64], flips: NDArray[np.bool_]
+) -> None:
+    """Fill in the order that goes to the nearest thing each time."""
+    for k in range(len(order)):
+        order[k] = k
+    for place in range(len(order)):
         best, flip, least = place, False, np.inf
-        for k in range(place, n):
+        for k in range(place, len(order)):
             i = order[k]
             distance = (starts[i, 0] - x) ** 2 + (starts[i, 1] - y) ** 2
             if distance < least or (distance == least and i < order[best]):
@@ -64,13 +63,13 @@ def _greedy(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y:
                 distance = (ends[i, 0] - x) ** 2 + (ends[i, 1] - y) ** 2
                 if distance < least:
                     best, flip, least = k, True, distance
-        order[place], order[best] = order[best], order[place]
+        i = order[best]
+        order[place], order[best] = i, order[place]
         flips[place] = flip
-        x, y = starts[order[place]] if flip else ends[order[place]]
-    return order, flips
+        x, y = (starts[i, 0], starts[i, 1]) if flip else (ends[i, 0], ends[i, 1])
 
 
-@njit(cache=True)
+@part
 def _gap(ways: Floats, i: int, j: int, x: float, y: float) -> float:
     """Travel from thing i to thing j in their present sense; i = -1: from x, y; j = n: no travel."""
     if j == len(ways):
@@ -80,7 +79,7 @@ def _gap(ways: Floats, i: int, j: int, x: float, y: float) -> float:
     return float(np.hypot(ways[j, 0] - x, ways[j, 1] - y))
 
 
-@njit(cache=True)
+@part
 def _turned(ways: Floats, still: NDArray[np.bool_], k: int) -> tuple[float, float, float, float]:
     """Where thing k is entered and left when the stretch around it runs the other way."""
     if still[k]:
@@ -88,19 +87,30 @@ def _turned(ways: Floats, still: NDArray[np.bool_], k: int) -> tuple[float, floa
     return ways[k, 2], ways[k, 3], ways[k, 0], ways[k, 1]
 
 
-@njit(cache=True)
+@part
+def _mirror(order: NDArray[np.int64], flips: NDArray[np.bool_], ways: Floats, still: NDArray[np.bool_], i: int, j: int) -> None:
+    """The things i..j in reverse order, each as it is."""
+    while i < j:
+        order[i], order[j] = order[j], order[i]
+        flips[i], flips[j] = flips[j], flips[i]
+        still[i], still[j] = still[j], still[i]
+        for k in range(4):
+            ways[i, k], ways[j, k] = ways[j, k], ways[i, k]
+        i, j = i + 1, j - 1
+
+
+@part
 def _reverse(order: NDArray[np.int64], flips: NDArray[np.bool_], ways: Floats, still: NDArray[np.bool_], i: int, j: int) -> None:
-    order[i : j + 1] = order[i : j + 1][::-1].copy()
-    flips[i : j + 1] = flips[i : j + 1][::-1].copy()
-    still[i : j + 1] = still[i : j + 1][::-1].copy()
-    ways[i : j + 1] = ways[i : j + 1][::-1].copy()
+    """The things i..j run the other way."""
+    _mirror(order, flips, ways, still, i, j)
     for k in range(i, j + 1):
         if not still[k]:
             flips[k] = not flips[k]
-            ways[k, 0], ways[k, 1], ways[k, 2], ways[k, 3] = ways[k, 2], ways[k, 3], ways[k, 0], ways[k, 1]
+            for axis in range(2):
+                ways[k, axis], ways[k, 2 + axis] = ways[k, 2 + axis], ways[k, axis]
 
 
-@njit(cache=True)
+@part
 def _turn_round(
     order: NDArray[np.int64], flips: NDArray[np.bool_], ways: Floats, still: NDArray[np.bool_], x: float, y: float, reach: int
 ) -> float:
@@ -117,7 +127,7 @@ def _turn_round(
                 forth += _gap(ways, j - 1, j, x, y)
                 back += np.hypot(inner_x - out_x, inner_y - out_y)
             inner_x, inner_y = in_x, in_y
-            last_x, last_y = _turned(ways, still, i)[2:]
+            _, _, last_x, last_y = _turned(ways, still, i)
             after = 0.0 if j + 1 == len(ways) else np.hypot(ways[j + 1, 0] - last_x, ways[j + 1, 1] - last_y)
             change = before + forth + _gap(ways, j, j + 1, x, y) - np.hypot(in_x - px, in_y - py) - back - after
             if change > GAIN_MM:
@@ -127,7 +137,7 @@ def _turn_round(
     return gained
 
 
-@njit(cache=True)
+@part
 def _move(
     order: NDArray[np.int64], flips: NDArray[np.bool_], ways: Floats, still: NDArray[np.bool_], x: float, y: float, reach: int
 ) -> float:
@@ -161,15 +171,13 @@ def _move(
     return gained
 
 
-@njit(cache=True)
+@part
 def _rotate(
     order: NDArray[np.int64], flips: NDArray[np.bool_], ways: Floats, still: NDArray[np.bool_], i: int, last: int, to: int
 ) -> None:
-    """Things i..last put behind thing `to`, all as they are."""
+    """Things i..last put behind thing `to`, all as they are: what lies on both sides of a place changes sides."""
     low, high = (i, to) if to > last else (to + 1, last)
     middle = last + 1 if to > last else i  # what begins here comes first
-    ranks = np.concatenate((np.arange(middle, high + 1), np.arange(low, middle)))
-    order[low : high + 1] = order[ranks]
-    flips[low : high + 1] = flips[ranks]
-    still[low : high + 1] = still[ranks]
-    ways[low : high + 1] = ways[ranks]
+    _mirror(order, flips, ways, still, low, middle - 1)
+    _mirror(order, flips, ways, still, middle, high)
+    _mirror(order, flips, ways, still, low, high)

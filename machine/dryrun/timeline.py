@@ -5,9 +5,9 @@ most the junction speed, and the speeds at the corners are the greatest from whi
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from mdp.kernel import floats, kernel
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
@@ -66,11 +66,11 @@ def move_times(
     return times
 
 
-@njit(cache=True)
+@kernel
 def _planned(directions, length, cruise, acceleration, measure, halts, jerk):  # type: ignore[no-untyped-def]
     """Seconds of each move: corner speeds, backward and forward pass, trapezoids."""
     n = len(length)
-    corner = np.zeros(n + 1)
+    corner, times = floats(n + 1, 0.0), floats(n, 0.0)
     for i in range(1, n):
         if halts[i] or measure[i] != measure[i - 1]:
             continue
@@ -82,7 +82,6 @@ def _planned(directions, length, cruise, acceleration, measure, halts, jerk):  #
         corner[i] = v
     for i in range(n - 1, -1, -1):
         corner[i] = min(corner[i], np.sqrt(corner[i + 1] ** 2 + 2.0 * acceleration[i] * length[i]))
-    times = np.empty(n)
     for i in range(n):
         a, v0, distance = acceleration[i], corner[i], length[i]
         corner[i + 1] = min(corner[i + 1], np.sqrt(v0 * v0 + 2.0 * a * distance))
