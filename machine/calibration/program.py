@@ -1,0 +1,189 @@
+"""Program: the G-code that takes the head to a mark at each pose of a calibration, and waits there until X Y Z are noted."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from machine.blocks import filled
+from machine.collide import corners
+from machine.dialects import DIALECTS
+from machine.gcode import BLOCKS
+from machine.kinematics.table import machine_points
+from machine.limits import turn_speed
+from machine.pen import Pen, number
+from machine.placeholders import placeholders
+from machine.turning import turn
+from mdp.clearance import least_tip_height_mm
+from mdp.mesh import Floats
+from mdp.pose import Pose, level
+from profiles.errors import MoveError
+from profiles.machine import Box, Machine
+from profiles.profile import Profile
+
+TURNS_DEG = (0.0, 90.0, 180.0, 270.0)
+TILTS_DEG = (60.0, 45.0, 30.0, 20.0, 15.0, 10.0)
+MOST_MARK_RADIUS_MM = 45.0
+MARGIN_MM = 10.0  # how far the centres of a machine that is not calibrated yet may be from where the profile has them
+ABOVE_MM = 8.0
+HEATING = ("M104", "M109", "M140", "M190", "M141", "M191", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT")
+WAIT = {  # how each firmware says something and waits; where it can, the tip may be jogged meanwhile
+    "marlin": ("M0 {text}",),
+    "reprapfirmware": ('M291 P"{text}" R"calibrate" S3 X1 Y1 Z1',),
+    "klipper": ("M117 {text}", "PAUSE"),
+    "klipper_steppers": ("M117 {text}", "PAUSE"),
+    "linuxcnc": ("(MSG, {text})", "M0"),
+    "grblhal": ("(MSG, {text})", "M0"),
+}
+
+
+@dataclass(frozen=True)
+class Course:
+    """The poses at which the mark is touched, where it is expected then, and how high the tip stands while the table turns."""
+
+    poses: tuple[Pose, ...]
+    expected_mm: tuple[tuple[float, float, float], ...]
+    safe_z_mm: float
+    mark_mm: tuple[float, float, float]
+
+
+def course(machine: Machine, mark_height_mm: float, mark_radius_mm: float | None = None) -> Course:
+    """Four turns at the level table and at two tilts, as steep as head, limits and the mark's height allow.
+
+    Raises MoveError when no tilt of 10 degrees or more does.
+    """
+    least = machine.table.radius_mm if machine.table.size_mm is None else 0.5 * min(machine.table.size_mm)
+    radius = mark_radius_mm if mark_radius_mm is not None else min(0.6 * least, MOST_MARK_RADIUS_MM)
+    if not machine.tilts:
+        raise MoveError(f"{machine.name} has three axes: there is no rotary axis to calibrate")
+    if not 5.0 <= radius <= least:
+        raise MoveError(f"a mark {radius:g} mm from the middle cannot be used: 5 to {least:g} mm are allowed on {machine.name}")
+    mark = (radius, 0.0, mark_height_mm)
+    tilts = _tilts(machine, mark)
+    turns = _turns(machine)
+    found = tuple(Pose(tilt, value) for tilt in (machine.tilt.zero_deg, *tilts) for value in turns)
+    expected = tuple(_expected(machine, pose, mark) for pose in found)
+    return Course(found, expected, _safe_z_mm(machine, mark, max(abs(t - machine.tilt.zero_deg) for t in tilts)), mark)
+
+
+def calibration_lines(profile: Profile, touches: Course) -> Iterator[str]:
+    """The lines of the program: homing as the start block does it but without heat, then every touch, then level again."""
+    machine = profile.machine.model_copy(update={"coordinates": "table"})
+    dialect = DIALECTS[machine.dialect]
+    pen = Pen(dialect, machine, "", level(machine))
+    pen.values = placeholders("calibration", profile, [], 0.0, 0.0)
+    yield f"; {machine.name}: calibration, {len(touches.poses)} touches of one mark, nozzle cold and clean"
+    radius, _, height = touches.mark_mm
+    yield f"; the mark is {height:g} mm high and stands {radius:g} mm from the middle, towards +X at turn 0"
+    for word in dialect.before_start:
+        yield from _filled(word, pen)
+    yield from (line for line in _filled(machine.gcode.start, pen) if line.split(" ")[0] not in HEATING)
+    yield from (mode for mode in dialect.modes if mode not in ("M83", "M82"))
+    for word in dialect.after_start:
+        yield from _filled(word, pen)
+    if dialect.follow_off and dialect.follow_off.startswith("M"):
+        yield dialect.follow_off
+    up, across = 60.0 * machine.z.speed_mm_s, 60.0 * min(machine.x.speed_mm_s, machine.y.speed_mm_s, 100.0)
+    for place, (pose, (x, y, z)) in enumerate(zip(touches.poses, touches.expected_mm, strict=True), start=1):
+        name = f"{machine.tilt.letter}{number(pose.tilt_deg)} {machine.turn.letter}{number(pose.turn_deg)}"
+        yield f"; touch {place}: {name}, expected near X{x:.1f} Y{y:.1f} Z{z:.1f}"
+        yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
+        yield from _turn(pose, pen)
+        yield f"G1 X{x:.3f} Y{y:.3f} F{across:.0f}"
+        yield f"G1 Z{_hover(machine, z, touches.safe_z_mm):.3f} F{up:.0f}"
+        yield from (line.format(text=f"touch {place} {name} note X Y Z") for line in WAIT[machine.dialect])
+    yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
+    yield from _turn(level(machine), pen)
+    for word in dialect.before_end:
+        yield from _filled(word, pen)
+    if dialect.last:
+        yield dialect.last
+
+
+def _filled(block: str, pen: Pen) -> list[str]:
+    return filled(block, BLOCKS[0], pen.values, pen.dialect.longest_line)
+
+
+def _turn(pose: Pose, pen: Pen) -> Iterator[str]:
+    speed = turn_speed(pose.tilt_deg - pen.pose.tilt_deg, pose.turn_deg - pen.pose.turn_deg, pen.machine)
+    yield from turn(pose, speed, pen)
+
+
+def _hover(machine: Machine, expected_z_mm: float, safe_z_mm: float) -> float:
+    """Over the mark where it is expected; at the safe height while a sign may be wrong and the mark on the other side."""
+    unsure = any(key.endswith(".sign") for key in machine.uncalibrated)
+    return safe_z_mm if unsure else min(safe_z_mm, expected_z_mm + ABOVE_MM)
+
+
+def _tilts(machine: Machine, mark: tuple[float, float, float]) -> tuple[float, float]:
+    """The steepest tilts: one to each side where the limits allow it, else two to one side."""
+    least, most = machine.tilt.reach_deg
+    zero = machine.tilt.zero_deg
+    able = {}
+    for side in (1.0, -1.0):
+        inside = [zero + side * t for t in TILTS_DEG if least <= zero + side * t <= most]
+        able[side] = next((tilt for tilt in inside if _reachable(machine, mark, tilt)), None)
+    ahead, behind = able[1.0], able[-1.0]
+    if ahead is not None and behind is not None:
+        return ahead, behind
+    one = ahead if ahead is not None else behind
+    if one is None:
+        raise MoveError(
+            f"no tilt of {TILTS_DEG[-1]:g} deg or more can be measured on {machine.name} with a mark {mark[2]:g} mm high: "
+            "its head or its limits stand in the way; take a higher mark, nearer to the middle"
+        )
+    return one, 0.5 * (one + zero)
+
+
+def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> bool:
+    """Whether the tip can touch the mark at a tilt at every turn: head over the plate, X Y Z inside, room above to turn."""
+    if _safe_z_mm(machine, mark, abs(tilt_deg - machine.tilt.zero_deg)) > machine.z.limits_mm[1]:
+        return False
+    if least_tip_height_mm(_clipped(machine, mark), Pose(tilt_deg, machine.turn.zero_deg)) > mark[2]:
+        return False
+    limits = np.array([axis.limits_mm for axis in (machine.x, machine.y, machine.z)])
+    places = np.array([_expected(machine, Pose(tilt_deg, value), mark) for value in _turns(machine)])
+    return bool((places >= limits[:, 0]).all() and (places <= limits[:, 1]).all())
+
+
+def _clipped(machine: Machine, mark: tuple[float, float, float]) -> Machine:
+    """The machine with its head's boxes cut where the plate cannot reach them."""
+    far = machine.table.radius_mm + mark[0] + MARGIN_MM
+    boxes = []
+    for box in machine.head.boxes:
+        low = (max(box.min_mm[0], -far), max(box.min_mm[1], -far), box.min_mm[2])
+        high = (min(box.max_mm[0], far), min(box.max_mm[1], far), box.max_mm[2])
+        if low[0] < high[0] and low[1] < high[1]:
+            boxes.append(Box(name=box.name, min_mm=low, max_mm=high))
+    return machine.model_copy(update={"head": machine.head.model_copy(update={"boxes": boxes})})
+
+
+def _turns(machine: Machine) -> list[float]:
+    """The four turns inside limits and cables, each as near to the zero as can be."""
+    least, most = machine.turn.reach_deg
+    zero = machine.turn.zero_deg
+    found = [next((zero + v for v in (t, t - 360.0) if least <= zero + v <= most), None) for t in TURNS_DEG]
+    return [value for value in found if value is not None]
+
+
+def _expected(machine: Machine, pose: Pose, mark: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = machine_points(machine, pose, np.array([mark]))[0].tolist()
+    return x, y, z
+
+
+def _safe_z_mm(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> float:
+    """Machine Z over everything that turns, to either side up to a tilt, whichever way the axes really go."""
+    around = np.linspace(0.0, 2.0 * pi, 24, endpoint=False)
+    ring = np.column_stack([np.cos(around), np.sin(around), np.zeros(24)])
+    solid = [ring * machine.table.radius_mm, ring * mark[0] + np.array([0.0, 0.0, mark[2]])]
+    solid += [corners(box.min_mm, box.max_mm) for box in machine.cradle]
+    steps = np.append(np.arange(-tilt_deg, tilt_deg, 2.0), tilt_deg)
+    zero = machine.turn.zero_deg
+    points = np.vstack(solid)
+    heights = [_highest(machine, Pose(machine.tilt.zero_deg + step, zero), points) for step in steps.tolist()]
+    return max(heights) + MARGIN_MM
+
+
+def _highest(machine: Machine, pose: Pose, points: Floats) -> float:
+    return float(machine_points(machine, pose, points)[:, 2].max())
