@@ -105,6 +105,8 @@ def print_model(
 ) -> int:
     """Dry-run, then stream a model or a G-code file to a printer, whose port is tried before any work is done."""
     check_port(port, baud, sim_speed)
+    if Path(model).suffix.lower() not in GCODE_SUFFIXES:
+        check_dialect(profile.machine, port)
     program, profile = _program(model, profile, ranker, orient, named)
     check_dialect(profile.machine, port)
     _refuse_errors(program, force)

@@ -7,6 +7,7 @@ wants to look again.
 import re
 from collections.abc import Callable, Iterator
 
+from machine.dialects import DIALECTS
 from machine.link.heater import Heater
 from machine.link.motion import Motion
 from profiles.machine import Machine
@@ -39,6 +40,7 @@ class Body:
         self.events: list[tuple[float, str]] = []
         self.unknown = 0
         self.halt_wanted = False
+        self.turning: dict[str, tuple[float, float]] = {}
 
     def note(self, what: str) -> None:
         """Put an event on record."""
@@ -96,23 +98,23 @@ def _pushes(body: Body, words: Words) -> bool:
 
 
 def _dwell(body: Body, words: Words, text: str) -> Iterator[float]:
-    yield from _drained(body)
+    yield from drained(body)
     until_s = body.now_s + max(0.0, words.get("S", words.get("P", 0.0) / 1000.0))
     while body.now_s < until_s and not body.halt_wanted:
         yield until_s
 
 
-def _drained(body: Body) -> Iterator[float]:
+def drained(body: Body) -> Iterator[float]:
     while body.motion.end_s > body.now_s:
         yield body.motion.end_s
 
 
 def _drain(body: Body, words: Words, text: str) -> Iterator[float]:
-    yield from _drained(body)
+    yield from drained(body)
 
 
 def _home(body: Body, words: Words, text: str) -> Iterator[float]:
-    yield from _drained(body)
+    yield from drained(body)
     letters = {*words, *FLAG.findall(text)}
     axes = [i for i, letter in enumerate(body.motion.letters[:5]) if letter in letters] or list(range(5))
     until_s = body.now_s + body.motion.home(axes)
@@ -137,14 +139,19 @@ def _filament_relative(body: Body, words: Words, text: str) -> Work:
     return None
 
 
+def _accelerate(body: Body, words: Words, text: str) -> Work:
+    body.motion.accelerate(words)
+    return None
+
+
 def _call_it(body: Body, words: Words, text: str) -> Work:
     body.motion.call_it(words)
     body.say(body.motion.told())
     return None
 
 
-def _heat(body: Body, words: Words, text: str) -> Work:
-    heater, name = (body.nozzle, "nozzle") if text.startswith(("M104", "M109")) else (body.bed, "bed")
+def heat(body: Body, words: Words, text: str) -> Work:
+    heater, name = (body.nozzle, "nozzle") if text.startswith(("M104", "M109", "M568")) else (body.bed, "bed")
     wanted = words.get("S", words.get("R"))
     if wanted is not None:
         heater.set(wanted, body.now_s)
@@ -152,8 +159,8 @@ def _heat(body: Body, words: Words, text: str) -> Work:
     return None
 
 
-def _heat_and_wait(body: Body, words: Words, text: str) -> Iterator[float]:
-    _heat(body, words, text)
+def heat_and_wait(body: Body, words: Words, text: str) -> Iterator[float]:
+    heat(body, words, text)
     heater = body.nozzle if text.startswith("M109") else body.bed
     rising = heater.target_c > heater.at(body.now_s)
     if not rising and "R" not in words:
@@ -166,8 +173,15 @@ def _heat_and_wait(body: Body, words: Words, text: str) -> Iterator[float]:
     body.waits_for_heat = False
 
 
+def _wait_for_all(body: Body, words: Words, text: str) -> Iterator[float]:
+    """M116 (RepRapFirmware)."""
+    yield from heat_and_wait(body, {"S": body.bed.target_c}, "M190")
+    yield from heat_and_wait(body, {"S": body.nozzle.target_c}, "M109")
+
+
 def _fan(body: Body, words: Words, text: str) -> Work:
-    body.fan = min(max(words.get("S", 255.0), 0.0), 255.0) / 255.0 if text.startswith("M106") else 0.0
+    full = 1.0 if words.get("S", 255.0) <= DIALECTS[body.machine.dialect].fan_full == 1 else 255.0
+    body.fan = min(max(words.get("S", full), 0.0), full) / full if text.startswith("M106") else 0.0
     body.note(f"fan {body.fan:.2f}")
     return None
 
@@ -188,7 +202,7 @@ def _report(body: Body, words: Words, text: str) -> Work:
 
 
 def _rest(body: Body, words: Words, text: str) -> Iterator[float]:
-    yield from _drained(body)
+    yield from drained(body)
     body.note("motors off")
 
 
@@ -223,25 +237,28 @@ COMMANDS: dict[str, Callable[[Body, Words, str], Work]] = {
     "M82": _filament_relative,
     "M83": _filament_relative,
     "M84": _rest,
-    "M104": _heat,
+    "M104": heat,
     "M105": _tell_temperature,
     "M106": _fan,
     "M107": _fan,
     "M108": _hurry,
-    "M109": _heat_and_wait,
+    "M109": heat_and_wait,
     "M110": _nothing,
     "M114": _tell_position,
     "M117": _nothing,
-    "M140": _heat,
+    "M140": heat,
     "M155": _report,
-    "M190": _heat_and_wait,
+    "M190": heat_and_wait,
     "M201": _nothing,
     "M203": _nothing,
-    "M204": _nothing,
+    "M204": _accelerate,
     "M205": _nothing,
     "M220": _nothing,
     "M221": _nothing,
     "M400": _drain,
     "M410": _stop,
+    "M116": _wait_for_all,
+    "M486": _nothing,
+    "M568": heat,
     "T0": _nothing,
 }

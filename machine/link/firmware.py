@@ -10,8 +10,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
 
+from machine.dialects import DIALECTS
 from machine.link.commands import COMMANDS, Body, move, words_of
 from machine.link.framing import checksum
+from machine.link.macros import NAME, VALUE, command_of
 from machine.link.record import Record, moves_of
 from profiles.machine import Machine
 
@@ -44,6 +46,7 @@ class Firmware:
         self._said: list[str] = []
         self.body = Body(machine, self._said.append)
         self._busy_every_s = busy_s
+        self._longest = DIALECTS[machine.dialect].longest_line
         self._busy_s = inf
         self._lines: deque[bytes] = deque()
         self._half = b""
@@ -176,7 +179,7 @@ class Firmware:
     def _fetch(self) -> None:
         """Move lines from the receive ring into the queue while it has room, checking number and checksum."""
         while self._lines and len(self._queue) < BUFSIZE:
-            line = self._lines.popleft().partition(b";")[0][: MAX_CMD_SIZE - 1].lstrip(b" ")
+            line = self._lines.popleft().partition(b";")[0][: self._longest].lstrip(b" ")
             if not line:
                 continue
             label = ""
@@ -247,6 +250,10 @@ class Firmware:
         if name == "M115":
             self._introduce()
             return None
+        if DIALECTS[self.body.machine.dialect].macros and (found := NAME.match(text)):
+            macro = command_of(found[0].upper())
+            if macro is not None:
+                return macro(self.body, dict(VALUE.findall(text[found.end() :])))
         command = COMMANDS.get(name)
         if command is None:
             self.body.unknown += 1

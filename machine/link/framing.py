@@ -37,8 +37,7 @@ def frame(number: int, command: str, limit: int = LINE_LIMIT) -> bytes:
 def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
     """The error for a command that does not fit in a line."""
     return LocalProtocolError(
-        f"the command {command[:40]!r}... is {len(command)} characters long: with number and checksum "
-        f"at most {limit} are allowed"
+        f"the command {command[:40]!r}... is {len(command)} characters long: with number and checksum at most {limit} are allowed"
     )
 
 

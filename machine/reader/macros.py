@@ -18,7 +18,11 @@ def macro(reader: Reader, code: str) -> bool:
     name, _, rest = code.partition(" ")
     action = MACROS.get(name) if reader.dialect.macros else None
     if action is None:
-        return False
+        homed = re.fullmatch(r"HOME_([A-DU-Z]+)", name) if reader.dialect.macros else None
+        if homed is None:
+            return False
+        _home(reader, homed[1])
+        return True
     if reader.turning and name != "MANUAL_STEPPER":
         flush(reader)
     action(reader, dict(VALUE.findall(rest)))
@@ -32,6 +36,14 @@ def _number(reader: Reader, values: Values, key: str, default: float | None = No
     if text is None or not re.fullmatch(r"[-+]?[0-9]{1,12}(\.[0-9]{0,20})?", text):
         raise GcodeError(f"line {reader.number}: {key} is {text!r}: a number is expected"[:200])
     return float(text)
+
+
+def _home(reader: Reader, letters: str) -> None:
+    """HOME_AB and the like, which machines define for themselves: the named rotary axes stand at their zero."""
+    for axis, letter in enumerate((reader.machine.tilt.letter, reader.machine.turn.letter), start=3):
+        if letter in letters:
+            reader.note("G28", 0.0, letter)
+            reader.at[axis] = reader.home[axis]
 
 
 def _turn(reader: Reader, values: Values) -> None:
