@@ -39,7 +39,7 @@ def test_a_solid_part_extrudes_its_volume(make):
 
 
 @settings(max_examples=15, deadline=None)
-@given(st.floats(2.0, 30.0), st.floats(2.0, 30.0), st.floats(0.4, 3.0), st.floats(0, 90))
+@given(st.floats(3.0, 30.0), st.floats(3.0, 30.0), st.floats(0.4, 3.0), st.floats(0, 90))
 def test_any_solid_block_extrudes_its_volume(x, y, z, turn):
     mesh = standing(m3.Manifold.cube((x, y, z)).rotate((0, 0, turn)))
     sliced = slice_part(whole(mesh), profile(*SOLID))
