@@ -1,6 +1,7 @@
 """The calibrate command: writes the program and the sheet, works out the numbers, saves them in the user's own profile."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from machine.app.output import check_writable, write_bytes, write_lines
@@ -11,7 +12,7 @@ from machine.calibration.sheet import read_sheet, sheet_text
 from profiles.errors import OutputError, ProfileError
 from profiles.machine import Machine
 from profiles.places import own_folder
-from profiles.profile import Profile
+from profiles.profile import Profile, load_one
 from profiles.toml import toml
 
 MOST_OFF_MM = 0.5
@@ -41,9 +42,12 @@ def write_program(
 
 
 def work_out(
-    name: str, machine: Machine, measured: Path, mark_height_mm: float | None, save: str | None, replace: bool, force: bool
+    name: str, settings: Sequence[str], measured: Path, mark_height_mm: float | None, save: str | None, replace: bool, force: bool
 ) -> int:
     """Find signs, zeros and centres from a filled sheet, tell them and save them."""
+    machine = load_one(name, settings).get("machine")
+    if not isinstance(machine, Machine):
+        raise ProfileError(f"{name} is not a machine profile")
     sheet = read_sheet(measured, mark_height_mm)
     if sheet.machine not in (None, name):
         raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")

@@ -87,6 +87,9 @@ def export(
     json: JsonFile = None,
     svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer")] = None,
     layer: Annotated[str | None, typer.Option("--layer", metavar="PART:LAYER", help="which layer, counted from 1:1")] = None,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="tell also time, material, support and risky area printed in one part")
+    ] = False,
     force: Force = False,
     machine: MachineName = "generic_ac",
     material: MaterialName = "pla",
@@ -97,7 +100,7 @@ def export(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
-    return commands.export(model, profile, ranker, orient, out, json, svg, layer, force)
+    return commands.export(model, profile, ranker, orient, out, json, svg, layer, force, compare)
 
 
 @app.command()
@@ -149,6 +152,39 @@ def print_(
     )
     named = _named(machine=machine, material=material, process=process, settings=settings)
     return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named)
+
+
+@app.command()
+def calibrate(
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="OUT.gcode", help="program to write, with a sheet beside it to fill in")
+    ] = None,
+    measured: Annotated[
+        Path | None, typer.Option("--measured", metavar="FILE", help="filled sheet, .toml or .csv: work out the numbers")
+    ] = None,
+    mark_height: Annotated[
+        float | None, typer.Option("--mark-height", metavar="MM", min=0, max=200, help="height of the mark over the plate")
+    ] = None,
+    mark_radius: Annotated[
+        float | None, typer.Option("--mark-radius", metavar="MM", help="distance of the mark from the middle of the plate")
+    ] = None,
+    save: Annotated[str | None, typer.Option("--save", metavar="NAME", help="name of your profile; else the machine's")] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
+    force: Annotated[bool, typer.Option("--force", help="save although the touches are far off")] = False,
+    machine: MachineName = "generic_ac",
+    settings: Settings = None,
+) -> int:
+    """Find signs, zeros and centres of the rotary axes from a few touches of a mark, and keep them in your own profile."""
+    from machine.app import calibrate_command
+
+    if (out is None) == (measured is None):
+        raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected")
+    if out is not None:
+        profile = _profile(machine, "pla", "standard", settings, None, None, None)
+        return calibrate_command.write_program(machine, profile, out, mark_height, mark_radius, replace)
+    if measured is None:
+        return 1
+    return calibrate_command.work_out(machine, settings or [], measured, mark_height, save, replace, force)
 
 
 @profiles_app.command("list")

@@ -37,7 +37,7 @@ def sheet_text(name: str, machine: Machine, touches: Course) -> str:
         f"machine = '{name}'",
         "# Height of the mark over the plate's surface, measured with a caliper.",
         f"mark_height_mm = {touches.mark_mm[2]:g}",
-        "# Where the mark stands, seen from the middle, counted from the workpiece's +X towards +Y: then turn.zero_deg is found too.",
+        "# Where the mark is seen from the middle, counted from the workpiece's +X towards +Y: turn.zero_deg is then found too.",
         "# mark_angle_deg = 0.0",
     ]
     for pose, (x, y, z) in zip(touches.poses, touches.expected_mm, strict=True):
@@ -72,7 +72,7 @@ def read_sheet(path: Path, mark_height_mm: float | None = None) -> Sheet:
     name = document.get("machine")
     return Sheet(
         tuple(touch for touch in touches if touch is not None),
-        height,
+        _number(path, "mark_height_mm", height),
         None if angle is None else _number(path, "mark_angle_deg", angle),
         None if name is None else str(name),
     )
