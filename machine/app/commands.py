@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from machine.app.compare import Rival, compare_table, compared, plain
 from machine.app.foot import in_words, told_in
 from machine.app.layer_picture import asked, drawn
 from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
@@ -65,8 +66,12 @@ def export(
     svg: Path | None,
     layer: str | None,
     force: bool,
+    compare: bool = False,
 ) -> int:
-    """Write a model's G-code, and one layer's picture where asked; refused when its dry run finds an error, unless forced."""
+    """Write a model's G-code, and one layer's picture where asked; refused when its dry run finds an error, unless forced.
+
+    compare: tell also what the model costs printed in one part.
+    """
     check_writable(out)
     _check(json)
     if svg is not None:
@@ -78,7 +83,7 @@ def export(
     write_lines(out, program.lines)
     if svg is not None:
         write_bytes(svg, picture)
-    _tell(program, json)
+    _tell(program, json, compared(program, profile) if compare else ())
     return 0
 
 
@@ -157,8 +162,8 @@ def _check(file: Path | None) -> None:
         check_writable(file)
 
 
-def _tell(program: Program, json: Path | None) -> None:
+def _tell(program: Program, json: Path | None, rivals: tuple[Rival, ...] = ()) -> None:
     if json is not None:
-        write_json(json, summary(program.run))
+        write_json(json, summary(program.run) | ({"compare": plain(rivals)} if rivals else {}))
     if json is None or str(json) != "-":
-        show(run_table(program.run))
+        show(run_table(program.run) + (compare_table(rivals) if rivals else ""))
