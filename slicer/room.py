@@ -24,6 +24,7 @@ SLIVER_MM = 0.02  # what is narrower than twice this and has no place has neighb
 EVEN_MM = 1e-6  # heights nearer than this are equal
 SPECK_MM2 = 4.0 * SLIVER_MM**2  # no place that is no sliver is smaller
 LEAST_MM2 = 1e-5  # places smaller than this are rounding
+STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
 SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
 
 
@@ -65,7 +66,13 @@ def carried(places: Polygons, reached: Polygons, ground: Polygons, lean_mm: floa
         rest = rest - ground
     if rest.area() >= LEAST_MM2:
         rest = rest - leaning(grown(straight, -SLIVER_MM), lean_mm)
-    return straight if rest.area() < LEAST_MM2 else straight + (leaning(rest, lean_mm) ^ reached)
+    if rest.area() < LEAST_MM2:
+        return straight
+    for share in STEPS:
+        aside = leaning(rest, share * lean_mm) ^ reached
+        if share == STEPS[-1] or (rest - leaning(aside, lean_mm)).area() < LEAST_MM2:
+            break
+    return straight + aside
 
 
 def rooms(
