@@ -27,8 +27,10 @@ from profiles.errors import UserError
 from profiles.profile import Profile, load
 
 SUFFIXES = {".stl", ".obj", ".off", ".ply", ".3mf", ".glb"}
-HEAD = ("model", "machine", "parts", "volume error", "reduction", "filled", "plastic / model", "outside", "farthest mm")
-HEAD += ("unsupported", "reported", "errors", "search s", "print s")
+HEAD = (
+    "model", "machine", "parts", "volume error", "reduction", "filled", "plastic / model", "outside", "farthest mm",
+    "unsupported", "reported", "errors", "search s", "print s",
+)  # fmt: skip
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ the stretch's own moves follow one by one. A bead is carried by what lies under 
 moment; its room is taken when all across it plastic already reaches its top.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -46,12 +46,15 @@ class Laid:
 class Ground:
     """(n,) for the rows of a program: depth of the head in earlier plastic, lengths in air and in taken room, mm.
 
+    beside_mm: lengths that only what lies beside them carries.
+
     untested_row: the first row that was not tried, where the table turns too often; -1: all were.
     """
 
     depth_mm: Floats
     air_mm: Floats
     taken_mm: Floats
+    beside_mm: Floats
     untested_row: int
 
 
@@ -71,7 +74,7 @@ def beads(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], pro
 def walk(program: ParsedProgram, deposited: Laid, profile: Profile) -> Ground:
     """Go through all moves of a program in order."""
     machine, count = profile.machine, len(program.line)
-    found = Ground(np.zeros(count), np.zeros(count), np.zeros(count), -1)
+    found = Ground(*np.zeros((4, count)), -1)
     if not len(deposited.rows):
         return found
     half, height = np.zeros(count), np.zeros(count)
@@ -89,12 +92,12 @@ def walk(program: ParsedProgram, deposited: Laid, profile: Profile) -> Ground:
         ups[before:after] = rotation(machine, stretch.pose)[2]
         turned += before
         if turned > MOST_TURNED:
-            return Ground(found.depth_mm, found.air_mm, found.taken_mm, int(stretch.rows[0]))
+            return replace(found, untested_row=int(stretch.rows[0]))
         field = _field(deposited, int(before), int(after), stretch, ups, machine)
         if field is not None:
             _walked(
                 stretch.rows, program.start, program.end, extruded, half, height, path, done, held, int(stretch.rows[0]), gap,
-                _plate(machine, stretch.pose), field, *head_of(machine), found.depth_mm, found.air_mm, found.taken_mm,
+                _plate(machine, stretch.pose), field, *head_of(machine), found.depth_mm, found.air_mm, found.taken_mm, found.beside_mm,
             )  # fmt: skip
     return found
 
@@ -169,7 +172,7 @@ def _lies(x, y, z, row, strict, first, gap, at, height, path, done, held, half, 
 
 @part
 def _carried(x, y, z, nx, ny, row, first, gap, at, height, path, done, held, half, plate, field):  # type: ignore[no-untyped-def]
-    """0: the bead hangs in air at a place, 1: something carries it, 2: its room is taken; nx, ny: to its side, length 1."""
+    """0: a bead hangs in air at a place, 1: lies on something, 2: its room is taken, 3: only has a neighbour; nx, ny: to its side."""
     if abs(z - height[row] - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height[row]:
         return 1
     taken, carried = 0, 0
@@ -180,18 +183,17 @@ def _carried(x, y, z, nx, ny, row, first, gap, at, height, path, done, held, hal
         carried += 1 if found > 0 else 0
     if taken == 3:
         return 2
+    if carried > 0:
+        return 1
     off = half[row] + 0.75 * field.cell + 0.1 * height[row]
     for k in range(-1, 2, 2):
-        if (
-            carried == 0
-            and _lies(x + k * off * nx, y + k * off * ny, z, row, True, first, gap, at, height, path, done, held, half, field) > 0
-        ):
-            carried = 1
-    return 1 if carried > 0 else 0
+        if _lies(x + k * off * nx, y + k * off * ny, z, row, True, first, gap, at, height, path, done, held, half, field) > 0:
+            return 3
+    return 0
 
 
 @njit(cache=True)
-def _walked(rows, start, end, extruded, half, height, path, done, held, first, gap, plate, field, silhouette, boxes, depth, air, taken):  # type: ignore[no-untyped-def] # fmt: skip # noqa: E501
+def _walked(rows, start, end, extruded, half, height, path, done, held, first, gap, plate, field, silhouette, boxes, depth, air, taken, next_to):  # type: ignore[no-untyped-def] # fmt: skip # noqa: E501
     """Try each row of a stretch against the field, then lay it."""
     for row in rows:
         a, b = start[row], end[row]
@@ -215,4 +217,6 @@ def _walked(rows, start, end, extruded, half, height, path, done, held, first, g
                     air[row] += length / count
                 elif found == 2:
                     taken[row] += length / count
+                elif found == 3:
+                    next_to[row] += length / count
         laid(a, b, half[row], row, field)

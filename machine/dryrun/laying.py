@@ -12,6 +12,7 @@ from slicer.paths import Kind
 TOLD = (Kind.OVERHANG.value, Kind.BRIDGE.value)  # the slicer itself says that these hang
 PURGE = "Custom"  # what a start block pushes out beside the plate is meant to fall
 ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # of a part's length in air
+LOST_SHARE = 0.5  # of a part's first layer without anything under it
 TAKEN_SHARE = 0.4  # of a layer's length in room already filled
 LEAST_MM = 10.0
 
@@ -40,14 +41,14 @@ def _in_air(program: ParsedProgram, length: Floats, ground: Ground) -> list[Find
         mine = own & (program.part == part)
         whole, loose = float(length[mine].sum()), float(hanging[mine].sum())
         begins = mine & (program.layer == program.layer[mine & (length > 0)].min())
-        first = float(ground.air_mm[begins].sum())
-        lost = first > max(LEAST_MM, 0.5 * float(length[begins].sum()))
-        if loose < LEAST_MM or not (lost or loose > WARNING_SHARE * whole):
+        first = float((ground.air_mm + ground.beside_mm)[begins].sum())
+        lost = first > max(LEAST_MM, LOST_SHARE * float(length[begins].sum()))
+        if not (lost or loose > max(LEAST_MM, WARNING_SHARE * whole)):
             continue
         severity: Severity = "error" if lost or loose > ERROR_SHARE * whole else "warning"
         message = f"{loose:.1f} mm of {whole:.0f} mm are extruded into air, nothing lies under or beside them"
         if lost:
-            message = f"the part begins in air: {first:.1f} mm of its first layer have nothing under or beside them"
+            message = f"the part begins in air: {first:.1f} mm of its first layer have nothing under them"
         found.append(_at(program, begins & (ground.air_mm > 0) if lost else mine & (hanging > 0), severity, "air", message))
     return found
 

@@ -12,7 +12,7 @@ SLACK_MM = 0.02
 
 def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
     """Errors of code order and retraction."""
-    return [*_parts(program), *_layers(program), *_pulled(program, profile)]
+    return [*_parts(program), *_layers(program), *_pulled(program, profile), *_oozing(program)]
 
 
 def _place(program: ParsedProgram, row: int) -> tuple[int, int, int]:
@@ -50,20 +50,21 @@ def _pulled(program: ParsedProgram, profile: Profile) -> list[Finding]:
 
     Nothing is said of a program that never pulls back; what the start block does is its own affair.
     """
-    e, extra = program.e_mm, max(profile.material.prime_extra_mm, profile.material.retract_prime_extra_mm)
+    e, material = program.e_mm, profile.material
     rows = np.flatnonzero((np.abs(e) > 1e-9) & (program.part > 0))
-    back = rows[e[rows] < 0.0]
-    if not len(back):
+    if not (e[rows] < 0.0).any():
         return []
     pushing = program.kind[rows] == MoveKind.EXTRUDE
-    state = np.where(pushing, 0.0, -e[rows])
-    # Runs between beads: what they pull back and push again must come to nothing, or to the extra push after it.
+    # What is done between two beads must come to nothing, or to the extra push after it.
     run = np.cumsum(pushing)
-    balance = np.bincount(run, weights=state)
-    has = np.bincount(run, weights=~pushing) > 0
-    ends = np.searchsorted(run, np.arange(len(balance)), side="right") < len(run)
-    over = has & (balance < -extra - SLACK_MM) & (np.arange(len(balance)) > 0)
-    under = has & ends & (balance > SLACK_MM)
+    balance = np.bincount(run, weights=np.where(pushing, 0.0, -e[rows]))
+    stood = np.bincount(run, weights=~pushing) > 0
+    turns = np.cumsum(program.kind == MoveKind.ROTATE)[rows]
+    turned = np.diff(turns[np.searchsorted(run, np.arange(len(balance) + 1)).clip(max=len(run) - 1)]) > 0
+    extra = np.where(turned, max(material.prime_extra_mm, material.retract_prime_extra_mm), material.retract_prime_extra_mm)
+    inner = np.arange(len(balance))
+    over = stood & (balance < -extra - SLACK_MM) & (inner > 0)
+    under = stood & (balance > SLACK_MM) & (inner < run[-1])
     found = []
     for wrong, said in (
         (over, "{:.3f} mm more filament is pushed than was pulled back"),
@@ -77,3 +78,16 @@ def _pulled(program: ParsedProgram, profile: Profile) -> list[Finding]:
             message = f"{said.format(worst)} before the next bead (places: {len(mine)})"
             found.append(Finding("error", "retraction", *_place(program, row), message))
     return found
+
+
+def _oozing(program: ParsedProgram) -> list[Finding]:
+    """The first turn of the table, in a program that pulls filament back, before which it was not."""
+    if not (program.e_mm < -1e-9).any():
+        return []
+    beads = program.kind == MoveKind.EXTRUDE
+    pulled = np.cumsum(np.where(beads, 0.0, -program.e_mm))
+    last = np.maximum.accumulate(np.where(beads, np.arange(len(beads)), -1))
+    loose = (program.kind == MoveKind.ROTATE) & (program.part > 0) & (last >= 0) & (pulled - pulled[last] < SLACK_MM)
+    row = int(np.flatnonzero(loose)[0]) if loose.any() else -1
+    message = "the table turns while the filament is not pulled back"
+    return [Finding("error", "retraction", *_place(program, row), message)] if row >= 0 else []

@@ -34,4 +34,4 @@ def test_more_than_the_axes_allow_or_nothing_changes_nothing(told: dict[str, flo
 
 
 def test_a_turn_keeps_the_axis_s_own_acceleration() -> None:
-    assert _seconds({"C": 10.0, "F": 60000.0}, {"S": 1.0}) == pytest.approx(2 * sqrt(10 / 400))
+    assert _seconds({"C": 30.0, "F": 60000.0}, {"S": 1.0}) == pytest.approx(30 / 60 + 60 / 400)

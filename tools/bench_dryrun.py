@@ -1,0 +1,115 @@
+"""Time the dry run of a long program, stage by stage, with its peak memory.
+
+    python tools/bench_dryrun.py [FILE.gcode] [--machine NAME] [--scale S] [--layer MM] [--keep FILE.gcode]
+
+Without a file the program is made first: a demo model, scaled, solid and in fine layers, planned and written as `tiltprint
+export` does; --keep saves it for the next time. Then the stages of the dry run, each with processor and wall seconds, and
+what `dry_run` needs altogether in a process of its own, reading the file included.
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import TypeVar
+
+import numpy as np
+
+from machine.app.pipeline import decompose_model
+from machine.dryrun import clearance, dry_run, heat, laying, made, motion, plate, sequence
+from machine.dryrun.ground import beads, walk
+from machine.dryrun.timeline import move_times
+from machine.gcode import write_gcode
+from machine.kinematics.table import workpiece_path
+from machine.parse import parse_gcode
+from machine.parsed import MoveKind
+from machine.plan import plan
+from profiles.profile import Profile, load
+from slicer.parts import slice_parts
+
+T = TypeVar("T")
+
+
+def main() -> None:
+    """Read the options, make the program where none is given, print the tables."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("file", type=Path, nargs="?")
+    options.add_argument("--machine", default="generic_ac")
+    options.add_argument("--model", default="demo:figure")
+    options.add_argument("--scale", default="2")
+    options.add_argument("--layer", default="0.1")
+    options.add_argument("--keep", type=Path)
+    options.add_argument("--whole", action="store_true", help=argparse.SUPPRESS)
+    given = options.parse_args()
+    profile = load(machine=given.machine)
+    if given.whole:
+        whole(given.file, profile)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        file = given.file or given.keep or Path(folder) / "long.gcode"
+        if given.file is None:
+            make(given.model, given.machine, given.scale, given.layer, file)
+        stages(file, profile)
+        command = [sys.executable, __file__, str(file), "--machine", given.machine, "--whole"]
+        print(subprocess.run(command, check=True, capture_output=True, text=True).stdout, end="")
+
+
+def make(model: str, machine: str, scale: str, layer: str, file: Path) -> None:
+    """Write the long program."""
+    fine = [f"process.scale={scale}", f"process.layer_height_mm={layer}", "process.infill_density=1"]
+    profile = load(machine=machine, settings=fine)
+    found = decompose_model(model, profile, "classic").decomposition
+    sliced = slice_parts(found.parts, profile)
+    file.write_text("\n".join(write_gcode(plan(found, sliced, profile), profile)) + "\n")
+
+
+def stages(file: Path, profile: Profile) -> None:
+    """Each stage by itself, warm: the kernels have run on a short program before."""
+    machine = profile.machine
+    lines = file.read_text().splitlines()
+    dry_run(lines[:20000], profile)
+    print(f"{file.name}: {len(lines)} lines on {machine.name}\n")
+    print("| stage | processor s | wall s |\n|---|---|---|")
+    program = timed("parse", lambda: parse_gcode(lines, machine))
+    rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
+    ends = timed("kinematics", lambda: [workpiece_path(machine, side[rows]) for side in (program.start, program.end)])
+    segments = np.stack(ends, axis=1)
+    stop = np.zeros(len(program.line), dtype=np.bool_)
+    timed("timeline", lambda: move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration))
+    deposited = beads(program, segments, rows, profile)
+    ground = timed("plastic under every move", lambda: walk(program, deposited, profile))
+    timed("head against table and cradle", lambda: clearance.findings(program, segments, rows, machine))
+    timed(
+        "other findings",
+        lambda: [
+            *laying.findings(program, deposited, ground), *sequence.findings(program, profile),
+            *made.findings(lines, program, profile), *motion.findings(program, machine),
+            *plate.findings(program, segments, rows, profile), *heat.findings(program, profile),
+        ],
+    )  # fmt: skip
+
+
+def timed(name: str, stage: Callable[[], T]) -> T:
+    """Run a stage and print its row."""
+    cpu, wall = process_time(), perf_counter()
+    result = stage()
+    print(f"| {name} | {process_time() - cpu:.1f} | {perf_counter() - wall:.1f} |", flush=True)
+    return result
+
+
+def whole(file: Path, profile: Profile) -> None:
+    """One dry run as a user's: seconds and peak memory of the process."""
+    cpu, wall = process_time(), perf_counter()
+    run = dry_run(file.read_text().splitlines(), profile)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    errors = sum(finding.severity == "error" for finding in run.findings)
+    told = f"{len(run.program.line)} moves, {run.time_s / 3600:.1f} h, {errors} errors"
+    print(f"\nwhole: {process_time() - cpu:.1f} s processor, {perf_counter() - wall:.1f} s wall, peak {peak:.2f} GB ({told})")
+
+
+if __name__ == "__main__":
+    main()
