@@ -12,13 +12,13 @@ ROUNDING = 5e-4
 
 
 def axis_limits(machine: Machine) -> dict[str, Limits]:
-    """Least and greatest value of X, Y, Z and the two rotary letters, mm and deg."""
+    """Least and greatest value of X, Y, Z and the two rotary letters, mm and deg, as limits and cables allow."""
     return {
         "X": machine.x.limits_mm,
         "Y": machine.y.limits_mm,
         "Z": machine.z.limits_mm,
-        machine.tilt.letter: machine.tilt.limits_deg,
-        machine.turn.letter: machine.turn.limits_deg,
+        machine.tilt.letter: machine.tilt.reach_deg,
+        machine.turn.letter: machine.turn.reach_deg,
     }
 
 

@@ -31,8 +31,20 @@ def show(name: str, as_json: bool, settings: Sequence[str]) -> int:
         return 0
     for section, model in sections.items():
         for key, value, meaning in rows(section, model):
-            sys.stdout.write(f"{key} = {json.dumps(value)}" + (f"  # {meaning}\n" if meaning else "\n"))
+            told = "; ".join(each for each in (meaning, _origin(model, key)) if each)
+            sys.stdout.write(f"{key} = {json.dumps(value)}" + (f"  # {told}\n" if told else "\n"))
     return 0
+
+
+def _origin(model: Frozen, key: str) -> str:
+    """Where a machine's number comes from: its source, or that no source gives it."""
+    if not isinstance(model, Machine):
+        return ""
+    steps = key.split(".")
+    places = [".".join(steps[:k]) for k in range(len(steps), 1, -1)]
+    if any(place in model.uncalibrated for place in places):
+        return "UNCALIBRATED"
+    return next((f"from: {model.sources[place]}" for place in places if place in model.sources), "")
 
 
 def check(file: Path) -> int:

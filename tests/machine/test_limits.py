@@ -65,3 +65,8 @@ def test_a_turn_of_both_axes_lasts_as_long_as_the_slower_one() -> None:
     assert turn_speed(30.0, 40.0, MACHINE) == pytest.approx(50.0)  # 1 s of tilt at 30 deg/s
     assert turn_speed(0.0, -120.0, MACHINE) == pytest.approx(60.0)
     assert turn_speed(0.0, 0.0, MACHINE) == 30.0
+
+
+def test_a_cable_bounds_the_turn_like_a_limit() -> None:
+    machine = load(settings=["machine.turn.budget_deg=400"]).machine
+    assert axis_limits(machine)["C"] == (-400.0, 400.0)

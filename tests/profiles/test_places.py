@@ -121,3 +121,10 @@ def test_checking_a_machine_tells_every_block_that_cannot_be_filled_in(capsys: p
     told = capsys.readouterr().err
     assert "machine.gcode.start: placeholder {heat} is not known" in told
     assert "machine.gcode.end: placeholder {tlit} is not known" in told
+
+
+def test_what_is_shown_of_a_machine_tells_where_each_number_comes_from(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["profiles", "show", "open5x_voron0"]) == 0
+    lines = {line.partition(" = ")[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert lines["machine.x.limits_mm"].endswith("config.g, M208 M203 M201")
+    assert lines["machine.tilt.sign"].endswith("; UNCALIBRATED")
