@@ -121,7 +121,7 @@ class Process(Frozen):
         2.0, ge=0.2, le=20, description="diameter of a branch at its top, mm; thinner ones are knocked over by the nozzle"
     )
     support_branch_growth_deg: float = Field(
-        2.0, ge=0, le=20, description="branches get thicker downward, each side leaning by this, deg: tall ones must not sway"
+        1.0, ge=0, le=20, description="branches get thicker downward, each side leaning by this, deg: tall ones must not sway"
     )
     support_pattern: Literal["lines", "grid"] = Field("lines", description="what fills support: lines are easily broken away")
     support_density: float = Field(0.15, gt=0, le=1, description="share of the support's inside that is filled")
