@@ -2,7 +2,7 @@
 
 For each stretch of moves at one pose the earlier plastic is turned into the machine frame and laid into a field of heights; then
 the stretch's own moves follow one by one. A bead is carried by what lies under it or beside it along the direction of that
-moment; its room is taken when all across it plastic already reaches its top.
+moment; its room is taken when plastic already reaches its top along its middle and to one side at least.
 """
 
 from dataclasses import dataclass, replace
@@ -74,7 +74,7 @@ def beads(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], pro
 def walk(program: ParsedProgram, deposited: Laid, profile: Profile) -> Ground:
     """Go through all moves of a program in order."""
     machine, count = profile.machine, len(program.line)
-    found = Ground(*np.zeros((4, count)), -1)
+    found = Ground(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count), -1)
     if not len(deposited.rows):
         return found
     half, height = np.zeros(count), np.zeros(count)
@@ -95,10 +95,12 @@ def walk(program: ParsedProgram, deposited: Laid, profile: Profile) -> Ground:
             return replace(found, untested_row=int(stretch.rows[0]))
         field = _field(deposited, int(before), int(after), stretch, ups, machine)
         if field is not None:
+            measured = (found.depth_mm, found.air_mm, found.taken_mm, found.beside_mm)
+            plate, first = _plate(machine, stretch.pose), int(stretch.rows[0])
+            told = (half, height, path, done, held)
             _walked(
-                stretch.rows, program.start, program.end, extruded, half, height, path, done, held, int(stretch.rows[0]), gap,
-                _plate(machine, stretch.pose), field, *head_of(machine), found.depth_mm, found.air_mm, found.taken_mm, found.beside_mm,
-            )  # fmt: skip
+                stretch.rows, program.start, program.end, extruded, *told, first, gap, plate, field, *head_of(machine), *measured
+            )
     return found
 
 
@@ -172,19 +174,19 @@ def _lies(x, y, z, row, strict, first, gap, at, height, path, done, held, half, 
 
 @part
 def _carried(x, y, z, nx, ny, row, first, gap, at, height, path, done, held, half, plate, field):  # type: ignore[no-untyped-def]
-    """0: a bead hangs in air at a place, 1: lies on something, 2: its room is taken, 3: only has a neighbour; nx, ny: to its side."""
-    if abs(z - height[row] - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height[row]:
-        return 1
+    """0: a bead hangs in air, 1: lies on something, 2: its room is taken, 3: only has a neighbour; nx, ny: to its side."""
     taken, carried = 0, 0
     for k in range(-1, 2):
         off = 2.0 * INNER * half[row] * k
         found = _lies(x + off * nx, y + off * ny, z, row, False, first, gap, at, height, path, done, held, half, field)
-        taken += 1 if found == 2 else 0
-        carried += 1 if found > 0 else 0
-    if taken == 3:
+        taken += (2 if k == 0 else 1) if found == 2 else 0
+        carried += 1 if found == 1 else 0
+    if taken > 2:
         return 2
-    if carried > 0:
+    if carried > 0 or abs(z - height[row] - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height[row]:
         return 1
+    if taken > 0:
+        return 3
     off = half[row] + 0.75 * field.cell + 0.1 * height[row]
     for k in range(-1, 2, 2):
         if _lies(x + k * off * nx, y + k * off * ny, z, row, True, first, gap, at, height, path, done, held, half, field) > 0:

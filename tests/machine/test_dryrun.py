@@ -60,6 +60,23 @@ def test_a_reversal_is_passed_at_half_the_junction_speed() -> None:
     assert _times([[side], [-side]], v).sum() == pytest.approx(2 * one)
 
 
+def test_a_short_piece_between_two_lines_is_ramped_through_without_stopping() -> None:
+    # 1 mm at half the feed: down to 25 mm/s before it, up again after it, its own speed throughout
+    rows, v, slow, a, side = np.zeros((3, 6)), 50.0, 25.0, 1500.0, 20.0
+    rows[:, 0] = [side, 1.0, side]
+    times = move_times(rows, np.array([v, slow, v]), np.zeros(3, dtype=bool), MACHINE)
+    ramp_up, ramp_down = v * v / (2 * a), (v * v - slow * slow) / (2 * a)
+    one = v / a + (v - slow) / a + (side - ramp_up - ramp_down) / v
+    assert times == pytest.approx([one, 1.0 / slow, one], rel=1e-3)
+
+
+def test_the_acceleration_told_lengthens_the_ramps() -> None:
+    rows = np.zeros((1, 6))
+    rows[0, 0] = 100.0
+    times = move_times(rows, np.array([100.0]), np.zeros(1, dtype=bool), MACHINE, np.array([500.0]))
+    assert times[0] == pytest.approx(100 / 100 + 100 / 500, rel=1e-3)
+
+
 def test_a_wait_between_two_moves_stops_the_machine_and_counts() -> None:
     flowing, waiting = (
         dry_run((BEGIN + f"G0 X10 F6000\n{wait}G0 X20\n" + END).splitlines(), CLEAN) for wait in ("", "G4 P500\n")
