@@ -62,6 +62,7 @@ def assert_sound(values: Any, found: Supports) -> None:
         rest = hanging[k] - missed[k].buffer(0.02)
         deep = process.support_gap_mm + process.support_distance_mm + 2 * process.layer_height_mm
         near = [printed[m] for m in range(k) if 0 <= bottom[k] - top[m] + 1e-6 <= deep + 1e-6]
+        near += [solid[j] for j in range(k - 1) if bottom[k] - top[j] <= process.support_gap_mm + 1e-6]
         held = shapely.union_all(near).buffer(0.5 * width + ROUNDING_MM)
         reach = 0.5 * process.support_distance_mm + 0.06
         wall = solid[k - 1] if k else shapely.Polygon()
