@@ -1,8 +1,8 @@
 """Beam: the nodes that a search follows, one place each.
 
-The first place follows the classic ranking. Every further place follows a trade-off of its own between what is made safe and
-what is left risky for ever, and takes its node from the children of its own and all lower places. So a wider beam holds the
-narrower ones and never ends worse, and the places do not fill with what one ranking finds nearly equal.
+The first place follows the classic ranking, large parts first. Every further place follows a trade-off of its own between what
+is made safe and what is left risky for ever, and takes its node from the children of its own and all lower places. So a wider
+beam holds the narrower ones and never ends worse, and the places do not fill with what one ranking finds nearly equal.
 """
 
 from collections.abc import Iterator, Sequence
@@ -106,7 +106,7 @@ class Beam:
         trade_off = TRADE_OFFS[place % len(TRADE_OFFS)]
         if trade_off is not None:
             return traded(tables, trade_off, bound_mm2)
-        pool = entries(tables, self.rules.model.risky_mm2, bound_mm2)
+        pool = entries(tables, self.rules.model.risky_mm2, bound_mm2, preferred_mm3=self.rules.preferred_mm3)
         return self.ranker.ordered(pool, lambda entry: tables[entry.table].plan(entry.row), self.rules.model)
 
     def _child(self, branch: Branch, entry: Entry) -> Node | None:
@@ -120,7 +120,8 @@ class Beam:
         """Put the stage's pool on record: the first candidates of the classic ranking, and what the places took."""
         tables = [branch.table for branch in branches]
         risky_mm2 = self.rules.model.risky_mm2
-        pool = entries(tables, risky_mm2, self.best.cost_mm2) if tables else iter(())
+        bound_mm2, preferred_mm3 = self.best.cost_mm2, self.rules.preferred_mm3
+        pool = entries(tables, risky_mm2, bound_mm2, preferred_mm3=preferred_mm3) if tables else iter(())
         offered = list(islice(pool, max(RECORDED, 2 * len(self.nodes))))
         place_of = {(entry.table, entry.row): place for place, entry in enumerate(offered)}
         made = []

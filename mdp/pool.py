@@ -34,7 +34,7 @@ class Table:
         self.saved_mm2, self.residual_mm2 = saved_mm2, residual_mm2
         self._check = check
         self.reason = np.full(len(worth.gain_mm2), UNKNOWN, np.int32)
-        self._volume_mm3, self._fragile_mm = np.zeros(len(worth.gain_mm2)), np.zeros(len(worth.gain_mm2))
+        self.volume_mm3, self._fragile_mm = np.zeros(len(worth.gain_mm2)), np.zeros(len(worth.gain_mm2))
         self._rankings: dict[float, _Ranking] = {}
 
     def ranked(self, trade_off: float) -> Iterator[int]:
@@ -52,7 +52,7 @@ class Table:
             return
         mine = np.nonzero(np.isin(self.worth.direction, self.worth.direction[fresh]))[0]
         found = self._check(self.worth.direction[mine], self.worth.offset_mm[mine])
-        self.reason[mine], self._volume_mm3[mine], self._fragile_mm[mine] = found.reason, found.volume_mm3, found.fragile_mm
+        self.reason[mine], self.volume_mm3[mine], self._fragile_mm[mine] = found.reason, found.volume_mm3, found.fragile_mm
 
     def plane(self, row: int) -> Plane:
         """The plane of a row."""
@@ -64,7 +64,7 @@ class Table:
         return Plan(
             gain_mm2=float(worth.gain_mm2[row]),
             residual_mm2=float(worth.residual_mm2[row]),
-            volume_mm3=float(self._volume_mm3[row]),
+            volume_mm3=float(self.volume_mm3[row]),
             above_platform_mm=float(worth.offset_mm[row] - self.limits.least_offset_mm[worth.direction[row]]),
             fragile_mm=min(float(self._fragile_mm[row]), worth.remainder.thin_mm(self.plane(row))),
             saved_before_mm2=self.saved_mm2,
@@ -138,30 +138,39 @@ def traded(tables: Sequence[Table], trade_off: float, bound_mm2: float) -> Itera
         yield Entry(index, row, 0)
 
 
-def entries(tables: Sequence[Table], risky_mm2: float, bound_mm2: float, least_reduction: float = 0.0) -> Iterator[Entry]:
+def entries(
+    tables: Sequence[Table], risky_mm2: float, bound_mm2: float, least_reduction: float = 0.0, preferred_mm3: float = 0.0
+) -> Iterator[Entry]:
     """Feasible candidates, best first; those that would leave bound_mm2 or more for ever are left out.
 
     risky_mm2: the model's risky area, which delta and the reductions are shares of. least_reduction: accumulated reduction
-    that a candidate must exceed.
+    that a candidate must exceed. preferred_mm3: parts of at least this volume come before all smaller ones.
     """
     side = _side_by_side(tables, risky_mm2)
     waiting = side.order[(side.residual_sum_mm2 < bound_mm2)[side.order] & (side.reduction > least_reduction)[side.order]]
+    yield from _relaxed(tables, side, waiting, preferred_mm3, np.inf)
+    if preferred_mm3 > 0.0:
+        yield from _relaxed(tables, side, waiting, 0.0, preferred_mm3)
+
+
+def _relaxed(tables: Sequence[Table], side: "_Side", waiting: Ints, least_mm3: float, most_mm3: float) -> Iterator[Entry]:
+    """The feasible ones of the waiting candidates whose parts have a volume from least_mm3 to below most_mm3."""
     near: list[list[Plane]] = [[] for _ in tables]
     best, delta, number = -np.inf, FIRST_DELTA, 0
     while len(waiting) and delta <= LAST_DELTA:
         admitted = side.residual[waiting] < delta
         turn = waiting[admitted & (side.reduction[waiting] >= best)]
         for place, index in enumerate(turn):
-            table, row = int(side.table[index]), int(side.row[index])
-            plane = tables[table].plane(row)
-            if any(same(plane, other) for other in near[table]):
-                continue
-            if tables[table].reason[row] == UNKNOWN:
+            table, row = tables[int(side.table[index])], int(side.row[index])
+            if table.reason[row] == UNKNOWN:
                 _look_ahead(tables, side, turn[place : place + LOOK_AHEAD])
-            if tables[table].reason[row] == Reason.FEASIBLE:
-                near[table].append(plane)
+            if table.reason[row] != Reason.FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
+                continue
+            plane, others = table.plane(row), near[int(side.table[index])]
+            if not any(same(plane, other) for other in others):
+                others.append(plane)
                 best = max(best, float(side.reduction[index]))
-                yield Entry(table, row, number)
+                yield Entry(int(side.table[index]), row, number)
         waiting = waiting[~admitted]
         delta, number = delta * DELTA_FACTOR, number + 1
 

@@ -37,6 +37,7 @@ class Rules:
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
         self.ground = ground(mesh, settings)
         self.limits: Bounds = bounds(mesh, self.machine, settings)
+        self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         self.least_gain_mm2 = settings.least_gain * self.root.risky_mm2
         self.evaluated = 0
         self._began = perf_counter()

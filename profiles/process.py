@@ -312,6 +312,12 @@ class Search(Frozen):
     least_volume_share: float = Field(
         0.02, ge=0, lt=1, description="criterion IV: a part has at least this share of the model's volume (published: 0.1)"
     )
+    preferred_volume_share: float = Field(
+        0.1,
+        ge=0,
+        lt=1,
+        description="criterion IV as a preference: the classic ranking takes parts of at least this share of the volume first",
+    )
     least_interface_mm2: float = Field(
         4.0, ge=0, le=1e6, description="least area that a part, and each of its pieces that is no crumb, stands on, mm2"
     )
@@ -326,7 +332,7 @@ class Search(Frozen):
     )
     most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
     time_limit_s: float | None = Field(None, ge=0, description="the search ends after this time with the best so far, s")
-    least_gain: float = Field(0.005, ge=0, le=1, description="a cut must make at least this share of the model's risky area safe")
+    least_gain: float = Field(0.002, ge=0, le=1, description="a cut must make at least this share of the model's risky area safe")
     platform_radius_mm: float | None = Field(
         None, gt=0, description="criterion III: radius of the disc that every plane must clear; absent: the model's footprint"
     )

@@ -84,3 +84,12 @@ def test_the_round_is_the_one_in_which_the_relaxation_lets_a_candidate_in() -> N
     table = rules.table(rules.root)
     for entry in entries([table], rules.model.risky_mm2, np.inf):
         assert round_of(float(table.worth.residual_mm2[entry.row]) / rules.model.risky_mm2) == entry.round
+
+
+def test_parts_of_the_preferred_volume_come_first_and_all_others_after_them() -> None:
+    rules = _rules(1, "branch")
+    table, tenth = rules.table(rules.root), 0.1 * rules.model.volume_mm3
+    volumes = [table.volume_mm3[entry.row] for entry in entries([table], rules.model.risky_mm2, np.inf, preferred_mm3=tenth)]
+    large = [volume >= tenth for volume in volumes]
+    assert large == sorted(large, reverse=True)
+    assert 0 < sum(large) < len(large)
