@@ -11,6 +11,7 @@ from machine.app.progress import Ticker, say
 from machine.app.warmup import warm
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode import write_gcode
+from machine.limits import check_parts
 from machine.plan import plan
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
@@ -110,13 +111,14 @@ def _hints(found: Decomposition, profile: Profile, orient: bool) -> tuple[str, .
 
 
 def build(decomposition: Decomposition, profile: Profile) -> Program:
-    """Slice, plan, write and dry-run a decomposition."""
+    """Slice, plan, write and dry-run a decomposition. Raises MoveError, before slicing, for a part outside the axes' ranges."""
     ticker = Ticker()
     parts = decomposition.parts
 
     def show(begun: int, of: int, layers: int, all_layers: int) -> None:
         ticker.tick(f"slicing part {begun} of {of}: {min(100, 100 * layers // max(all_layers, 1))} % of the layers")
 
+    check_parts(parts, profile)
     sliced = slice_parts(parts, profile, show)
     ticker.tick("planning moves", at_once=ticker.live)
     lines = tuple(write_gcode(plan(decomposition, sliced, profile), profile))
