@@ -6,14 +6,30 @@ arrays come from here, flags from variables. Its sorts, searches and assignments
 second or more for the first of each, so numbers are moved one by one.
 """
 
-import numpy as np
-from numba import njit
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
-kernel = njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+import numpy as np
+from numba import config, njit
+
+from mdp.store import folder
+
+KERNEL = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 # No flag allows the compiler to change a result, so all processors and numbers of threads give the same numbers.
 vector_part = njit(error_model="numpy", fastmath={"nnan", "ninf", "nsz"}, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 inlined = njit(error_model="numpy", inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function for calls from Python and keep it, in a folder below the one that NUMBA_CACHE_DIR names or our own."""
+    given = config.CACHE_DIR
+    config.CACHE_DIR = str(folder(Path(function.__code__.co_filename)))
+    try:
+        return njit(**KERNEL)(function)
+    finally:
+        config.CACHE_DIR = given
 
 
 @part

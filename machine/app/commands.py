@@ -12,7 +12,7 @@ from machine.app.png import write_png
 from machine.app.printing import check_dialect, check_port, print_program
 from machine.app.progress import say
 from machine.app.report import parts_table, run_table, show
-from machine.app.warmup import warm
+from machine.app.warmup import warm_dry_run
 from machine.dryrun.dryrun import dry_run, summary
 from mdp.save import part_file, stl, threemf, values
 from profiles.errors import GcodeError, MoveError
@@ -77,7 +77,7 @@ def export(
     if svg is not None:
         check_writable(svg)
     wanted = asked(layer, svg is not None)
-    program = build(decompose_model(model, profile, ranker, orient).decomposition, profile)
+    program = build(decompose_model(model, profile, ranker, orient, to_build=True).decomposition, profile)
     _refuse_errors(program, force)
     picture = b"" if svg is None else drawn(program.sliced, *wanted)
     write_lines(out, program.lines)
@@ -125,9 +125,9 @@ def _program(model: str, profile: Profile, ranker: str, orient: bool, named: fro
         profile, taken = told_in(lines, profile, named)
         if taken:
             say(f"{Path(model).name}: {in_words(taken, profile)}, as the file itself tells")
-        warm(profile)
+        warm_dry_run()
         return Program(lines, dry_run(lines, profile), None), profile
-    return build(decompose_model(model, profile, ranker, orient).decomposition, profile), profile
+    return build(decompose_model(model, profile, ranker, orient, to_build=True).decomposition, profile), profile
 
 
 def _gcode_lines(path: Path) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from machine.app.output import write_bytes
 from machine.app.progress import Ticker, say
-from machine.app.warmup import warm
+from machine.app.warmup import warm_program, warm_search
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode import write_gcode
 from machine.limits import check_parts
@@ -53,8 +53,13 @@ def model_name(model: str) -> str:
     return model if model.startswith("demo:") else Path(model).name
 
 
-def decompose_model(model: str, profile: Profile, ranker: str, orient: bool = False, record: Path | None = None) -> Decomposed:
-    """Read a model and find its parts; repairs and notes go to stderr. orient: lay the model down in the best way first."""
+def decompose_model(
+    model: str, profile: Profile, ranker: str, orient: bool = False, record: Path | None = None, to_build: bool = False
+) -> Decomposed:
+    """Read a model and find its parts; repairs and notes go to stderr. orient: lay the model down in the best way first.
+
+    to_build: `build` comes next, the first run may compile what it needs meanwhile.
+    """
     if ranker not in RANKERS:
         raise ProfileError(f"--ranker {ranker}: this version knows {', '.join(RANKERS)}")
     began = perf_counter()
@@ -62,7 +67,7 @@ def decompose_model(model: str, profile: Profile, ranker: str, orient: bool = Fa
     read_s = perf_counter() - began
     for repair in repairs:
         say(f"{model_name(model)}: {repair}")
-    warm(profile)
+    warm_search(to_build)
     if orient:
         mesh = _laid_down(mesh, profile)
     ticker = Ticker()
@@ -119,6 +124,7 @@ def build(decomposition: Decomposition, profile: Profile) -> Program:
         ticker.tick(f"slicing part {begun} of {of}: {min(100, 100 * layers // max(all_layers, 1))} % of the layers")
 
     check_parts(parts, profile)
+    warm_program(profile)
     sliced = slice_parts(parts, profile, show)
     ticker.tick("planning moves", at_once=ticker.live)
     lines = tuple(write_gcode(plan(decomposition, sliced, profile), profile))

@@ -1,9 +1,12 @@
-"""Warm-up: loads the compiled kernels with a tiny model; the first run ever compiles them, in two processes, and says so."""
+"""Warm-up: the first run ever compiles the kernels with a tiny model, in two processes, and says so; later runs find them kept.
 
+The search's kernels and those that make and try a program take about the same time. Where both are needed another process
+compiles the latter, while this one compiles the former and searches. Where only the search is, they share its kernels.
+"""
+
+import atexit
 import subprocess
 import sys
-import threading
-from pathlib import Path
 from time import perf_counter
 
 import manifold3d as m3
@@ -15,51 +18,82 @@ from machine.gcode import write_gcode
 from machine.plan import plan
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
+from mdp.forecast import Surface
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
-from mdp.search import decompose
-from mdp.sweep import Remainder, gains, sweep, sweep_kernel
+from mdp.store import all_kept
+from mdp.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 from slicer.slice import slice_part
 
+SEARCH, PROGRAM = "search", "program"
 LEANING = np.array([0.0, np.sin(0.2), np.cos(0.2)])
-COMPILING_AFTER_S = 4.0  # loading kernels that are compiled takes less; the cache may be an older version's
+PLANE = Plane(LEANING, 20.0)
+
+_others: list["subprocess.Popen[bytes]"] = []
 
 
-def warm(profile: Profile) -> None:
-    """Bring all kernels of a print into memory, compiling them where no earlier run has left them on disk."""
-    began = perf_counter()
-    other: list[subprocess.Popen[bytes]] = []
+def warm_search(program_too: bool) -> None:
+    """Return when the kernels of the search are compiled; those for a program may be under way then: see warm_program."""
+    needed = [what for what in ((SEARCH, PROGRAM) if program_too else (SEARCH,)) if not all_kept(what).exists()]
+    if not needed:
+        return
+    began = _tell()
+    _start(needed[-1])
+    if SEARCH in needed:
+        _sweep()
+        if len(needed) > 1:
+            _beside_sweep()
+        else:
+            _finish(SEARCH)
+        _keep(SEARCH)
+        say(f"compiled what the search needs in {perf_counter() - began:.0f} s")
 
-    def compiling() -> None:
-        say("compiling the kernels (only the first run does)")
-        other.append(subprocess.Popen([sys.executable, "-m", "machine.app.warmup"], stderr=subprocess.DEVNULL))
 
-    timer = threading.Timer(COMPILING_AFTER_S if _compiled_before() else 0.0, compiling)
-    timer.daemon = True
-    timer.start()
-    try:
-        # The largest kernel first: meanwhile the other process compiles what comes after it.
-        sweep(_remainder(), LEANING[None], 1.0)
-        few = profile.search.model_copy(update={"directions": 8, "beam_width": 1, "most_parts": 2})
-        decompose(mesh_of(_tee()), "warm", profile.model_copy(update={"search": few}))
-        for process in other:
-            process.wait()
-        _print(profile)
-    finally:
-        timer.cancel()
-        timer.join()
-        for process in other:
-            process.kill()
-            process.wait()
-    if other:
+def warm_program(profile: Profile) -> None:
+    """Return when the kernels that make and try a program are compiled."""
+    if all_kept(PROGRAM).exists():
+        return
+    if not _others:
+        began = _tell()
+        _program(profile)
+        _keep(PROGRAM)
         say(f"compiled in {perf_counter() - began:.0f} s")
+    elif _finish(PROGRAM):
+        _keep(PROGRAM)
 
 
-def _compiled_before() -> bool:
-    """Whether numba's cache holds the largest kernel, of this or an older version."""
-    return any(Path(sweep_kernel.stats.cache_path).glob("sweep.*.nbi"))
+def warm_dry_run() -> None:
+    """Say that a dry run compiles its kernels, where it does."""
+    if not all_kept(PROGRAM).exists():
+        _tell()
+
+
+def _tell() -> float:
+    say("compiling the kernels (only the first run does)")
+    return perf_counter()
+
+
+def _keep(what: str) -> None:
+    kept = all_kept(what)
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    kept.touch()
+
+
+def _start(what: str) -> None:
+    """Compile in another process, which ends with this one."""
+    _others.append(subprocess.Popen([sys.executable, "-m", "machine.app.warmup", what], stderr=subprocess.DEVNULL))
+    atexit.register(_others[-1].kill)
+
+
+def _finish(what: str) -> bool:
+    """Wait for the other process; False where it failed: then the work itself compiles what is missing."""
+    other = _others.pop()
+    done = other.wait() == 0
+    if not done:
+        say(f"compiling the kernels for the {what} beside the work failed; the work compiles them itself")
+    return done
 
 
 def _remainder() -> Remainder:
@@ -72,14 +106,26 @@ def _tee() -> m3.Manifold:
     return m3.Manifold.cube((4.0, 4.0, 30.0), True).translate((0.0, 0.0, 15.0)) + bar
 
 
-def _print(profile: Profile) -> None:
+def _sweep() -> None:
+    """The largest kernel, and those that lay out a surface for it."""
+    sweep(_remainder(), LEANING[None], 1.0)
+
+
+def _beside_sweep() -> None:
+    """The other kernels of the search."""
+    remainder = _remainder()
+    gains(remainder, LEANING[None], 1.0, threshold(45.0))
+    remainder.thin_mm(PLANE)
+    Surface.of(remainder.mesh, remainder.risky, 45.0).left_mm2([PLANE])
+
+
+def _program(profile: Profile) -> None:
     """Slice, plan, write and dry-run a tee in two parts."""
     coarse = {"layer_height_mm": 0.3, "line_width_mm": 0.6, "first_layer_height_mm": 0.3, "support": "auto", "walls": 2}
     profile = profile.model_copy(update={"process": profile.process.model_copy(update=coarse)})
-    plane = Plane(LEANING, 20.0)
-    above, below = cut(_tee(), plane)
+    above, below = cut(_tee(), PLANE)
     parts = []
-    for index, (base, solid) in enumerate(((PLATFORM, below), (plane, above)), start=1):
+    for index, (base, solid) in enumerate(((PLATFORM, below), (PLANE, above)), start=1):
         leaning = poses(profile.machine, LEANING)
         pose = leaning[0] if leaning and index > 1 else level(profile.machine)
         mesh = mesh_of(solid)
@@ -90,5 +136,7 @@ def _print(profile: Profile) -> None:
 
 
 if __name__ == "__main__":
-    gains(_remainder(), LEANING[None], 1.0, threshold(45.0))
-    _print(load())
+    if sys.argv[1] == SEARCH:
+        _beside_sweep()
+    else:
+        _program(load())
