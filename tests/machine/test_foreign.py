@@ -34,13 +34,13 @@ class TestSlicers:
     """What a slicer of three axes writes."""
 
     @pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="PrusaSlicer is not installed")
-    @pytest.mark.parametrize("flavour", ["marlin2", "klipper", "reprapfirmware"])
-    def test_prusaslicer_s_filament_and_layers_are_read(self, tmp_path: Path, flavour: str) -> None:
+    @pytest.mark.parametrize(("flavour", "dialect"), [("marlin2", "marlin"), ("marlin", "klipper"), ("reprapfirmware",) * 2])
+    def test_prusaslicer_s_filament_and_layers_are_read(self, tmp_path: Path, flavour: str, dialect: str) -> None:
         (tmp_path / "box.stl").write_bytes(stl(box(10, 10, 6)))
         command = ["prusa-slicer", "-g", "--gcode-flavor", flavour, "--output", "box.gcode", "box.stl"]
         subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
         text = (tmp_path / "box.gcode").read_text()
-        machine = load("three_axis", settings=[f"machine.dialect={flavour.rstrip('2')}"]).machine
+        machine = load("three_axis", settings=[f"machine.dialect={dialect}"]).machine
         parsed = parse_gcode(text.splitlines(), machine)
         told = float(re.search(r"filament used \[mm\] = ([0-9.]+)", text)[1])  # type: ignore[index]
         assert parsed.filament_mm.max() == pytest.approx(told, abs=0.02)

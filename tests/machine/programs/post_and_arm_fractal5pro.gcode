@@ -4,33 +4,40 @@
 ; material = PLA
 ; process = standard
 ;TYPE:Custom
-M486 T2
+MANUAL_STEPPER STEPPER=stepper_b GCODE_AXIS=
+MANUAL_STEPPER STEPPER=stepper_a GCODE_AXIS=
+SET_PRINT_STATS_INFO TOTAL_LAYER=6
+EXCLUDE_OBJECT_DEFINE NAME=part_1
+EXCLUDE_OBJECT_DEFINE NAME=part_2
 G21
 G90
 M83
 M140 S60
 M104 S215
+home_ab
 G28
-G92 B0 A0
 M190 S60
 M109 S215
 G92 E0
 G21
 G90
 M83
+MANUAL_STEPPER STEPPER=stepper_b GCODE_AXIS=B LIMIT_VELOCITY=20 LIMIT_ACCEL=100
+MANUAL_STEPPER STEPPER=stepper_a GCODE_AXIS=A LIMIT_VELOCITY=10 LIMIT_ACCEL=100
 G92 E0
-G0 Z15.000 F300
+G0 Z17.000 F300
 G0 X-4.775 Y-4.775 F9000
 ;TYPE:Custom
 G0 B0.0000 A0.0000 F600
 ;PART:1 of 2
 ;POSE:B0.0000 A0.0000
 G0 Z0.200 F300
-M486 S0
+EXCLUDE_OBJECT_START NAME=part_1
 ;LAYER_CHANGE
 ;Z:0.2
 ;HEIGHT:0.2
-M73 P2 R3
+SET_PRINT_STATS_INFO CURRENT_LAYER=1
+M73 P8 R1
 ;TYPE:External perimeter
 ;WIDTH:0.45
 G1 X4.775 E0.32326 F2400
@@ -46,9 +53,10 @@ G1 Y-4.325 E0.29279
 ;LAYER_CHANGE
 ;Z:0.4
 ;HEIGHT:0.2
-M104 S210
+SET_PRINT_STATS_INFO CURRENT_LAYER=2
+SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210
 M106 S255
-M73 P3 R3
+M73 P13 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -70,7 +78,8 @@ G1 Y-4.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P5 R3
+SET_PRINT_STATS_INFO CURRENT_LAYER=3
+M73 P18 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -89,23 +98,25 @@ G1 X4.325 E0.29279 F2400
 G1 Y4.325 E0.29280
 G1 X-4.325 E0.29279
 G1 Y-4.325 E0.29279
-M486 S-1
+EXCLUDE_OBJECT_END NAME=part_1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
-G0 Z169.512 F300
+G0 Z7.339 F300
+G0 X100.000 Y-147.050 F9000
 ;TYPE:Custom
-G0 B90.0000 A90.0000 F849
+G0 B90.0000 A90.0000 F600
 ;PART:2 of 2
 ;POSE:B90.0000 A90.0000
 G0 X-4.775 Y-59.775 F9000
 G0 Z5.200 F300
-M486 S1
+EXCLUDE_OBJECT_START NAME=part_2
 ;LAYER_CHANGE
 ;Z:0.2
 ;HEIGHT:0.2
+SET_PRINT_STATS_INFO CURRENT_LAYER=4
 M107
-M73 P63 R1
+M73 P57 R1
 G1 E1.20000 F2100
 ;TYPE:External perimeter
 ;WIDTH:0.45
@@ -122,8 +133,9 @@ G1 Y-59.325 E0.29279
 ;LAYER_CHANGE
 ;Z:0.4
 ;HEIGHT:0.2
+SET_PRINT_STATS_INFO CURRENT_LAYER=5
 M106 S255
-M73 P65 R1
+M73 P62 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -145,7 +157,8 @@ G1 Y-59.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P67 R1
+SET_PRINT_STATS_INFO CURRENT_LAYER=6
+M73 P68 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -164,14 +177,17 @@ G1 X4.325 E0.29279 F2400
 G1 Y-50.675 E0.29280
 G1 X-4.325 E0.29279
 G1 Y-59.325 E0.29279
-M486 S-1
+EXCLUDE_OBJECT_END NAME=part_2
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
-G0 Z169.512 F300
+G0 Z7.600 F300
+G0 X100.000 Y-147.050 F9000
 ;TYPE:Custom
-G0 B0.0000 A0.0000 F849
+G0 B0.0000 A0.0000 F600
 ;TYPE:Custom
+MANUAL_STEPPER STEPPER=stepper_b GCODE_AXIS=
+MANUAL_STEPPER STEPPER=stepper_a GCODE_AXIS=
 M104 S0
 M140 S0
 M107
@@ -180,11 +196,11 @@ M73 P100 R0
 ; filament used [mm] = 15.19
 ; filament used [cm3] = 0.04
 ; filament used [g] = 0.05
-; estimated printing time (normal mode) = 2m 14s
+; estimated printing time (normal mode) = 40s
 ; tiltprint_config = begin
 ; machine.name = Fractal 5 Pro
 ; machine.shape = table
-; machine.dialect = marlin
+; machine.dialect = klipper
 ; machine.coordinates = table
 ; machine.x.limits_mm = [-150.0, 150.0]
 ; machine.x.speed_mm_s = 300.0
@@ -239,19 +255,43 @@ M73 P100 R0
 ; machine.bed_limit_c = 130.0
 ; machine.uncalibrated[0] = machine.tilt.zero_deg
 ; machine.uncalibrated[1] = machine.turn.zero_deg
-; machine.uncalibrated[2] = machine.head.silhouette_mm
-; machine.uncalibrated[3] = machine.head.boxes
-; machine.uncalibrated[4] = machine.extruder_speed_mm_s
-; machine.uncalibrated[5] = machine.extruder_acceleration_mm_s2
-; machine.uncalibrated[6] = machine.junction_speed_mm_s
-; machine.uncalibrated[7] = machine.table.thickness_mm
+; machine.uncalibrated[2] = machine.turn.point_mm
+; machine.uncalibrated[3] = machine.head.silhouette_mm
+; machine.uncalibrated[4] = machine.head.boxes
+; machine.uncalibrated[5] = machine.cradle
+; machine.uncalibrated[6] = machine.extruder_speed_mm_s
+; machine.uncalibrated[7] = machine.extruder_acceleration_mm_s2
+; machine.uncalibrated[8] = machine.table.thickness_mm
+; machine.sources.machine.x = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, stepper_x and printer
+; machine.sources.machine.y = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, stepper_y and printer
+; machine.sources.machine.z = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, stepper_z and printer
+; machine.sources.machine.tilt.limits_deg = home_ab sets the switch to -1.8; Fractal Cortex tilts 0 to 90
+; machine.sources.machine.tilt.speed_deg_s = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, manual_stepper stepper_b
+; machine.sources.machine.tilt.acceleration_deg_s2 = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, manual_stepper stepper_b
+; machine.sources.machine.tilt.axis = Fractal Cortex's transform Rx(B) Rz(A)
+; machine.sources.machine.tilt.sign = Fractal Cortex's transform Rx(B) Rz(A)
+; machine.sources.machine.tilt.point_mm = the levelling procedure lays the plate's surface into the tilt axis
+; machine.sources.machine.turn.axis = Fractal Cortex's transform Rx(B) Rz(A)
+; machine.sources.machine.turn.sign = Fractal Cortex's transform Rx(B) Rz(A)
+; machine.sources.machine.turn.limits_deg = slip ring; a hundred turns either way
+; machine.sources.machine.turn.speed_deg_s = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, manual_stepper stepper_a
+; machine.sources.machine.turn.acceleration_deg_s2 = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, manual_stepper stepper_a
+; machine.sources.machine.table.radius_mm = fractalrobotics/Fractal-5-Pro@d49f96f, plate radius
+; machine.sources.machine.head.nozzle_mm = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, extruder
+; machine.sources.machine.head.silhouette_mm = hydra5x docs/envelope.md, Volcano block over its diagonal
+; machine.sources.machine.nozzle_limit_c = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, extruder max_temp
+; machine.sources.machine.bed_limit_c = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, heater_bed max_temp
+; machine.sources.machine.junction_speed_mm_s = Klipper's square_corner_velocity unless told otherwise
+; machine.sources.machine.tool_mm = Fractal Cortex's transform has no offsets
+; machine.sources.machine.clearance_mm = chosen
+; machine.sources.machine.lift_mm = chosen
 ; machine.gcode.start[0] = G21
 ; machine.gcode.start[1] = G90
 ; machine.gcode.start[2] = M83
 ; machine.gcode.start[3] = M140 S{bed_c}
 ; machine.gcode.start[4] = M104 S{first_layer_nozzle_c}
-; machine.gcode.start[5] = G28
-; machine.gcode.start[6] = G92 {tilt}0 {turn}0
+; machine.gcode.start[5] = home_ab
+; machine.gcode.start[6] = G28
 ; machine.gcode.start[7] = M190 S{bed_c}
 ; machine.gcode.start[8] = M109 S{first_layer_nozzle_c}
 ; machine.gcode.start[9] = G92 E0

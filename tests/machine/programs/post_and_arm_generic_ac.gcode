@@ -19,7 +19,7 @@ G21
 G90
 M83
 G92 E0
-G0 Z10.000 F600
+G0 Z11.000 F600
 G0 X-4.775 Y-4.775 F9000
 ;TYPE:Custom
 G0 A0.0000 C0.0000 F1800
@@ -30,7 +30,7 @@ M486 S0
 ;LAYER_CHANGE
 ;Z:0.2
 ;HEIGHT:0.2
-M73 P1 R1
+M73 P4 R1
 ;TYPE:External perimeter
 ;WIDTH:0.45
 G1 X4.775 E0.32326 F2400
@@ -48,7 +48,7 @@ G1 Y-4.325 E0.29279
 ;HEIGHT:0.2
 M104 S210
 M106 S255
-M73 P5 R1
+M73 P12 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -70,7 +70,7 @@ G1 Y-4.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P10 R1
+M73 P22 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -93,7 +93,8 @@ M486 S-1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
-G0 Z98.726 F600
+G0 Z2.528 F600
+G0 X53.333 Y-106.667 F9000
 ;TYPE:Custom
 G0 A90.0000 C90.0000 F2546
 ;PART:2 of 2
@@ -105,7 +106,7 @@ M486 S1
 ;Z:0.2
 ;HEIGHT:0.2
 M107
-M73 P60 R1
+M73 P55 R1
 G1 E1.20000 F2100
 ;TYPE:External perimeter
 ;WIDTH:0.45
@@ -145,7 +146,7 @@ G1 Y-71.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P69 R1
+M73 P73 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -168,7 +169,8 @@ M486 S-1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
-G0 Z98.726 F600
+G0 Z-5.400 F600
+G0 X0.000 Y-160.000 F9000
 ;TYPE:Custom
 G0 A0.0000 C0.0000 F2546
 ;TYPE:Custom
@@ -180,7 +182,7 @@ M73 P100 R0
 ; filament used [mm] = 15.19
 ; filament used [cm3] = 0.04
 ; filament used [g] = 0.05
-; estimated printing time (normal mode) = 52s
+; estimated printing time (normal mode) = 24s
 ; tiltprint_config = begin
 ; machine.name = generic A/C table
 ; machine.shape = table
@@ -224,6 +226,15 @@ M73 P100 R0
 ; machine.table.radius_mm = 100.0
 ; machine.table.size_mm = None
 ; machine.table.thickness_mm = 4.0
+; machine.cradle[0].name = left arm
+; machine.cradle[0].min_mm = [-130.0, -20.0, -40.0]
+; machine.cradle[0].max_mm = [-104.0, 20.0, -1.0]
+; machine.cradle[1].name = right arm
+; machine.cradle[1].min_mm = [104.0, -20.0, -40.0]
+; machine.cradle[1].max_mm = [130.0, 20.0, -1.0]
+; machine.cradle[2].name = bearing plate
+; machine.cradle[2].min_mm = [-130.0, -35.0, -50.0]
+; machine.cradle[2].max_mm = [130.0, 35.0, -24.0]
 ; machine.head.nozzle_mm = 0.4
 ; machine.head.silhouette_mm[0] = [0.6, 0.0]
 ; machine.head.silhouette_mm[1] = [2.5, 2.0]
@@ -241,7 +252,27 @@ M73 P100 R0
 ; machine.nozzle_limit_c = 300.0
 ; machine.bed_limit_c = 110.0
 ; machine.uncalibrated[0] = machine.tilt.point_mm
-; machine.uncalibrated[1] = machine.head.silhouette_mm
+; machine.uncalibrated[1] = machine.tilt.zero_deg
+; machine.uncalibrated[2] = machine.turn.point_mm
+; machine.uncalibrated[3] = machine.head.silhouette_mm
+; machine.uncalibrated[4] = machine.head.boxes
+; machine.uncalibrated[5] = machine.cradle
+; machine.sources.machine.x = an example
+; machine.sources.machine.y = an example
+; machine.sources.machine.z = an example
+; machine.sources.machine.tilt = an example: axle 12 mm below the plate's surface
+; machine.sources.machine.turn = an example: ten turns of cable either way
+; machine.sources.machine.table = an example
+; machine.sources.machine.head.nozzle_mm = the usual nozzle
+; machine.sources.machine.head.silhouette_mm = hydra5x docs/envelope.md, V6 block and heat sink
+; machine.sources.machine.junction_speed_mm_s = Marlin's classic jerk
+; machine.sources.machine.extruder_speed_mm_s = an example
+; machine.sources.machine.extruder_acceleration_mm_s2 = an example
+; machine.sources.machine.nozzle_limit_c = an all-metal hot end
+; machine.sources.machine.bed_limit_c = an example
+; machine.sources.machine.tool_mm = X Y Z are the tip's by the choice of zero
+; machine.sources.machine.clearance_mm = chosen
+; machine.sources.machine.lift_mm = chosen
 ; machine.gcode.start[0] = G21
 ; machine.gcode.start[1] = G90
 ; machine.gcode.start[2] = M83
