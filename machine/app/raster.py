@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from mdp.kernel import kernel, part
 from mdp.mesh import Floats, Mesh
 
 Image = NDArray[np.uint8]
@@ -116,13 +116,13 @@ def _to_screen(corners: Floats, axes: Floats, scale: float, middle: Floats, widt
     return np.stack([0.5 * width + scale * seen[..., 0], 0.5 * height - scale * seen[..., 1], seen[..., 2]], axis=-1)
 
 
-@numba.njit(cache=True, inline="always")
+@part
 def _dot(a: Any, b: Any) -> float:
     """Written out: numba's own would need scipy."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@numba.njit(cache=True)
+@kernel
 def _blend(faces: Any, around: Any, first: Any, normals: Any, areas: Any, crease: float) -> Any:
     out = np.zeros((len(faces), 3, 3))
     for f in range(len(faces)):
@@ -136,7 +136,7 @@ def _blend(faces: Any, around: Any, first: Any, normals: Any, areas: Any, crease
     return out
 
 
-@numba.njit(cache=True)
+@kernel
 def z_buffer(screen: Any, width: int, height: int) -> Any:
     """Depth (h, w), greatest is nearest, and face index (h, w), -1 where nothing is; screen as from _to_screen."""
     depth = np.full((height, width), -np.inf)
@@ -162,7 +162,7 @@ def z_buffer(screen: Any, width: int, height: int) -> Any:
     return depth, face
 
 
-@numba.njit(cache=True)
+@part
 def _lit_share(shadow: Any, x: float, y: float, d: float, bias: float) -> float:
     """Share of the shadow map's texels around a point that see it: percentage-closer filtering over 5 x 5 texels."""
     column, row = int(x), int(y)
@@ -175,7 +175,7 @@ def _lit_share(shadow: Any, x: float, y: float, d: float, bias: float) -> float:
     return seen / 25.0
 
 
-@numba.njit(cache=True)
+@kernel
 def _shade(screen: Any, lit: Any, face: Any, normals: Any, paint: Any, shadow: Any, bias: float, to_light: Any, axes: Any) -> Any:
     """Colour (h, w, 3) and the normal in camera axes (h, w, 3) of every pixel."""
     height, width = face.shape
@@ -207,7 +207,7 @@ def _shade(screen: Any, lit: Any, face: Any, normals: Any, paint: Any, shadow: A
     return colour, bent
 
 
-@numba.njit(cache=True)
+@kernel
 def _draw_edges(colour: Any, face: Any, group: Any, depth: Any, bent: Any, axes: Any, pixel_mm: float) -> None:
     """Darken pixels at outlines, creases and borders between meshes."""
     height, width = face.shape

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
+from mdp.kernel import kernel, part
 from mdp.mesh import Floats, Mesh
 from slicer.paths import Kind
 
@@ -115,7 +115,7 @@ def _listed(
     return np.searchsorted(cell[order], np.arange(shape.prod() + 1)), face[order]
 
 
-@njit(cache=True)
+@kernel
 def _winding(points, corners, origin, size, shape, first, faces, aside):  # type: ignore[no-untyped-def]
     """(n,) how often the surface winds about each point: signed crossings of the ray straight up."""
     winding = np.zeros(len(points), np.int64)
@@ -136,7 +136,7 @@ def _winding(points, corners, origin, size, shape, first, faces, aside):  # type
     return winding
 
 
-@njit(cache=True)
+@kernel
 def _nearest(points, corners, origin, size, shape, first, faces, most):  # type: ignore[no-untyped-def]
     """(n,) distance of each point to the nearest face, at most `most`."""
     distances = np.full(len(points), most)
@@ -151,7 +151,7 @@ def _nearest(points, corners, origin, size, shape, first, faces, most):  # type:
     return distances
 
 
-@njit(cache=True)
+@part
 def _to_triangle(p, a, b, c):  # type: ignore[no-untyped-def]
     """Distance of a point from a triangle: inside its prism the height, else the nearest edge."""
     ab, ac, ap = b - a, c - a, p - a
@@ -164,7 +164,7 @@ def _to_triangle(p, a, b, c):  # type: ignore[no-untyped-def]
     return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
 
 
-@njit(cache=True)
+@part
 def _to_edge(p, a, b):  # type: ignore[no-untyped-def]
     d, ap = b - a, p - a
     length2 = _dot(d, d)
@@ -173,11 +173,11 @@ def _to_edge(p, a, b):  # type: ignore[no-untyped-def]
     return np.sqrt(_dot(rest, rest))
 
 
-@njit(cache=True)
+@part
 def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@part
 def _cross(a, b):  # type: ignore[no-untyped-def]
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -7,14 +7,13 @@ as the bead, lying in its part's own direction; the corners that round beads lea
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from machine.dryrun.deposit import AROUND, inside
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.ground import beads
 from machine.dryrun.stretches import stretches
-from mdp.kernel import part
+from mdp.kernel import kernel, part
 from mdp.mesh import Floats, Mesh
 from mdp.pose import rotation
 from profiles.profile import Profile
@@ -98,7 +97,7 @@ def _in_bar(p, a, d, length, up, half, height):  # type: ignore[no-untyped-def]
     return side <= (half + ROUND_MM) * (half + ROUND_MM)
 
 
-@njit(cache=True)
+@kernel
 def _marked(places, order, first, origin, cell, shape, segments, ups, width, height, hit):  # type: ignore[no-untyped-def]
     """Mark the places in every bar: those of the cells that its box touches, piece by piece."""
     d, low, high = np.zeros(3), np.zeros(3, np.int64), np.zeros(3, np.int64)

@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from machine.dryrun.field import NOTHING, Field, empty, laid, sloped_depth
 from machine.dryrun.stretches import Stretch, stretches
 from machine.kinematics.table import machine_points
 from machine.parsed import MoveKind, ParsedProgram
-from mdp.kernel import part
+from mdp.kernel import kernel, part
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
@@ -139,7 +138,7 @@ def _plate(machine: Machine, pose: Pose) -> Floats:
     return np.array([-normal[0] / normal[2], -normal[1] / normal[2], float(normal @ centre) / normal[2]])
 
 
-@njit(cache=True)
+@kernel
 def _settled(ends, half, rows, field):  # type: ignore[no-untyped-def]
     """Lay (m, 2, 3) beads into a field."""
     for i in range(len(ends)):
@@ -194,7 +193,7 @@ def _carried(x, y, z, nx, ny, row, first, gap, at, height, path, done, held, hal
     return 0
 
 
-@njit(cache=True)
+@kernel
 def _walked(rows, start, end, extruded, half, height, path, done, held, first, gap, plate, field, silhouette, boxes, depth, air, taken, next_to):  # type: ignore[no-untyped-def] # fmt: skip # noqa: E501
     """Try each row of a stretch against the field, then lay it."""
     for row in rows:
