@@ -1,0 +1,60 @@
+"""Bench of G-code: a print of a million strokes written and read back; processor seconds and memory."""
+
+import argparse
+import resource
+import time
+
+import numpy as np
+
+from machine.dialects import DIALECTS
+from machine.gcode import write_gcode
+from machine.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel
+from machine.parse import parse_gcode
+from mdp.pose import Pose
+from profiles.profile import load
+from slicer.paths import Kind
+
+STROKES, PER_STROKE, LAYERS_A_PART = 5000, 200, 50
+
+
+def program() -> MachineProgram:
+    """Five parts at five poses, twenty strokes of 200 short lines a layer."""
+    chance = np.random.default_rng(1)
+    start = np.array([[0.0, 0.0, 10.0], [0.0, 0.0, 10.0]])
+    moves: list[Move] = [Travel(start, 10.0), Travel(start, 10.0)]
+    for k in range(STROKES):
+        layer, part = k // 20, k // (20 * LAYERS_A_PART)
+        if k % (20 * LAYERS_A_PART) == 0:
+            pose = Pose(5.0 * part, 10.0 * part)
+            moves += [Reorient(pose, 20.0), BeginPart(part + 1, pose, LAYERS_A_PART)]
+        if k % 20 == 0:
+            moves.append(BeginLayer(part + 1, layer % LAYERS_A_PART + 1, 0.2 * layer + 0.2, 0.2, 1.0))
+        angle = np.cumsum(chance.uniform(0, 0.05, PER_STROKE + 1))
+        points = np.column_stack([40 * np.cos(angle), 40 * np.sin(angle), np.full(PER_STROKE + 1, 0.2 * (layer + 1))])
+        moves.append(Stroke(Kind.INNER_WALL, points, np.full(PER_STROKE, 0.05), 40.0, 0.45))
+    return MachineProgram("bench", tuple(moves))
+
+
+def main() -> None:
+    """Write and read, and tell how long each took."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("dialect", choices=DIALECTS, nargs="?", default="marlin")
+    parser.add_argument("coordinates", choices=("table", "workpiece"), nargs="?", default="table")
+    given = parser.parse_args()
+    profile = load(settings=[f"machine.dialect={given.dialect}", f"machine.coordinates={given.coordinates}"])
+    made = program()
+    marks = [time.process_time()]
+    begun = write_gcode(made, profile)
+    marks.append(time.process_time())
+    lines = tuple(begun)
+    marks.append(time.process_time())
+    parsed = parse_gcode(lines, profile.machine)
+    marks.append(time.process_time())
+    clock, write, parse = np.diff(marks)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{given.dialect} {given.coordinates}: {len(lines)} lines, {len(parsed.line)} moves")
+    print(f"clock {clock:.1f} s, write {write:.1f} s, parse {parse:.1f} s, peak {peak:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()
