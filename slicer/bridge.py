@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mdp.kernel import kernel, longs
+from mdp.kernel import floats, kernel, table
 from mdp.mesh import Floats
 from slicer.bead import Bead
 from slicer.paths import Kind
@@ -22,6 +21,7 @@ ANCHOR = 2.0  # line widths that the lines of a bridge reach over its banks
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
 ADRIFT = 10.0  # and one held nowhere like this
 TOLERATED = 0.02  # share of a bridge's length that may have a loose end: corners of the place
+NEAR_MM = 1e-6  # more than rounding moves the end of a line off the side it lies on
 GAIN = 0.01  # a direction is better only by this share, more than where the lines happen to lie; else the place's own sides win
 
 
@@ -51,20 +51,18 @@ def bridge(hanging: Polygons, banks: Floats, width_mm: float) -> Bridge | None:
     if hanging.area() < LEAST * width_mm**2 or not len(banks):
         return None
     sides = edges(hanging)
-    around = sides.reshape(-1, 2)
-    best, least = None, np.inf
-    for angle in _angles(sides):
-        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        turned = np.ascontiguousarray((around @ turn).reshape(-1, 4))
-        rows = clipped(turned, np.arange(turned[:, 1].min() + 0.5 * width_mm, turned[:, 1].max(), width_mm))
-        if not len(rows):
-            continue
-        spans, held = rows[:, 1] - rows[:, 0], _held(banks, rows, np.ascontiguousarray(turn))
-        sag = float(((np.array([ADRIFT, LOOSE, 1.0])[held] * spans) ** 2).sum() / spans.sum())
-        if held.any() and sag < least * (1.0 - GAIN):
-            least, loose = sag, float(spans[held < 2].sum() / spans.sum())
-            best = (float(np.degrees(angle)), float(spans.max()), loose)
-    return None if best is None else Bridge(hanging, *best)
+    angles = _angles(sides)
+    best, longest_mm, loose = _best(sides, _near(banks, sides), np.array(angles), width_mm)
+    return None if best < 0 else Bridge(hanging, float(np.degrees(angles[best])), longest_mm, loose)
+
+
+def _near(banks: Floats, sides: Floats) -> Floats:
+    """The edges that a ray to the right may cross from anywhere on a place with these sides."""
+    x, y = sides[:, 0], sides[:, 1]
+    above, below = y.min() - NEAR_MM, y.max() + NEAR_MM
+    right = np.maximum(banks[:, 0], banks[:, 2]) > x.min() - NEAR_MM
+    level = (np.maximum(banks[:, 1], banks[:, 3]) > above) & (np.minimum(banks[:, 1], banks[:, 3]) < below)
+    return banks[right & level]
 
 
 def _angles(sides: Floats) -> list[float]:
@@ -77,14 +75,36 @@ def _angles(sides: Floats) -> list[float]:
 
 
 @kernel
-def _held(banks: Floats, rows: Floats, turn: Floats) -> NDArray[np.int64]:
-    """(m,) how many ends of each line lie on a bank."""
-    held: NDArray[np.int64] = longs(len(rows), 0)
-    for r in range(len(rows)):
-        for end in range(2):
-            x, y = rows[r, end], rows[r, 2]
-            held[r] += lies_inside(banks, turn[0, 0] * x + turn[0, 1] * y, turn[1, 0] * x + turn[1, 1] * y)
-    return held
+def _best(sides: Floats, banks: Floats, angles: Floats, width_mm: float) -> tuple[int, float, float]:
+    """Which angle sags least (-1: none is held), its longest span and the share of its lines that is loose."""
+    best, least, longest_mm, loose = -1, np.inf, 0.0, 0.0
+    turned, sag_of = table(len(sides), 4), np.array([ADRIFT**2, LOOSE**2, 1.0])
+    for a in range(len(angles)):
+        cos, sin = np.cos(angles[a]), np.sin(angles[a])
+        low, high = np.inf, -np.inf
+        for e in range(len(sides)):
+            for k in range(0, 4, 2):
+                x, y = sides[e, k], sides[e, k + 1]
+                turned[e, k], turned[e, k + 1] = x * cos + y * sin, y * cos - x * sin
+            low, high = min(low, turned[e, 1]), max(high, turned[e, 1])
+        heights = floats(max(int(np.ceil((high - low) / width_mm - 0.5)), 0), 0.0)
+        for k in range(len(heights)):
+            heights[k] = low + (k + 0.5) * width_mm
+        rows = clipped(turned, heights)
+        total = sagging = free = longest = 0.0
+        any_held = False
+        for r in range(len(rows)):
+            held, y = 0, rows[r, 2]
+            for end in range(2):
+                x = rows[r, end]
+                held += lies_inside(banks, cos * x - sin * y, sin * x + cos * y)
+            span = rows[r, 1] - rows[r, 0]
+            total, longest, any_held = total + span, max(longest, span), any_held or held > 0
+            sagging += sag_of[held] * span * span
+            free += span if held < 2 else 0.0
+        if any_held and sagging < least * (1.0 - GAIN) * total:
+            best, least, longest_mm, loose = a, sagging / total, longest, free / total
+    return best, longest_mm, loose
 
 
 def bridged(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:
