@@ -1,5 +1,7 @@
 """Coordinates: axis positions and the places on the table that a following firmware (TCP) calls X Y Z."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from machine.dialects import DIALECTS
@@ -32,7 +34,7 @@ def axis_positions(machine: Machine, rows: Floats) -> Floats:
     positions = np.empty_like(places)
     changes = np.flatnonzero((rows[1:, 3:5] != rows[:-1, 3:5]).any(axis=1)) + 1
     bounds = [0, *changes.tolist(), len(rows)]
-    for first, last in zip(bounds, bounds[1:], strict=False):
+    for first, last in pairwise(bounds):
         pose = Pose(float(rows[first, 3]), float(rows[first, 4])) if last > first else level(machine)
         positions[first:last] = machine_points(machine, pose, places[first:last])
     return positions
