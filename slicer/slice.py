@@ -9,32 +9,24 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.base import compensated
 from slicer.bead import Bead
-from slicer.bridge import Bridge, beside, bridge_beads, bridged
+from slicer.bridge import beside, bridge_beads, bridged
 from slicer.brim import brim
-from slicer.contact import contacts
 from slicer.cooling import fan_share, hanging_fan
-from slicer.forbidden import far_mm, forbidden
 from slicer.gap import gaps
-from slicer.heights import heights_of
-from slicer.infill import infill, pattern_density
-from slicer.interface import beneath, interface_edges, strengthened
+from slicer.infill import infill
 from slicer.interlock import filled as interlocked
-from slicer.interlock import grooved
 from slicer.order import ordered
 from slicer.overhang import overhanging
 from slicer.paths import Kind, Layer, Path, SlicedPart
-from slicer.pedestal import pedestal_beads, pedestal_layers, without_pedestal
-from slicer.polygons import Polygons, cleaned, united
+from slicer.pedestal import pedestal_beads
+from slicer.polygons import united
 from slicer.props import support_beads
-from slicer.region import Region, regions
 from slicer.seam import Surroundings, rear_of, seamed
-from slicer.section import sections
 from slicer.skin import angle_of_layer_deg, skin
 from slicer.speed import layer_time_s, speeds_mm_s
-from slicer.support import supports
-from slicer.walls import Walls, wall_beads, walls
+from slicer.stack import Stack, stack_of
+from slicer.walls import wall_beads
 
 
 def slice_part(
@@ -50,81 +42,63 @@ def slice_part(
     input gives the same paths. show: hears after each layer its number and how many there are. Raises SliceError when the
     part gives no bead at all.
     """
-    process, mesh = profile.process, part.in_part_frame()
-    pedestal_mm = profile.search.pedestal_mm if part.index == 1 else 0.0
-    at = heights_of(mesh, process, part.index == 1, pedestal_mm)
-    below_model = pedestal_layers(at.tip_mm, pedestal_mm)
-    outlines = grooved([cleaned(loops) for loops in sections(mesh, at.cut_mm)], part, later, at.cut_mm, process)
-    if part.index == 1:
-        outlines[0] = compensated(outlines[0], process.elephant_foot_mm, process.line_width_mm)
-    own = without_pedestal(outlines, mesh, at.cut_mm, pedestal_mm, below_model) if below_model else outlines
-    processes = strengthened(process, part.index > 1, len(outlines))
-    walled = [walls(s, p.walls, p.line_width_mm, h) for s, p, h in zip(own, processes, at.height_mm, strict=True)]
-    below = beneath(part, earlier, outlines[0])
-    filled = regions(own, [w.inside for w in walled], below, process)
-    density = pattern_density([region.sparse for region in filled], process, process.layer_height_mm)
-    over = contacts(mesh, outlines, at.cut_mm, process, below)
-    far = far_mm(mesh)
-    shut = forbidden(part, later, at.tip_mm - at.height_mm, at.tip_mm, process.support_distance_mm, far)
-    props = supports([c.hanging for c in over], outlines, at, process, below, shut, far)
-    edges, rear = interface_edges(part, outlines[0], below, later), rear_of(mesh.bounds_mm)
+    stack = stack_of(part, profile, earlier, later)
+    bounds_mm = part.in_part_frame().bounds_mm
+    rear = rear_of(bounds_mm)
     layers: list[Layer] = []
-    tip, seams = None, np.zeros((0, 2))
-    for i, outline in enumerate(outlines):
-        height = float(at.height_mm[i])
-        region, beads = _beads(own[i], walled[i], filled[i], over[i].bridges, i, processes[i], height)
-        beads += infill(region.sparse, process, density, i, float(at.tip_mm[i]), height)
-        beads += support_beads(props.areas[i], props.dense[i], process, height, i == 0 and part.index == 1)
-        if i < below_model:
-            beads += pedestal_beads(outline, i, below_model, process, height)
-        if i == 0 and part.index == 1:
-            top_mm = max(float(each.mesh.bounds_mm[1, 2]) for each in (part, *later))
-            beads += brim(united([outline, props.areas[0]]), outline, top_mm, process, height)
-        around = Surroundings(rear, seams, rear if tip is None else tip, edges, float(at.cut_mm[i]), i)
-        beads, seams = seamed(beads, process, around)
-        bank = outlines[i - 1] if i else below
-        layer = _layer(beads, outline, bank, i, part, profile, float(at.tip_mm[i]), height, tip)
+    tip, seams = rear, np.zeros((0, 2))
+    for i in range(len(stack.outlines)):
+        around = Surroundings(rear, seams, tip, stack.edges, float(stack.at.cut_mm[i]), i)
+        beads, seams = seamed([*_own(stack, i), *_beside(stack, i, part, later)], profile.process, around)
+        layer = _layer(beads, stack, i, part, profile, tip if layers else None)
         if layer.paths:
             tip = layer.paths[-1].points[-1]
             layers.append(layer)
         if show is not None:
-            show(i + 1, len(outlines))
-    _check(part, mesh.bounds_mm, layers, process)
-    worst = sum(layer.z_mm <= at.tip_mm[props.worst_layer] for layer in layers) if props.unsupported_mm2 > 0 else 0
-    return SlicedPart(part.index, tuple(layers), props.unsupported_mm2, worst)
+            show(i + 1, len(stack.outlines))
+    _check(part, bounds_mm, layers, profile.process)
+    missed_mm2, at_mm = stack.supports.unsupported_mm2, stack.at.tip_mm[stack.supports.worst_layer]
+    worst = sum(layer.z_mm <= at_mm for layer in layers) if missed_mm2 > 0 else 0
+    return SlicedPart(part.index, tuple(layers), missed_mm2, worst)
 
 
-def _beads(
-    outline: Polygons, around: Walls, region: Region, bridges: Sequence[Bridge], layer: int, process: Process, height_mm: float
-) -> tuple[Region, list[Bead]]:
-    """What a layer prints of the part itself but for the infill, and the regions beside its bridges."""
+def _own(stack: Stack, layer: int) -> list[Bead]:
+    """What a layer prints of the part itself."""
+    process, height_mm = stack.processes[layer], float(stack.at.height_mm[layer])
+    region, around, outline = stack.regions[layer], stack.walls[layer], stack.own[layer]
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
     angle = angle_of_layer_deg(process.infill_angle_deg, layer)
     beads = wall_beads(around, process, height_mm)
     beads += gaps(around.free, width, height_mm, outline, process.outer_bulge) + gaps(around.narrow, width, height_mm)
-    for span in bridges:
+    for span in stack.contacts[layer].bridges:
         area = bridged(span, around.inside, width)
         if not area.is_empty():
             beads += bridge_beads(area, span.angle_deg, process.bridge_flow, width, height_mm, overlap)
             region = beside(region, area, width)
     beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
-    return region, beads + skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
+    beads += skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
+    return beads + infill(region.sparse, process, stack.density, layer, float(stack.at.tip_mm[layer]), height_mm)
 
 
-def _layer(
-    beads: list[Bead],
-    outline: Polygons,
-    bank: Polygons | None,
-    index: int,
-    part: Part,
-    profile: Profile,
-    z_mm: float,
-    height_mm: float,
-    tip: Floats | None,
-) -> Layer:
+def _beside(stack: Stack, layer: int, part: Part, later: Sequence[Part]) -> list[Bead]:
+    """What a layer prints for the part: support, pedestal, skirt and brim."""
+    process, height_mm = stack.processes[layer], float(stack.at.height_mm[layer])
+    props, outline, on_platform = stack.supports, stack.outlines[layer], part.index == 1
+    foot = layer == 0 and on_platform
+    beads = support_beads(props.areas[layer], props.dense[layer], process, height_mm, foot)
+    if layer < stack.pedestal_layers:
+        beads += pedestal_beads(outline, layer, stack.pedestal_layers, process, height_mm)
+    if foot:
+        top_mm = max(float(each.mesh.bounds_mm[1, 2]) for each in (part, *later))
+        beads += brim(united([outline, props.areas[0]]), outline, top_mm, process, height_mm)
+    return beads
+
+
+def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Profile, tip: Floats | None) -> Layer:
     """The beads in order, with speeds, flow, fan and heat."""
-    process, material = profile.process, profile.material
-    placed = overhanging(ordered(beads, outline, process, tip), outline, bank, process)
+    process, material, outline = profile.process, profile.material, stack.outlines[index]
+    z_mm, height_mm = float(stack.at.tip_mm[index]), float(stack.at.height_mm[index])
+    placed = overhanging(ordered(beads, outline, process, tip), outline, stack.bank(index), process)
     on_platform = part.index == 1
     if index == 0 and not on_platform and process.interlock_mm > 0.0:
         placed = interlocked(placed, part, process, height_mm)
