@@ -1,6 +1,7 @@
 """Bead: a piece of plastic to lay down, before its place in the order, its speed and its travel are known."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -37,7 +38,7 @@ class Bead:
         """Whether the bead must begin where it does: walls have their seam there."""
         return self.closed or self.kind in WALLS
 
-    @property
+    @cached_property
     def length_mm(self) -> float:
         """Length of the bead."""
         return length_mm(self.points)

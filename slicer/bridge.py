@@ -62,7 +62,8 @@ def _near(banks: Floats, sides: Floats) -> Floats:
     above, below = y.min() - NEAR_MM, y.max() + NEAR_MM
     right = np.maximum(banks[:, 0], banks[:, 2]) > x.min() - NEAR_MM
     level = (np.maximum(banks[:, 1], banks[:, 3]) > above) & (np.minimum(banks[:, 1], banks[:, 3]) < below)
-    return banks[right & level]
+    near: Floats = banks[right & level]
+    return near
 
 
 def _angles(sides: Floats) -> list[float]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mdp.kernel import kernel, longs, part
 from mdp.mesh import Floats
-from slicer.polygons import Polygons, contours
+from slicer.polygons import Polygons, contours, edges_of
 
 MARGIN_MM = 1e-6  # by which a side reaches into neighbouring cells, so that rounding never hides it
 
@@ -35,7 +35,7 @@ def lattice(polygons: Polygons) -> Lattice:
     """The sides of all contours in cells, about one side a cell."""
     loops = contours(polygons)
     begins = np.cumsum([0, *(len(loop) for loop in loops)]).astype(np.int64)
-    sides = np.concatenate([np.zeros((0, 4)), *(np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops)])
+    sides = edges_of(loops)
     loop = np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins))
     low = sides.reshape(-1, 2).min(axis=0, initial=1e9) - 1.0
     wide, deep = np.maximum(sides.reshape(-1, 2).max(axis=0, initial=-1e9) + 1.0 - low, 1.0)

@@ -81,7 +81,11 @@ def closed(loop: Floats) -> Floats:
 
 def edges(polygons: Polygons) -> Floats:
     """(n, 4) edges of all contours, x0 y0 x1 y1."""
-    loops = contours(polygons)
+    return edges_of(contours(polygons))
+
+
+def edges_of(loops: Sequence[Floats]) -> Floats:
+    """(n, 4) edges of loops (k, 2), loop after loop."""
     if not loops:
         return np.zeros((0, 4))
     points = np.concatenate(loops)

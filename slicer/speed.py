@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from math import hypot
 
 import numpy as np
 
@@ -58,10 +59,17 @@ def _of_bead(bead: Bead, table: dict[Kind, float], process: Process) -> float:
 def travel_time_s(placed: Sequence[Placed], profile: Profile) -> float:
     """What a layer's travels and retractions take at least."""
     material = profile.material
-    points = [np.vstack([a.points[-1:], b.approach, b.points[:1]]) for a, b in pairwise(placed)]
-    length = sum(length_mm(np.ascontiguousarray(way)) for way in points)
+    length = sum(_travel_mm(a, b) for a, b in pairwise(placed))
     pulls = sum(p.retract for p in placed) * 2.0 * material.retract_mm / material.retract_speed_mm_s
     return length / profile.process.travel_speed_mm_s + pulls
+
+
+def _travel_mm(before: Placed, after: Placed) -> float:
+    """Length of the way between two beads."""
+    if len(after.approach):
+        return length_mm(np.concatenate([before.points[-1:], after.approach, after.points[:1]]))
+    (x0, y0), (x1, y1) = before.points[-1].tolist(), after.points[0].tolist()
+    return hypot(x1 - x0, y1 - y0)
 
 
 def layer_time_s(placed: Sequence[Placed], speeds: Floats, profile: Profile) -> float:

@@ -65,7 +65,7 @@ def _split(
     if area.is_empty():
         return line, area
     rest = area - grown(core, half + inner + SLACK_MM, BLUNT)
-    if rest.area() < LEAST_REST_MM2 or opened(rest, 0.5 * least_mm).is_empty():
+    if rest.area() < LEAST_REST_MM2 or grown(rest, -0.5 * least_mm).is_empty():
         return line, Polygons()
     line = line ^ grown(core, inner + SLACK_MM)
     rest = area - rounded(line, half + SLACK_MM)

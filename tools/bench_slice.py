@@ -1,4 +1,4 @@
-"""Measures slicing beside PrusaSlicer: `python tools/bench_slice.py [MODEL ...] [--height MM] [--set KEY=VALUE] [--rival ...]`.
+"""Measures slicing beside PrusaSlicer: `python tools/bench_slice.py [MODEL ...] [--height MM] [--support] [--set ...]`.
 
 Every model is scaled to one height (default 60 mm: 300 layers of 0.2 mm; 0: as it is), stands as one part on the platform
 and is sliced once to warm up and then three times; the least core seconds count, mesh to paths. Where PrusaSlicer is
@@ -35,6 +35,7 @@ from slicer.slice import slice_part
 
 RUNS = 3
 SHIPPED = ("demo:figure", "demo:tree", "demo:bracket", "demo:lattice")
+TREE, SNUG = "process.support=auto", ("--support-material", "--support-material-style", "snug")  # each slicer's own support
 UNMARKED = ("process.overhang_share=0", "process.outer_bulge=0")  # walls keep their names, and both lay the same beads
 KINDS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE, Kind.GAP)
 
@@ -61,15 +62,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("models", nargs="*", default=SHIPPED)
     parser.add_argument("--height", type=float, default=60.0)
     parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("--support", action="store_true", help="both slicers with support, each as it does that")
     parser.add_argument("--rival", default="prusa-slicer", help="PrusaSlicer's command")
     options = parser.parse_args(arguments)
-    profile = load(settings=[*SAME, *UNMARKED, *options.set])
+    profile = load(settings=[*SAME, *UNMARKED, *((TREE,) if options.support else ()), *options.set])
     for model in options.models:
         mesh = standing(model, options.height)
         cuts = heights_of(mesh, profile.process, True).cut_mm
         section_s = min(core_seconds(lambda: sections(mesh, cuts)) for _ in range(RUNS + 1))  # noqa: B023
         print(f"\n{Path(model).name}: {len(mesh.faces)} faces, {len(cuts)} layers, sections {section_s:.3f} core s")
-        print_table(ours(mesh, profile), rival(mesh, options.rival) if shutil.which(options.rival) else None)
+        words = (options.rival, *(SNUG if options.support else ()))
+        print_table(ours(mesh, profile), rival(mesh, words) if shutil.which(options.rival) else None)
 
 
 def print_table(own: Figures, other: Figures | None) -> None:
@@ -114,17 +117,17 @@ def metres(sliced: SlicedPart) -> dict[str, float]:
     return dict(lengths)
 
 
-def rival(mesh: Mesh, command: str) -> Figures:
+def rival(mesh: Mesh, command: Sequence[str]) -> Figures:
     """PrusaSlicer's whole command on the same mesh."""
     with tempfile.TemporaryDirectory() as folder:
         model, out = Path(folder) / "model.stl", Path(folder) / "model.gcode"
         model.write_bytes(stl(mesh))
         runs = []
         for _ in range(RUNS):
-            words = [sys.executable, "-I", "-c", METER, command, *PRUSA.split(), "--no-overhangs", "-o", out, model]
+            words = [sys.executable, "-I", "-c", METER, *command, *PRUSA.split(), "--no-overhangs", "-o", out, model]
             done = subprocess.run(words, capture_output=True, text=True, check=False)
             if done.returncode or not out.exists():
-                raise SystemExit(f"{command} failed: {(done.stderr or done.stdout).strip()[-300:]}")
+                raise SystemExit(f"{command[0]} failed: {(done.stderr or done.stdout).strip()[-300:]}")
             runs.append([float(word) for word in done.stdout.split()[-2:]])
         lengths_m, filament_mm = laid(out.read_text(encoding="utf-8"))
     return Figures(min(run[0] for run in runs), max(run[1] for run in runs) / 1024, filament_mm * pi * 1.75**2 / 4.0, lengths_m)
