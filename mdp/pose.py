@@ -105,7 +105,7 @@ def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tup
     a, b, c = _angle(turn_axis, direction), _angle(tilt_axis, UP), _angle(tilt_axis, turn_axis)
     s = 0.5 * (a + b + c)
     triple2 = 4.0 * sin(s) * sin(s - a) * sin(s - b) * sin(s - c)
-    if triple2 < -1e-9:
+    if triple2 < -SINGULAR * SINGULAR:
         return []
     normal = _cross(turn_axis, tilt_axis)
     length = max(triple2, 0.0) ** 0.5 / determinant

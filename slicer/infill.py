@@ -49,9 +49,7 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     drawn = asked
     for _ in range(2):
         step = 0.25 * LENGTH * spacing / drawn / len(chosen)  # a gyroid's layers differ over a quarter of its period
-        beads = [
-            bead for k, i in enumerate(chosen) for bead in infill(areas[i], process, drawn, i, (k + 0.5) * step, height_mm)
-        ]
+        beads = [bead for k, i in enumerate(chosen) for bead in infill(areas[i], process, drawn, i, (k + 0.5) * step, height_mm)]
         got = sum(bead.length_mm for bead in beads) * spacing / sum(areas[i].area() for i in chosen)
         if got <= 0.0:
             return asked

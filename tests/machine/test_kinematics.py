@@ -87,6 +87,11 @@ def test_every_pose_of_any_chain_brings_its_direction_upright(machine: Machine, 
         assert rotation(machine, pose) @ direction == pytest.approx(UP, abs=1e-9 if far else 2 * SINGULAR)
 
 
+def test_a_direction_just_beyond_what_the_axes_reach_has_no_pose() -> None:
+    machine = _chain(((1.0, 6.103515625e-05, 0.0), (0.0, 0.5, 1.0)), ((0.0, 0.0, 0.0),) * 3, (-1, -1), (0.0, 0.0))
+    assert poses(machine, unit((0.0, 0.5, 1.0))) == []  # 3e-5 short of upright at the best
+
+
 @given(CHAINS, st.floats(-170, 170), st.floats(-170, 170))
 def test_the_pose_that_a_direction_was_made_with_is_among_its_poses(machine: Machine, tilt: float, turn: float) -> None:
     made = Pose(machine.tilt.zero_deg + tilt, machine.turn.zero_deg + turn)

@@ -101,6 +101,7 @@ def test_a_run_is_told_in_four_lines_and_its_findings() -> None:
         "1 part, 1 layer, 0 reorientations, 1 retraction, 0.01 m travel",
         "plastic from 0.0, 0.0, 10.0 to 30.0, 0.0, 10.0 mm (workpiece)",
         "axes X 0.0..30.0, Y 0.0..0.0, Z 10.0..10.0, A 0.0..0.0, C 0.0..0.0",
+        "error: the part begins in air: 30.0 mm of its first layer have nothing under them (line 8)",
         "warning: M777 is not known to the dry run and was ignored (1 times) (line 10)",
     ]
 
