@@ -32,7 +32,7 @@ from mdp.sums import dot, find_heights, find_lowest, sum_risks, sum_volumes
 # Threads of our own: they wait for each other without spinning, Ctrl-C reaches the one that asks, and kernels that are not
 # parallel themselves compile in half the time.
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-ROWS_AT_ONCE = 4
+LEAST_ROWS, SHARES = 4, 8  # rows a call, and calls for every core: handing a call over costs as much as a row
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,8 +169,9 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 
 
 def _in_threads(kernel: Callable[..., None], count: int, *arguments: Any) -> None:
-    """Run a kernel over `count` rows, a few at a time on every core; each row is written by one call alone."""
-    spans = [(row, min(row + ROWS_AT_ONCE, count)) for row in range(0, count, ROWS_AT_ONCE)]
+    """Run a kernel over `count` rows, some at a time on every core; each row is written by one call alone."""
+    rows = max(LEAST_ROWS, count // (SHARES * THREADS))
+    spans = [(row, min(row + rows, count)) for row in range(0, count, rows)]
     threads = min(THREADS, len(spans))
     if threads < 2:
         kernel(0, count, *arguments)
