@@ -80,6 +80,8 @@ def _moved(rules: Rules, best: Chain) -> Chain:
     """With every plane moved to where less stays risky, the one cut first moved first."""
     enough_mm2 = ENOUGH * rules.model.risky_mm2
     for place in range(len(best.planes)):
+        if rules.late():
+            break
         node = best.nodes[place]
         surface = _surface(node)
         ever_better = list(_climb(rules, surface, best, place))
@@ -132,7 +134,7 @@ def _climb(rules: Rules, surface: Surface, found: Chain, place: int) -> Iterator
                 if left_mm2 < least_mm2 - SAME_MM2 and rules.allowed(found.nodes[place], plane):
                     here, least_mm2 = plane, left_mm2
                     yield [here, *later]
-            if least_mm2 == before_mm2:
+            if least_mm2 == before_mm2 or rules.late():
                 break
 
 

@@ -39,8 +39,9 @@ class Table:
 
     def ranked(self, trade_off: float) -> Iterator[int]:
         """Feasible rows by gain less trade_off times residual, best first; near-equal planes take one place."""
-        ranking = self._rankings.setdefault(trade_off, _Ranking(self, trade_off))
-        place = 0
+        if trade_off not in self._rankings:
+            self._rankings[trade_off] = _Ranking(self, trade_off)
+        ranking, place = self._rankings[trade_off], 0
         while (row := ranking.at(place)) is not None:
             yield row
             place += 1
