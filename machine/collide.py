@@ -146,9 +146,9 @@ def hull(points_mm: Floats, bead_mm: float) -> Printed:
 
 
 def together(pieces: list[Printed]) -> Printed:
-    """Several printed pieces as one."""
+    """Several printed pieces as one: the hull of their hulls, for no direction reaches farther than it."""
     points = [piece.points_mm for piece in pieces]
-    return Printed(np.vstack([np.zeros((0, 3)), *points]), max((piece.bead_mm for piece in pieces), default=0.0))
+    return hull(np.vstack([np.zeros((0, 3)), *points]), max((piece.bead_mm for piece in pieces), default=0.0))
 
 
 Reach = Callable[[Floats], Floats]  # (k, 3) directions -> (k,) how far a solid reaches along each

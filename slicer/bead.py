@@ -1,10 +1,11 @@
 """Bead: a piece of plastic to lay down, before its place in the order, its speed and its travel are known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdp.kernel import kernel
 from mdp.mesh import Floats
@@ -12,6 +13,7 @@ from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
 ROUND_SIDES = 1.0 - pi / 4.0
+HIDDEN_RESOLUTION_MM = 0.0125  # of what the outer wall hides: PrusaSlicer's resolution of G-code
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +57,38 @@ def _length(points: Floats) -> float:
     for i in range(1, len(points)):
         total += np.hypot(points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1])
     return total
+
+
+def thinned(bead: Bead) -> Bead:
+    """The bead without points that lie within HIDDEN_RESOLUTION_MM of the line between their neighbours; a loop's start stays."""
+    if len(bead.points) < 3:
+        return bead
+    kept = _corners(bead.points, HIDDEN_RESOLUTION_MM)
+    return bead if kept.all() else replace(bead, points=bead.points[kept])
+
+
+@kernel
+def _corners(points: Floats, tolerance_mm: float) -> NDArray[np.bool_]:
+    """(n,) points that a polyline keeps (Douglas and Peucker 1973); the chord of a loop is the way from its start."""
+    kept = np.zeros(len(points), np.bool_)
+    kept[0], kept[len(points) - 1] = True, True
+    stack = [(0, len(points) - 1)]
+    while len(stack):
+        a, b = stack.pop()
+        dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+        square = max(dx * dx + dy * dy, 1e-18)
+        farthest, at = tolerance_mm * tolerance_mm, -1
+        for k in range(a + 1, b):
+            x, y = points[k, 0] - points[a, 0], points[k, 1] - points[a, 1]
+            share = min(max((x * dx + y * dy) / square, 0.0), 1.0)
+            away = (x - share * dx) ** 2 + (y - share * dy) ** 2
+            if away > farthest:
+                farthest, at = away, k
+        if at >= 0:
+            kept[at] = True
+            stack.append((a, at))
+            stack.append((at, b))
+    return kept
 
 
 def spacing_mm(width_mm: float, height_mm: float) -> float:

@@ -9,7 +9,7 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import Bead
+from slicer.bead import WALLS, Bead, thinned
 from slicer.bridge import beside, bridge_beads, bridged
 from slicer.brim import brim
 from slicer.cooling import fan_share, hanging_fan
@@ -49,7 +49,8 @@ def slice_part(
     tip, seams = rear, np.zeros((0, 2))
     for i in range(len(stack.outlines)):
         around = Surroundings(rear, seams, tip, stack.edges, float(stack.at.cut_mm[i]), i)
-        beads, seams = seamed([*_own(stack, i), *_beside(stack, i, part, later)], profile.process, around)
+        laid = [*_own(stack, i), *_beside(stack, i, part, later)]
+        beads, seams = seamed([bead if bead.kind in WALLS else thinned(bead) for bead in laid], profile.process, around)
         layer = _layer(beads, stack, i, part, profile, tip if layers else None)
         if layer.paths:
             tip = layer.paths[-1].points[-1]

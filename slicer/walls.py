@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead, bulged, spacing_mm
+from slicer.bead import HIDDEN_RESOLUTION_MM, Bead, bulged, spacing_mm
 from slicer.gap import LEAST_GAP, LEAST_LINE
 from slicer.paths import Kind
 from slicer.polygons import Polygons, contours, grown, opened, rounded
 
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner; what it leaves there is looked at again with round beads
 LEAST_REST_MM2 = 1e-3
-INNER_RESOLUTION_MM = 0.0125  # behind the outer wall detail is unseen and costs time: PrusaSlicer's resolution of G-code
 SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original leave no slivers
 
 
@@ -45,7 +44,7 @@ def walls(section: Polygons, count: int, width_mm: float, height_mm: float) -> W
         if not rest.is_empty():
             free, narrow = (rest, narrow) if level == 0 else (free, narrow + rest)
         levels.append(tuple(contours(line)))
-        area = core.simplify(INNER_RESOLUTION_MM)
+        area = core.simplify(HIDDEN_RESOLUTION_MM)
         if core.is_empty():
             break
     core = grown(area, -spacing)

@@ -9,13 +9,13 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import length_mm, spacing_mm
+from slicer.bead import HIDDEN_RESOLUTION_MM, length_mm, spacing_mm
 from slicer.centreline import centrelines
 from slicer.gap import gaps
 from slicer.paths import Kind, bead_area_mm2
 from slicer.polygons import Polygons, closed, contours
 from slicer.section import sections
-from slicer.walls import INNER_RESOLUTION_MM, wall_beads, walls
+from slicer.walls import wall_beads, walls
 from tests.slicer.hand import as_shapely, distances_mm, profile, section_at, shared
 
 WIDTH, HEIGHT = 0.45, 0.2
@@ -113,7 +113,7 @@ def test_walls_stay_inside_any_polygon(points):
     polygon = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(2.0, 24)
     for level, loops in enumerate(walls(polygon, 3, WIDTH, HEIGHT).loops):
         for loop in loops:
-            coarse = 0.01 + level * INNER_RESOLUTION_MM
+            coarse = 0.01 + level * HIDDEN_RESOLUTION_MM
             assert distances_mm(polygon, loop).min() > WIDTH / 2 + level * SPACING - coarse
 
 
