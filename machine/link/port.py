@@ -3,10 +3,13 @@
 import errno
 import os
 import select
+import socket
 import stat
+from dataclasses import dataclass
 from time import monotonic
 from types import TracebackType
 from typing import Any, Self
+from urllib.parse import urlsplit
 
 import serial
 from serial.tools import list_ports
@@ -18,25 +21,43 @@ READ_BYTES = 4096
 WRITE_S = 10.0  # a printer whose buffers stay full for longer has stopped reading
 BAUDS = (1200, 4_000_000)  # slowest and fastest rate that an adapter is known to take
 
-# termios.error is no OSError; pyserial lets it through when a setting is refused.
-_TROUBLE: tuple[type[Exception], ...] = (serial.SerialException, OSError, ValueError)
+# termios.error is no OSError; pyserial lets it through when a setting is refused. An rfc2217:// port that is closed or
+# refuses a setting may show it as AttributeError or NotImplementedError.
+_TROUBLE: tuple[type[Exception], ...] = (serial.SerialException, OSError, ValueError, AttributeError, NotImplementedError)
 if os.name == "posix":
     import termios
 
     _TROUBLE += (termios.error,)
 
 
+@dataclass(frozen=True)
+class SerialDevice:
+    """A serial port of this computer. name: the stable one of a USB adapter where there is one, else the path."""
+
+    name: str
+    path: str
+    description: str
+    serial_number: str
+
+
 class Port:
     """An open port: write all, read what is there.
 
-    On POSIX the bytes go through pyserial's own file descriptor: its read() and write() add five system calls to a turn,
-    as much time as all the rest of a turn takes.
+    On POSIX the bytes of devices and of socket:// go through pyserial's own file descriptor: its read() and write() add five
+    system calls to a turn, as much time as all the rest of a turn takes, and over a socket it reads byte by byte.
     """
 
     def __init__(self, device: Any, name: str) -> None:
         self._device = device
-        self._descriptor: int | None = getattr(device, "fd", None)
+        self._descriptor = _descriptor(device)
         self.name = name
+
+    def set_baud(self, baud: int) -> None:
+        """Go on at another rate, bits a second. PortError when the device refuses it."""
+        try:
+            self._device.baudrate = baud
+        except _TROUBLE as error:
+            raise PortError(refusal(self.name, baud, error)) from None
 
     def write(self, data: bytes) -> None:
         """Send all bytes. PortError when the printer does not take them or the port is gone."""
@@ -45,9 +66,9 @@ class Port:
                 self._device.write(data)
             else:
                 self._write_descriptor(self._descriptor, data)
-        except serial.SerialTimeoutException:
-            raise PortError(f"the printer at {self.name} has stopped reading: it took no bytes for {WRITE_S:g} s") from None
         except _TROUBLE as error:
+            if _timed_out(error):
+                raise PortError(f"the printer at {self.name} has stopped reading: it took no bytes for {WRITE_S:g} s") from None
             raise self._lost(error) from None
 
     def read(self) -> bytes:
@@ -102,7 +123,8 @@ class Port:
         self.close()
 
     def _lost(self, error: Exception) -> PortError:
-        return PortError(f"the connection at {self.name} was lost: is the cable or the printer unplugged? ({_reason(error)})")
+        cause = "is the printer or the network down?" if "://" in self.name else "is the cable or the printer unplugged?"
+        return PortError(f"the connection at {self.name} was lost: {cause} ({_reason(error)})")
 
 
 def open_port(name: str, baud: int) -> Port:
@@ -113,22 +135,65 @@ def open_port(name: str, baud: int) -> Port:
     """
     if not BAUDS[0] <= baud <= BAUDS[1]:
         raise PortError(f"baud rate {baud} is not possible: {BAUDS[0]} to {BAUDS[1]} is allowed, printers use 115200 or 250000")
-    if "://" not in name:
+    if "://" in name:
+        _check_address(name)
+    else:
         _check_path(name)
+    # pyserial's rfc2217:// knows no time limit for writing, its socket has one of its own.
+    write_s = None if name.startswith("rfc2217://") else WRITE_S
     try:
-        device = serial.serial_for_url(
-            name, baudrate=baud, timeout=READ_S, write_timeout=WRITE_S, exclusive=None if "://" in name else True
-        )
+        device = serial.serial_for_url(name, baudrate=baud, timeout=READ_S, write_timeout=write_s, exclusive=True)
     except _TROUBLE as error:
         raise PortError(refusal(name, baud, error)) from None
     return Port(device, name)
 
 
+def _descriptor(device: Any) -> int | None:
+    """The file descriptor of a POSIX device or of a socket, None where pyserial gives none."""
+    if os.name != "posix":
+        return None
+    try:
+        descriptor: int = device.fileno()
+    except OSError:  # io.UnsupportedOperation, as rfc2217:// and loop:// have none
+        return None
+    if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+        with socket.socket(fileno=os.dup(descriptor)) as same:  # a small line must not wait for the answer to the last one
+            same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return descriptor
+
+
+def serial_devices() -> tuple[SerialDevice, ...]:
+    """The serial ports of this computer: those with a stable name first, each once."""
+    stable = _stable_names()
+    found = [
+        SerialDevice(
+            name=stable.get(os.path.realpath(port.device), port.device),
+            path=port.device,
+            description=_described(port),
+            serial_number=port.serial_number or "",
+        )
+        for port in list_ports.comports()
+    ]
+    return tuple(sorted(found, key=lambda device: (device.name == device.path, device.name)))
+
+
+def _stable_names() -> dict[str, str]:
+    """Device path -> its name under /dev/serial/by-id, which stays the same wherever it is plugged in."""
+    folder = "/dev/serial/by-id"
+    names = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
+    return {os.path.realpath(f"{folder}/{name}"): f"{folder}/{name}" for name in names}
+
+
+def _described(port: Any) -> str:
+    """Maker and product as the adapter itself tells them over USB."""
+    words = [word for word in (port.manufacturer, port.product or port.description) if word and word != "n/a"]
+    ids = f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None and port.pid is not None else ""
+    return " ".join([*dict.fromkeys(words), *([f"({ids})"] if ids else [])])
+
+
 def port_names() -> list[str]:
     """Serial devices that exist, the stable names of USB adapters first."""
-    folder = "/dev/serial/by-id"
-    stable = [f"{folder}/{entry}" for entry in sorted(os.listdir(folder))] if os.path.isdir(folder) else []
-    return stable + sorted(found.device for found in list_ports.comports())
+    return [device.name for device in serial_devices()]
 
 
 def refusal(name: str, baud: int, error: Exception) -> str:
@@ -137,6 +202,8 @@ def refusal(name: str, baud: int, error: Exception) -> str:
     text = str(error).lower()
     if "exclusively lock" in text or number in (errno.EBUSY, errno.EAGAIN):
         return f"port {name} is busy: another program holds it open"
+    if "://" in name:
+        return f"port {name} cannot be opened: {_reason(error)}"
     if number in (errno.EACCES, errno.EPERM):
         return f"port {name} may not be used by this user: {_owners(name)}"
     if number == errno.ENOENT:
@@ -150,6 +217,20 @@ def missing(name: str) -> str:
     """One sentence for a port that does not exist, with those that do."""
     there = port_names()
     return f"port {name} does not exist: {'there are ' + ', '.join(there) if there else 'no serial port was found'}"
+
+
+def _check_address(name: str) -> None:
+    """Refuse socket:// and rfc2217:// without a host and a port number."""
+    scheme = name.partition("://")[0]
+    if scheme not in ("socket", "rfc2217"):
+        return
+    try:
+        parts = urlsplit(name)
+        whole = bool(parts.hostname and parts.port)
+    except ValueError:  # a port that is no number, or too great
+        whole = False
+    if not whole:
+        raise PortError(f"port {name} is not complete: {scheme}://HOST:PORT is expected, PORT from 1 to 65535")
 
 
 def _check_path(name: str) -> None:
@@ -171,18 +252,29 @@ def _owners(name: str) -> str:
         group = grp.getgrgid(os.stat(name).st_gid).gr_name
     except (OSError, KeyError):
         return "its owner must allow it"
-    return f"it belongs to group {group!r}; join that group (usermod -aG {group} USER) and log in again"
+    return f"it belongs to group {group!r}; add your user to that group (sudo usermod -aG {group} $USER) and log in again"
 
 
-def _number(error: Exception) -> int | None:
+def _number(error: BaseException) -> int | None:
     number = getattr(error, "errno", None)
     if number is None and error.args and isinstance(error.args[0], int):
         number = error.args[0]
-    # pyserial wraps a failed tcgetattr as text only; the trouble itself is the one it was handling.
-    return _number(error.__context__) if number is None and isinstance(error.__context__, Exception) else number
+    # pyserial wraps a failed tcgetattr or connect as text only; the trouble itself is the one it was handling.
+    return _number(error.__context__) if number is None and error.__context__ is not None else number
+
+
+def _timed_out(error: BaseException | None) -> bool:
+    """Whether a write gave up, by pyserial's own clock or by its socket's."""
+    while error is not None and not isinstance(error, serial.SerialTimeoutException | TimeoutError):
+        error = error.__context__
+    return error is not None
 
 
 def _reason(error: Exception) -> str:
     """The system's own words in one line."""
     number = _number(error)
-    return os.strerror(number).lower() if number else " ".join(str(error).split()).lower() or type(error).__name__
+    if number is not None and number > 0:
+        return os.strerror(number).lower()
+    if number is not None:  # getaddrinfo has numbers of its own
+        return "there is no such host"
+    return " ".join(str(error).split()).lower() or type(error).__name__

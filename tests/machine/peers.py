@@ -1,0 +1,144 @@
+"""Peers for tests of the link: what answers at a pseudo-terminal, at a socket, behind RFC 2217."""
+
+import os
+import pty
+import select
+import socket
+import termios
+import threading
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import serial
+import serial.rfc2217
+
+from machine.link.firmware import Firmware
+
+RATES = {getattr(termios, f"B{rate}"): rate for rate in (9600, 57600, 115200, 230400, 1000000)}
+Answer = Callable[[bytes, int], bytes]  # what is received, baud rate that the host has set -> what is answered
+
+
+@contextmanager
+def on_terminal(answer: Answer, greeting: bytes = b"") -> Iterator[str]:
+    """The path of a pseudo-terminal with a peer that answers by a function."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    over, end = os.pipe()
+
+    def serve() -> None:
+        os.write(master, greeting)
+        while over not in (ready := select.select([master, over], [], [])[0]):
+            if master in ready:
+                baud = RATES.get(termios.tcgetattr(slave)[5], 0)
+                os.write(master, answer(os.read(master, 4096), baud))
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    try:
+        yield os.ttyname(slave)
+    finally:
+        os.write(end, b"x")
+        thread.join(5)
+        for descriptor in (master, slave, over, end):
+            os.close(descriptor)
+
+
+def scripted(words: dict[str, str], otherwise: str = "ok") -> Answer:
+    """A peer that answers each line that begins with a word of the table as it says, any other line otherwise."""
+    half = [b""]
+
+    def answer(data: bytes, _baud: int) -> bytes:
+        *lines, half[0] = (half[0] + data).split(b"\n")
+        said = [_said(line.decode("ascii", "replace"), words, otherwise) for line in lines if line.strip()]
+        return "".join(said).encode("ascii")
+
+    return answer
+
+
+def _said(line: str, words: dict[str, str], otherwise: str) -> str:
+    command = line.partition(" ")[2].partition("*")[0] if line.startswith("N") else line
+    text = next((answer for word, answer in words.items() if command.startswith(word)), otherwise)
+    return f"{text}\n" if text else ""
+
+
+@contextmanager
+def on_socket(firmware: Firmware) -> Iterator[str]:
+    """The socket:// address of a firmware that is as fast as possible; one host after the other."""
+    server = socket.create_server(("localhost", 0))
+
+    def serve() -> None:
+        while True:
+            try:
+                host, _ = server.accept()
+            except OSError:
+                return
+            host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            with host:
+                try:
+                    while data := host.recv(4096):
+                        firmware.receive(data)
+                        host.sendall(firmware.advance())
+                except OSError:
+                    continue
+
+    threading.Thread(target=serve, daemon=True).start()
+    try:
+        yield f"socket://localhost:{server.getsockname()[1]}"
+    finally:
+        server.shutdown(socket.SHUT_RDWR)
+        server.close()
+
+
+class _WithoutModemLines(serial.Serial):  # type: ignore[misc]
+    """A pseudo-terminal has none, and says so with an error."""
+
+    cts = dsr = ri = cd = True
+
+    def _update_dtr_state(self) -> None:
+        return
+
+    def _update_rts_state(self) -> None:
+        return
+
+
+class _Wire:
+    """What pyserial's PortManager writes its own words to."""
+
+    def __init__(self, host: socket.socket) -> None:
+        self.write = host.sendall
+
+
+@contextmanager
+def behind_rfc2217(path: str) -> Iterator[str]:
+    """The rfc2217:// address of a server for one host, made of pyserial's own PortManager, in front of a serial device."""
+    server = socket.create_server(("localhost", 0))
+
+    def serve() -> None:
+        host, _ = server.accept()
+        host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        try:
+            with host, _WithoutModemLines(path, timeout=0) as device:
+                _serve_rfc2217(host, device)
+        except OSError:  # the device behind it is gone
+            return
+
+    threading.Thread(target=serve, daemon=True).start()
+    try:
+        yield f"rfc2217://localhost:{server.getsockname()[1]}"
+    finally:
+        server.close()
+
+
+def _serve_rfc2217(host: socket.socket, device: serial.Serial) -> None:
+    """Both directions until the host hangs up."""
+    manager = serial.rfc2217.PortManager(device, _Wire(host))
+    while True:
+        ready = select.select([host, device], [], [], 5.0)[0]
+        if host in ready:
+            data = host.recv(4096)
+            if not data:
+                return
+            device.write(b"".join(manager.filter(data)))
+        if device in ready:
+            host.sendall(b"".join(manager.escape(device.read(4096))))
