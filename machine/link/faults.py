@@ -1,96 +1,214 @@
-"""Faults of a serial line, planned beforehand and applied once each: lost, flipped and doubled bytes, lost answers, resets."""
+"""Fault scripts: what goes wrong on a serial line and in a printer, where or how often, the same at every run of a seed."""
 
 import random
-from collections.abc import Callable, Iterable
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from math import inf, log
+from pathlib import Path
+from typing import Any, Literal, get_args
 
-Kind = Literal["drop", "flip", "double", "swallow ok", "false resend", "reset", "silent reset"]
-BYTE_KINDS: tuple[Kind, ...] = ("drop", "flip", "double")
+from profiles.errors import PrinterError
+
+ByteKind = Literal["drop", "flip", "duplicate", "delay"]
+OkKind = Literal["swallow ok", "truncate ok", "double ok"]
+MomentKind = Literal[
+    "spurious resend",
+    "error",
+    "garbage",
+    "reset",
+    "silent reset",
+    "disconnect",
+    "stall",
+    "block",
+    "heater failure",
+    "thermal runaway",
+]
+Kind = ByteKind | OkKind | MomentKind
+Unit = Literal["byte", "answer", "line"]
+BYTE_KINDS: tuple[Kind, ...] = get_args(ByteKind)
+OK_KINDS: tuple[Kind, ...] = get_args(OkKind)
+MOMENT_KINDS: tuple[Kind, ...] = get_args(MomentKind)
+KINDS = BYTE_KINDS + OK_KINDS + MOMENT_KINDS
+HEALED: tuple[Kind, ...] = (*BYTE_KINDS[:3], *OK_KINDS, "spurious resend")  # what a sender can heal without stopping
+
+# Keys of a fault in a file beside kind, place and direction, with the kinds that know them.
+KEYS: dict[str, tuple[Kind, ...]] = {
+    "bit": ("flip",),
+    "number": ("spurious resend",),
+    "seconds": ("delay", "stall", "block", "disconnect"),
+    "text": ("garbage", "error"),
+}
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault. at: index of the byte (drop, flip, double, reset) or of the answer line (swallow ok, false resend).
+    """One fault, once at a place or again and again by chance.
 
-    to_host: of the answers instead of the commands; value: which bit is flipped, or the line wrongly asked for.
+    at: bytes count from 0 in their direction, answers (lines the printer says) and lines (that the firmware begins to execute)
+    from 1; unit: what `at` counts, "" for the kind's own (units_of). chance: instead of at, the probability at each of them.
+    to_host: of the answers' bytes instead of the commands'. value: which bit is flipped, or the line wrongly asked for; None:
+    the seed decides. seconds: how long a delay, a stall (nothing said), a block (nothing read), a disconnection lasts. text:
+    what is said instead of the kind's own words.
     """
 
     kind: Kind
-    at: int
+    at: int | None = None
     to_host: bool = False
-    value: int = 0
+    value: int | None = None
+    chance: float = 0.0
+    unit: Unit | Literal[""] = ""
+    seconds: float = inf
+    text: str = ""
+
+    def __post_init__(self) -> None:
+        if (self.at is None) == (self.chance == 0.0):
+            raise ValueError(f"fault {self.kind!r}: either at or chance is expected, not both or none")
+
+    @property
+    def counted(self) -> Unit:
+        """What `at` counts, or what `chance` is a chance of."""
+        return self.unit or units_of(self.kind)[0]
 
 
-def random_faults(seed: int, count: int, first: int, last: int) -> tuple[Fault, ...]:
-    """`count` byte faults and lost answers at random places first..last of either direction, the same for the same seed."""
+@dataclass(frozen=True)
+class FaultScript:
+    """The faults of a run; the seed decides everything that is left to chance."""
+
+    faults: tuple[Fault, ...] = ()
+    seed: int = 0
+
+    def places(self, index: int) -> Iterator[int]:
+        """Where the fault of this index strikes, rising; those of a chance lie as far apart as a geometric law throws them."""
+        fault = self.faults[index]
+        first = 0 if fault.counted == "byte" else 1
+        if fault.at is not None:
+            yield fault.at
+            return
+        rng, place = random.Random(f"{self.seed} {index}"), first - 1
+        while True:
+            place += 1 + (int(log(1.0 - rng.random()) / log(1.0 - fault.chance)) if fault.chance < 1.0 else 0)
+            yield place
+
+
+def units_of(kind: Kind) -> tuple[Unit, ...]:
+    """What the place of such a fault may count, the usual one first."""
+    if kind in BYTE_KINDS:
+        return ("byte",)
+    return ("answer",) if kind in OK_KINDS else ("line", "byte", "answer")
+
+
+def random_script(
+    seed: int, count: int, lines: range, kinds: Sequence[Kind] = KINDS, line_bytes: int = 36, most_s: float = 3.0
+) -> FaultScript:
+    """`count` faults of these kinds at random places of those lines, the same for the same seed.
+
+    line_bytes: how long a line is on the wire, so that byte faults fall among them (answers are taken to be half as long);
+    most_s: how long delays and stalls last at most; one in eight of stalls, blocks and disconnections lasts for ever.
+    """
     rng = random.Random(seed)
-    faults: list[Fault] = []
-    for _ in range(count):
-        kind = rng.choice((*BYTE_KINDS, *BYTE_KINDS, "swallow ok", "false resend"))
-        if kind in BYTE_KINDS:
-            faults.append(Fault(kind, rng.randint(first, last), rng.random() < 0.5, rng.randrange(8)))
-        else:
-            line = rng.randint(first // 30, last // 30)
-            faults.append(Fault(kind, line, True, max(1, line - rng.randint(-2, 12))))
-    return tuple(faults)
+    return FaultScript(tuple(_random_fault(rng, rng.choice(kinds), lines, line_bytes, most_s) for _ in range(count)), seed)
 
 
-class NoisyLine:
-    """Both directions of a line with its faults; each call hands on what arrives at the other end."""
-
-    def __init__(self, faults: Iterable[Fault], reset: Callable[[bool], None]) -> None:
-        self._in = sorted((f for f in faults if not f.to_host and f.kind in (*BYTE_KINDS, "reset", "silent reset")), key=_place)
-        self._out = sorted((f for f in faults if f.to_host and f.kind in BYTE_KINDS), key=_place)
-        self._answers = {f.at: f for f in faults if f.kind in ("swallow ok", "false resend")}
-        self._reset = reset
-        self._in_bytes = self._out_bytes = self._answer_lines = 0
-
-    def to_printer(self, data: bytes) -> bytes:
-        """What the printer gets of the host's bytes."""
-        end = self._in_bytes + len(data)
-        while self._in and self._in[0].at < end and self._in[0].kind in ("reset", "silent reset"):
-            self._reset(self._in.pop(0).kind == "reset")
-        data = _damaged(data, self._in_bytes, self._in)
-        self._in_bytes = end
-        return data
-
-    def to_host(self, data: bytes) -> bytes:
-        """What the host gets of the printer's whole lines."""
-        if self._answers:
-            data = b"".join(self._answer(line) for line in data.splitlines(keepends=True))
-        begin, self._out_bytes = self._out_bytes, self._out_bytes + len(data)
-        return _damaged(data, begin, self._out)
-
-    def _answer(self, line: bytes) -> bytes:
-        self._answer_lines += 1
-        fault = self._answers.get(self._answer_lines)
-        if fault is None:
-            return line
-        if fault.kind == "false resend":
-            return line + b"Resend: %d\nok\n" % fault.value
-        return b"" if line.startswith(b"ok") else line
+def _random_fault(rng: random.Random, kind: Kind, lines: range, line_bytes: int, most_s: float) -> Fault:
+    line, to_host = rng.choice(lines), rng.random() < 0.5
+    seconds = inf if rng.random() < 0.125 and kind != "delay" else rng.uniform(0.05, most_s)
+    if kind in BYTE_KINDS:
+        at = int((line + rng.random()) * line_bytes / (2 if to_host else 1))
+        return Fault(kind, at, to_host, rng.randrange(8), seconds=seconds)
+    value = max(1, line - rng.randint(-2, 12)) if kind == "spurious resend" else None
+    return Fault(kind, line, value=value, seconds=seconds)
 
 
-def _place(fault: Fault) -> int:
-    return fault.at
+def read_script(path: Path) -> FaultScript:
+    """The script in a TOML file: `seed` and [[fault]] tables. Raises PrinterError for a file that is none."""
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
+        raise PrinterError(f"the fault script {path} cannot be read: {reason}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise PrinterError(f"the fault script {path} is not TOML: {error}") from None
+    for key in document:
+        if key not in ("seed", "fault"):
+            raise PrinterError(f"{path}: {key} is not known: seed and [[fault]] tables are allowed")
+    seed, tables = document.get("seed", 0), document.get("fault", [])
+    if not _whole(seed):
+        raise PrinterError(f"{path}: seed is {seed!r}: a whole number is allowed")
+    if not (isinstance(tables, list) and all(isinstance(table, dict) for table in tables)):
+        raise PrinterError(f"{path}: fault is {tables!r}: tables headed [[fault]] are allowed")
+    return FaultScript(tuple(_read_fault(table, f"{path}: fault {n}") for n, table in enumerate(tables, 1)), seed)
 
 
-def _damaged(data: bytes, begin: int, faults: list[Fault]) -> bytes:
-    """The data with the faults that fall into it; those are used up."""
-    out = bytearray(data)
-    shift = 0
-    while faults and faults[0].at < begin + len(data) and faults[0].kind in BYTE_KINDS:
-        fault = faults.pop(0)
-        at = fault.at - begin + shift
-        if not 0 <= at < len(out):
-            continue
-        if fault.kind == "drop":
-            del out[at]
-            shift -= 1
-        elif fault.kind == "double":
-            out.insert(at, out[at])
-            shift += 1
-        else:
-            out[at] ^= 1 << fault.value
-    return bytes(out)
+def _read_fault(table: Mapping[str, Any], where: str) -> Fault:
+    kind = table.get("kind")
+    if kind not in KINDS:
+        raise _wrong(where, "kind", kind, ", ".join(KINDS))
+    units = units_of(kind)
+    known = [
+        "kind",
+        *units,
+        "chance",
+        *(["to"] if "byte" in units else []),
+        *(key for key, kinds in KEYS.items() if kind in kinds),
+    ]
+    for key in table:
+        if key not in known:
+            raise PrinterError(f"{where}: {key} is not a key of {kind!r}: {', '.join(known)} are allowed")
+    placed = [key for key in (*units, "chance") if key in table]
+    if len(placed) != 1:
+        given = " and ".join(placed) if placed else "no place"
+        raise PrinterError(f"{where}: {kind!r} has {given}: one of {', '.join(units)}, chance is allowed")
+    if table.get("to", "printer") not in ("printer", "host"):
+        raise _wrong(where, "to", table["to"], "printer, host")
+    return Fault(
+        kind,
+        at=None if placed == ["chance"] else _number(table, placed[0], where, 0 if placed == ["byte"] else 1),
+        to_host=table.get("to") == "host",
+        value=_number(table, "bit", where, 0, 7) if "bit" in table else _number(table, "number", where, 0),
+        chance=_chance(table, where),
+        unit="" if placed == ["chance"] else placed[0],  # type: ignore[arg-type]
+        seconds=_seconds(table, kind, where),
+        text=_text(table, where),
+    )
+
+
+def _number(table: Mapping[str, Any], key: str, where: str, least: int, most: float = inf) -> int | None:
+    value = table.get(key)
+    if value is not None and not (_whole(value) and least <= value <= most):
+        raise _wrong(where, key, value, f"a whole number from {least} " + (f"to {most}" if most < inf else "up"))
+    return value
+
+
+def _chance(table: Mapping[str, Any], where: str) -> float:
+    value = table.get("chance", 0.0)
+    if "chance" in table and not (_real(value) and 1e-12 <= value <= 1):
+        raise _wrong(where, "chance", value, "a number above 0, at most 1")
+    return float(value)
+
+
+def _seconds(table: Mapping[str, Any], kind: Kind, where: str) -> float:
+    value = table.get("seconds", inf)
+    if not (_real(value) and value >= 0) or (kind == "delay" and value == inf):
+        allowed = "a number of seconds from 0 up" + ("" if kind == "delay" else ", inf for ever")
+        raise _wrong(where, "seconds", value if "seconds" in table else None, allowed)
+    return float(value)
+
+
+def _text(table: Mapping[str, Any], where: str) -> str:
+    value = table.get("text", "")
+    if not (isinstance(value, str) and all(ord(c) < 256 for c in value)):
+        raise _wrong(where, "text", value, "text of characters up to \\u00ff, one for each byte")
+    return value
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _real(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _wrong(where: str, key: str, value: Any, allowed: str) -> PrinterError:
+    return PrinterError(f"{where}: {key} is {'missing' if value is None else repr(value)}: {allowed} is allowed")

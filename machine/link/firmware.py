@@ -6,7 +6,7 @@ its exact words, a repeat of the last line swallowed in silence, `ok` = taken, w
 
 import re
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import inf
 
@@ -56,7 +56,8 @@ class Firmware:
         self._wake_s: float | None = None
         self._work: Iterator[float] | None = None
         self._lost_bytes = 0
-        self._taken = 0
+        self._taken = self._watched = 0
+        self.watch: Callable[[int], bool] | None = None  # told each line's count before it begins; True: advance() returns first
         self.dead = False
 
     def receive(self, data: bytes) -> None:
@@ -84,6 +85,10 @@ class Firmware:
                 self._pass(self._wake_s)
                 self._wake_s = None
             elif self._queue:
+                if self.watch is not None and self._work is None and self._watched == self._taken:
+                    self._watched += 1
+                    if self.watch(self._watched):
+                        break
                 self._run()
             else:
                 if until_s < inf:
@@ -117,6 +122,11 @@ class Firmware:
         if banner:
             self._said += BANNER.splitlines()
 
+    @property
+    def last_number(self) -> int:
+        """Number of the last numbered line that was taken."""
+        return self._last
+
     def record(self) -> Record:
         """What was done so far."""
         body = self.body
@@ -144,6 +154,7 @@ class Firmware:
         self._half = self._scanned = b""
         self._wake_s = self._work = None
         self._busy_s = inf
+        self._watched = self._taken
 
     def _read_urgent(self, data: bytes) -> None:
         """The emergency parser reads M112, M108 and M410 from the raw bytes, whatever waits before them."""
@@ -159,7 +170,7 @@ class Firmware:
     def _do_urgent(self, number: bytes) -> None:
         body = self.body
         if number == b"112":
-            self._kill()
+            self._shut_down("M112", "echo:M112 Shutdown")
         elif number == b"108":
             body.impatient = True
             if body.waits_for_heat:
@@ -169,10 +180,14 @@ class Firmware:
             if self._wake_s is not None:
                 self._wake_s = body.now_s
 
-    def _kill(self) -> None:
-        self.body.note("M112")
+    def kill(self, error: str) -> None:
+        """The firmware stops for ever with its own words, heaters off."""
+        self._shut_down(error, f"Error:{error}")
+
+    def _shut_down(self, event: str, told: str) -> None:
+        self.body.note(event)
         self.body.off()
-        self._said += ["echo:M112 Shutdown", "Error:Printer halted. kill() called!", "//action:poweroff"]
+        self._said += [told, "Error:Printer halted. kill() called!", "//action:poweroff"]
         self._forget()
         self.dead = True
 
@@ -245,7 +260,7 @@ class Firmware:
 
     def _begin(self, text: str, name: str, rest: str) -> Iterator[float] | str | None:
         if name == "M112":
-            self._kill()
+            self._shut_down("M112", "echo:M112 Shutdown")
             return None
         if name == "M115":
             self._introduce()

@@ -14,11 +14,17 @@ class Heater:
         self._ceiling_c = 1.3 * limit_c + 50.0  # where full power would end: the limit is reached in finite time
         self._time_constant_s = time_constant_s
         self._from_c, self._since_s = ROOM_C, 0.0
+        self.failed = False
 
     def set(self, target_c: float, now_s: float) -> None:
         """A new target, deg C, kept between 0 and the limit as the firmware does."""
         self._from_c, self._since_s = self.at(now_s), now_s
         self.target_c = min(max(target_c, 0.0), self._limit_c)
+
+    def fail(self, now_s: float) -> None:
+        """From now on it gives no heat whatever it is told: a cartridge that fell out."""
+        self._from_c, self._since_s = self.at(now_s), now_s
+        self.failed = True
 
     def at(self, now_s: float) -> float:
         """Temperature at a time, deg C."""
@@ -36,5 +42,5 @@ class Heater:
 
     def _goal(self) -> tuple[float, float]:
         """Where it would go without a thermostat, and where the thermostat stops it."""
-        stop = max(self.target_c, ROOM_C)
+        stop = ROOM_C if self.failed else max(self.target_c, ROOM_C)
         return (self._ceiling_c if stop > self._from_c else ROOM_C), stop

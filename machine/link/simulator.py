@@ -5,50 +5,53 @@ import select
 import threading
 from collections.abc import Iterable
 from math import inf
+from pathlib import Path
 from time import monotonic
 from types import TracebackType
 from typing import Self
 
-from machine.link.faults import Fault, NoisyLine
+from machine.link.cable import Cable
+from machine.link.faults import Fault, FaultScript
 from machine.link.firmware import BUSY_S, Firmware, Habits
 from machine.link.record import Record
-from profiles.errors import PortError
+from machine.link.terminal import Server, Terminal
 from profiles.machine import Machine
 
-READ_BYTES = 4096
 UNREAD_BYTES = 1 << 20  # answers kept for a host that does not read; older ones are dropped beyond
 
 
 class SimulatedPrinter:
     """`with SimulatedPrinter(machine) as printer:` open printer.path with pyserial, look at printer.record afterwards.
 
-    speed: virtual seconds in a real one; inf never sleeps, the clock jumps over every wait. Raises PortError on a system
-    without pseudo-terminals.
+    speed: virtual seconds in a real one; inf never sleeps, the clock jumps over every wait. faults: what goes wrong; after a
+    disconnection the terminal is gone (reading fails) and comes back at a new printer.path, or behind the same `link` (a symbolic
+    link to keep). tcp: a port number of this computer (0: a free one) instead of a terminal; path is then a socket:// address.
+    Raises PortError on a system without pseudo-terminals, or for a link or port that is taken.
     """
 
-    def __init__(self, machine: Machine, speed: float = inf, habits: Habits | None = None, faults: Iterable[Fault] = ()) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        speed: float = inf,
+        habits: Habits | None = None,
+        faults: FaultScript | Iterable[Fault] = (),
+        link: Path | None = None,
+        tcp: int | None = None,
+    ) -> None:
         if not speed > 0:
             raise ValueError(f"speed is {speed:g}: it must be above 0")
         # `busy:` must come in real time, or a slow simulation would look dead to the sender.
         self._firmware = Firmware(machine, habits, BUSY_S * min(1.0, speed))
+        self._cable = Cable(self._firmware, faults if isinstance(faults, FaultScript) else FaultScript(tuple(faults)))
         self._speed = speed
         self._lock = threading.Lock()
-        faults = tuple(faults)
-        self._noise = NoisyLine(faults, self._firmware.reset) if faults else None
+        self._link, self._tcp = link, tcp
         self._out = b""
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Self:
-        try:
-            import tty
-
-            self._master, self._slave = os.openpty()
-        except (ImportError, OSError) as error:
-            raise PortError(f"the simulated printer needs a pseudo-terminal, which this system does not give ({error})") from None
-        # Raw: no echo, no change of newlines. The own slave end stays open, so that the terminal outlives each host.
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
+        self._terminal: Terminal | Server = Terminal(self._link) if self._tcp is None else Server(self._tcp)
+        self._terminal.open()
         self._end, self._wake = os.pipe()
         self._began_s = monotonic()
         self._thread = threading.Thread(target=self._serve, name="simulated printer", daemon=True)
@@ -59,8 +62,16 @@ class SimulatedPrinter:
         os.write(self._wake, b"x")
         if self._thread is not None:
             self._thread.join()
-        for descriptor in (self._master, self._slave, self._end, self._wake):
+        self._terminal.close()
+        if isinstance(self._terminal, Server):
+            self._terminal.end()
+        for descriptor in (self._end, self._wake):
             os.close(descriptor)
+
+    @property
+    def path(self) -> str:
+        """What to open; another one after a disconnection."""
+        return self._terminal.path
 
     @property
     def record(self) -> Record:
@@ -70,47 +81,44 @@ class SimulatedPrinter:
 
     def _serve(self) -> None:
         """Read, work, answer, until __exit__ writes to the pipe."""
-        data = b""
+        data, there = b"", True
         while True:
+            now_s = monotonic() - self._began_s
             with self._lock:
-                answer = self._turn(data)
-            self._answer(answer)
-            readable, _, _ = select.select([self._master, self._end], [self._master] if self._out else [], [], self._pause_s())
+                answer = self._turn(data, now_s)
+            if there != self._cable.connected(now_s):
+                there = not there
+                self._plug(there)
+            if there:
+                self._answer(answer)
+            deaf = self._cable.blocked(now_s)
+            listening, talking = [] if deaf else self._terminal.listening(), self._terminal.talking() if self._out else []
+            readable, _, _ = select.select([*listening, self._end], talking, [], self._pause_s(now_s))
             if self._end in readable:
                 return
-            data = self._read() if readable else b""
+            data = self._terminal.read() if readable else b""
 
-    def _turn(self, data: bytes) -> bytes:
-        if data and self._noise is not None:
-            data = self._noise.to_printer(data)
-        if self._speed == inf:
-            self._firmware.receive(data)
-            answer = self._firmware.advance()
+    def _plug(self, there: bool) -> None:
+        self._out = b""
+        if there:
+            self._terminal.open()
         else:
-            now_s = (monotonic() - self._began_s) * self._speed
-            answer = self._firmware.advance(now_s)
-            self._firmware.receive(data)
-            answer += self._firmware.advance(now_s)
-        return self._noise.to_host(answer) if answer and self._noise is not None else answer
+            self._terminal.close()
 
-    def _pause_s(self) -> float | None:
-        """How long nothing happens unless the host says something; None: for ever."""
+    def _turn(self, data: bytes, now_s: float) -> bytes:
         if self._speed == inf:
-            return None
-        due_s = self._firmware.next_s()
-        return None if due_s == inf else max(0.0, due_s / self._speed - (monotonic() - self._began_s))
+            return self._cable.exchange(data, now_s)
+        until_s = now_s * self._speed
+        return self._cable.exchange(b"", now_s, until_s) + self._cable.exchange(data, now_s, until_s)
 
-    def _read(self) -> bytes:
-        try:
-            return os.read(self._master, READ_BYTES)
-        except (BlockingIOError, OSError):
-            return b""
+    def _pause_s(self, now_s: float) -> float | None:
+        """How long nothing happens unless the host says something; None: for ever."""
+        due_s = self._cable.due_s(now_s)
+        if self._speed < inf:
+            due_s = min(due_s, self._firmware.next_s() / self._speed)
+        return None if due_s == inf else max(0.0, due_s - (monotonic() - self._began_s))
 
     def _answer(self, answer: bytes) -> None:
-        if not answer and not self._out:
-            return
-        self._out = (self._out + answer)[-UNREAD_BYTES:]
-        try:
-            self._out = self._out[os.write(self._master, self._out) :]
-        except BlockingIOError:
-            return
+        if answer or self._out:
+            self._out = (self._out + answer)[-UNREAD_BYTES:]
+            self._out = self._out[self._terminal.write(self._out) :]

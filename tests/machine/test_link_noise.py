@@ -5,7 +5,8 @@ import random
 import numpy as np
 import pytest
 
-from machine.link.faults import NoisyLine, random_faults
+from machine.link.cable import Cable
+from machine.link.faults import HEALED, random_script
 from machine.link.firmware import Firmware, Habits
 from machine.link.protocol import Protocol
 from machine.link.simulator import SimulatedPrinter
@@ -25,15 +26,14 @@ def noisy_print(seed: int, faults: int, torn: bool) -> tuple[PrinterError | None
     rng, now_s = random.Random(seed), 0.0
     habits = Habits(advanced_ok=seed % 2 == 0, emergency_parser=seed % 3 > 0, busy=seed % 5 > 0)
     firmware, protocol, left = Firmware(MACHINE, habits), Protocol(), list(reversed(PROGRAM))
-    line = NoisyLine(random_faults(seed, faults, 60, 9000), firmware.reset)
+    cable = Cable(firmware, random_script(seed, faults, range(60, 300), HEALED, 30))
     while left or protocol.window.acknowledged < protocol.window.sent or protocol.state is not State.OPEN:
         assert now_s < 3600, "this print hangs"
         while left and protocol.room(left[-1]):
             protocol.send(left.pop(), now_s)
         heard = b""
-        for portion in _portions(line.to_printer(protocol.take()), rng if torn else None):
-            firmware.receive(portion)
-            heard += line.to_host(firmware.advance())
+        for portion in _portions(protocol.take(), rng if torn else None):
+            heard += cable.exchange(portion, now_s)
         now_s += 0.001 if heard else 0.05
         for portion in _portions(heard, rng):
             protocol.receive(portion, now_s)

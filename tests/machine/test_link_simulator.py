@@ -9,7 +9,6 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.link.faults import Fault, NoisyLine, random_faults
 from machine.link.firmware import Firmware, Habits
 from machine.link.framing import frame
 from machine.link.heater import Heater
@@ -280,13 +279,6 @@ def test_a_machine_with_other_letters_is_spoken_to_in_them() -> None:
     firmware = Firmware(load(machine="fractal5pro").machine, Habits())
     answer(firmware, "G1 B30 A45\n")
     assert firmware.record().end[0, 3:5].tolist() == [30.0, 45.0]
-
-
-def test_planned_faults_hit_their_bytes_once() -> None:
-    line = NoisyLine([Fault("drop", 1), Fault("flip", 4, value=0), Fault("double", 6)], lambda banner: None)
-    assert line.to_printer(b"abc") + line.to_printer(b"defgh") == b"acdegghh"[:2] + b"ddfggh"
-    assert line.to_printer(b"abcdefgh") == b"abcdefgh"
-    assert random_faults(1, 5, 100, 900) == random_faults(1, 5, 100, 900)
 
 
 def test_the_terminal_answers_a_plain_serial_program() -> None:

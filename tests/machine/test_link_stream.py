@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import serial
 
-from machine.link.faults import Fault, random_faults
+from machine.link.faults import HEALED, Fault, random_script
 from machine.link.firmware import Firmware, Habits
 from machine.link.framing import frame
 from machine.link.port import open_port, refusal
@@ -215,15 +215,15 @@ SURVIVED = {
     "a whole line lost": LOST_LINE,
     "the number becomes that of the line before": (Fault("flip", byte_of(51, 2), value=0),),
     "the checksum's star becomes a newline": (Fault("flip", byte_of(50, WIRE[50].index(b"*")), value=5),),
-    "a byte doubled": (Fault("double", byte_of(50, 7)),),
+    "a byte doubled": (Fault("duplicate", byte_of(50, 7)),),
     "an ok lost": (Fault("swallow ok", LINE, True),),
     "three oks lost in a row": tuple(Fault("swallow ok", LINE + n, True) for n in range(3)),
     "the last oks lost": tuple(Fault("swallow ok", LINE + n, True) for n in range(250, 253)),
     "bytes of answers lost": tuple(Fault("drop", BYTE + n, True) for n in (0, 71, 133, 280)),
     "bytes of answers flipped": tuple(Fault("flip", BYTE + n, True, n % 7) for n in (0, 71, 133, 280)),
-    "a resend of an acknowledged line": (Fault("false resend", LINE, True, 45),),
-    "a resend of a line far back": (Fault("false resend", LINE, True, 10),),
-    "a resend of a line to come": (Fault("false resend", LINE, True, 999),),
+    "a resend of an acknowledged line": (Fault("spurious resend", LINE, True, 45),),
+    "a resend of a line far back": (Fault("spurious resend", LINE, True, 10),),
+    "a resend of a line to come": (Fault("spurious resend", LINE, True, 999),),
     "a damaged greeting": (Fault("drop", 3), Fault("flip", 20, value=2), Fault("drop", 30, True)),
 }
 
@@ -239,7 +239,7 @@ def test_a_fault_is_healed(name: str, habits: Habits) -> None:
 @pytest.mark.parametrize(("kind", "habits"), [
     ("reset", Habits()), ("reset", PLAIN), ("silent reset", Habits()), ("silent reset", PLAIN)])  # fmt: skip
 def test_a_restart_in_mid_print_stops_it_at_once(kind: str, habits: Habits) -> None:
-    with SimulatedPrinter(MACHINE, habits=habits, faults=[Fault(kind, byte_of(100))]) as printer:  # type: ignore[arg-type]
+    with SimulatedPrinter(MACHINE, habits=habits, faults=[Fault(kind, byte_of(100), unit="byte")]) as printer:  # type: ignore[arg-type]
         with pytest.raises(FirmwareError, match="restarted"):
             print_lines(PROGRAM, printer.path, 250000, timing=QUICK)
         record = printer.record
@@ -251,7 +251,7 @@ def test_a_restart_in_mid_print_stops_it_at_once(kind: str, habits: Habits) -> N
 def test_random_faults_end_in_the_exact_moves_or_in_an_error(seed: int) -> None:
     habits = Habits(advanced_ok=seed % 2 == 0, emergency_parser=seed % 3 > 0, busy=seed % 5 > 0)
     began = time.monotonic()
-    with SimulatedPrinter(MACHINE, habits=habits, faults=random_faults(seed, 8, 60, 8000)) as printer:
+    with SimulatedPrinter(MACHINE, habits=habits, faults=random_script(seed, 8, range(3, 280), HEALED, 30)) as printer:
         try:
             print_lines(PROGRAM, printer.path, 250000, timing=QUICK)
             whole = True

@@ -1,0 +1,142 @@
+"""Where a simulated printer is reached: a pseudo-terminal with a device path, or a TCP port for socket:// addresses."""
+
+import os
+import socket
+from pathlib import Path
+
+from profiles.errors import PortError
+
+READ_BYTES = 4096
+
+
+class Terminal:
+    """A raw pseudo-terminal. link: a symbolic link to keep on its path; PortError when something else is there."""
+
+    def __init__(self, link: Path | None = None) -> None:
+        if link is not None and not link.is_symlink() and link.exists():
+            raise PortError(f"{link} exists and is no link to a terminal: the simulated printer does not replace it")
+        self._link = link
+        self._master = self._slave = -1
+        self.path = ""
+
+    def open(self) -> None:
+        """Open it; after close() again, at another path unless a link leads to it. PortError where there are none."""
+        try:
+            import tty
+
+            self._master, self._slave = os.openpty()
+        except (ImportError, OSError) as error:
+            raise PortError(f"the simulated printer needs a pseudo-terminal, which this system does not give ({error})") from None
+        # Raw: no echo, no change of newlines. The own slave end stays open, so that the terminal outlives each host.
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        if self._link is not None:
+            self._unlink()
+            self._link.symlink_to(self.path)
+            self.path = str(self._link)
+
+    def close(self) -> None:
+        """The cable is out: a host's next reading or writing fails."""
+        if self._master < 0:
+            return
+        self._unlink()
+        for descriptor in (self._master, self._slave):
+            os.close(descriptor)
+        self._master = self._slave = -1
+
+    def listening(self) -> list[int]:
+        """Descriptors that become readable when the host says something."""
+        return [self._master] if self._master >= 0 else []
+
+    def talking(self) -> list[int]:
+        """Descriptors that become writable when the host has read."""
+        return self.listening()
+
+    def read(self) -> bytes:
+        """What the host has written."""
+        try:
+            return os.read(self._master, READ_BYTES)
+        except (BlockingIOError, OSError):
+            return b""
+
+    def write(self, data: bytes) -> int:
+        """How many bytes the terminal took."""
+        try:
+            return os.write(self._master, data)
+        except BlockingIOError:
+            return 0
+
+    def _unlink(self) -> None:
+        if self._link is not None and self._link.is_symlink():
+            self._link.unlink()
+
+
+class Server:
+    """A TCP port of this computer for one host at a time; number 0 takes a free one."""
+
+    def __init__(self, number: int) -> None:
+        try:
+            self._server = socket.create_server(("localhost", number))
+        except OSError as error:
+            raise PortError(f"TCP port {number} cannot be listened on: {(error.strerror or str(error)).lower()}") from None
+        self._server.setblocking(False)
+        self._host: socket.socket | None = None
+        self._open = False
+        self.path = f"socket://localhost:{self._server.getsockname()[1]}"
+
+    def open(self) -> None:
+        """Let a host in."""
+        self._open = True
+
+    def close(self) -> None:
+        """The host is cut off."""
+        self._open = False
+        self._hang_up()
+
+    def end(self) -> None:
+        """Close the port for good."""
+        self.close()
+        self._server.close()
+
+    def listening(self) -> list[int]:
+        """Descriptors that become readable when a host comes or says something."""
+        if not self._open:
+            return []
+        return [self._server.fileno()] if self._host is None else [self._host.fileno()]
+
+    def talking(self) -> list[int]:
+        """Descriptors that become writable when the host has read."""
+        return [] if self._host is None else [self._host.fileno()]
+
+    def read(self) -> bytes:
+        """What the host has written; a host that comes or goes writes nothing."""
+        try:
+            if self._host is None:
+                self._host, _ = self._server.accept()
+                self._host.setblocking(False)
+                self._host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                return b""
+            data = self._host.recv(READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._hang_up()
+        return data
+
+    def write(self, data: bytes) -> int:
+        """How many bytes the connection took; without a host they are lost."""
+        try:
+            return len(data) if self._host is None else self._host.send(data)
+        except BlockingIOError:
+            return 0
+        except OSError:
+            self._hang_up()
+            return len(data)
+
+    def _hang_up(self) -> None:
+        if self._host is not None:
+            self._host.close()
+            self._host = None
