@@ -53,7 +53,7 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
     plain = draw([floor, model], [FLOOR, PLAIN], [None, risky], view, half)
     gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     apart = [part.mesh.moved(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
-    reds = [_residual(part, profile) for part in parts]
+    reds = [residual(part, profile) for part in parts]
     exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], [None, *reds], view, half)
     return np.concatenate([plain, exploded], axis=1)
 
@@ -85,7 +85,7 @@ def part_colours(count: int) -> Floats:
     return colours
 
 
-def _residual(part: Part, profile: Profile) -> NDArray[np.bool_]:
+def residual(part: Part, profile: Profile) -> NDArray[np.bool_]:
     """(m,) faces of a part that need support although it is printed in its own direction."""
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
     return risky_upright(part.mesh, angle, counted) if part.index == 1 else risky_above(part.mesh, part.base, angle)

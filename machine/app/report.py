@@ -3,8 +3,10 @@
 import sys
 
 import numpy as np
+from numpy.typing import NDArray
 
 from machine.app.pipeline import Decomposed
+from machine.dryrun.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, Part
 from mdp.orientation import best_orientation, in_words
@@ -38,17 +40,22 @@ def parts_table(found: Decomposed, angle_deg: float = 45.0, count_platform_faces
     for part in decomposition.parts:
         angles = [f"{part.pose.tilt_deg:.1f}", f"{part.pose.turn_deg:.1f}", f"{part.base.offset_mm:.1f}"]
         share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
-        areas = [_number(_before_mm2(part, angle_deg, count_platform_faces)), _number(part.risky_area_mm2)]
+        areas = [_number(risky_before_mm2(part, angle_deg, count_platform_faces)), _number(part.risky_area_mm2)]
         rows.append([str(part.index), *angles, f"{part.volume_mm3:.0f}", share, *areas])
     told = f"{decomposition.candidates_evaluated} candidates in {decomposition.search_s:.1f} s\n"
     return table(rows) + "\n" + _compared(decomposition, angle_deg, count_platform_faces) + told
 
 
-def _before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -> float:
-    """What is risky of a part's own faces, the cut below it left out, when the model is printed straight up."""
+def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> NDArray[np.bool_]:
+    """(m,) what is risky of a part's own faces, the cut below it left out, when the model is printed straight up."""
     down = risky_upright(part.mesh, angle_deg, count_platform_faces)
     cut = np.all(np.abs(part.base.heights_mm(part.mesh.vertices))[part.mesh.faces] <= ORDER_TOLERANCE_MM, axis=1)
-    return float(part.mesh.areas_mm2[down & ~cut if part.index > 1 else down].sum())
+    return down & ~cut if part.index > 1 else down
+
+
+def risky_before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -> float:
+    """The area of those faces."""
+    return float(part.mesh.areas_mm2[risky_before(part, angle_deg, count_platform_faces)].sum())
 
 
 def _compared(decomposition: Decomposition, angle_deg: float, count_platform_faces: bool) -> str:
@@ -91,6 +98,15 @@ def run_table(run: DryRun) -> str:
         where = f" (line {finding['line']})" if finding["line"] else ""
         lines.append(f"{finding['severity']}: {finding['message']}{where}")
     return "\n".join(lines) + "\n"
+
+
+def agreement_line(found: Agreement) -> str:
+    """How the plastic agrees with the model."""
+    return (
+        f"the beads fill {100 * found.filled:.1f} % of the model; of their length {100 * found.outside:.2f} % lie outside it "
+        f"by more than half a line ({found.farthest_mm:.2f} mm at the worst), {100 * found.unsupported:.2f} % hang in air "
+        f"and {100 * found.reported:.2f} % are marked overhang or bridge and do\n"
+    )
 
 
 def _count(number: int, things: str) -> str:

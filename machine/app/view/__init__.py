@@ -1,0 +1,1 @@
+"""View: one HTML file that shows a print; docs/view.md has the format."""

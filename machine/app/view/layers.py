@@ -1,0 +1,90 @@
+"""Layers: which rows of a program belong to one layer, as its comments tell or else as the heights of its strokes show."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.app.view.encoding import Column
+from machine.parsed import MoveKind, ParsedProgram
+from mdp.mesh import Floats
+
+SAME_MM = 0.02  # strokes whose heights differ less lie in one layer
+NONE: dict[str, Column] = {
+    **{name: Column(np.zeros(0), "i32") for name in ("layer_part", "layer_number", "layer_first", "layer_rows")},
+    **{name: Column(np.zeros(0), "f32") for name in ("layer_z", "layer_time")},
+}  # of a page without paths
+FEWEST = 4  # strokes a layer on average: a text with fewer does not go by layers
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """number: (n,) for the rows of a program, 0 before the first. first, rows: (l,) where layers begin and how long they are.
+
+    by: "comments", or "heights" where the text does not tell its layers.
+    """
+
+    number: NDArray[np.int64]
+    first: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    by: str
+
+
+def layers_of(program: ParsedProgram, layer_height_mm: float) -> Layers:
+    """The layers of a program. layer_height_mm: by how much a helix rises until it is a new layer."""
+    told = program.layers > 0
+    number = program.layer if told else _by_heights(program, layer_height_mm)
+    changes = np.ones(len(number), dtype=np.bool_)
+    changes[1:] = (np.diff(number) != 0) | (np.diff(program.part) != 0)
+    begins = np.flatnonzero(changes)
+    rows = np.diff(np.append(begins, len(number)))
+    layer = number[begins] > 0
+    return Layers(number, begins[layer], rows[layer], "comments" if told else "heights")
+
+
+def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.int64]:
+    strokes = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
+    number = np.zeros(len(program.line), dtype=np.int64)
+    if not len(strokes):
+        return number
+    z = program.end[strokes, 2]
+    steps = np.ones(len(strokes), dtype=np.bool_)
+    steps[1:] = (np.abs(np.diff(z)) > SAME_MM) | np.any(np.diff(program.end[strokes, 3:], axis=0) != 0.0, axis=1)
+    run = np.cumsum(steps) - 1
+    risen = np.floor((z - z[np.flatnonzero(steps)][run] + 1e-6) / layer_height_mm)
+    steps[1:] |= np.diff(risen) != 0
+    if steps.sum() * FEWEST > len(strokes) > FEWEST:
+        steps[1:] = False
+    number[strokes[steps]] = 1
+    return np.cumsum(number)
+
+
+def columns(
+    program: ParsedProgram, layers: Layers, ends_s: Floats, height_mm: Floats, kept: NDArray[np.int64]
+) -> dict[str, Column]:
+    """The table of layers. ends_s, height_mm: (n,) of all rows; first and rows are told in places of the kept rows."""
+    first, last = layers.first, layers.first + layers.rows
+    part = program.part[first]
+    seconds = np.concatenate([[0.0], ends_s])
+    laid = np.append(np.where(program.kind == MoveKind.EXTRUDE, program.end[:, 2], -np.inf), -np.inf)
+    top = np.maximum.reduceat(laid, np.stack([first, last], axis=1).ravel())[::2] if len(first) else np.zeros(0)
+    top = np.where(np.isfinite(top), top, program.end[last - 1, 2])
+    begin = np.searchsorted(kept, first)
+    return {
+        "layer_part": Column(part, "i32"),
+        "layer_number": Column(layers.number[first], "i32"),
+        "layer_first": Column(begin, "i32"),
+        "layer_rows": Column(np.searchsorted(kept, last) - begin, "i32"),
+        "layer_z": Column(top - _ground(part, top, height_mm, layers), "f32"),
+        "layer_time": Column(seconds[last] - seconds[first], "f32"),
+    }
+
+
+def _ground(part: NDArray[np.int64], top: Floats, height_mm: Floats, layers: Layers) -> Floats:
+    """(l,) machine Z at which the part of each layer begins: its first layer's beads less their height."""
+    parts, places, back = np.unique(part, return_index=True, return_inverse=True)
+    thick = np.array(
+        [height_mm[a : a + n].max(initial=0.0) for a, n in zip(layers.first[places], layers.rows[places], strict=True)]
+    )
+    ground: Floats = (top[places] - thick)[back] if len(parts) else np.zeros(0)
+    return ground

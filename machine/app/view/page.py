@@ -1,0 +1,40 @@
+"""Page: the template, its scripts and a packed block put together into one HTML file that fetches nothing."""
+
+import base64
+import re
+from hashlib import sha256
+from html import escape
+from importlib import resources
+
+MARKER = re.compile(r"<!--(?:TITLE|CSP|DATA)-->|/\*(?:STYLE|SCRIPT)\*/")
+
+
+def page(title: str, block: bytes, live: bool = False) -> bytes:
+    """The HTML file. title: any text; block: from machine.app.view.contents; live: it may ask its own server for the state."""
+    style, script, body = _template()
+    put = {
+        "<!--TITLE-->": escape(title),
+        "<!--CSP-->": f'<meta http-equiv="Content-Security-Policy" content="{policy(style, script, live)}">',
+        "<!--DATA-->": f'<script type="application/octet-stream" id="tiltprint">{base64.b64encode(block).decode()}</script>',
+        "/*STYLE*/": style,
+        "/*SCRIPT*/": script,
+    }
+    return MARKER.sub(lambda found: put[found[0]], body).encode(errors="replace")
+
+
+def policy(style: str, script: str, live: bool) -> str:
+    """What the page may do: run its own script, use its own style, draw pictures that it has made itself."""
+    asks = "; connect-src 'self'" if live else ""
+    pictures = "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    return f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; {pictures}{asks}"
+
+
+def _hash(text: str) -> str:
+    return "sha256-" + base64.b64encode(sha256(text.encode()).digest()).decode()
+
+
+def _template() -> tuple[str, str, str]:
+    """Style, scripts in the order of their names, and the page around them."""
+    files = {file.name: file for file in resources.files("machine.app.view").joinpath("template").iterdir()}
+    scripts = "\n".join(files[name].read_text(encoding="utf-8") for name in sorted(files) if name.endswith(".js"))
+    return files["style.css"].read_text(encoding="utf-8"), scripts, files["page.html"].read_text(encoding="utf-8")
