@@ -16,10 +16,7 @@ from pathlib import Path
 from time import process_time
 
 from machine.app.pipeline import Program, build, decompose_model
-from machine.dryrun.deposit import inside_share
-from machine.dryrun.fill import filled_share
-from machine.dryrun.ground import beads
-from machine.dryrun.laying import unsupported_mm
+from machine.dryrun.agreement import agreement
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import print_lines
 from mdp.decomposition import Decomposition
@@ -76,17 +73,14 @@ def row(file: Path, machine: str, settings: list[str], stream: bool) -> str:
 
 def figures(found: Decomposition, program: Program, profile: Profile) -> list[object]:
     """The columns between the machine and the seconds."""
-    run, mesh = program.run, found.mesh
-    share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm)
-    fill = filled_share(run, mesh, profile)
-    deposited = beads(run.program, run.segments_mm, run.segment_row, profile)
-    length, loose, told = unsupported_mm(run.program, deposited, run.ground)
+    told, run = agreement(program.run, found.mesh, profile)
+    mesh = found.mesh
     codes = sorted({finding.code for finding in run.findings if finding.severity == "error"})
     error = abs(found.volume_mm3 / mesh.volume_mm3 - 1.0)
     plastic = run.segment_mm3.sum() / mesh.volume_mm3
     return [
-        len(found.parts), f"{error:.1e}", f"{found.reduction:.3f}", f"{fill.share:.4f}", f"{plastic:.3f}",
-        f"{1.0 - share.share:.4f}", f"{share.farthest_mm:.2f}", f"{loose / length:.4f}", f"{told / length:.4f}",
+        len(found.parts), f"{error:.1e}", f"{found.reduction:.3f}", f"{told.filled:.4f}", f"{plastic:.3f}",
+        f"{told.outside:.4f}", f"{told.farthest_mm:.2f}", f"{told.unsupported:.4f}", f"{told.reported:.4f}",
         " ".join(codes) or "0",
     ]  # fmt: skip
 

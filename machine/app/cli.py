@@ -112,19 +112,22 @@ def simulate(
     ranker: RankerName = "classic",
     orient: Orient = False,
     json: JsonFile = None,
+    beside: Annotated[
+        str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
+    ] = None,
     machine: MachineGiven = None,
     material: MaterialGiven = None,
     process: ProcessGiven = None,
     settings: Settings = None,
 ) -> int:
-    """Dry-run a model or a G-code file; exit 1 when a finding is an error."""
+    """Dry-run a model or a G-code file, held against the model; exit 1 when a finding is an error."""
     from machine.app import commands
 
     profile = _profile(
         machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
     )
     named = _named(machine=machine, material=material, process=process, settings=settings)
-    return commands.simulate(model, profile, ranker, orient, json, named)
+    return commands.simulate(model, profile, ranker, orient, json, named, beside)
 
 
 @app.command("print")

@@ -1,5 +1,6 @@
 """Commands: what decompose, export, simulate and print do; each returns an exit code and never sees the parser."""
 
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from machine.app.compare import Rival, compare_table, compared, plain
@@ -11,11 +12,13 @@ from machine.app.pipeline import Program, build, decompose_model
 from machine.app.png import write_png
 from machine.app.printing import check_dialect, check_port, print_program
 from machine.app.progress import say
-from machine.app.report import parts_table, run_table, show
+from machine.app.report import agreement_line, parts_table, run_table, show
 from machine.app.warmup import warm_dry_run
+from machine.dryrun.agreement import Agreement, agreement
 from machine.dryrun.dryrun import dry_run, summary
+from mdp.read import locate, read_mesh
 from mdp.save import part_file, stl, threemf, values
-from profiles.errors import GcodeError, MoveError
+from profiles.errors import GcodeError, MoveError, ProfileError
 from profiles.profile import Profile
 
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
@@ -88,12 +91,30 @@ def export(
 
 
 def simulate(
-    model: str, profile: Profile, ranker: str, orient: bool, json: Path | None, named: frozenset[str] = frozenset()
+    model: str,
+    profile: Profile,
+    ranker: str,
+    orient: bool,
+    json: Path | None,
+    named: frozenset[str] = frozenset(),
+    beside: str | None = None,
 ) -> int:
-    """Dry-run a model or a G-code file; 1 when a finding is an error. named: profiles given, not taken from the file."""
+    """Dry-run a model or a G-code file; 1 when a finding is an error.
+
+    named: profiles given, not taken from the file. beside: the model that a G-code file's plastic is held against.
+    """
     _check(json)
-    program, _ = _program(model, profile, ranker, orient, named)
-    _tell(program, json)
+    program, profile = _program(model, profile, ranker, orient, named)
+    mesh = None if program.decomposition is None else program.decomposition.mesh
+    if beside is not None:
+        if mesh is not None:
+            raise ProfileError(f"--model {beside}: {model} is a model itself; --model goes with a G-code file")
+        mesh, _ = read_mesh(locate(beside), profile.process.scale, profile.process.rotate_deg)
+    found = None
+    if mesh is not None:
+        found, run = agreement(program.run, mesh, profile)
+        program = replace(program, run=run)
+    _tell(program, json, found=found)
     return 1 if _errors(program) else 0
 
 
@@ -162,8 +183,10 @@ def _check(file: Path | None) -> None:
         check_writable(file)
 
 
-def _tell(program: Program, json: Path | None, rivals: tuple[Rival, ...] = ()) -> None:
+def _tell(program: Program, json: Path | None, rivals: tuple[Rival, ...] = (), found: Agreement | None = None) -> None:
     if json is not None:
-        write_json(json, summary(program.run) | ({"compare": plain(rivals)} if rivals else {}))
+        told = {"compare": plain(rivals)} if rivals else {}
+        write_json(json, summary(program.run) | told | ({"model": asdict(found)} if found is not None else {}))
     if json is None or str(json) != "-":
-        show(run_table(program.run) + (compare_table(rivals) if rivals else ""))
+        beside = "" if found is None else agreement_line(found)
+        show(run_table(program.run) + beside + (compare_table(rivals) if rivals else ""))

@@ -13,6 +13,7 @@ import manifold3d as m3
 import numpy as np
 
 from machine.app.progress import say
+from machine.dryrun.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.gcode import write_gcode
 from machine.plan import plan
@@ -132,7 +133,8 @@ def _program(profile: Profile) -> None:
         parts.append(Part(index, mesh, base, pose, rotation(profile.machine, pose), mesh.volume_mm3, 0.0))
     found = Decomposition("warm", mesh_of(_tee()), tuple(parts), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
     sliced = [slice_part(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
-    dry_run(list(write_gcode(plan(found, sliced, profile), profile)), profile)
+    run = dry_run(list(write_gcode(plan(found, sliced, profile), profile)), profile)
+    agreement(run, found.mesh, profile)
 
 
 if __name__ == "__main__":

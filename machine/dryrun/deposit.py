@@ -15,13 +15,14 @@ PIECE_MM = 1.0
 ASIDE = np.array([3.1e-7, 1.7e-7])  # keeps upright rays off the edges of CAD faces
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Share:
-    """Extruded length within tolerance of the model, of all that belongs to it."""
+    """Extruded length within tolerance of the model, of all that belongs to it; outside: (m,) segments that are not."""
 
     inside_mm: float
     total_mm: float
     farthest_mm: float
+    outside: NDArray[np.bool_]
 
     @property
     def share(self) -> float:
@@ -35,22 +36,24 @@ def inside_share(run: DryRun, mesh: Mesh, tolerance_mm: float) -> Share:
     Judged by the midpoints of pieces of at most 1 mm. mesh: the closed model in the workpiece frame. farthest_mm: the
     greatest distance of a midpoint outside the model, looked for up to four tolerances and at least 1 mm.
     """
-    own = np.array([name not in AROUND for name in run.segment_type], dtype=np.bool_)
-    middles, lengths = _pieces(run.segments_mm[own])
+    own = np.flatnonzero([name not in AROUND for name in run.segment_type])
+    middles, lengths, which = _pieces(run.segments_mm[own])
     outside = outside_mm(middles, mesh, max(4.0 * tolerance_mm, 1.0))
     within = outside <= tolerance_mm
-    return Share(float(lengths[within].sum()), float(lengths.sum()), float(outside.max(initial=0.0)))
+    marked = np.zeros(len(run.segments_mm), dtype=np.bool_)
+    marked[own[which[~within]]] = True
+    return Share(float(lengths[within].sum()), float(lengths.sum()), float(outside.max(initial=0.0)), marked)
 
 
-def _pieces(segments: Floats) -> tuple[Floats, Floats]:
-    """Midpoints and lengths of (m, 2, 3) segments cut into pieces of at most PIECE_MM."""
+def _pieces(segments: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Midpoints and lengths of (m, 2, 3) segments cut into pieces of at most PIECE_MM, and which segment each is of."""
     steps = segments[:, 1] - segments[:, 0]
     length = np.linalg.norm(steps, axis=1)
     counts = np.maximum(np.ceil(length / PIECE_MM), 1).astype(np.int64)
     which = np.repeat(np.arange(len(segments)), counts)
     place = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
     middles: Floats = segments[which, 0] + ((place + 0.5) / counts[which])[:, None] * steps[which]
-    return middles, length[which] / counts[which]
+    return middles, length[which] / counts[which], which
 
 
 def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:

@@ -38,6 +38,8 @@ WRONG = [
     (["print", "demo:tree"], "--port"),
     (["print", "empty.gcode", "--port", "sim"], "empty.gcode"),
     (["simulate", "rubbish.gcode"], "rubbish.gcode"),
+    (["simulate", "demo:tree", "--model", "demo:tree"], "--model demo:tree"),
+    (["simulate", "short.gcode", "--model", "nowhere.stl"], "nowhere.stl"),
     (["profiles", "show", "unicorn"], "generic_ac"),
     (["profiles", "check", "nowhere.toml"], "nowhere.toml"),
     (["fly"], "decompose"),
@@ -54,6 +56,7 @@ WRONG = [
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty.gcode").write_text("")
+    (tmp_path / "short.gcode").write_text("G28\nG1 Z5 F600\n")
     (tmp_path / "-lead.stl").write_text("solid")
     (tmp_path / "rubbish.gcode").write_bytes(bytes(range(256)))
     return tmp_path
@@ -138,6 +141,9 @@ def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Pat
         "axes", "findings",
     }  # fmt: skip
     assert first == again
+    assert main(["simulate", "a.gcode", "--model", "demo:bracket", "--json", "beside.json"]) == 0
+    beside = json.loads(Path("beside.json").read_text())["model"]
+    assert (beside["outside"], beside["filled"] > 0.5) == (0.0, True)
 
 
 def test_the_simulated_speed_must_be_a_number(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

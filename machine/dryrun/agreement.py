@@ -1,0 +1,61 @@
+"""Agreement: the deposited plastic beside the model it was made from: what is filled, what lies outside, what hangs in air."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from machine.dryrun.deposit import Share, inside_share
+from machine.dryrun.dryrun import DryRun
+from machine.dryrun.fill import filled_share
+from machine.dryrun.findings import Finding
+from machine.dryrun.ground import beads
+from machine.dryrun.laying import unsupported_mm
+from mdp.mesh import Mesh
+from profiles.profile import Profile
+
+MOST_OUTSIDE = 0.01  # of the extruded length, by more than half a line: seams, brims and thin walls stay far below
+LEAST_FILLED = 0.98  # of the model at 100 % infill
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Shares 0..1. filled: of the model's inside that lies in a bead; outside: of the extruded length (skirt and support
+    aside) that lies more than half a line outside the model, farthest_mm the worst of it; unsupported: of the extruded
+    length that hangs in air where the slicer has not said so, reported: where it has.
+    """
+
+    filled: float
+    outside: float
+    farthest_mm: float
+    unsupported: float
+    reported: float
+
+
+def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, DryRun]:
+    """How the plastic of a dry run agrees with the closed model (workpiece frame); the run with what that found added.
+
+    Findings: outside (error), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
+    """
+    share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm)
+    filled = filled_share(run, mesh, profile).share
+    deposited = beads(run.program, run.segments_mm, run.segment_row, profile)
+    length, loose, told = unsupported_mm(run.program, deposited, run.ground)
+    whole = max(length, 1e-9)
+    found = Agreement(filled, 1.0 - share.share, share.farthest_mm, loose / whole, told / whole)
+    return found, replace(run, findings=(*run.findings, *_findings(run, share, found, profile)))
+
+
+def _findings(run: DryRun, share: Share, found: Agreement, profile: Profile) -> list[Finding]:
+    findings = []
+    if found.outside > MOST_OUTSIDE:
+        row = int(run.segment_row[np.flatnonzero(share.outside)[0]])
+        message = (
+            f"{100 * found.outside:.1f} % of the extruded length lie outside the model by more than half a line, "
+            f"{found.farthest_mm:.2f} mm and more at the worst"
+        )
+        place = (int(run.program.line[row]), int(run.program.part[row]), int(run.program.layer[row]))
+        findings.append(Finding("error", "outside", *place, message))
+    if profile.process.infill_density >= 1.0 and found.filled < LEAST_FILLED:
+        message = f"the beads fill {100 * found.filled:.1f} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"
+        findings.append(Finding("warning", "unfilled", 0, 0, 0, message))
+    return findings

@@ -1,0 +1,52 @@
+import numpy as np
+import pytest
+
+from machine.dryrun import dry_run
+from machine.dryrun.agreement import agreement
+from profiles.profile import Profile, load
+from tests import shapes
+from tests.machine.hand import printed, text
+
+FULL = ["process.infill_density=1"]
+BOX = shapes.box(10.0, 10.0, 10.0)
+
+
+def filled_box(layers: int, aside_mm: float = 0.0) -> list[str]:
+    """Layers of parallel beads 0.4 mm apart in a 10 mm box about the axis."""
+    lines = ["G28", "M83", "M104 S200", "M109 S200", ";TYPE:Solid infill", ";WIDTH:0.4", ";HEIGHT:0.2"]
+    for layer in range(layers):
+        lines.append(f"G0 Z{0.2 * (layer + 1):.1f} F600")
+        for y in np.arange(-4.8, 5.0, 0.4):
+            lines += [f"G0 X{aside_mm - 5:g} Y{y:.2f} F6000", f"G1 X{aside_mm + 5:g} E0.33 F600"]
+    return lines
+
+
+def codes(lines: list[str], profile: Profile) -> set[str]:
+    return {finding.code for finding in agreement(dry_run(lines, profile), BOX, profile)[1].findings} & {"outside", "unfilled"}
+
+
+def test_a_filled_box_agrees_with_the_box() -> None:
+    found, _ = agreement(dry_run(filled_box(50), load(settings=FULL)), BOX, load(settings=FULL))
+    assert (found.filled, found.outside, found.unsupported) == (pytest.approx(1.0, abs=0.002), 0.0, 0.0)
+    assert codes(filled_box(50), load(settings=FULL)) == set()
+
+
+def test_a_box_without_its_upper_half_is_unfilled_unless_the_infill_is_sparse() -> None:
+    assert codes(filled_box(25), load(settings=FULL)) == {"unfilled"}
+    assert codes(filled_box(25), load(settings=["process.infill_density=0.2"])) == set()
+
+
+def test_a_box_printed_two_tenths_aside_is_within_half_a_line_and_one_farther_aside_is_not() -> None:
+    assert codes(filled_box(50, 0.2), load(settings=FULL)) == set()
+    assert codes(filled_box(50, 1.0), load(settings=FULL)) == {"outside", "unfilled"}
+
+
+@pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro", "trident_5axis"])
+def test_a_table_whose_centre_lies_elsewhere_puts_tilted_parts_outside_the_model(machine: str) -> None:
+    profile, decomposition, _, _ = printed(machine)
+    lines = [line for line in text(machine) if not line.startswith("; ")]  # so that no comment gives it away
+    x, y, z = profile.machine.tilt.point_mm
+    moved = profile.machine.tilt.model_copy(update={"point_mm": (x, y + 2.0, z - 3.0)})
+    wrong = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": moved})})
+    assert "outside" not in {f.code for f in agreement(dry_run(lines, profile), decomposition.mesh, profile)[1].findings}
+    assert "outside" in {f.code for f in agreement(dry_run(lines, wrong), decomposition.mesh, wrong)[1].findings}
