@@ -6,6 +6,7 @@ from pathlib import Path
 from machine.app.compare import Rival, compare_table, compared, plain
 from machine.app.foot import in_words, told_in
 from machine.app.layer_picture import asked, drawn
+from machine.app.match import check_printer, check_program
 from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
 from machine.app.picture import contact_sheet, parts_picture
 from machine.app.pipeline import Program, build, decompose_model
@@ -104,11 +105,13 @@ def simulate(
     named: profiles given, not taken from the file. beside: the model that a G-code file's plastic is held against.
     """
     _check(json)
+    if beside is not None:
+        if Path(model).suffix.lower() not in GCODE_SUFFIXES:
+            raise ProfileError(f"--model {beside}: {model} is a model itself; --model goes with a G-code file")
+        locate(beside)
     program, profile = _program(model, profile, ranker, orient, named)
     mesh = None if program.decomposition is None else program.decomposition.mesh
     if beside is not None:
-        if mesh is not None:
-            raise ProfileError(f"--model {beside}: {model} is a model itself; --model goes with a G-code file")
         mesh, _ = read_mesh(locate(beside), profile.process.scale, profile.process.rotate_deg)
     found = None
     if mesh is not None:
@@ -130,11 +133,14 @@ def print_model(
     named: frozenset[str] = frozenset(),
 ) -> int:
     """Dry-run, then stream a model or a G-code file to a printer, whose port is tried before any work is done."""
-    check_port(port, baud, sim_speed)
+    answer = check_port(port, baud, sim_speed)
     if Path(model).suffix.lower() not in GCODE_SUFFIXES:
         check_dialect(profile.machine, port)
+        check_printer(answer, profile.machine, force)
     program, profile = _program(model, profile, ranker, orient, named)
     check_dialect(profile.machine, port)
+    check_printer(answer, profile.machine, force)
+    check_program(answer, program, profile, Path(model).name, force)
     _refuse_errors(program, force)
     show(run_table(program.run))
     return print_program(program, profile, port, baud, sim_speed)
