@@ -36,6 +36,7 @@ MaterialGiven = Annotated[str | None, typer.Option("--material", metavar="NAME|F
 ProcessGiven = Annotated[str | None, typer.Option("--process", metavar="NAME|FILE", help="process profile; else the file's")]
 Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
+HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]
 BeamWidth = Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")]
 SearchName = Annotated[
     str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
@@ -60,6 +61,7 @@ def decompose(
     sheet: Annotated[
         Path | None, typer.Option("--sheet", metavar="FILE", help="picture of the print order, tilted as printed")
     ] = None,
+    html: HtmlFile = None,
     record: Annotated[
         Path | None, typer.Option("--record", metavar="FILE", help="what the search saw, as .npz for training")
     ] = None,
@@ -72,7 +74,7 @@ def decompose(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
-    return commands.decompose(model, profile, ranker, orient, out, json, png, sheet, record)
+    return commands.decompose(model, profile, ranker, orient, out, json, png, sheet, record, html)
 
 
 @app.command()
@@ -86,6 +88,7 @@ def export(
     orient: Orient = False,
     json: JsonFile = None,
     svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer")] = None,
+    html: HtmlFile = None,
     layer: Annotated[str | None, typer.Option("--layer", metavar="PART:LAYER", help="which layer, counted from 1:1")] = None,
     compare: Annotated[
         bool, typer.Option("--compare", help="tell also time, material, support and risky area printed in one part")
@@ -100,7 +103,7 @@ def export(
     from machine.app import commands
 
     profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
-    return commands.export(model, profile, ranker, orient, out, json, svg, layer, force, compare)
+    return commands.export(model, profile, ranker, orient, out, json, svg, layer, force, compare, html)
 
 
 @app.command()
@@ -115,6 +118,7 @@ def simulate(
     beside: Annotated[
         str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
     ] = None,
+    html: HtmlFile = None,
     machine: MachineGiven = None,
     material: MaterialGiven = None,
     process: ProcessGiven = None,
@@ -127,7 +131,35 @@ def simulate(
         machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
     )
     named = _named(machine=machine, material=material, process=process, settings=settings)
-    return commands.simulate(model, profile, ranker, orient, json, named, beside)
+    return commands.simulate(model, profile, ranker, orient, json, named, beside, html)
+
+
+@app.command()
+def view(
+    model: ModelOrGcode,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="VIEW.html", help="page to write; else named after the model, here")
+    ] = None,
+    open_: Annotated[bool, typer.Option("--open", help="show the page in the browser")] = False,
+    beam_width: BeamWidth = None,
+    search: SearchName = None,
+    time_limit: TimeLimit = None,
+    ranker: RankerName = "classic",
+    orient: Orient = False,
+    compare: Annotated[bool, typer.Option("--compare", help="tell also time and material printed in one part")] = False,
+    machine: MachineGiven = None,
+    material: MaterialGiven = None,
+    process: ProcessGiven = None,
+    settings: Settings = None,
+) -> int:
+    """Write one HTML page that shows a model or a G-code file: parts, layers, the moving machine, a report."""
+    from machine.app import view_command
+
+    profile = _profile(
+        machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
+    )
+    named = _named(machine=machine, material=material, process=process, settings=settings)
+    return view_command.view(model, profile, ranker, orient, out, open_, compare, named)
 
 
 @app.command("print")

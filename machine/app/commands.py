@@ -9,11 +9,12 @@ from machine.app.layer_picture import asked, drawn
 from machine.app.match import check_printer, check_program
 from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
 from machine.app.picture import contact_sheet, parts_picture
-from machine.app.pipeline import Program, build, decompose_model
+from machine.app.pipeline import Program, build, decompose_model, model_name
 from machine.app.png import write_png
 from machine.app.printing import check_dialect, check_port, print_program
 from machine.app.progress import say
 from machine.app.report import agreement_line, parts_table, run_table, show
+from machine.app.view.page import write_parts_page, write_print_page
 from machine.app.warmup import warm_dry_run
 from machine.dryrun.agreement import Agreement, agreement
 from machine.dryrun.dryrun import dry_run, summary
@@ -35,11 +36,12 @@ def decompose(
     png: Path | None,
     sheet: Path | None,
     record: Path | None,
+    html: Path | None = None,
 ) -> int:
     """Find the parts of a model and save what is asked for."""
     if out is not None:
         check_folder(out)
-    for file in (json, png, sheet, record):
+    for file in (json, png, sheet, record, html):
         _check(file)
     found = decompose_model(model, profile, ranker, orient, record)
     told = values(found.decomposition, found.read_s, found.total_s)
@@ -53,6 +55,8 @@ def decompose(
         write_png(png, parts_picture(found.decomposition, profile))
     if sheet is not None:
         write_png(sheet, contact_sheet(found.decomposition, profile.machine))
+    if html is not None:
+        write_parts_page(html, found.decomposition, profile)
     if json is not None:
         write_json(json, told)
     if json is None or str(json) != "-":
@@ -71,13 +75,15 @@ def export(
     layer: str | None,
     force: bool,
     compare: bool = False,
+    html: Path | None = None,
 ) -> int:
     """Write a model's G-code, and one layer's picture where asked; refused when its dry run finds an error, unless forced.
 
     compare: tell also what the model costs printed in one part.
     """
     check_writable(out)
-    _check(json)
+    for file in (json, html):
+        _check(file)
     if svg is not None:
         check_writable(svg)
     wanted = asked(layer, svg is not None)
@@ -87,7 +93,10 @@ def export(
     write_lines(out, program.lines)
     if svg is not None:
         write_bytes(svg, picture)
-    _tell(program, json, compared(program, profile) if compare else ())
+    rivals = compared(program, profile) if compare else ()
+    if html is not None:
+        write_print_page(html, model_name(model), program, profile, rivals=rivals)
+    _tell(program, json, rivals)
     return 0
 
 
@@ -99,17 +108,20 @@ def simulate(
     json: Path | None,
     named: frozenset[str] = frozenset(),
     beside: str | None = None,
+    html: Path | None = None,
 ) -> int:
     """Dry-run a model or a G-code file; 1 when a finding is an error.
 
     named: profiles given, not taken from the file. beside: the model that a G-code file's plastic is held against.
     """
-    _check(json)
+    for file in (json, html):
+        _check(file)
     if beside is not None:
         if Path(model).suffix.lower() not in GCODE_SUFFIXES:
             raise ProfileError(f"--model {beside}: {model} is a model itself; --model goes with a G-code file")
         locate(beside)
-    program, profile = _program(model, profile, ranker, orient, named)
+    given = profile
+    program, profile = program_of(model, profile, ranker, orient, named)
     mesh = None if program.decomposition is None else program.decomposition.mesh
     if beside is not None:
         mesh, _ = read_mesh(locate(beside), profile.process.scale, profile.process.rotate_deg)
@@ -117,6 +129,9 @@ def simulate(
     if mesh is not None:
         found, run = agreement(program.run, mesh, profile)
         program = replace(program, run=run)
+    if html is not None:
+        known = machine_known(program, profile, given, named)
+        write_print_page(html, model_name(model), program, profile, known)
     _tell(program, json, found=found)
     return 1 if _errors(program) else 0
 
@@ -137,7 +152,7 @@ def print_model(
     if Path(model).suffix.lower() not in GCODE_SUFFIXES:
         check_dialect(profile.machine, port)
         check_printer(answer, profile.machine, force)
-    program, profile = _program(model, profile, ranker, orient, named)
+    program, profile = program_of(model, profile, ranker, orient, named)
     check_dialect(profile.machine, port)
     check_printer(answer, profile.machine, force)
     check_program(answer, program, profile, Path(model).name, force)
@@ -146,7 +161,8 @@ def print_model(
     return print_program(program, profile, port, baud, sim_speed)
 
 
-def _program(model: str, profile: Profile, ranker: str, orient: bool, named: frozenset[str]) -> tuple[Program, Profile]:
+def program_of(model: str, profile: Profile, ranker: str, orient: bool, named: frozenset[str]) -> tuple[Program, Profile]:
+    """The program of a model or of a G-code file, which may tell its own profiles, and the profile it was tried with."""
     if Path(model).suffix.lower() in GCODE_SUFFIXES:
         lines = _gcode_lines(Path(model))
         profile, taken = told_in(lines, profile, named)
@@ -155,6 +171,11 @@ def _program(model: str, profile: Profile, ranker: str, orient: bool, named: fro
         warm_dry_run()
         return Program(lines, dry_run(lines, profile), None), profile
     return build(decompose_model(model, profile, ranker, orient, to_build=True).decomposition, profile), profile
+
+
+def machine_known(program: Program, profile: Profile, given: Profile, named: frozenset[str]) -> bool:
+    """Whether a program's machine is told by its file (profile differs from the one given) or by the user, not guessed."""
+    return program.decomposition is not None or "machine" in named or profile.machine is not given.machine
 
 
 def _gcode_lines(path: Path) -> tuple[str, ...]:

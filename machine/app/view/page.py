@@ -2,11 +2,38 @@
 
 import base64
 import re
+from collections.abc import Sequence
 from hashlib import sha256
 from html import escape
 from importlib import resources
+from pathlib import Path
+
+from machine.app.compare import Rival
+from machine.app.output import write_bytes
+from machine.app.pipeline import Program
+from machine.app.view.contents import of_parts, of_print
+from mdp.decomposition import Decomposition
+from profiles.profile import Profile
 
 MARKER = re.compile(r"<!--(?:TITLE|CSP|DATA)-->|/\*(?:STYLE|SCRIPT)\*/")
+DATA = b'<script type="application/octet-stream" id="tiltprint">'
+
+
+def write_parts_page(path: Path, decomposition: Decomposition, profile: Profile) -> None:
+    """Write the page of parts alone, whole or not at all. Raises OutputError."""
+    write_bytes(path, page(decomposition.name, of_parts(decomposition, profile)))
+
+
+def write_print_page(
+    path: Path, name: str, program: Program, profile: Profile, known: bool = True, rivals: Sequence[Rival] = ()
+) -> int:
+    """Write the page of a whole print, whole or not at all; arguments as of_print takes them. Returns its size in bytes.
+
+    Raises OutputError.
+    """
+    content = page(name, of_print(name, program, profile, known, rivals))
+    write_bytes(path, content)
+    return len(content)
 
 
 def page(title: str, block: bytes, live: bool = False) -> bytes:
@@ -15,7 +42,7 @@ def page(title: str, block: bytes, live: bool = False) -> bytes:
     put = {
         "<!--TITLE-->": escape(title),
         "<!--CSP-->": f'<meta http-equiv="Content-Security-Policy" content="{policy(style, script, live)}">',
-        "<!--DATA-->": f'<script type="application/octet-stream" id="tiltprint">{base64.b64encode(block).decode()}</script>',
+        "<!--DATA-->": f"{DATA.decode()}{base64.b64encode(block).decode()}</script>",
         "/*STYLE*/": style,
         "/*SCRIPT*/": script,
     }

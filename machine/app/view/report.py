@@ -1,0 +1,162 @@
+"""Report: what stands beside the picture: figures of the print, its parts, its kinds of line, its rivals.
+
+All values are texts ready to show, so that the page has nothing to work out.
+"""
+
+from collections.abc import Sequence
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.app.compare import Rival
+from machine.app.pipeline import Program
+from machine.app.report import duration, risky_before_mm2
+from machine.app.view.paths import PRIME, WIPE, page_kinds
+from machine.app.view.settings import settings_tables
+from machine.dryrun.dryrun import DryRun, summary
+from machine.parsed import MoveKind
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Floats
+from mdp.orientation import best_orientation, in_words
+from profiles.profile import Profile
+
+Table = dict[str, Any]
+Row = list[str]
+MOVES = {
+    MoveKind.TRAVEL: "travel", MoveKind.RETRACT: "retraction", PRIME: "prime", WIPE: "wipe", MoveKind.ROTATE: "turning the table",
+}  # fmt: skip
+UNTOLD = "not told"
+
+
+def parts_report(decomposition: Decomposition, profile: Profile) -> dict[str, Any]:
+    """The report of a page of parts alone."""
+    facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
+    rows = [_solid(part, decomposition, profile) for part in decomposition.parts]
+    tables = [_table("Parts", SOLID, rows), _areas(decomposition, profile), *settings_tables(profile)]
+    return {"facts": facts, "tables": tables}
+
+
+def print_report(program: Program, profile: Profile, ends_s: Floats, rivals: Sequence[Rival] = ()) -> dict[str, Any]:
+    """The report of a whole print. ends_s: (n,) when each row ends; rivals: the same model printed in one part."""
+    tables = [_parts(program, profile, ends_s), _kinds(program.run, profile)]
+    if program.decomposition is not None:
+        tables.append(_rivals(rivals) if rivals else _areas(program.decomposition, profile))
+    return {"facts": [*_figures(program.run, profile), *_names(profile)], "tables": tables + settings_tables(profile)}
+
+
+def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), folded: bool = False) -> Table:
+    return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": folded}
+
+
+SOLID = ["part", "tilt", "turn", "volume", "share", "risky before", "risky after"]
+
+
+def _solid(part: Part, decomposition: Decomposition, profile: Profile) -> Row:
+    """A part's shape: pose, volume, and the faces that would and will need support."""
+    before = risky_before_mm2(part, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
+    share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
+    angles = [f"{part.pose.tilt_deg:.1f}°", f"{part.pose.turn_deg:.1f}°"]
+    return [str(part.index), *angles, _cm3(part.volume_mm3), share, _mm2(before), _mm2(part.risky_area_mm2)]
+
+
+def _parts(program: Program, profile: Profile, ends_s: Floats) -> Table:
+    """Each part with its layers, time and material; what its solid is where the program came from a model."""
+    parsed, seconds = program.run.program, np.diff(ends_s, prepend=0.0)
+    found = program.decomposition
+    solids = {part.index: _solid(part, found, profile) for part in found.parts} if found is not None else {}
+    rows = []
+    for index in parsed.parts or (0,):
+        mine = parsed.part == index
+        layers = len(np.unique(parsed.layer[mine & (parsed.layer > 0)]))
+        made = [
+            str(layers) if parsed.layers else UNTOLD,
+            duration(float(seconds[mine].sum())),
+            _grams(parsed.e_mm[mine], profile),
+        ]
+        rows.append([*solids.get(index, [str(index) if index else "all"]), *made])
+    head = SOLID if solids else SOLID[:1]
+    return _table("Parts", [*head, "layers", "time", "material"], rows)
+
+
+def _kinds(run: DryRun, profile: Profile) -> Table:
+    """Time and material by what is printed, then the ways between, then waiting; they add up to the whole print."""
+    program, kind = run.program, page_kinds(run.program)
+    groups: list[tuple[str, NDArray[np.bool_]]] = [
+        (name or UNTOLD, (kind == MoveKind.EXTRUDE) & (program.type == place)) for place, name in enumerate(program.types)
+    ]
+    groups += [(name, kind == number) for number, name in MOVES.items()]
+    told = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]
+    if run.dwell_s > 0:
+        told.append(("waiting", run.dwell_s, 0.0))
+    rows = [[name, duration(s), _share(s, run.time_s), f"{e / 1000:.2f} m", _grams(e, profile)] for name, s, e in told]
+    notes = ["heating and homing are not counted"]
+    return _table("Time and material", ["kind", "time", "share", "filament", "material"], rows, notes)
+
+
+def _areas(decomposition: Decomposition, profile: Profile) -> Table:
+    """Risky area straight up, in the best single orientation, in parts."""
+    best = best_orientation(decomposition.mesh, profile.process.self_supporting_angle_deg)
+    single = best.risky_mm2 + (best.base_mm2 if profile.search.count_platform_faces else 0.0)
+    told = [
+        ("straight up", decomposition.risky_area_mm2),
+        ("best single orientation", single),
+        (_count(len(decomposition.parts)), decomposition.residual_area_mm2),
+    ]
+    whole = decomposition.risky_area_mm2
+    rows = [[name, _mm2(area), _share(whole - area, whole)] for name, area in told]
+    rows[0][2] = ""
+    notes = [f"best single orientation: {in_words(best)}", "--compare tells time and material too"]
+    return _table("Compared", ["print", "risky area", "less"], rows, notes)
+
+
+def _rivals(rivals: Sequence[Rival]) -> Table:
+    """This print beside the model in one part: time, filament, support, risky area."""
+    rows = []
+    for rival in rivals:
+        made = ["-"] * 4
+        if rival.time_s is not None:
+            filament, grams, support = rival.filament_mm or 0.0, rival.filament_g or 0.0, rival.support_mm3 or 0.0
+            made = [duration(rival.time_s), f"{filament / 1000:.2f} m", f"{grams:.1f} g", _cm3(support)]
+        rows.append([rival.name, *made, _mm2(rival.risky_mm2)])
+    notes = [f"{rival.name}: {note}" for rival in rivals for note in (rival.orientation, rival.message) if note]
+    return _table("Compared", ["print", "time", "filament", "material", "support", "risky area"], rows, notes)
+
+
+def _figures(run: DryRun, profile: Profile) -> list[Row]:
+    values = summary(run)
+    return [
+        ["time", duration(values["time_s"])],
+        ["material", _grams(run.program.e_mm, profile)],
+        ["filament", f"{values['filament_mm'] / 1000:.2f} m"],
+        *[[key, str(values[key])] for key in ("parts", "layers", "reorientations", "retractions")],
+        ["travel", f"{values['travel_mm'] / 1000:.2f} m"],
+    ]
+
+
+def _names(profile: Profile) -> list[Row]:
+    return [["machine", profile.machine.name], ["filament", profile.material.name], ["process", profile.process.name]]
+
+
+def _grams(filament_mm: Any, profile: Profile) -> str:
+    """Weight of filament that was pushed; filament_mm: a length, or the steps that make it."""
+    material = profile.material
+    volume_mm3 = float(np.sum(filament_mm)) * pi * material.diameter_mm**2 / 4.0
+    return f"{volume_mm3 * material.density_g_cm3 / 1000.0 + 0.0:.1f} g"
+
+
+def _share(part: float, whole: float) -> str:
+    return f"{round(100.0 * part / whole, 1) + 0.0 if whole > 0 else 0.0:.1f} %"
+
+
+def _cm3(volume_mm3: float) -> str:
+    return f"{volume_mm3 / 1000.0:.2f} cm³"
+
+
+def _mm2(area: float) -> str:
+    return f"{max(area, 0.0):.1f} mm²"
+
+
+def _count(parts: int) -> str:
+    return f"in {parts} part{'s' * (parts != 1)}"
