@@ -11,6 +11,7 @@ from machine.link.firmware import Firmware
 
 ERROR = "Error:Heating failed, system stopped! Heater_ID: 0"
 GARBAGE_BYTES = 20
+LATE_S = 1e-9  # the firmware is looked at that much late, for a clock told in another unit is rounded
 
 
 class _Places:
@@ -71,11 +72,13 @@ class _Way:
 class Cable:
     """exchange() is one turn: the host's bytes travel to the firmware, it works, its answers travel back.
 
-    now_s is the cable's own clock, in which delays, stalls and disconnections are counted; the firmware has another one.
+    now_s is the cable's own clock, in which delays, stalls and disconnections are counted; speed: how many seconds pass for the
+    firmware in one of it, inf: its clock jumps over every wait.
     """
 
-    def __init__(self, firmware: Firmware, script: FaultScript | None = None) -> None:
+    def __init__(self, firmware: Firmware, script: FaultScript | None = None, speed: float = inf) -> None:
         script = script or FaultScript()
+        self._speed = speed
         self._firmware = firmware
         self._in = _Way(_placed(script, "byte", False))
         self._out = _Way(_placed(script, "byte", True))
@@ -99,23 +102,36 @@ class Cable:
 
     def due_s(self, now_s: float) -> float:
         """When something happens without further bytes, on the cable's clock; inf: never."""
-        times = (self._in.due_s(), self._out.due_s(), self._blocked_s, self._back_s)
+        firmware_s = inf if self._speed == inf else self._firmware.next_s() / self._speed + LATE_S
+        times = (self._in.due_s(), self._out.due_s(), self._blocked_s, self._back_s, firmware_s)
         return min((t for t in times if t > now_s), default=inf)
 
-    def exchange(self, data: bytes, now_s: float = 0.0, until_s: float = inf) -> bytes:
-        """What the host hears after these bytes; until_s: how far the firmware's clock may run."""
+    def exchange(self, data: bytes, now_s: float = 0.0, until_s: float | None = None) -> bytes:
+        """What the host hears after these bytes; until_s: how far the firmware's clock may run, if not as speed says."""
+        until_s = until_s if until_s is not None else inf if self._speed == inf else now_s * self._speed
         if self._clean:
+            said = self._firmware.advance(until_s) if until_s < inf else b""
             self._firmware.receive(data)
-            return self._firmware.advance(until_s)
+            return said + self._firmware.advance(until_s)
         if self.connected(now_s):
             self._carry(data, self._in, now_s, until_s)
         self._work(now_s, until_s)
         return self._out.take(now_s) if self.connected(now_s) else b""
 
     def _work(self, now_s: float, until_s: float) -> None:
-        """Let the firmware work on what has arrived; a fault at a line strikes before the line begins."""
+        """Let the firmware work, then on what has arrived; while it is blocked its ring fills, if it has one."""
+        if self.blocked(now_s):
+            if self._firmware.has_ring:
+                self._firmware.receive(self._in.take(now_s))
+            return
+        if until_s < inf:
+            self._advance(now_s, until_s)
         if arrived := self._in.take(now_s):
             self._firmware.receive(arrived)
+        self._advance(now_s, until_s)
+
+    def _advance(self, now_s: float, until_s: float) -> None:
+        """A fault at a line strikes before the line begins."""
         while True:
             said = self._firmware.advance(until_s)
             if self.connected(now_s):
@@ -125,6 +141,8 @@ class Cable:
             struck, self._struck = self._struck, []
             for fault in struck:
                 self._strike(fault, now_s)
+            if self.blocked(now_s):
+                return
 
     def _watch(self, line: int) -> bool:
         self._struck += [fault for _, fault in self._lines.before(line + 1)]
@@ -191,7 +209,8 @@ class Cable:
             self._out.open_s = max(self._out.open_s, until_s)
         elif kind == "block":
             self._blocked_s = until_s
-            self._in.open_s = max(self._in.open_s, until_s)
+            if not self._firmware.has_ring:
+                self._in.open_s = max(self._in.open_s, until_s)
         else:
             self._out.put(self._foreign(fault))
 

@@ -19,6 +19,8 @@ from profiles.machine import Machine
 
 BUFSIZE = 4  # lines waiting, the one at work included
 MAX_CMD_SIZE = 96
+HALF_BYTES = 1024
+UNREAD_LINES = 20
 BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
 CHATTER_S = 3600.0  # of a longer wait only the last hour is talked through: a jump over years must not fill the memory
 DIGITS = re.compile(rb"\s*([-+]?\d+)")
@@ -50,6 +52,7 @@ class Firmware:
         self._busy_s = inf
         self._lines: deque[bytes] = deque()
         self._half = b""
+        self._read = 0
         self._scanned = b""
         self._queue: deque[tuple[str, str]] = deque()
         self._last = 0
@@ -67,11 +70,24 @@ class Firmware:
         if self._habits.emergency_parser:
             self._read_urgent(data)
         if self._habits.rx_ring is not None:
-            kept = data[: max(0, self._habits.rx_ring - 1 - len(self._half) - sum(len(x) + 1 for x in self._lines))]
+            waiting = len(self._half) + sum(len(line) + 1 for line in self._lines) - self._read
+            kept = data[: max(0, self._habits.rx_ring - 1 - waiting)]
             self._lost_bytes += len(data) - len(kept)
             data = kept
         *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
         self._lines.extend(lines)
+        if len(self._half) > HALF_BYTES:  # a line without end: what is too long for a command is not kept
+            self._half = self._half[: self._longest]
+
+    @property
+    def has_ring(self) -> bool:
+        """Whether bytes arrive in a ring that overflows; over USB the host waits instead."""
+        return self._habits.rx_ring is not None
+
+    @property
+    def full(self) -> bool:
+        """Over USB: nothing more is read until there is room again."""
+        return not self.has_ring and len(self._lines) > UNREAD_LINES
 
     def advance(self, until_s: float = inf) -> bytes:
         """Work until a virtual time; with inf until there is nothing to do, the clock jumping over all waits."""
@@ -152,6 +168,7 @@ class Firmware:
         self._lines.clear()
         self._queue.clear()
         self._half = self._scanned = b""
+        self._read = 0
         self._wake_s = self._work = None
         self._busy_s = inf
         self._watched = self._taken
@@ -194,6 +211,7 @@ class Firmware:
     def _fetch(self) -> None:
         """Move lines from the receive ring into the queue while it has room, checking number and checksum."""
         while self._lines and len(self._queue) < BUFSIZE:
+            self._read = 0
             line = self._lines.popleft().partition(b";")[0][: self._longest].lstrip(b" ")
             if not line:
                 continue
@@ -208,6 +226,8 @@ class Firmware:
                 label = f" N{self._last}"
                 line = line[1 : line.rindex(b"*")].lstrip(b"-+0123456789").lstrip(b" ")
             self._queue.append((label, line.decode("ascii", "replace").rstrip()))
+        if not self._lines and len(self._queue) < BUFSIZE:
+            self._read = len(self._half)  # taken from the ring, put together elsewhere
 
     def _complaint(self, line: bytes) -> str | None:
         """What is wrong with a numbered line; "" for a repeat that Marlin drops in silence, None when it is taken."""
@@ -230,6 +250,7 @@ class Firmware:
         self._said += [f"Error:{complaint}, Last Line: {self._last}", f"Resend: {self._last + 1}", "ok"]
         self._lines.clear()
         self._half = b""
+        self._read = 0
 
     def _run(self) -> None:
         """Begin or go on with the oldest line of the queue."""

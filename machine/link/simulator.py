@@ -15,8 +15,10 @@ from machine.link.faults import Fault, FaultScript
 from machine.link.firmware import BUSY_S, Firmware, Habits
 from machine.link.record import Record
 from machine.link.terminal import Server, Terminal
+from machine.link.uart import Uart
 from profiles.machine import Machine
 
+RING = 128  # bytes of an AVR's receive ring
 UNREAD_BYTES = 1 << 20  # answers kept for a host that does not read; older ones are dropped beyond
 
 
@@ -26,6 +28,8 @@ class SimulatedPrinter:
     speed: virtual seconds in a real one; inf never sleeps, the clock jumps over every wait. faults: what goes wrong; after a
     disconnection the terminal is gone (reading fails) and comes back at a new printer.path, or behind the same `link` (a symbolic
     link to keep). tcp: a port number of this computer (0: a free one) instead of a terminal; path is then a socket:// address.
+    baud: every byte takes the time of 10 bits, both ways, and what a 128-byte receive ring cannot hold is lost (without
+    habits of your own); None: USB, as fast as the system, and the host waits. The rate a host opens the path with means nothing.
     Raises PortError on a system without pseudo-terminals, or for a link or port that is taken.
     """
 
@@ -37,13 +41,14 @@ class SimulatedPrinter:
         faults: FaultScript | Iterable[Fault] = (),
         link: Path | None = None,
         tcp: int | None = None,
+        baud: int | None = None,
     ) -> None:
         if not speed > 0:
             raise ValueError(f"speed is {speed:g}: it must be above 0")
         # `busy:` must come in real time, or a slow simulation would look dead to the sender.
-        self._firmware = Firmware(machine, habits, BUSY_S * min(1.0, speed))
-        self._cable = Cable(self._firmware, faults if isinstance(faults, FaultScript) else FaultScript(tuple(faults)))
-        self._speed = speed
+        self._firmware = Firmware(machine, habits or (Habits(rx_ring=RING) if baud else None), BUSY_S * min(1.0, speed))
+        self._cable = Cable(self._firmware, faults if isinstance(faults, FaultScript) else FaultScript(tuple(faults)), speed)
+        self._line = self._cable if baud is None else Uart(self._cable, baud)
         self._lock = threading.Lock()
         self._link, self._tcp = link, tcp
         self._out = b""
@@ -85,37 +90,37 @@ class SimulatedPrinter:
         while True:
             now_s = monotonic() - self._began_s
             with self._lock:
-                answer = self._turn(data, now_s)
+                answer = self._line.exchange(data, now_s)
             if there != self._cable.connected(now_s):
                 there = not there
                 self._plug(there)
             if there:
                 self._answer(answer)
-            deaf = self._cable.blocked(now_s)
-            listening, talking = [] if deaf else self._terminal.listening(), self._terminal.talking() if self._out else []
+            listening = [] if self._deaf(now_s) else self._terminal.listening()
+            talking = self._terminal.talking() if self._out else []
             readable, _, _ = select.select([*listening, self._end], talking, [], self._pause_s(now_s))
             if self._end in readable:
                 return
             data = self._terminal.read() if readable else b""
 
+    def _deaf(self, now_s: float) -> bool:
+        """Whether the host's bytes are left where they are, so that its writing comes to a halt."""
+        if isinstance(self._line, Uart):
+            return self._line.full
+        return self._firmware.full or (self._cable.blocked(now_s) and not self._firmware.has_ring)
+
     def _plug(self, there: bool) -> None:
         self._out = b""
+        if isinstance(self._line, Uart):
+            self._line.clear()
         if there:
             self._terminal.open()
         else:
             self._terminal.close()
 
-    def _turn(self, data: bytes, now_s: float) -> bytes:
-        if self._speed == inf:
-            return self._cable.exchange(data, now_s)
-        until_s = now_s * self._speed
-        return self._cable.exchange(b"", now_s, until_s) + self._cable.exchange(data, now_s, until_s)
-
     def _pause_s(self, now_s: float) -> float | None:
         """How long nothing happens unless the host says something; None: for ever."""
-        due_s = self._cable.due_s(now_s)
-        if self._speed < inf:
-            due_s = min(due_s, self._firmware.next_s() / self._speed)
+        due_s = self._line.due_s(now_s)
         return None if due_s == inf else max(0.0, due_s - (monotonic() - self._began_s))
 
     def _answer(self, answer: bytes) -> None:
