@@ -15,14 +15,25 @@ class Temperature:
 
 
 @dataclass(frozen=True, slots=True)
+class Position:
+    """Answer to M114 or an autoreport: (letter, value) pairs, rotary letters included."""
+
+    axes: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Ok:
-    """A line was accepted. The number and the free places come with Marlin's ADVANCED_OK, a temperature after M105."""
+    """A line was accepted. Number and free places come with Marlin's ADVANCED_OK, a temperature after M105.
+
+    position: Smoothie puts the answer to M114 behind its ok.
+    """
 
     line: int | None = None
     planner_free: int | None = None
     rx_free: int | None = None
     temperature: Temperature | None = None
     text: str = ""
+    position: Position | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +48,6 @@ class Busy:
     """The printer lives but has no time for more lines."""
 
     text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Position:
-    """Answer to M114: (letter, value) pairs, rotary letters included."""
-
-    axes: tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +80,21 @@ class Identity:
 
 
 @dataclass(frozen=True, slots=True)
+class Area:
+    """The geometry report of M115: (letter, least, greatest) of each axis. Marlin calls the fourth to sixth axis I, J, K."""
+
+    axes: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """`//action:NAME`: the printer asks the sender for something (pause, resume, cancel, disconnect, poweroff, ...)."""
+
+    name: str
+    words: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Echo:
     """Words for people, `echo:` or `//`."""
 
@@ -85,6 +104,13 @@ class Echo:
 @dataclass(frozen=True, slots=True)
 class Start:
     """The printer has just started: counters, position and temperatures are gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Banner:
+    """Words that a firmware says only while it starts; they betray a restart whose `start` was lost."""
+
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,17 +125,26 @@ class Unknown:
     text: str
 
 
-Told = Temperature | Position | Capability | Identity | Echo | Unknown
-Event = Ok | Resend | Busy | LineError | FirmwareFault | Start | Wait | Told
+Told = Temperature | Position | Capability | Identity | Area | Action | Echo | Unknown
+Event = Ok | Resend | Busy | LineError | FirmwareFault | Start | Banner | Wait | Told
 
-OK = re.compile(r"ok(?: N?(\d+))?(?: P(\d+))?(?: B(\d+))?")
-RESEND = re.compile(r"(?:resend:|rs)\s*N?(\d+)", re.IGNORECASE)
+OK = re.compile(r"ok(?: N?(\d{1,10}))?(?: P(\d{1,4}))?(?: B(\d{1,4}))?")
+RESEND = re.compile(r"(?:resend:|rs)\s*N?(\d{1,10})", re.IGNORECASE)
 NOZZLE = re.compile(r"(?:^|\s)T0?:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
 BED = re.compile(r"(?:^|\s)B:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
 AXIS = re.compile(r"([A-Z]):\s*(-?\d+\.?\d*)")
 CAPABILITY = re.compile(r"Cap:(\w+):([01])")
-# Words by which Marlin's and its forks' transmission errors are known even when a byte of them is damaged.
-OF_THE_LINE = ("checksum", "line number", "last line")
+AREA = re.compile(r"area:.*?full:\{min:\{([^}]*)\},?max:\{([^}]*)\}")
+REACH = re.compile(r"([a-z]):(-?\d+\.?\d*)")
+ACTION = re.compile(r"//\s*action:\s*(\w+)\s*(.*)")
+# A boot loader at another rate, and the jerk of a reset line, put rubbish in front of the word.
+START = re.compile(r"(?:.*[^ -~])?start")
+GREETS = re.compile(r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*")
+# Words by which transmission errors are known even when a byte of them is damaged.
+OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
+OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
+# Said by firmwares that stop, whatever became of the `Error:` before them.
+DEADLY = ("printer halted", "kill() called", "thermal runaway", "heating failed", "system stopped", "mintemp", "maxtemp")
 
 
 def read_event(raw: bytes) -> Event:
@@ -120,35 +155,59 @@ def read_event(raw: bytes) -> Event:
     folded = text.lower()
     if found := RESEND.fullmatch(text):
         return Resend(int(found[1]))
-    if folded.startswith(("error:", "!!", "fatal:")) or "printer halted" in folded:
-        of_the_line = any(word in folded for word in OF_THE_LINE)
-        return LineError(text) if of_the_line else FirmwareFault(text)
+    if folded.startswith(("error:", "!!", "fatal:", "alarm:")) or any(word in folded for word in DEADLY):
+        return _error(text, folded)
     if folded.startswith(("echo:busy:", "busy:")):
         return Busy(text)
-    if text in ("start", "wait"):
-        return Start() if text == "start" else Wait()
+    return _told(text)
+
+
+def _error(text: str, folded: str) -> Event:
+    if any(word in folded for word in OF_THE_LINE):
+        return LineError(text)
+    return Echo(text) if any(word in folded for word in OF_THE_CARD) else FirmwareFault(text)
+
+
+def _told(text: str) -> Event:
+    """What is no answer to a line."""
+    if text.startswith("X:"):
+        return _position(text)
+    if text == "wait":
+        return Wait()
+    if START.fullmatch(text):
+        return Start()
+    if found := ACTION.fullmatch(text):
+        return Action(found[1].lower(), found[2])
+    if GREETS.fullmatch(text):
+        return Banner(text)
     if text.startswith(("echo:", "//")):
         return Echo(text.removeprefix("echo:").removeprefix("//").strip())
     if text.startswith("FIRMWARE_NAME:"):
         return Identity(text)
     if found := CAPABILITY.fullmatch(text):
         return Capability(found[1], found[2] == "1")
-    if text.startswith("X:"):
-        return Position(tuple((letter, float(value)) for letter, value in AXIS.findall(text.partition("Count")[0])))
-    return _temperature(text) or Unknown(text)
+    return _area(text) or _temperature(text) or Unknown(text)
 
 
 def _ok(text: str) -> Event:
     if found := OK.fullmatch(text):
         line, planner, rx = found.groups()
         return Ok(_whole(line), _whole(planner), _whole(rx), None, text)
+    if not text.isascii() or not text.startswith("ok "):
+        return Unknown(text)
     if text.startswith(("ok T", "ok B:")):  # Klipper tells the bed first
         return Ok(temperature=_temperature(text), text=text)
-    return Ok(text=text) if text.startswith("ok ") else Unknown(text)
+    return Ok(text=text, position=_position(text) if " X:" in text else None)
 
 
 def _whole(digits: str | None) -> int | None:
     return None if digits is None else int(digits)
+
+
+def _position(text: str) -> Position:
+    """The axes' places; what follows Count (steps) and Machine (RepRapFirmware, before the table's map) is left out."""
+    text = text[text.index("X:") :].partition(" Count")[0].partition(" Machine")[0]
+    return Position(tuple((letter, float(value)) for letter, value in AXIS.findall(text)))
 
 
 def _temperature(text: str) -> Temperature | None:
@@ -161,3 +220,11 @@ def _pair(pattern: re.Pattern[str], text: str) -> tuple[float | None, float | No
     if found is None:
         return None, None
     return float(found[1]), None if found[2] is None else float(found[2])
+
+
+def _area(text: str) -> Area | None:
+    found = AREA.match(text)
+    if found is None:
+        return None
+    least, most = dict(REACH.findall(found[1])), dict(REACH.findall(found[2]))
+    return Area(tuple((letter.upper(), float(least[letter]), float(most[letter])) for letter in least if letter in most))

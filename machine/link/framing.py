@@ -2,6 +2,7 @@
 
 from profiles.errors import LocalProtocolError
 
+FRAME = 11  # N, five digits (numbers begin anew in time), blank, *, three digits of the checksum
 LINE_LIMIT = 95  # Marlin keeps MAX_CMD_SIZE - 1 characters; a longer line loses its checksum and is asked for again for ever
 REFUSED = {
     "M0": "waits for a person at the printer's own buttons",
@@ -59,16 +60,18 @@ def command_of(line: str, place: int, limit: int = LINE_LIMIT) -> str:
         raise LocalProtocolError(f"line {place} ({command[:40]!r}) holds a '*': checksums are added by the sender")
     if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
         raise LocalProtocolError(f"line {place} holds {name_of(command)}, which {reason}: remove it from the program")
-    if len(command) > limit - 6 and len(command) + len(str(place + 3)) + 6 > limit:
+    if len(command) > limit - FRAME:
         raise LocalProtocolError(
             f"line {place} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
-            f"{limit} are allowed"
+            f"{limit} are allowed, {limit - FRAME} without"
         )
     return command
 
 
 def name_of(command: str) -> str:
-    """The letter and number a command begins with, "M109" of "M109 S210"."""
+    """The letter and number a command begins with, "M109" of "M109 S210"; of a Klipper macro its first word."""
+    if command[1:2].isalpha():
+        return command.partition(" ")[0].upper()
     end = 1
     while end < len(command) and (command[end].isdigit() or command[end] == "."):
         end += 1

@@ -17,6 +17,7 @@ class State(Enum):
     PROBING = auto()  # silence or doubt: a new numbered M105 shows what arrived
     QUIET = auto()  # a resend was asked: nothing is sent until late lines have run dry
     REPEAT = auto()  # lines of the history are repeated one by one
+    RENUMBER = auto()  # M110 sent in mid-print: the numbers begin anew before they grow too long
     HALTED = auto()  # the firmware reported an error
     LOST = auto()  # silence, restart or nonsense: nothing more can be known
 
@@ -36,7 +37,9 @@ class Signal(Enum):
     SILENT = auto()  # probes or handshakes remain without answer
     START = auto()  # the printer started anew
     FAULT = auto()  # the firmware reported an error
-    UNCHECKED = auto()  # the printer ran a torn line without number and checksum
+    UNCHECKED = auto()  # what became of a line cannot be known: a torn one was run, or one without answer cannot be asked about
+    BROKEN = auto()  # the port was lost and is there again: what was on its way may have got lost
+    WORN = auto()  # the last number was used, and no line is in flight
 
 
 TABLE: dict[State, dict[Signal, State]] = {
@@ -60,6 +63,8 @@ TABLE: dict[State, dict[Signal, State]] = {
         Signal.FAULT: State.HALTED,
     },
     State.OPEN: {
+        Signal.BROKEN: State.PROBING,
+        Signal.WORN: State.RENUMBER,
         Signal.RESEND: State.QUIET,
         Signal.DOUBT: State.PROBING,
         Signal.STALL: State.PROBING,
@@ -69,6 +74,7 @@ TABLE: dict[State, dict[Signal, State]] = {
         Signal.FAULT: State.HALTED,
     },
     State.PROBING: {
+        Signal.BROKEN: State.PROBING,
         Signal.ANSWERED: State.OPEN,
         Signal.RESEND: State.QUIET,
         Signal.DOUBT: State.PROBING,
@@ -80,6 +86,7 @@ TABLE: dict[State, dict[Signal, State]] = {
         Signal.FAULT: State.HALTED,
     },
     State.QUIET: {
+        Signal.BROKEN: State.PROBING,
         Signal.HUSH: State.REPEAT,
         Signal.IMPOSSIBLE: State.LOST,
         Signal.START: State.LOST,
@@ -87,11 +94,21 @@ TABLE: dict[State, dict[Signal, State]] = {
         Signal.FAULT: State.HALTED,
     },
     State.REPEAT: {
+        Signal.BROKEN: State.PROBING,
         Signal.CAUGHT_UP: State.OPEN,
         Signal.RESEND: State.QUIET,
         Signal.DOUBT: State.PROBING,
         Signal.STALL: State.PROBING,
         Signal.IMPOSSIBLE: State.LOST,
+        Signal.START: State.LOST,
+        Signal.UNCHECKED: State.LOST,
+        Signal.FAULT: State.HALTED,
+    },
+    State.RENUMBER: {
+        Signal.BROKEN: State.RENUMBER,
+        Signal.SYNCED: State.OPEN,
+        Signal.STALL: State.RENUMBER,
+        Signal.SILENT: State.LOST,
         Signal.START: State.LOST,
         Signal.UNCHECKED: State.LOST,
         Signal.FAULT: State.HALTED,

@@ -3,23 +3,11 @@
 from collections import deque
 from dataclasses import dataclass
 
-from machine.link.framing import LINE_LIMIT, frame, name_of
+from machine.link.budget import budget_s
+from machine.link.framing import LINE_LIMIT, frame
 
-RX_BYTES = 127  # an AVR's 128-byte receive ring holds one byte less; a fuller one loses bytes without a word
 HISTORY = 512  # lines kept for a repeat: far more than any printer's buffers hold
-
-# Commands whose `ok` takes its time, with the most it may take, s. They are sent alone.
-BUDGET_S = {
-    "G4": 3600.0,
-    "G28": 600.0,
-    "G29": 1800.0,
-    "M109": 3600.0,
-    "M190": 3600.0,
-    "M191": 3600.0,
-    "M303": 3600.0,
-    "M400": 3600.0,
-    "M600": 86400.0,
-}
+FIRST_AGAIN = 1000  # numbers begin here when they begin anew: a printer that asks for line 1 or 2 has restarted
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,50 +18,76 @@ class Sent:
     size: int
     asks_temperature: bool
     budget_s: float
+    sent_s: float
 
 
 class Window:
-    """Wire numbers run from 1; `sent` is the last one given, `acknowledged` the last one known to have arrived.
+    """Lines are counted from 1; `sent` is the last one given, `acknowledged` the last one known to have arrived.
 
-    limit: characters of a line that the firmware keeps.
+    The numbers on the wire are these counts until they begin anew, then less by a constant. limit: characters of a line
+    that the firmware keeps; rx_bytes: what its receive buffer holds.
     """
 
-    def __init__(self, limit: int = LINE_LIMIT) -> None:
+    def __init__(self, limit: int = LINE_LIMIT, rx_bytes: int = 127) -> None:
         self._limit = limit
+        self.rx_bytes = rx_bytes
         self.sent = 0
         self.acknowledged = 0
         self.flight: deque[Sent] = deque()
         self._bytes = 0
+        self._before = 0
         self._history: dict[int, bytes] = {}
 
     def reset(self) -> None:
-        """Numbers begin anew."""
+        """Nothing was sent yet."""
         self.ground()
-        self.sent = self.acknowledged = 0
+        self.sent = self.acknowledged = self._before = 0
         self._history.clear()
+
+    def wire(self, number: int) -> int:
+        """The number on the wire of a line."""
+        return number - self._before
+
+    def line(self, wire: int) -> int:
+        """The line that has this number on the wire."""
+        return wire + self._before
+
+    def begin_anew(self) -> None:
+        """The next line has number FIRST_AGAIN + 1 on the wire. Nothing may be in flight."""
+        self._before = self.sent - FIRST_AGAIN
+        self._history.clear()
+
+    def keeps(self, number: int) -> bool:
+        """Whether a line can be repeated."""
+        return number in self._history
 
     def room(self, command: str, lines: int) -> bool:
         """Whether a command may follow what is in flight, at most `lines` of them together."""
         flight = self.flight
         if not flight:
             return True
-        if len(flight) >= lines or flight[-1].budget_s or self._bytes + len(command) + 16 > RX_BYTES:
+        if len(flight) >= lines or flight[-1].budget_s or not self.holds(command):
             return False
         return not budget_s(command)
 
-    def launch(self, command: str) -> bytes:
+    def holds(self, command: str) -> bool:
+        """Whether the receive buffer has a place for it even if nothing of what is in flight has left the buffer yet."""
+        # N, number, blank, *, three digits of the checksum, newline
+        return self._bytes + len(command) + 7 + len(str(self.sent + 1 - self._before)) <= self.rx_bytes
+
+    def launch(self, command: str, now_s: float = 0.0) -> bytes:
         """Give a command the next number, keep it for repeats; its bytes."""
-        framed = frame(self.sent + 1, command, self._limit)
+        framed = frame(self.sent + 1 - self._before, command, self._limit)
         self.sent += 1
         self._history[self.sent] = framed
         self._history.pop(self.sent - HISTORY, None)
-        self._fly(self.sent, framed, command)
+        self._fly(self.sent, framed, command, now_s)
         return framed
 
-    def repeat(self, number: int) -> bytes:
+    def repeat(self, number: int, now_s: float = 0.0) -> bytes:
         """The bytes of an earlier line, in flight again."""
         framed = self._history[number]
-        self._fly(number, framed, framed[framed.index(b" ") + 1 : framed.rindex(b"*")].decode("ascii"))
+        self._fly(number, framed, command_in(framed), now_s)
         return framed
 
     def acknowledge(self, number: int | None) -> int:
@@ -97,13 +111,16 @@ class Window:
         """The oldest M105 in flight."""
         return next((line.number for line in self.flight if line.asks_temperature), None)
 
-    def _fly(self, number: int, framed: bytes, command: str) -> None:
-        self.flight.append(Sent(number, len(framed), command == "M105", budget_s(command)))
+    def command(self, number: int) -> str:
+        """The command of a line that is still kept, else ""."""
+        framed = self._history.get(number)
+        return "" if framed is None else command_in(framed)
+
+    def _fly(self, number: int, framed: bytes, command: str, now_s: float) -> None:
+        self.flight.append(Sent(number, len(framed), command == "M105", budget_s(command), now_s))
         self._bytes += len(framed)
 
 
-def budget_s(command: str) -> float:
-    """The time budget of a slow command, 0 for a quick one."""
-    if command[0] == "G" and command[1:2] in ("0", "1"):  # most lines of a program; none of these is slow
-        return 0.0
-    return BUDGET_S.get(name_of(command), 0.0)
+def command_in(framed: bytes) -> str:
+    """The command of a framed line."""
+    return framed[framed.index(b" ") + 1 : framed.rindex(b"*")].decode("ascii")

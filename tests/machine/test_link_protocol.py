@@ -1,4 +1,6 @@
+import random
 from collections.abc import Callable
+from dataclasses import replace
 from functools import reduce
 from operator import xor
 
@@ -6,7 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from machine.link.conversation import PROBES
 from machine.link.events import (
+    Action,
+    Area,
     Busy,
     Capability,
     Echo,
@@ -22,10 +27,14 @@ from machine.link.events import (
     Wait,
     read_event,
 )
-from machine.link.framing import LINE_LIMIT, checksum, command_of, frame
-from machine.link.protocol import ASKED_LIMIT, HEARD_LIMIT, PROBES, SYNC_TRIES, Protocol, Timing
+from machine.link.families import FAMILIES, MARLIN
+from machine.link.framing import FRAME, LINE_LIMIT, checksum, command_of, frame
+from machine.link.hearing import HEARD_LIMIT
+from machine.link.protocol import Protocol, Timing
+from machine.link.resends import ASKED_LIMIT
 from machine.link.states import TABLE, Signal, State
-from machine.link.window import RX_BYTES
+from machine.link.verdict import SYNC_TRIES
+from machine.link.window import HISTORY
 from profiles.errors import FirmwareError, LocalProtocolError, RemoteProtocolError, SilenceError
 
 LINES: list[tuple[bytes, Event]] = [
@@ -53,7 +62,7 @@ LINES: list[tuple[bytes, Event]] = [
     (b"!! Lost communication with MCU", FirmwareFault("!! Lost communication with MCU")),
     (b"fatal: heater", FirmwareFault("fatal: heater")),
     (b'echo:Unknown command: "5 G92"', Echo('Unknown command: "5 G92"')),
-    (b"//action:pause\r", Echo("action:pause")),
+    (b"//action:pause\r", Action("pause")),
     (b"Cap:EMERGENCY_PARSER:1", Capability("EMERGENCY_PARSER", True)),
     (b"start", Start()),
     (b"wait", Wait()),
@@ -226,7 +235,7 @@ def test_a_printer_that_tells_numbers_gets_what_its_ring_holds() -> None:
     while table.protocol.room(command):
         written += table.send(command)
     assert written.count(b"\n") == 3
-    assert len(written) <= RX_BYTES
+    assert len(written) <= MARLIN.rx_bytes
     short = opened()
     assert sum(len(short.send("G1 X1")) > 0 for _ in range(9) if short.protocol.room("G1 X1")) == 4
 
@@ -289,9 +298,9 @@ def test_a_resend_without_its_ok_goes_on_after_a_pause() -> None:
 def test_a_lost_ok_is_cleared_up_by_a_new_question_never_by_a_repeat(advanced: bool) -> None:
     table = opened(advanced=advanced)
     table.send("G1 X1")
-    table.wait(29.0)
+    table.wait(3.9)
     assert table.wire() == b""
-    table.wait(1.1)
+    table.wait(0.2)
     assert table.wire() == frame(12, "M105")
     table.say(b"ok T:20.00 /0.00\n")
     assert (table.protocol.state, table.protocol.window.acknowledged) == (State.OPEN, 12)
@@ -348,6 +357,15 @@ def test_a_dead_printer_is_given_up_in_bounded_time() -> None:
         table.wait(0.5)
     assert isinstance(table.protocol.fault, SilenceError)
     assert table.now_s < 30.0 * (PROBES + 2)
+
+
+def test_a_question_that_would_overflow_the_buffer_of_a_printer_in_a_long_move_waits_longer() -> None:
+    table = opened()
+    table.send(*["G1 X100.123 Y100.123 E1.12345"] * 2, "G1 X100.123 Y100.123 E1.12345 F1800.5")
+    table.wait(29.0)
+    assert table.wire() == b""
+    table.wait(1.1)
+    assert table.wire() == frame(14, "M105")
 
 
 def test_two_waits_with_a_line_in_flight_ask_at_once() -> None:
@@ -465,3 +483,267 @@ def test_no_conversation_breaks_the_counts(acts: list[tuple[str, int]]) -> None:
         protocol = table.protocol
         assert 0 <= protocol.window.acknowledged <= protocol.window.sent
         assert (protocol.fault is None) == (protocol.state not in (State.HALTED, State.LOST))
+
+
+def family(name: str, size: int = 10**6) -> Table:
+    """A greeted printer that answers with plain oks and names itself."""
+    table = Table(size)
+    table.wait(0.6)
+    table.say(b"ok\nFIRMWARE_NAME:" + name.encode() + b"\nok\nok T:20.00 /0.00 B:20.00 /0.00\n")
+    assert table.protocol.state is State.OPEN
+    table.wire()
+    return table
+
+
+@pytest.mark.parametrize(("name", "row"), [
+    ("Marlin 2.1.2 (Jun 1 2024) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin", "marlin"),
+    ("Prusa-Firmware 3.13.3 based on Marlin", "marlin"),
+    ("Something nobody knows", "marlin"),
+    ("Repetier_1.0.4 FIRMWARE_URL:https://github.com/repetier/Repetier-Firmware/", "repetier"),
+    ("Smoothieware, FIRMWARE_URL:http%3A//smoothieware.org", "smoothie"),
+    (" RepRapFirmware for Duet 2 WiFi/Ethernet FIRMWARE_VERSION: 3.5.1", "reprapfirmware"),
+    ("Klipper FIRMWARE_VERSION:v0.12.0-100", "klipper"),
+])  # fmt: skip
+def test_the_firmware_s_own_name_chooses_its_row(name: str, row: str) -> None:
+    assert family(name).protocol.family is FAMILIES[row]
+
+
+@pytest.mark.parametrize("name", ["RepRapFirmware for Duet", "Klipper"])
+def test_a_line_without_answer_is_never_repeated_to_a_firmware_that_asks_for_none(name: str) -> None:
+    table = family(name)
+    table.send("G1 X7")
+    table.wait(4.1)
+    assert table.wire() == frame(4, "M105")
+    table.say(b"ok T:20.00 /0.00\n")
+    assert isinstance(table.protocol.fault, RemoteProtocolError)
+    assert "line 3 (G1 X7) was not answered" in str(table.protocol.fault)
+
+
+def test_a_late_answer_of_such_a_firmware_is_an_answer() -> None:
+    table = family("RepRapFirmware for Duet")
+    table.send("G1 X7")
+    table.wait(4.1)
+    table.say(b"ok\nok T:20.00 /0.00\n")
+    assert (table.protocol.state, table.protocol.window.acknowledged) == (State.OPEN, 4)
+
+
+def test_klipper_s_macros_may_work_for_minutes_without_a_word() -> None:
+    table = family("Klipper FIRMWARE_VERSION:v0.12.0")
+    table.send("PRINT_START BED=60")
+    table.wait(4.1)
+    table.wait(500.0)
+    assert table.wire() == frame(4, "M105")
+    assert table.protocol.fault is None
+
+
+def test_smoothie_gives_no_ok_after_its_resend() -> None:
+    table = family("Smoothieware")
+    line = table.send("G1 X1")
+    table.say(b"rs N3\r\n")
+    table.wait(0.13)
+    assert table.wire() == line
+    table.say(b"ok\r\n")
+    assert table.protocol.window.acknowledged == 3
+
+
+def test_repetier_gets_as_many_characters_as_its_buffer_holds() -> None:
+    table = family("Repetier_1.0.4")
+    for number in range(3, 11):
+        table.send("G1 X1")
+        table.say(b"ok %d\n" % number)
+    written = b""
+    while table.protocol.room("G1 X100.5"):
+        written += table.send("G1 X100.5")
+    assert written.count(b"\n") == 127 // len(frame(11, "G1 X100.5"))
+
+
+@pytest.mark.parametrize(("rx_bytes", "lines"), [(63, 1), (127, 3), (1023, 4)])
+def test_the_window_keeps_to_the_machine_s_own_buffer_and_to_the_printer_s_places(rx_bytes: int, lines: int) -> None:
+    table = Table()
+    table.protocol = Protocol(PATIENT, 0.0, rx_bytes=rx_bytes)
+    table.wait(0.6)
+    table.say(b"ok N0 P15 B3\nFIRMWARE_NAME:Marlin\nCap:EMERGENCY_PARSER:1\nok N1 P15 B3\nok T:20.00 /0.00\n")
+    for _ in range(3, 11):
+        table.say(b"ok N%d P15 B3\n" % table.protocol.send("G1 X1", 0.0))
+    table.wire()
+    written = b""
+    while table.protocol.room("G1 X100.123 Y100.123 E1.123"):
+        written += table.send("G1 X100.123 Y100.123 E1.123")
+    assert written.count(b"\n") == lines
+
+
+def test_two_lines_of_sixty_three_bytes_fill_the_ring_of_an_avr() -> None:
+    table, command = opened(), "G1 X100.12345 Y100.12345 Z10.12345 E1.1234 F3600.12345"
+    written = table.send(command)
+    assert table.protocol.room(command)
+    written += table.send(command)
+    assert (len(command), len(written)) == (54, 126)
+    assert not table.protocol.room("T0")
+
+
+def numbered_to(last: int, advanced: bool = True) -> Table:
+    """A greeted printer whose numbers begin anew after `last`."""
+    table = Table()
+    table.protocol = Protocol(PATIENT, 0.0, family=replace(MARLIN, last_number=last))
+    table.wait(0.6)
+    table.say(b"ok N0 P15 B3\nok N1 P15 B3\nok T:20.00 /0.00\n" if advanced else b"ok\nok\nok T:20.00 /0.00\n")
+    table.wire()
+    return table
+
+
+@pytest.mark.parametrize("advanced", [True, False])
+def test_numbers_begin_anew_before_they_grow_too_long(advanced: bool) -> None:
+    table = numbered_to(4, advanced)
+    for number in (3, 4):
+        table.send("G1 X1")
+        table.say(b"ok N%d P15 B3\n" % number if advanced else b"ok\n")
+    assert not table.protocol.room("G1 X1")
+    table.wait(0.01)
+    assert table.wire() == frame(1000, "M110 N1000")
+    table.say(b"ok N1000 P15 B3\n" if advanced else b"ok\n")
+    assert table.send("G1 X5") == frame(1001, "G1 X5")
+    table.say(b"Error:checksum mismatch, Last Line: 1000\nResend: 1001\nok\n")
+    assert table.wire() == frame(1001, "G1 X5")
+    table.say(b"ok N1001 P15 B3\n" if advanced else b"ok\n")
+    assert (table.protocol.state, table.protocol.window.acknowledged) == (State.OPEN, 5)
+
+
+def test_a_damaged_new_beginning_of_the_numbers_is_given_again() -> None:
+    table = numbered_to(3)
+    table.send("G1 X1")
+    table.say(b"ok N3 P15 B3\n")
+    table.wait(0.01)
+    first = table.wire()
+    table.say(b"Error:checksum mismatch, Last Line: 3\nResend: 4\nok\n")
+    table.wait(0.13)
+    assert table.wire() == first
+    table.say(b"ok N1000 P15 B3\n")
+    assert table.protocol.room("G1 X1")
+
+
+def test_a_new_beginning_without_answer_ends_the_print() -> None:
+    table = numbered_to(3)
+    table.send("G1 X1")
+    table.say(b"ok N3 P15 B3\n")
+    for _ in range(600):
+        table.wait(0.5)
+    assert isinstance(table.protocol.fault, SilenceError)
+
+
+def test_no_number_is_longer_than_a_checked_line_has_room_for() -> None:
+    longest = "M117 " + "x" * (LINE_LIMIT - FRAME - 5)
+    assert command_of(longest, 1) == longest
+    assert all(len(frame(row.last_number + PROBES, longest)) - 1 <= LINE_LIMIT for row in FAMILIES.values())
+
+
+def test_the_geometry_report_tells_the_axes_limits() -> None:
+    table = Table()
+    table.say(b"area:{full:{min:{x:0.0000,y:0.0000,z:0.0000,i:-120.0000,j:-36000.0000},max:{x:200.0000,y:200.0000,z:180.0000,"
+              b"i:120.0000,j:36000.0000}},work:{min:{x:5.0000,y:0.0000},max:{x:190.0000,y:200.0000}}}\n")  # fmt: skip
+    assert table.protocol.area == Area((
+        ("X", 0.0, 200.0), ("Y", 0.0, 200.0), ("Z", 0.0, 180.0), ("I", -120.0, 120.0), ("J", -36000.0, 36000.0)))  # fmt: skip
+
+
+def test_an_error_of_two_lines_is_told_whole_and_nothing_is_sent_meanwhile() -> None:
+    table = opened()
+    table.say(b"Error:0\n")
+    assert (table.protocol.fault, table.protocol.room("G1 X1")) == (None, False)
+    table.say(b": Extruder switched off. MAXTEMP triggered !\n")
+    assert "Error:0: Extruder switched off. MAXTEMP triggered !" in str(table.protocol.fault)
+
+
+def test_an_error_whose_words_never_come_is_an_error() -> None:
+    table = opened()
+    table.say(b"Error:0\n")
+    table.wait(0.3)
+    assert isinstance(table.protocol.fault, FirmwareError)
+
+
+def test_an_error_of_the_line_whose_resend_is_lost_is_asked_about_at_once() -> None:
+    table = opened()
+    table.send("G1 X1")
+    table.say(b"Error:checksum mismatch, Last Line: 10\nok\n")
+    table.wait(0.6)
+    assert table.wire() == frame(12, "M105")
+
+
+def test_a_line_asked_for_in_every_tenth_line_is_too_much_noise() -> None:
+    table = opened()
+    for number in range(11, 300):
+        table.send("G1 X1")
+        if number % 5 == 0:
+            table.say(b"Resend: %d\nok\n" % number)
+        table.say(b"ok N%d P15 B3\n" % number)
+        if table.protocol.fault is not None:
+            break
+    assert "20 of the last 200 lines" in str(table.protocol.fault)
+
+
+RUBBISH = bytes(random.Random(5).choices([0, 0x80, 0xF8, 0xFE, 0x1C, 0xE6, 0x66, 0x06], k=60)) + b"\xfe"
+
+
+def test_rubbish_of_a_wrong_baud_rate_is_recognised_and_other_rates_are_named() -> None:
+    table = Table()
+    table.protocol = Protocol(PATIENT, 0.0, baud=115200)
+    for _ in range(4):
+        table.say(RUBBISH)
+        table.wait(3.1)
+    assert str(table.protocol.fault) == (
+        "what comes at 115200 baud is rubbish: the printer speaks at another rate, "
+        "try --baud 250000, 230400, 500000, 1000000, 57600"
+    )
+    assert table.now_s < 13
+
+
+def test_rubbish_of_a_boot_loader_before_the_banner_is_forgiven() -> None:
+    table = Table()
+    table.say(RUBBISH + b"start\nMarlin 2.1.2\n")
+    table.say(b"ok\nok\nok T:20 /0\n")
+    assert table.protocol.state is State.OPEN
+
+
+def test_a_device_that_is_no_printer_is_told_by_its_own_words() -> None:
+    table = Table()
+    while table.protocol.fault is None and table.now_s < 100:
+        table.say(b"$GPGGA,123519,4807.038,N\r\n")
+        table.wait(1.0)
+    assert "no printer that this program knows: to 6 greetings it said '$GPGGA,123519,4807.038,N'" in str(table.protocol.fault)
+
+
+@pytest.mark.parametrize("said", [b"\x00\xf8start\n", b"echo: Last Updated: 2024-09-29 | Author: (none)\n", b"Grbl 1.1h\n"])
+def test_a_restart_is_heard_behind_rubbish_and_by_its_other_words(said: bytes) -> None:
+    table = opened()
+    table.send("G1 X1")
+    table.say(said)
+    assert "restarted in the middle of the print" in str(table.protocol.fault)
+
+
+def test_a_mended_cable_is_followed_by_a_question_and_what_was_lost_is_repeated() -> None:
+    table = opened()
+    line = table.send("G1 X1")
+    table.say(b"ok N1")
+    table.protocol.interrupted(table.now_s)
+    assert table.wire() == frame(12, "M105")
+    table.say(b"Error:Line Number is not Last Line Number+1, Last Line: 10\nResend: 11\nok\n")
+    table.wait(0.2)
+    assert table.wire() == line
+
+
+def test_a_printer_that_restarted_behind_a_mended_cable_is_not_printed_on() -> None:
+    table = opened()
+    table.protocol.interrupted(table.now_s)
+    table.say(b"Resend: 1\nok\n" * 2)
+    assert "restarted without a word" in str(table.protocol.fault)
+
+
+def test_words_of_the_card_reader_do_not_stop_a_print() -> None:
+    table = opened()
+    table.say(b"Error:volume.init failed\necho:No media\n")
+    assert table.protocol.fault is None
+
+
+def test_the_history_stays_bounded() -> None:
+    table = opened()
+    for _ in range(2000):
+        table.say(b"ok N%d P15 B3\n" % table.protocol.send("G1 X1", 0.0))
+    assert len(table.protocol.window._history) == HISTORY
