@@ -173,6 +173,11 @@ def print_(
     ranker: RankerName = "classic",
     orient: Orient = False,
     speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
+    watch: Annotated[bool, typer.Option("--watch", help="serve a page on this computer that follows the print")] = False,
+    watch_port: Annotated[
+        int | None,
+        typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one"),
+    ] = None,
     force: Force = False,
     machine: MachineGiven = None,
     material: MaterialGiven = None,

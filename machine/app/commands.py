@@ -14,7 +14,8 @@ from machine.app.png import write_png
 from machine.app.printing import check_dialect, check_port, print_program
 from machine.app.progress import say
 from machine.app.report import agreement_line, parts_table, run_table, show
-from machine.app.view.page import write_parts_page, write_print_page
+from machine.app.view.live import served
+from machine.app.view.page import parts_page, print_page
 from machine.app.warmup import warm_dry_run
 from machine.dryrun.agreement import Agreement, agreement
 from machine.dryrun.dryrun import dry_run, summary
@@ -56,7 +57,7 @@ def decompose(
     if sheet is not None:
         write_png(sheet, contact_sheet(found.decomposition, profile.machine))
     if html is not None:
-        write_parts_page(html, found.decomposition, profile)
+        write_bytes(html, parts_page(found.decomposition, profile))
     if json is not None:
         write_json(json, told)
     if json is None or str(json) != "-":
@@ -95,7 +96,7 @@ def export(
         write_bytes(svg, picture)
     rivals = compared(program, profile) if compare else ()
     if html is not None:
-        write_print_page(html, model_name(model), program, profile, rivals=rivals)
+        write_bytes(html, print_page(model_name(model), program, profile, rivals=rivals))
     _tell(program, json, rivals)
     return 0
 
@@ -131,7 +132,7 @@ def simulate(
         program = replace(program, run=run)
     if html is not None:
         known = machine_known(program, profile, given, named)
-        write_print_page(html, model_name(model), program, profile, known)
+        write_bytes(html, print_page(model_name(model), program, profile, known))
     _tell(program, json, found=found)
     return 1 if _errors(program) else 0
 
@@ -146,8 +147,12 @@ def print_model(
     sim_speed: float,
     force: bool,
     named: frozenset[str] = frozenset(),
+    watch_port: int | None = None,
 ) -> int:
-    """Dry-run, then stream a model or a G-code file to a printer, whose port is tried before any work is done."""
+    """Dry-run, then stream a model or a G-code file to a printer, whose port is tried before any work is done.
+
+    watch_port: serve the print's page on this port of this computer, 0: on any free one; None: serve nothing.
+    """
     answer = check_port(port, baud, sim_speed)
     if Path(model).suffix.lower() not in GCODE_SUFFIXES:
         check_dialect(profile.machine, port)
@@ -158,7 +163,13 @@ def print_model(
     check_program(answer, program, profile, Path(model).name, force)
     _refuse_errors(program, force)
     show(run_table(program.run))
-    return print_program(program, profile, port, baud, sim_speed)
+    if watch_port is None:
+        return print_program(program, profile, port, baud, sim_speed)
+    with served(print_page(model_name(model), program, profile, live=True), watch_port) as watched:
+        say(f"watch the print at {watched.address}")
+        code = print_program(program, profile, port, baud, sim_speed, watched.follow)
+        watched.end("stopped" if code else "done")
+    return code
 
 
 def program_of(model: str, profile: Profile, ranker: str, orient: bool, named: frozenset[str]) -> tuple[Program, Profile]:

@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import inf, isfinite
 from types import FrameType
@@ -44,12 +44,17 @@ def check_dialect(machine: Machine, port: str) -> None:
         )
 
 
-def print_program(program: Program, profile: Profile, port: str, baud: int, sim_speed: float) -> int:
-    """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible."""
+def print_program(
+    program: Program, profile: Profile, port: str, baud: int, sim_speed: float, follow: Callable[[Progress], None] | None = None
+) -> int:
+    """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible.
+
+    follow: is told, like the person watching, how far the print is.
+    """
     if port != SIMULATED:
-        return _ended(_stream(program, profile, port, baud))
+        return _ended(_stream(program, profile, port, baud, follow))
     with SimulatedPrinter(profile.machine, sim_speed or inf) as printer:
-        outcome = _stream(program, profile, printer.path, baud)
+        outcome = _stream(program, profile, printer.path, baud, follow)
         record = printer.record
     if outcome.cancelled:
         return _ended(outcome)
@@ -65,15 +70,23 @@ def print_program(program: Program, profile: Profile, port: str, baud: int, sim_
     return 0
 
 
-def _stream(program: Program, profile: Profile, port: str, baud: int) -> Outcome:
+def _stream(
+    program: Program, profile: Profile, port: str, baud: int, follow: Callable[[Progress], None] | None = None
+) -> Outcome:
     ticker = Ticker()
     stop = threading.Event()
+
+    def show_progress(progress: Progress) -> None:
+        ticker.tick(status(progress))
+        if follow is not None:
+            follow(progress)
+
     with _stopping(stop):
         outcome = print_lines(
             program.lines,
             port,
             baud,
-            lambda progress: ticker.tick(status(progress)),
+            show_progress,
             stop,
             program.run.time_s,
             limit=DIALECTS[profile.machine.dialect].longest_line,

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from machine.app.commands import machine_known, program_of
 from machine.app.compare import compared
-from machine.app.output import check_writable
+from machine.app.output import check_writable, write_bytes
 from machine.app.pipeline import model_name
 from machine.app.progress import say
 from machine.app.report import show
-from machine.app.view.page import DATA, write_print_page
+from machine.app.view.page import DATA, print_page
 from machine.app.view.thinning import MOST_ROWS
 from profiles.errors import GcodeError, OutputError
 from profiles.profile import Profile
@@ -29,9 +29,10 @@ def view(
     known = machine_known(program, profile, given, named)
     if not known:
         say(f"{model_name(model)} does not tell its machine: shown for {profile.machine.name}, --machine names another")
-    size = write_print_page(path, model_name(model), program, profile, known, compared(program, profile) if compare else ())
+    content = print_page(model_name(model), program, profile, known, compared(program, profile) if compare else ())
+    write_bytes(path, content)
     thinned = f", thinned to fewer than {MOST_ROWS}" if count > MOST_ROWS else ""
-    show(f"{path}: {size / 1e6:.1f} MB, {count} moves{thinned}\n")
+    show(f"{path}: {len(content) / 1e6:.1f} MB, {count} moves{thinned}\n")
     if show_it and not webbrowser.open(path.resolve().as_uri()):
         say(f"no browser could be started: open {path} in one")
     return 0

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from hashlib import sha256
 from html import escape
 from importlib import resources
-from pathlib import Path
 
 from machine.app.compare import Rival
-from machine.app.output import write_bytes
 from machine.app.pipeline import Program
 from machine.app.view.contents import of_parts, of_print
 from mdp.decomposition import Decomposition
@@ -19,21 +17,16 @@ MARKER = re.compile(r"<!--(?:TITLE|CSP|DATA)-->|/\*(?:STYLE|SCRIPT)\*/")
 DATA = b'<script type="application/octet-stream" id="tiltprint">'
 
 
-def write_parts_page(path: Path, decomposition: Decomposition, profile: Profile) -> None:
-    """Write the page of parts alone, whole or not at all. Raises OutputError."""
-    write_bytes(path, page(decomposition.name, of_parts(decomposition, profile)))
+def parts_page(decomposition: Decomposition, profile: Profile) -> bytes:
+    """The page of parts alone."""
+    return page(decomposition.name, of_parts(decomposition, profile))
 
 
-def write_print_page(
-    path: Path, name: str, program: Program, profile: Profile, known: bool = True, rivals: Sequence[Rival] = ()
-) -> int:
-    """Write the page of a whole print, whole or not at all; arguments as of_print takes them. Returns its size in bytes.
-
-    Raises OutputError.
-    """
-    content = page(name, of_print(name, program, profile, known, rivals))
-    write_bytes(path, content)
-    return len(content)
+def print_page(
+    name: str, program: Program, profile: Profile, known: bool = True, rivals: Sequence[Rival] = (), live: bool = False
+) -> bytes:
+    """The page of a whole print; arguments as of_print takes them."""
+    return page(name, of_print(name, program, profile, known, rivals, live), live)
 
 
 def page(title: str, block: bytes, live: bool = False) -> bytes:
