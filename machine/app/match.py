@@ -1,0 +1,149 @@
+"""Match: whether the printer at a port, the machine's profile and the program belong together, asked before anything moves."""
+
+from collections.abc import Mapping, Sequence
+
+from machine.app.foot import told_in
+from machine.app.pipeline import Program
+from machine.app.progress import say
+from machine.dryrun.dryrun import summary
+from machine.link.answer import Answer, Kind, ask_at_any_rate
+from machine.link.port import open_port
+from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError, SilenceError
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+ECHO = ("M114", "M115")
+SLACK = 0.01  # mm or deg: what the firmware and the program round
+# Words of the firmware's name -> the dialects that it understands. Others (forks under names of their own) are not judged.
+UNDERSTOOD = {
+    "klipper": ("klipper", "klipper_steppers"),
+    "reprapfirmware": ("reprapfirmware",),
+    "marlin": ("marlin",),
+}
+# Klipper's M114 tells X Y Z only, whatever steppers turn the table; the start block makes letters of them.
+TELLS_ALL_AXES = ("marlin", "reprapfirmware")
+# What a program depends on: made for one such machine it is wrong on another. Speeds and accelerations are not among it.
+SHAPING = ("shape", "dialect", "coordinates", "tool_mm")
+AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
+
+
+def printer_at(port: str, baud: int) -> Answer:
+    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is."""
+    with open_port(port, baud) as wire:
+        answer, rate = ask_at_any_rate(wire, baud)
+    if answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED) and rate != baud:
+        raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: use --baud {rate}")
+    if answer.kind is not Kind.PRINTER:
+        raise _REFUSALS[answer.kind](_why(answer, port, baud))
+    return answer
+
+
+_REFUSALS: Mapping[Kind, type[PrinterError]] = {
+    Kind.BUSY: PrinterError,
+    Kind.HALTED: FirmwareError,
+    Kind.STRANGER: RemoteProtocolError,
+    Kind.RUBBISH: PortError,
+    Kind.SILENT: SilenceError,
+}
+
+
+def _why(answer: Answer, port: str, baud: int) -> str:
+    words = answer.words[:60]
+    if answer.kind is Kind.BUSY:
+        return f"the printer at {port} is busy (it heats, moves or waits for a person): wait until it is done, or restart it"
+    if answer.kind is Kind.HALTED:
+        return f"the printer at {port} has stopped with an error of its own ({words}): switch it off and on again"
+    if answer.kind is Kind.STRANGER:
+        what = "it sends back what it is told" if words in ECHO else f"it says {words!r}"
+        return f"what answers at {port} is no printer: {what} instead of answering M115"
+    if answer.kind is Kind.RUBBISH:
+        return (
+            f"only rubbish comes from {port} at {baud} baud, and no printer answers at the usual other rates: "
+            f"the firmware's settings tell its rate for --baud"
+        )
+    return f"nothing answers at {port}: is the printer switched on, and is {baud} baud the firmware's rate?"
+
+
+def check_printer(answer: Answer | None, machine: Machine, force: bool) -> None:
+    """Refuse a printer whose firmware cannot print for the machine; force: only say so. None: nothing is known."""
+    if answer is not None:
+        _refuse(misfit(answer, machine), force)
+
+
+def check_program(answer: Answer | None, program: Program, profile: Profile, file: str, force: bool) -> None:
+    """Refuse a program that was made for another machine, or that leaves the limits that the firmware tells; force: say so."""
+    own, taken = told_in(program.lines, profile, frozenset())
+    if "machine" in taken:
+        _refuse(made_for_another(own.machine, profile.machine, file), force)
+    if answer is not None:
+        machine, reached = profile.machine, {letter: reach for letter, reach in summary(program.run)["axes"].items() if reach}
+        rotary = (machine.tilt.letter, machine.turn.letter)
+        followed = machine.coordinates == "workpiece"  # X Y Z of such a file are no places of the axes
+        _refuse(beyond(answer, {key: reach for key, reach in reached.items() if key in rotary or not followed}), force)
+
+
+def _refuse(sentence: str, force: bool) -> None:
+    if sentence and not force:
+        raise PrinterError(f"{sentence} (--force goes on)")
+    if sentence:
+        say(f"{sentence}; going on because of --force")
+
+
+def misfit(answer: Answer, machine: Machine) -> str:
+    """Why this firmware cannot print for a machine, as a sentence; "" when it can, or does not tell enough to say."""
+    folded = answer.words.lower()
+    dialects = next((row for word, row in UNDERSTOOD.items() if word in folded), (machine.dialect,))
+    if machine.dialect not in dialects:
+        return (
+            f"the printer's firmware is {answer.firmware[:60]}, but {machine.name} writes for {machine.dialect}: "
+            f"machine.dialect must be {' or '.join(dialects)}"
+        )
+    wanted = "XYZ" + (machine.tilt.letter + machine.turn.letter if machine.tilts else "")
+    lacking = [letter for letter in wanted if letter not in answer.letters]
+    if machine.dialect not in TELLS_ALL_AXES or not answer.letters or not lacking:
+        return ""
+    return (
+        f"the printer's firmware moves {' '.join(answer.letters)}, but {machine.name} needs {' '.join(wanted)}: "
+        f"{_listed(lacking)} {'is' if len(lacking) == 1 else 'are'} missing"
+    )
+
+
+def beyond(answer: Answer, reached: Mapping[str, Sequence[float]]) -> str:
+    """Which axis of a program leaves the limits that the firmware tells, as a sentence; "" when none does.
+
+    reached: letter -> least and greatest value of the program, mm or deg. Firmwares clip such a move without a word.
+    """
+    for letter, (low, high) in reached.items():
+        least, most = answer.limits.get(letter, (low, high))
+        if low < least - SLACK or high > most + SLACK:
+            return (
+                f"the program moves {letter} from {low:.2f} to {high:.2f}, but the printer's firmware allows "
+                f"{least:g} to {most:g}: the machine profile's limits must be those of the firmware"
+            )
+    return ""
+
+
+def made_for_another(made: Machine, chosen: Machine, file: str) -> str:
+    """Why a program made for one machine is wrong on another, as a sentence; "" when both are the same to it."""
+    if made.name != chosen.name:
+        return f"{file} was made for the machine {made.name}, not for {chosen.name}"
+    for key in SHAPING:
+        if (then := getattr(made, key)) != (now := getattr(chosen, key)):
+            return _changed(file, chosen, key, then, now)
+    for axis in ("tilt", "turn"):
+        for key in AXIS:
+            if (then := getattr(getattr(made, axis), key)) != (now := getattr(getattr(chosen, axis), key)):
+                return _changed(file, chosen, f"{axis}.{key}", then, now)
+    return ""
+
+
+def _changed(file: str, machine: Machine, key: str, then: object, now: object) -> str:
+    return f"{file} was made when machine.{key} of {machine.name} was {_plain(then)}, but it is {_plain(now)}"
+
+
+def _plain(value: object) -> str:
+    return ", ".join(f"{x:g}" for x in value) if isinstance(value, tuple) else str(value)
+
+
+def _listed(letters: list[str]) -> str:
+    return " and ".join(letters)

@@ -1,0 +1,142 @@
+"""Answer: what stands at the other end of a port, found by asking M115 and M114: a printer and its axes, or what else."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from time import monotonic
+
+from machine.link.events import Area, Busy, Event, FirmwareFault, Identity, Ok, Position
+from machine.link.hearing import Hearing
+from machine.link.port import Port
+
+PATIENCE_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and as many with its start
+QUICK_S = 1.5  # at another rate: it has started by then
+ASK_S = 1.0  # between questions; those asked during the start are lost
+POSITION_S = 1.0  # a printer that names itself but not its place
+RATES = (115200, 250000, 1000000, 230400)  # what firmwares are built with, the likeliest first
+NAME = "FIRMWARE_NAME:"
+GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of printers have words
+
+
+class Kind(Enum):
+    """What was heard."""
+
+    PRINTER = "printer"
+    BUSY = "busy printer"
+    HALTED = "halted printer"
+    STRANGER = "no printer"
+    RUBBISH = "rubbish"
+    SILENT = "silent"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What answers. words: the firmware's own line, its error, or the last words of a stranger.
+
+    letters: axes that M114 told, the filament's left out; "" when it told none. limits: letter -> least and greatest
+    value, of a firmware that tells them.
+    """
+
+    kind: Kind
+    words: str = ""
+    letters: str = ""
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def firmware(self) -> str:
+        """The firmware's name without the rest of its line."""
+        return self.words.removeprefix(NAME).strip().partition(" SOURCE_CODE_URL")[0].partition(" PROTOCOL_VERSION")[0]
+
+
+def ask(port: Port, patience_s: float = PATIENCE_S) -> Answer:
+    """Ask until a printer has named itself, s at most; raises PortError when the port is lost."""
+    heard = _Heard(port)
+    heard.listen("M115", patience_s, lambda: heard.named)
+    if heard.named:
+        heard.listen("M114", POSITION_S, lambda: heard.placed)
+    return heard.answer()
+
+
+def ask_at_any_rate(port: Port, baud: int, patience_s: float = PATIENCE_S) -> tuple[Answer, int]:
+    """What answers and at which rate: the given one, and where nothing sensible comes the usual others.
+
+    Where none makes a printer answer, the answer is that at the given rate, at which the port is left.
+    """
+    first = ask(port, patience_s)
+    if first.kind not in (Kind.RUBBISH, Kind.SILENT) or port.name.startswith("socket://"):
+        return first, baud
+    for rate in RATES:
+        if rate != baud:
+            port.set_baud(rate)
+            found = ask(port, QUICK_S)
+            if found.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED):
+                return found, rate
+    port.set_baud(baud)
+    return first, baud
+
+
+class _Heard:
+    """What one asking has brought so far."""
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self._hearing = Hearing()
+        self._words = self._fault = self._letters = ""
+        self._area: Area | None = None
+        self._ok = self._busy = self.named = self.placed = False
+
+    def listen(self, question: str, patience_s: float, until: Callable[[], bool]) -> None:
+        """Ask again and again until the answer is whole, or the time is over."""
+        end_s = next_s = monotonic()
+        end_s += patience_s
+        self._ok = False
+        while not until() and not self._fault and (now_s := monotonic()) < end_s:
+            if now_s >= next_s:
+                self._port.write(f"\n{question}\n".encode("ascii"))  # the newline ends what stood on the line before
+                next_s = now_s + ASK_S
+            if data := self._port.read():
+                for event in self._hearing.receive(data, now_s):
+                    self._take(event)
+
+    def answer(self) -> Answer:
+        """What all of it amounts to."""
+        if self._fault:
+            return Answer(Kind.STRANGER if GRBL_SAYS.fullmatch(self._fault) else Kind.HALTED, self._fault)
+        if self._words or self._ok:
+            return Answer(Kind.PRINTER, self._words, self._letters, self._limits())
+        if self._busy:
+            return Answer(Kind.BUSY)
+        if self._hearing.rubbish:
+            return Answer(Kind.RUBBISH)
+        words = self._hearing.foreign
+        return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
+
+    def _take(self, event: Event) -> None:
+        if isinstance(event, FirmwareFault):
+            self._fault = event.text
+        elif isinstance(event, Busy):
+            self._busy = True
+        elif isinstance(event, Area):
+            self._area = event
+        elif isinstance(event, Identity):
+            self._words = event.text
+        elif isinstance(event, Position):
+            self._place(event)
+        elif isinstance(event, Ok):
+            self._ok = True
+            if NAME in event.text:  # Klipper names itself behind its ok
+                self._words = event.text[event.text.index(NAME) :]
+            if event.position is not None:
+                self._place(event.position)
+            self.named = bool(self._words)
+
+    def _place(self, position: Position) -> None:
+        self._letters = "".join(letter for letter, _ in position.axes if letter != "E")
+        self.placed = True
+
+    def _limits(self) -> dict[str, tuple[float, float]]:
+        """The area with the letters of M114: Marlin names the axes from the fourth on I, J, K, whatever their words are."""
+        if self._area is None or len(self._letters) < len(self._area.axes):
+            return {}
+        return {letter: (low, high) for letter, (_, low, high) in zip(self._letters, self._area.axes, strict=False)}

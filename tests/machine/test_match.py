@@ -1,0 +1,204 @@
+"""Before anything moves: printer, profile and program belong together, or one sentence says why not; on the real command line."""
+
+import grp
+import os
+from pathlib import Path
+
+import pytest
+import serial
+
+from machine.app import match
+from machine.app.cli import main
+from machine.app.match import beyond, made_for_another, misfit
+from machine.link import answer as answer_module
+from machine.link.answer import Answer, Kind, ask, ask_at_any_rate
+from machine.link.port import open_port
+from machine.link.simulator import SimulatedPrinter
+from machine.settings import foot
+from profiles.profile import load
+from tests.machine.peers import Answer as Words
+from tests.machine.peers import behind_rfc2217, on_terminal, scripted
+
+MACHINE = load().machine
+NAMED = "FIRMWARE_NAME:Marlin 2.1.2 SOURCE_CODE_URL:x AXIS_COUNT:5\n"
+AREA = "area:{full:{min:{x:0.0,y:0.0,z:0.0,i:-90.0,j:-36000.0},max:{x:300.0,y:300.0,z:300.0,i:90.0,j:36000.0}},work:{}}\n"
+PLACE = "X:0.00 Y:0.00 Z:0.00 A:0.00 C:0.00 E:0.00 Count X:0 Y:0 Z:0 A:0 C:0\n"
+FIVE_AXES = {"M115": f"{NAMED}Cap:EEPROM:1\n{AREA}ok", "M114": f"{PLACE}ok"}
+
+
+def file_of(folder: Path, *lines: str) -> str:
+    file = folder / "part.gcode"
+    file.write_text("\n".join(["G21", "G90", "M83", "G28", "G92 A0 C0", *lines, "M104 S0", "M140 S0"]) + "\n")
+    return str(file)
+
+
+def printed(port: str, file: str, *options: str) -> int:
+    return main(["print", file, "--port", port, *options])
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Silence is recognised sooner than a real board would allow."""
+    monkeypatch.setattr(answer_module, "PATIENCE_S", 0.3)
+    monkeypatch.setattr(match, "ask_at_any_rate", lambda port, baud: ask_at_any_rate(port, baud, 0.3))
+    monkeypatch.setattr(answer_module, "QUICK_S", 0.3)
+
+
+def talking_at(rate: int) -> Words:
+    """A printer that understands one rate and at any other hears and says rubbish, as a UART does."""
+    right = scripted(FIVE_AXES)
+    return lambda data, baud: right(data, baud) if baud == rate else bytes(byte | 0x80 for byte in data) * 3
+
+
+STRANGERS: dict[str, tuple[Words, str]] = {
+    "rubbish": (lambda data, baud: b"\xf8\x80\x9e\xe6" * 8, "only rubbish comes from PORT at 115200 baud"),
+    "silence": (lambda data, baud: b"", "nothing answers at PORT: is the printer switched on, and is 115200 baud"),
+    "a modem": (lambda data, baud: b"ERROR 42\r\n", "what answers at PORT is no printer: it says 'ERROR 42'"),
+    "an echo": (lambda data, baud: data, "what answers at PORT is no printer: it sends back what it is told"),
+    "a mill": (scripted({}, "error:20"), "what answers at PORT is no printer: it says 'error:20'"),
+    "a halted one": (
+        scripted({}, "Error:Printer halted. kill() called!"),
+        "the printer at PORT has stopped with an error of its own (Error:Printer halted. kill() called!)",
+    ),
+    "a busy one": (scripted({}, "echo:busy: processing"), "the printer at PORT is busy"),
+    "three axes": (
+        scripted({"M115": f"{NAMED}ok", "M114": "X:0.00 Y:0.00 Z:0.00 E:0.00 Count X:0 Y:0 Z:0\nok"}),
+        "the printer's firmware moves X Y Z, but generic A/C table needs X Y Z A C: A and C are missing (--force goes on)",
+    ),
+    "Klipper": (
+        scripted({"M115": "ok FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.12", "M114": "X:0.0 Y:0.0 Z:0.0 E:0.0\nok"}),
+        "the printer's firmware is Klipper",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STRANGERS)
+def test_what_is_no_fitting_printer_is_refused_with_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], quick: None, name: str
+) -> None:
+    peer, sentence = STRANGERS[name]
+    with on_terminal(peer) as path:
+        assert printed(path, file_of(tmp_path, "G1 X1 F600")) == 1
+    message = capsys.readouterr().err
+    assert sentence.replace("PORT", path) in message
+    assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize("rate", [230400, 1000000])
+def test_the_rate_at_which_the_printer_speaks_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], quick: None, rate: int
+) -> None:
+    with on_terminal(talking_at(rate)) as path:
+        assert printed(path, file_of(tmp_path, "G1 X1 F600")) == 1
+    assert f"does not speak at 115200 baud but at {rate}: use --baud {rate}" in capsys.readouterr().err
+
+
+def test_the_rate_is_found_behind_rfc_2217_too(quick: None) -> None:
+    with on_terminal(talking_at(230400)) as path, behind_rfc2217(path) as address, open_port(address, 115200) as port:
+        answer, rate = ask_at_any_rate(port, 115200, 0.3)
+    assert (answer.kind, answer.letters, rate) == (Kind.PRINTER, "XYZAC", 230400)
+
+
+def test_a_busy_port_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with SimulatedPrinter(MACHINE) as printer, serial.Serial(printer.path, exclusive=True):
+        assert printed(printer.path, file_of(tmp_path, "G1 X1 F600")) == 1
+    assert f"port {printer.path} is busy: another program holds it open" in capsys.readouterr().err
+
+
+def test_a_port_without_rights_names_the_group(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", "/nowhere")  # the folder of who runs the tests may be closed to others
+    file = file_of(tmp_path, "G1 X1 F600")
+    assert printed("/dev/no-such-port", file) == 1  # all that is imported late is there now
+    with SimulatedPrinter(MACHINE) as printer:
+        os.chmod(printer.path, 0)
+        group = grp.getgrgid(os.stat(printer.path).st_gid).gr_name
+        user = os.geteuid()
+        try:
+            if user == 0:  # to whom every file is open
+                os.seteuid(65534)
+            assert printed(printer.path, file) == 1
+        finally:
+            os.seteuid(user)
+    sentence = f"port {printer.path} may not be used by this user: it belongs to group {group!r}; add your user to that group"
+    assert f"{sentence} (sudo usermod -aG {group} $USER)" in capsys.readouterr().err
+
+
+def test_the_limits_that_the_firmware_tells_bind_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    narrow = {**FIVE_AXES, "M115": FIVE_AXES["M115"].replace("i:-90.0", "i:-20.0")}
+    with on_terminal(scripted(narrow)) as path:
+        assert printed(path, file_of(tmp_path, "G0 Z100 F600", "G0 A-30 F600", "G0 A0")) == 1
+    words = "the program moves A from -30.00 to 0.00, but the printer's firmware allows -20 to 90"
+    assert words in capsys.readouterr().err
+
+
+def test_a_program_for_another_machine_is_refused_unless_forced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = load("open5x") if "open5x" in _machines() else load(_machines()[0])
+    file = file_of(tmp_path, "G1 X1 F600", *foot(made, 1.0, 1.0))
+    with SimulatedPrinter(MACHINE) as printer:
+        assert printed(printer.path, file, "--machine", "generic_ac") == 1
+        sentence = f"part.gcode was made for the machine {made.machine.name}, not for {MACHINE.name}"
+        assert f"{sentence} (--force goes on)" in capsys.readouterr().err
+        assert printer.record.lines == len(["M115", "M114"])
+        assert printed(printer.path, file, "--machine", "generic_ac", "--force") == 0
+    assert f"{sentence}; going on because of --force" in capsys.readouterr().err
+
+
+def _machines() -> list[str]:
+    from profiles.places import shipped
+
+    return [name for name in shipped("machine") if name != "generic_ac"]
+
+
+def test_a_program_made_before_the_axes_were_measured_anew_is_refused() -> None:
+    now = load(settings=["machine.tilt.point_mm=[0.0, 1.0, 2.5]"]).machine
+    sentence = made_for_another(MACHINE, now, "part.gcode")
+    assert sentence.startswith(f"part.gcode was made when machine.tilt.point_mm of {MACHINE.name} was ")
+    assert sentence.endswith("but it is 0, 1, 2.5")
+    assert made_for_another(now, now, "part.gcode") == ""
+
+
+def test_speeds_do_not_make_another_machine() -> None:
+    assert made_for_another(MACHINE, load(settings=["machine.tilt.speed_deg_s=3"]).machine, "a.gcode") == ""
+
+
+def test_the_simulated_printer_answers_with_its_axes() -> None:
+    with SimulatedPrinter(MACHINE) as printer, open_port(printer.path, 115200) as port:
+        answer = ask(port)
+    assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZAC")
+    assert answer.firmware.startswith("Marlin")
+    assert misfit(answer, MACHINE) == ""
+
+
+def test_a_board_that_starts_when_its_port_is_opened_is_waited_for() -> None:
+    deaf = [2]
+    right = scripted(FIVE_AXES)
+
+    def starting(data: bytes, baud: int) -> bytes:
+        deaf[0] -= 1
+        return b"" if deaf[0] > 0 else b"start\necho:Marlin 2.1.2\n" if deaf[0] == 0 else right(data, baud)
+
+    with on_terminal(starting) as path, open_port(path, 115200) as port:
+        assert ask(port).letters == "XYZAC"
+
+
+def test_limits_carry_the_firmware_s_own_letters() -> None:
+    with on_terminal(scripted(FIVE_AXES)) as path, open_port(path, 115200) as port:
+        assert ask(port).limits["A"] == (-90.0, 90.0)
+
+
+@pytest.mark.parametrize("letters", ["", "XYZAC", "XYZABC"])
+def test_a_firmware_that_tells_enough_or_nothing_is_not_refused(letters: str) -> None:
+    assert misfit(Answer(Kind.PRINTER, "FIRMWARE_NAME:Marlin 2", letters), MACHINE) == ""
+
+
+def test_klipper_is_not_asked_for_letters_that_the_start_block_makes() -> None:
+    machine = load(settings=["machine.dialect=klipper"]).machine
+    assert misfit(Answer(Kind.PRINTER, "FIRMWARE_NAME:Klipper", "XYZ"), machine) == ""
+
+
+@pytest.mark.parametrize(("reach", "refused"), [((-90.0, 90.0), False), ((-90.005, 0.0), False), ((0.0, 90.1), True)])
+def test_a_program_at_the_limit_is_inside(reach: tuple[float, float], refused: bool) -> None:
+    answer = Answer(Kind.PRINTER, "", "XYZAC", {"A": (-90.0, 90.0)})
+    assert bool(beyond(answer, {"A": reach, "C": (-1e6, 1e6)})) is refused
