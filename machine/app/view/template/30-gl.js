@@ -1,0 +1,43 @@
+// GL: programs, buffers and the light that all drawing shares.
+
+const LIGHT = `
+vec3 lit(vec3 colour, vec3 n) {
+  float key = max(dot(n, normalize(vec3(-0.45, 0.55, 0.75))), 0.0);
+  float fill = max(dot(n, normalize(vec3(0.7, -0.15, 0.5))), 0.0);
+  float gloss = pow(max(dot(n, normalize(vec3(-0.25, 0.35, 1.0))), 0.0), 24.0);
+  return colour * (0.36 + 0.56 * key + 0.2 * fill) + vec3(0.07 * gloss);
+}`;
+
+/** A linked program {use, at: place of an attribute, to: place of a uniform}. Raises what the compiler says. */
+function programOf(gl, vertex, fragment) {
+  const program = gl.createProgram();
+  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, `#version 300 es\nprecision highp float;\nprecision highp int;\n${text}`);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) throw new Error(gl.getShaderInfoLog(shader));
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(gl.getProgramInfoLog(program));
+  const places = new Map();
+  const to = (name) => {
+    if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name));
+    return places.get(name);
+  };
+  return { use: () => gl.useProgram(program), at: (name) => gl.getAttribLocation(program, name), to };
+}
+
+function bufferOf(gl, content, usage = gl.STATIC_DRAW, target = gl.ARRAY_BUFFER) {
+  const buffer = gl.createBuffer();
+  gl.bindBuffer(target, buffer);
+  gl.bufferData(target, content, usage);
+  return buffer;
+}
+
+/** A buffer with `margin` empty bytes before and behind the content. */
+function framedBuffer(gl, content, margin) {
+  const buffer = bufferOf(gl, content.byteLength + 2 * margin);
+  gl.bufferSubData(gl.ARRAY_BUFFER, margin, content);
+  return buffer;
+}

@@ -1,0 +1,58 @@
+// Marks: seams, retractions and primes as small figures on the path: told apart by shape as well as by colour.
+
+const MARK_VERTEX = `
+in vec3 place;
+uniform mat4 toClip;
+uniform float size, nearer;
+void main() {
+  gl_Position = toClip * vec4(place, 1.0);
+  gl_Position.z -= nearer * gl_Position.w;
+  gl_PointSize = size;
+}`;
+const MARK_FRAGMENT = `
+uniform vec3 fill;
+uniform int shape; // 0 diamond, 1 triangle down, 2 triangle up
+out vec4 colour;
+float inside(vec2 p) {
+  if (shape == 0) return 0.9 - abs(p.x) - abs(p.y);
+  float y = shape == 1 ? p.y : -p.y;
+  return min(0.75 - y - 0.1, 0.5 * (y + 0.85) - abs(p.x) + 0.0);
+}
+void main() {
+  vec2 p = gl_PointCoord * 2.0 - 1.0;
+  if (shape != 0) p.y = -p.y;
+  float d = inside(p);
+  if (d < 0.0) discard;
+  colour = vec4(d < 0.16 ? vec3(0.06) : fill, 1.0);
+}`;
+
+const MARKS = {
+  seams: { fill: [1.0, 1.0, 1.0], shape: 0 },
+  retracts: { fill: [0.84, 0.37, 0.0], shape: 1 },
+  primes: { fill: [0.34, 0.71, 0.91], shape: 2 },
+};
+
+/** Marks of one kind at the beginnings of rows. */
+function marksAt(gl, marked, path, { fill, shape }) {
+  const program = programOf(gl, MARK_VERTEX, MARK_FRAGMENT), vao = gl.createVertexArray(), places = new Float32Array(3 * marked.length);
+  marked.forEach((row, k) => places.set(path.points.subarray(3 * path.slot(row), 3 * path.slot(row) + 3), 3 * k));
+  gl.bindVertexArray(vao);
+  bufferOf(gl, places);
+  gl.enableVertexAttribArray(program.at("place"));
+  gl.vertexAttribPointer(program.at("place"), 3, gl.FLOAT, false, 0, 0);
+  gl.bindVertexArray(null);
+  const draw = (toClip, firstRow, endRow, size, nearer) => {
+    const first = countUpTo(marked, firstRow - 1), end = countUpTo(marked, endRow - 1);
+    if (end <= first) return;
+    program.use();
+    gl.bindVertexArray(vao);
+    gl.uniformMatrix4fv(program.to("toClip"), false, toClip);
+    gl.uniform1f(program.to("size"), size);
+    gl.uniform1f(program.to("nearer"), nearer);
+    gl.uniform3fv(program.to("fill"), fill);
+    gl.uniform1i(program.to("shape"), shape);
+    gl.drawArrays(gl.POINTS, first, end - first);
+    gl.bindVertexArray(null);
+  };
+  return { draw };
+}

@@ -1,0 +1,107 @@
+// Solids: triangles with flat faces, drawn whole or as a ghost whose edges show and whose faces let the light through.
+
+const SOLID_VERTEX = `
+in vec3 place;
+in vec4 colour;
+uniform mat4 toClip, toEye;
+uniform float behind;
+out vec3 seen;
+out vec4 paint;
+void main() {
+  vec4 p = toEye * vec4(place, 1.0);
+  seen = p.xyz;
+  paint = colour;
+  gl_Position = toClip * vec4(place, 1.0);
+  gl_Position.z += behind * gl_Position.w;
+}`;
+const SOLID_FRAGMENT = `
+in vec3 seen;
+in vec4 paint;
+uniform float ghost; // 0: whole; else how much of a ghost is seen face on
+uniform float strength;
+out vec4 colour;
+${LIGHT}
+void main() {
+  vec3 n = normalize(cross(dFdx(seen), dFdy(seen)));
+  float a = paint.a * strength;
+  if (ghost > 0.0) a *= ghost + (0.62 - ghost) * pow(1.0 - abs(dot(n, normalize(seen))), 2.0);
+  colour = vec4(lit(paint.rgb, n) * a, a);
+}`;
+
+/** Drawing for triangles {places, colours}, three corners each; a range of corners may be drawn alone. */
+function solidOf(gl, { places, colours }) {
+  const program = programOf(gl, SOLID_VERTEX, SOLID_FRAGMENT), vao = gl.createVertexArray();
+  gl.bindVertexArray(vao);
+  bufferOf(gl, places);
+  gl.enableVertexAttribArray(program.at("place"));
+  gl.vertexAttribPointer(program.at("place"), 3, gl.FLOAT, false, 0, 0);
+  const painted = bufferOf(gl, colours, gl.DYNAMIC_DRAW);
+  gl.enableVertexAttribArray(program.at("colour"));
+  gl.vertexAttribPointer(program.at("colour"), 4, gl.UNSIGNED_BYTE, true, 0, 0);
+  gl.bindVertexArray(null);
+  const paint = (colours) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, painted);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, colours);
+  };
+  const pass = (first, count) => gl.drawArrays(gl.TRIANGLES, first, count);
+  const draw = (seen, { ghost = 0, strength = 1, behind = 0, range = [0, places.length / 3] } = {}) => {
+    if (range[1] <= range[0]) return;
+    program.use();
+    gl.bindVertexArray(vao);
+    gl.uniformMatrix4fv(program.to("toClip"), false, seen.toClip);
+    gl.uniformMatrix4fv(program.to("toEye"), false, seen.toEye);
+    gl.uniform1f(program.to("ghost"), ghost);
+    gl.uniform1f(program.to("strength"), strength);
+    gl.uniform1f(program.to("behind"), behind);
+    const through = ghost > 0 || strength < 1, count = range[1] - range[0];
+    if (through) {
+      gl.colorMask(false, false, false, false);
+      pass(range[0], count);
+      gl.colorMask(true, true, true, true);
+      gl.enable(gl.BLEND);
+    }
+    pass(range[0], count);
+    gl.disable(gl.BLEND);
+    gl.bindVertexArray(null);
+  };
+  return { draw, paint };
+}
+
+/** Corners of triangles put together, all of one colour a piece. */
+function trianglesOf(pieces) {
+  const places = [], colours = [];
+  for (const { corners, colour } of pieces)
+    for (const corner of corners) {
+      places.push(...corner);
+      colours.push(...colour);
+    }
+  return { places: new Float32Array(places), colours: new Uint8Array(colours) };
+}
+
+const quad = (a, b, c, d) => [a, b, c, a, c, d];
+
+function boxCorners([x0, y0, z0], [x1, y1, z1]) {
+  const at = (i) => [i & 1 ? x1 : x0, i & 2 ? y1 : y0, i & 4 ? z1 : z0];
+  return [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]].flatMap((side) => quad(...side.map(at)));
+}
+
+function boxEdges([x0, y0, z0], [x1, y1, z1]) {
+  const at = (i) => [i & 1 ? x1 : x0, i & 2 ? y1 : y0, i & 4 ? z1 : z0];
+  return [0, 1, 2, 3, 4, 5, 6, 7].flatMap((i) => [1, 2, 4].filter((bit) => !(i & bit)).flatMap((bit) => [at(i), at(i | bit)]));
+}
+
+const circle = (radius, z, steps) => Array.from({ length: steps }, (_, k) => {
+  const angle = (2 * Math.PI * k) / steps;
+  return [radius * Math.cos(angle), radius * Math.sin(angle), z];
+});
+
+/** The surface of an outline [radius, z] turned about z. */
+function revolved(outline, steps = 64) {
+  const rings = outline.map(([radius, z]) => circle(radius, z, steps));
+  return rings.slice(1).flatMap((ring, i) => ring.flatMap((_, k) => {
+    const next = (k + 1) % steps;
+    return quad(rings[i][k], rings[i][next], ring[next], ring[k]);
+  }));
+}
+
+const chained = (points) => points.flatMap((point, k) => [point, points[(k + 1) % points.length]]);

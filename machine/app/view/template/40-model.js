@@ -1,0 +1,61 @@
+// Model: the parts' surfaces, the planes of the cuts and the directions of printing.
+
+const RED = [213, 32, 40];
+const LEFT = { none: 0, printed: 1, straight: 2 };
+
+/** Corners of all faces and, a part each, which of them are its own. */
+function surfacesOf({ header, array }) {
+  const vertices = array("vertices"), faces = array("faces"), [marks] = array("face_marks");
+  if (faces.length < 3) return null;
+  const places = new Float32Array(9 * faces[0].length);
+  for (let face = 0, at = 0; face < faces[0].length; face++)
+    for (let corner = 0; corner < 3; corner++)
+      for (let axis = 0; axis < 3; axis++) places[at++] = vertices[axis][faces[corner][face]] / 1000;
+  const parts = header.parts.filter((part) => part.mesh).map((part) => ({ part, range: part.mesh.faces.map((face) => 3 * face) }));
+  return { places, marks, parts };
+}
+
+/** Colours of all corners: the part's, and red where a face is risky in the way asked for (none, printed, straight). */
+function surfaceColours({ marks, parts }, colourOf, risky) {
+  const colours = new Uint8Array(12 * marks.length);
+  for (const { part, range } of parts)
+    for (let corner = range[0]; corner < range[1]; corner++) {
+      const red = marks[Math.floor(corner / 3)] & LEFT[risky];
+      const [r, g, b] = red ? RED : colourOf(part);
+      colours.set([r, g, b, red ? 255 : 254], 4 * corner);
+    }
+  return colours;
+}
+
+/** Two vectors across a direction. */
+function beside(direction) {
+  const a = unit(cross(Math.abs(direction[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], direction));
+  return [a, cross(direction, a)];
+}
+
+/** The disc of a cut, 72 corners about its middle. */
+function discOf({ normal, centre_mm: centre, radius_mm: radius }) {
+  const [a, b] = beside(normal);
+  return circle(radius * 1.12, 0, 72).map(([u, v]) => add(centre, add(scaled(a, u), scaled(b, v))));
+}
+
+function planesOf(parts, colourOf) {
+  const cut = parts.filter((part) => part.base && part.base.radius_mm > 0);
+  const pieces = cut.map((part) => {
+    const disc = discOf(part.base);
+    return { corners: disc.flatMap((place, k) => [part.base.centre_mm, place, disc[(k + 1) % disc.length]]), colour: [...colourOf(part), 255] };
+  });
+  const edges = cut.map((part) => ({ corners: chained(discOf(part.base)), colour: [...colourOf(part), 255] }));
+  return { discs: trianglesOf(pieces), edges: trianglesOf(edges) };
+}
+
+/** An arrow along each part's direction: a shaft and a head. */
+function arrowsOf(parts, colourOf, span) {
+  const pieces = parts.filter((part) => part.base && part.direction).map((part) => {
+    const long = 0.3 * span, [a, b] = beside(part.direction);
+    const outline = [[0, 0], [0.018 * long * 2, 0], [0.018 * long * 2, 0.72 * long], [0.1 * long, 0.72 * long], [0, long]];
+    const place = ([u, v, w]) => add(part.base.centre_mm, add(add(scaled(a, u), scaled(b, v)), scaled(part.direction, w)));
+    return { corners: revolved(outline, 24).map(place), colour: [...colourOf(part), 255] };
+  });
+  return trianglesOf(pieces);
+}

@@ -1,0 +1,33 @@
+// Page: the elements, and words that several places say in the same way.
+
+const $ = (id) => document.getElementById(id);
+
+/** A new element with properties, classes and children; text is only ever put in as text. */
+function made(tag, { text, className, ...properties } = {}, ...children) {
+  const element = document.createElement(tag);
+  if (text !== undefined) element.textContent = text;
+  if (className) element.className = className;
+  Object.assign(element, properties);
+  element.append(...children);
+  return element;
+}
+
+function duration(seconds) {
+  const whole = Math.round(seconds), two = (x) => String(x).padStart(2, "0");
+  const [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  return hours ? `${hours}h ${two(minutes)}m ${two(rest)}s` : `${minutes}m ${two(rest)}s`;
+}
+
+function notice(text) {
+  $("notice").textContent = text;
+  $("notice").hidden = !text;
+}
+
+/** Who is told what has changed: row, layers, colours, look. */
+function bells() {
+  const heard = new Map();
+  return {
+    on: (names, listener) => names.split(" ").forEach((name) => heard.set(name, [...(heard.get(name) || []), listener])),
+    ring: (...names) => new Set(names.flatMap((name) => heard.get(name) || [])).forEach((listener) => listener()),
+  };
+}

@@ -1,0 +1,55 @@
+// Scene: what the person has chosen to see; the only state that the page keeps.
+
+function sceneOf(print, bells) {
+  const { rows, header } = print, last = Math.max(rows.count - 1, 0);
+  const scene = {
+    row: last, share: 1, place: [0, 0, 0, 0, 0],
+    part: null, others: "faint", low: 0, high: Math.max(rows.layers.length - 1, 0),
+    riding: false, dark: false, stride: 1, mode: "part", hidden: new Set(),
+    model: rows.count ? "ghost" : "solid", risky: "printed",
+    on: { beads: true, travels: false, retractions: false, seams: false, machine: header.machine.known, planes: false, directions: false, findings: true },
+  };
+  scene.layers = () => (scene.part === null ? rows.layers : rows.layers.filter((layer) => layer.part === scene.part));
+  /** Show the print after a share of a row. */
+  scene.go = (row, share = 1) => {
+    scene.row = clamp(Math.round(row), 0, last);
+    scene.share = share;
+    scene.place = rows.count ? placeAt(rows, scene.row, share) : restingPlace(header);
+    bells.ring("row");
+  };
+  /** The end of a layer some layers away. */
+  scene.goLayer = (by) => {
+    if (!rows.layers.length) return;
+    const now = layerOf(rows, scene.row), complete = now >= 0 && scene.row === rows.layers[now].last;
+    const next = now + (by < 0 && !complete ? 0 : by) + (by > 0 && !complete ? -1 : 0);
+    scene.go(rows.layers[clamp(next, 0, rows.layers.length - 1)].last);
+  };
+  scene.time = () => {
+    if (!rows.count) return 0;
+    const start = scene.row ? rows.time[scene.row - 1] : 0;
+    return mix(start, rows.time[scene.row], scene.share) / 1000;
+  };
+  scene.goToTime = (seconds) => {
+    const milliseconds = seconds * 1000, row = Math.min(countUpTo(rows.time, milliseconds), last);
+    const start = row ? rows.time[row - 1] : 0, long = rows.time[row] - start;
+    scene.go(row, long > 0 ? clamp((milliseconds - start) / long, 0, 1) : 1);
+  };
+  scene.choosePart = (index) => {
+    scene.part = index;
+    [scene.low, scene.high] = [0, Math.max(scene.layers().length - 1, 0)];
+    bells.ring("layers");
+  };
+  scene.chooseLayers = (low, high) => {
+    const most = Math.max(scene.layers().length - 1, 0);
+    [scene.low, scene.high] = [clamp(Math.min(low, high), 0, most), clamp(Math.max(low, high), 0, most)];
+    bells.ring("layers");
+  };
+  return scene;
+}
+
+/** Without a path the machine waits level, the head well above everything. */
+function restingPlace({ machine, parts }) {
+  const high = 30 + Math.max(60, ...parts.map((part) => (part.base ? part.base.centre_mm[2] + part.base.radius_mm : 0)));
+  const origin = carried(chainOf(machine).table(machine.tilt.zero_deg, machine.turn.zero_deg), [0, 0, high]);
+  return [...add(origin, machine.tool_mm), machine.tilt.zero_deg, machine.turn.zero_deg];
+}

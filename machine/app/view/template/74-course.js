@@ -1,0 +1,65 @@
+// Course: the slider over the whole print, playing it, and the strip that shows where each part lies.
+
+const PLAYING = [1, 5, 20, 100, 300, 1000];
+const USUAL = 100;
+
+function courseOf(print, scene, bells) {
+  const { rows, header } = print, position = $("position");
+  position.max = Math.max(rows.count - 1, 0);
+  for (const speed of PLAYING) $("speed").append(made("option", { value: speed, text: `${speed}×`, selected: speed === USUAL }));
+  const total = rows.count ? rows.time[rows.count - 1] / 1000 : 0;
+  const player = playerOf(scene, bells, total);
+  position.addEventListener("input", () => { player.stop(); scene.go(Number(position.value)); });
+  $("play").addEventListener("click", player.toggle);
+  $("back").addEventListener("click", () => { player.stop(); scene.go(scene.row - 1); });
+  $("forth").addEventListener("click", () => { player.stop(); scene.go(scene.row + 1); });
+  bells.on("row", () => {
+    if (Number(position.value) !== scene.row) position.value = scene.row;
+    position.setAttribute("aria-valuetext", `${duration(scene.time())} of ${duration(total)}`);
+    $("clock").textContent = `${duration(scene.time())} / ${duration(total)}`;
+  });
+  paintStrip($("strip"), header.parts, rows.count);
+  return player;
+}
+
+function playerOf(scene, bells, total) {
+  const player = { playing: false };
+  let before = 0;
+  const step = (now) => {
+    if (!player.playing) return;
+    const next = scene.time() + (Math.min(now - before, 250) / 1000) * Number($("speed").value);
+    before = now;
+    scene.goToTime(Math.min(next, total));
+    if (next >= total) player.stop(); else requestAnimationFrame(step);
+  };
+  const tell = () => {
+    $("play").textContent = player.playing ? "❚❚" : "▶";
+    $("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");
+    bells.ring("look");
+  };
+  player.start = () => {
+    if (player.playing) return;
+    if (scene.time() >= total) scene.goToTime(0);
+    player.playing = true;
+    before = performance.now();
+    requestAnimationFrame(step);
+    tell();
+  };
+  player.stop = () => { if (player.playing) { player.playing = false; tell(); } };
+  player.toggle = () => (player.playing ? player.stop() : player.start());
+  return player;
+}
+
+/** Each part's rows as a piece of its colour. */
+function paintStrip(canvas, parts, count) {
+  canvas.width = 1200;
+  canvas.height = 8;
+  const pen = canvas.getContext("2d");
+  pen.fillStyle = PLAIN;
+  pen.fillRect(0, 0, 1200, 8);
+  for (const part of parts) {
+    if (!part.rows) continue;
+    pen.fillStyle = part.colour;
+    pen.fillRect((part.first_row / count) * 1200, 0, Math.max((part.rows / count) * 1200, 1), 8);
+  }
+}

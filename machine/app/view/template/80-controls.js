@@ -1,0 +1,102 @@
+// Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
+
+function controlsOf(print, scene, bells) {
+  for (const name of Object.keys(scene.on)) {
+    const box = $(`show-${name}`);
+    box.checked = scene.on[name];
+    box.addEventListener("change", () => { scene.on[name] = box.checked; bells.ring("look"); });
+  }
+  const select = (id, take, bell) => $(id).addEventListener("change", () => { take($(id).value); bells.ring(bell); });
+  $("model").value = scene.model;
+  select("colour-by", (value) => { scene.mode = value; }, "colours");
+  select("others", (value) => { scene.others = value; }, "look");
+  select("model", (value) => { scene.model = value; }, "look");
+  select("risky", (value) => { scene.risky = value; }, "model");
+  select("frame", (value) => { scene.riding = value === "workpiece"; }, "frame");
+  if (!print.rows.count) document.body.classList.add("no-paths");
+  if (!print.surfaces && !print.header.parts.some((part) => part.base)) document.body.classList.add("no-solids");
+  typeBoxes(print, scene, bells);
+  tabs();
+}
+
+/** A box for every kind of line in the print, with its share of the time. */
+function typeBoxes({ rows }, scene, bells) {
+  const seconds = new Float64Array(rows.types.length);
+  let whole = 0;
+  for (let i = 0; i < rows.count; i++) {
+    const took = rows.time[i] - (i ? rows.time[i - 1] : 0);
+    whole += took;
+    if (rows.kind[i] === KIND.extrude) seconds[rows.type[i]] += took;
+  }
+  rows.types.forEach((name, place) => {
+    if (!seconds[place]) return;
+    const box = made("input", { type: "checkbox", checked: true });
+    box.addEventListener("change", () => { scene.hidden[box.checked ? "delete" : "add"](place); bells.ring("colours"); });
+    const share = ((100 * seconds[place]) / whole).toFixed(1);
+    $("types").append(made("label", {}, box, swatch(typeColour(name)), name || "not told", made("span", { className: "share", text: `${share} %` })));
+  });
+}
+
+function swatch(colour) {
+  const mark = made("span", { className: "swatch" });
+  mark.style.backgroundColor = colour;
+  return mark;
+}
+
+const TITLES = { part: "part", kind: "kind of line", speed: "speed", layer: "layer time", flow: "flow", fan: "fan", nozzle: "nozzle", height: "height", width: "width" };
+
+function showLegend({ rows, header }, mode, legend) {
+  const box = $("legend");
+  box.replaceChildren(made("b", { text: TITLES[mode] + (legend ? `, ${legend.unit}` : "") }));
+  if (legend) {
+    const scale = made("canvas", { width: 256, height: 1 });
+    const pen = scale.getContext("2d");
+    STEPS.forEach((_, k) => { pen.fillStyle = hex(ramp(k / 255)); pen.fillRect(k, 0, 1, 1); });
+    box.append(scale, made("div", { className: "marks" }, ...legend.marks.map(([, text]) => made("span", { text }))));
+    return;
+  }
+  const entries = mode === "kind" ? kindEntries(rows) : header.parts.map((part) => [part.colour, part.index ? `${part.index}` : "the file"]);
+  box.append(...entries.slice(0, 24).map(([colour, text]) => made("span", {}, swatch(colour), text)));
+}
+
+function kindEntries(rows) {
+  const used = new Set();
+  for (let i = 0; i < rows.count; i++) if (rows.kind[i] === KIND.extrude) used.add(rows.type[i]);
+  return [...used].sort((a, b) => a - b).map((place) => [typeColour(rows.types[place]), rows.types[place] || "not told"]);
+}
+
+function tabs() {
+  const all = [...document.querySelectorAll("[role=tab]")];
+  const choose = (chosen) => all.forEach((tab) => {
+    tab.setAttribute("aria-selected", tab === chosen);
+    tab.tabIndex = tab === chosen ? 0 : -1;
+    $(tab.getAttribute("aria-controls")).hidden = tab !== chosen;
+  });
+  all.forEach((tab, k) => {
+    tab.addEventListener("click", () => choose(tab));
+    tab.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      const next = all[(k + step + all.length) % all.length];
+      choose(next);
+      next.focus();
+      event.stopPropagation();
+    });
+  });
+}
+
+/** Dark or light: what the system prefers until the person says otherwise. */
+function themeOf(scene, bells) {
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const choose = (dark) => {
+    scene.dark = dark;
+    document.documentElement.dataset.theme = dark ? "dark" : "light";
+    bells.ring("theme");
+  };
+  let told = false;
+  const toggle = () => { told = true; choose(!scene.dark); };
+  system.addEventListener("change", () => { if (!told) choose(system.matches); });
+  $("theme").addEventListener("click", toggle);
+  choose(system.matches);
+  return toggle;
+}

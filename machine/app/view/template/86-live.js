@@ -1,0 +1,32 @@
+// Live: follows a running print, asking the computer that served the page for what the printer has acknowledged.
+
+const ASK_EVERY_MS = 1000;
+const OVER = ["done", "stopped"];
+
+function follow({ rows }, scene, player) {
+  const badge = $("live");
+  badge.hidden = false;
+  let shown = -1;
+  const ask = async () => {
+    let state;
+    try {
+      state = await (await fetch("state", { cache: "no-store" })).json();
+    } catch {
+      badge.textContent = "the print's computer does not answer";
+      return setTimeout(ask, 5 * ASK_EVERY_MS);
+    }
+    badge.textContent = liveTold(state);
+    if (state.line !== null && state.line !== shown && !player.playing) {
+      shown = state.line;
+      scene.go(Math.max(countUpTo(rows.line, state.line) - 1, 0));
+    }
+    return OVER.includes(state.state) ? null : setTimeout(ask, ASK_EVERY_MS);
+  };
+  ask();
+}
+
+function liveTold({ state, line, total, left_s: left, nozzle_c: nozzle, nozzle_target_c: wanted, bed_c: bed }) {
+  const heat = (name, value, target) => value !== null && value !== undefined && `${name} ${Math.round(value)}${target ? ` of ${Math.round(target)}` : ""} °C`;
+  const told = [state, line && `line ${line}${total ? ` of ${total}` : ""}`, heat("nozzle", nozzle, wanted), heat("bed", bed), left && `${duration(left)} left`];
+  return told.filter(Boolean).join(" · ");
+}

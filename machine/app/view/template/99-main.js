@@ -1,0 +1,74 @@
+// Main: the page put together: bytes to print, print to picture, hands to scene.
+
+async function main() {
+  const text = $("tiltprint").textContent.trim();
+  $("tiltprint").textContent = "";
+  const print = await printOf(text), { header, rows } = print;
+  const ring = bells(), camera = cameraOf(), scene = sceneOf(print, ring);
+  $("title").textContent = header.title;
+  $("summary").textContent = summaryOf(header, rows);
+  showReport(header);
+  controlsOf(print, scene, ring);
+  readoutsOf(print, scene, ring);
+  layerSliders(print, scene, ring);
+  const toggleTheme = themeOf(scene, ring), player = courseOf(print, scene, ring);
+  const showMarkers = findingsOf(print, scene, ring, camera, player.stop);
+  scene.go(rows.count - 1);
+  const picture = pictureOf(print, scene, camera, ring, showMarkers);
+  if (!picture) return withoutPicture();
+  const fit = fitting(print, scene, camera, picture, ring);
+  keysOf({ scene, camera, player, look: picture.moved, fit, toggleTheme });
+  handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => goTo(picture.rowAt(event), scene, player) });
+  if (header.live && location.protocol.startsWith("http")) follow(print, scene, player);
+  if (header.thinned) notice(thinnedTold(header.thinned));
+  document.documentElement.dataset.state = "ready";
+}
+
+function goTo(row, scene, player) {
+  if (row < 0) return;
+  player.stop();
+  scene.go(row);
+}
+
+function summaryOf({ time_s: seconds, filament_mm: filament, parts }, { count, layers }) {
+  const many = (number, thing) => `${number.toLocaleString("en")} ${thing}${number === 1 ? "" : "s"}`;
+  const told = [many(parts.length, "part")];
+  if (count) told.push(many(layers.length, "layer"), duration(seconds), `${(filament / 1000).toFixed(2)} m of filament`);
+  return told.join(" · ");
+}
+
+/** Puts the work into view, and keeps it there when the frame is changed. */
+function fitting(print, scene, camera, picture, ring) {
+  const [least, most] = print.box, middle = scaled(add(least, most), 0.5);
+  const work = () => standing(print.chain, scene.place, scene.riding).work;
+  const fit = () => {
+    camera.fit(print.box, picture.canvas.clientWidth / Math.max(picture.canvas.clientHeight, 1));
+    camera.target = carried(work(), middle);
+    picture.ask();
+  };
+  let before = work();
+  ring.on("frame", () => {
+    camera.target = carried(multiply(work(), undone(before)), camera.target);
+    picture.ask();
+  });
+  ring.on("row frame", () => { before = work(); });
+  document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => {
+    [camera.yaw, camera.pitch] = VIEWS[button.dataset.view].map((angle) => angle * RAD);
+    picture.ask();
+  }));
+  $("fit").addEventListener("click", fit);
+  fit();
+  return fit;
+}
+
+function withoutPicture() {
+  document.body.classList.add("no-picture");
+  notice("This browser shows no WebGL2, so there is no picture of the print; the report and the findings are complete.");
+  $("tab-report").click();
+  document.documentElement.dataset.state = "failed";
+}
+
+main().catch((error) => {
+  notice(`The page could not be shown: ${error.message}`);
+  document.documentElement.dataset.state = "failed";
+});

@@ -1,0 +1,171 @@
+"""Browser: a headless Chromium driven by the DevTools protocol over a pipe, with the standard library only."""
+
+import base64
+import fcntl
+import json
+import os
+import select
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = (
+    "--headless --no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
+    "--disable-sync --disable-extensions --disable-dev-shm-usage --hide-scrollbars --force-device-scale-factor=1 "
+    "--use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist --remote-debugging-pipe"
+).split()
+PATIENCE_S = 60.0
+
+
+class Browser:
+    """One Chromium with one page; a context: leaving it ends the process and removes its profile folder.
+
+    complaints: what the console and the page complained of; requests: every address asked for since the last `open`.
+    """
+
+    def __init__(self, size: tuple[int, int] = (1280, 800), flags: tuple[str, ...] = ()) -> None:
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        self._folder = tempfile.TemporaryDirectory(prefix="browser")
+        self._count, self._read, self._session = 0, b"", ""
+        to_child, self._out = _pipe()
+        self._in, from_child = _pipe()
+        command = [str(CHROMIUM), *FLAGS, *flags, f"--user-data-dir={self._folder.name}", f"--window-size={size[0]},{size[1]}"]
+        self._process = subprocess.Popen(
+            [*command, "about:blank"],
+            preexec_fn=lambda: (os.dup2(to_child, 3), os.dup2(from_child, 4)) and None,
+            pass_fds=(3, 4),
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(to_child)
+        os.close(from_child)
+        pages = [t for t in self._send("Target.getTargets")["targetInfos"] if t["type"] == "page"]
+        self._session = self._send("Target.attachToTarget", targetId=pages[0]["targetId"], flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self._send(f"{domain}.enable")
+        self.resize(*size)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._process.terminate()
+        self._process.wait(PATIENCE_S)
+        os.close(self._in)
+        os.close(self._out)
+        self._folder.cleanup()
+
+    def open(self, address: str) -> None:
+        """Load a page and wait until it says that it is ready (or that it cannot draw)."""
+        self.complaints.clear()
+        self.requests.clear()
+        self._send("Page.navigate", url=address)
+        self.wait("['ready', 'failed'].includes(document.documentElement?.dataset.state)")
+
+    def value(self, expression: str) -> Any:
+        """What a JavaScript expression gives, awaited where it is a promise. Raises RuntimeError for what it throws."""
+        answer = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in answer:
+            raise RuntimeError(json.dumps(answer["exceptionDetails"])[:800])
+        return answer["result"].get("value")
+
+    def wait(self, condition: str) -> None:
+        """Until a JavaScript condition holds. Raises TimeoutError with the console's complaints."""
+        end = time.monotonic() + PATIENCE_S
+        while not self.value(f"!!({condition})"):
+            if time.monotonic() > end:
+                raise TimeoutError(f"{condition}; the console says {self.complaints}")
+            time.sleep(0.02)
+
+    def click(self, selector: str) -> None:
+        """A click on an element, as its own handler gets it."""
+        self.value(f"document.querySelector({json.dumps(selector)}).click()")
+
+    def press(self, x: float, y: float) -> None:
+        """A real mouse click at a place of the page."""
+        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+            self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """A real drag with the left button."""
+        places = [("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)]
+        for kind, (x, y) in places:
+            self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+
+    def key(self, key: str) -> None:
+        """One key pressed and released."""
+        text = {"text": key} if len(key) == 1 else {}
+        self._send("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
+        self._send("Input.dispatchKeyEvent", type="keyUp", key=key)
+
+    def resize(self, width: int, height: int, mobile: bool = False) -> None:
+        """Another size of the window, in CSS pixels."""
+        self._send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
+
+    def prefer(self, scheme: str) -> None:
+        """What the system asks for: dark or light."""
+        self._send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+
+    def screenshot(self, path: Path | None = None) -> bytes:
+        """The window as PNG."""
+        picture = base64.b64decode(self._send("Page.captureScreenshot", format="png")["data"])
+        if path:
+            path.write_bytes(picture)
+        return picture
+
+    def pdf(self) -> bytes:
+        """The page as it would be printed."""
+        return base64.b64decode(self._send("Page.printToPDF", printBackground=True)["data"])
+
+    def _send(self, method: str, **given: Any) -> dict[str, Any]:
+        self._count += 1
+        message = {"id": self._count, "method": method, "params": given}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._out, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._receive()
+            if answer.get("id") == self._count:
+                if "error" in answer:
+                    raise RuntimeError(f"{method}: {answer['error']}")
+                result: dict[str, Any] = answer["result"]
+                return result
+            self._note(answer)
+
+    def _receive(self) -> dict[str, Any]:
+        while b"\0" not in self._read:
+            if not select.select([self._in], [], [], PATIENCE_S)[0]:
+                raise TimeoutError("the browser does not answer")
+            piece = os.read(self._in, 1 << 20)
+            if not piece:
+                raise RuntimeError("the browser has ended")
+            self._read += piece
+        message, _, self._read = self._read.partition(b"\0")
+        answer: dict[str, Any] = json.loads(message)
+        return answer
+
+    def _note(self, event: dict[str, Any]) -> None:
+        given = event.get("params", {})
+        match event.get("method"):
+            case "Network.requestWillBeSent":
+                self.requests.append(given["request"]["url"])
+            case "Runtime.exceptionThrown":
+                self.complaints.append(json.dumps(given["exceptionDetails"])[:800])
+            case "Runtime.consoleAPICalled" if given["type"] in ("error", "warning", "assert"):
+                self.complaints.append(str([value.get("value") for value in given["args"]]))
+            case "Log.entryAdded" if given["entry"]["level"] in ("error", "warning"):
+                self.complaints.append(given["entry"]["text"])
+
+
+def _pipe() -> tuple[int, int]:
+    """Ends of a pipe that are neither 3 nor 4, which the browser takes for itself."""
+    low = os.pipe()
+    high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in low]
+    for end in low:
+        os.close(end)
+    return high[0], high[1]
