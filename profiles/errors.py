@@ -14,6 +14,7 @@ UserError                         message (one sentence: thing, value, what is a
     RemoteProtocolError           the printer asked for something impossible
     FirmwareError                 the printer reported an error; its own text is kept
     SilenceError                silence beyond the bound
+  JournalError                    machine/link: a journal from which a print cannot be resumed
 
 Anything else is a bug: short message, log file, exit 3. Ctrl-C: stop safely, exit 130.
 """
@@ -73,3 +74,7 @@ class FirmwareError(PrinterError):
 
 class SilenceError(PrinterError):
     """The printer stayed silent beyond the allowed time."""
+
+
+class JournalError(UserError):
+    """A journal from which a print cannot be resumed; the message says why."""

@@ -13,7 +13,11 @@ WORD = re.compile(r"([PR])\s*(\d+\.?\d*)")
 
 @dataclass(frozen=True)
 class Progress:
-    """A moment of a print. None: not known (yet)."""
+    """A moment of a print. None: not known (yet).
+
+    state: printing, pausing, paused, resuming, cancelling, finishing, reconnecting. file_line: line in the program's file of the
+    newest acknowledged command, from 1. message: the newest word to the person watching, "" when there is none.
+    """
 
     sent: int
     acknowledged: int
@@ -25,6 +29,11 @@ class Progress:
     part: int | None
     parts: int | None
     layer: int | None
+    state: str = "printing"
+    file_line: int = 0
+    feed_percent: float = 100.0
+    flow_percent: float = 100.0
+    message: str = ""
 
 
 @dataclass

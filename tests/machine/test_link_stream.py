@@ -17,6 +17,7 @@ import serial
 from machine.link.faults import HEALED, Fault, random_script
 from machine.link.firmware import Firmware, Habits
 from machine.link.framing import frame
+from machine.link.medium import Medium
 from machine.link.port import open_port, refusal
 from machine.link.progress import Progress
 from machine.link.protocol import Timing
@@ -344,7 +345,7 @@ def test_a_cable_pulled_in_mid_print_ends_it_and_leaves_no_thread() -> None:
     threads, server = threading.active_count(), threading.Thread(target=serve, daemon=True)
     server.start()
     with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
-        print_lines(PROGRAM, os.ttyname(slave), 250000, timing=QUICK)
+        print_lines(PROGRAM, os.ttyname(slave), 250000, timing=QUICK, medium=Medium(lost_s=0.3))
     server.join(5)
     os.close(slave)
     assert threading.active_count() <= threads

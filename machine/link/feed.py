@@ -1,0 +1,424 @@
+"""Feed: one print under way; the program's commands in order, and between them what person, printer and journal want."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from threading import Event as Flag
+
+from machine.link import requests
+from machine.link.control import Control, Request, Wish
+from machine.link.events import Action, Echo, Event, Identity, Ok, Position, Temperature
+from machine.link.framing import LINE_LIMIT, command_of
+from machine.link.journal import Journal, Moment
+from machine.link.modal import Modal, axes_of
+from machine.link.park import Laid, lift_words, standing_mm
+from machine.link.progress import Place, Progress
+from machine.link.retreat import retreat, unlike
+from machine.link.talk import Talk
+from machine.link.trail import Step, Trail
+from machine.link.watchdog import Watchdog
+from profiles.errors import PrinterError, RemoteProtocolError
+from profiles.profile import Profile
+
+PROGRESS_S = 0.2  # a person reads no faster
+ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
+REPORT_S = 2  # between reports of one that does
+WARNINGS = 20  # kept of the printer's own words that show a program it does not understand
+WARNS = ("nknown command", "cold extrusion", "too long extrusion")
+BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
+CHECK_S = 30.0  # between looks at the position where a layer ends
+CHECK_MUTE_S = 10.0  # the same for a printer that does not tell what it has executed
+NEAR = 0.1  # mm or deg: M114 tells hundredths, motor steps are smaller
+
+
+class CancelledError(Exception):
+    """The stop flag was set, or a person or the printer asked for the end."""
+
+
+class EmergencyError(Exception):
+    """A person asked for the emergency stop."""
+
+
+@dataclass(frozen=True)
+class Begin:
+    """Where a resumed print goes on: the first line of the program to be sent, and commands before it."""
+
+    line: int
+    before: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a resumed print finds: the newest line number the printer has seen before it was greeted anew, where it says it
+    stands, and its temperatures; None where it does not tell.
+    """
+
+    last_number: int | None
+    position: Position | None
+    temperature: Temperature
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is fixed for a print. total: commands; begin: for a resumed one, decides once the printer has spoken."""
+
+    total: int | None = None
+    total_s: float | None = None
+    limit: int = LINE_LIMIT
+    profile: Profile | None = None
+    standby_c: float | None = None
+    begin: Callable[[Found], Begin] | None = None
+
+
+class Feed:
+    """run() a program over a greeted talk; heard() and turned() are the talk's callbacks."""
+
+    def __init__(
+        self,
+        job: Job,
+        control: Control | None,
+        journal: Journal | None,
+        on_progress: Callable[[Progress], None] | None,
+        stop: Flag | None,
+        began_s: float,
+    ) -> None:
+        self._job, self._control, self._journal = job, control, journal
+        self._on_progress, self._stop = on_progress, stop
+        machine = job.profile.machine if job.profile is not None else None
+        self.modal, self.trail, self._place = Modal(axes_of(machine)), Trail(), Place()
+        self._laid = Laid(machine) if machine is not None else None
+        self._watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c)) if machine is not None else Watchdog()
+        self.talk: Talk
+        self.state, self._message = "printing", ""
+        self.temperature, self.firmware = Temperature(), "unknown"
+        self.warnings: list[str] = []
+        self.sent = 0
+        self._feed_percent = self._flow_percent = 100.0
+        self._own: deque[str] = deque()
+        self._pause_s: float | None = None
+        self._resume = self._layer_ended = self._verify = False
+        self._began_s = self._shown_s = self._asked_s = self._checked_s = began_s
+
+    @property
+    def acknowledged(self) -> int:
+        """Commands of the program that the printer has taken."""
+        return self.trail.commands
+
+    def run(self, lines: Iterable[str]) -> None:
+        """Feed the program from its beginning, or where the job says, to the barrier at its end."""
+        talk = self.talk
+        if talk.protocol.capabilities.get("AUTOREPORT_TEMP"):
+            talk.send(f"M155 S{REPORT_S}")
+        begin = self._begin()
+        for line, command in self._commands(lines):
+            if begin is not None and line < begin.line:
+                self._absorb(command)
+                continue
+            if begin is not None:
+                self._approach(begin)
+                begin = None
+            self._between(command)
+            self._send(line, command)
+        self._finish()
+
+    @property
+    def resumes(self) -> bool:
+        """Whether this print goes on where an earlier one ended."""
+        return self._job.begin is not None
+
+    def _begin(self) -> Begin | None:
+        if self._job.begin is None:
+            return None
+        position = self.talk.ask_position()
+        return self._job.begin(Found(self.talk.last_number, position, self.temperature))
+
+    def _approach(self, begin: Begin) -> None:
+        """What stands before the first line of a resumed print, proved by the printer's own position."""
+        self.turn_to("resuming")
+        self.trail = Trail(begin.line - 1)
+        for command in begin.before:
+            self.talk.send(command)
+        self._prove("before the print goes on")
+        self.turn_to("printing")
+
+    def _absorb(self, command: str) -> None:
+        """A command that was done by an earlier run."""
+        self._follow(command)
+
+    def _follow(self, command: str) -> bool:
+        """Keep modal state and the print's outline in step; True when the command moves something."""
+        modal = self.modal
+        before, pulled = modal.at[5], modal.pulled_mm
+        moves = modal.take(command)
+        if moves and self._laid is not None and command.startswith(("G1", "G2", "G3")):
+            pushed = before is None or modal.at[5] is None or modal.at[5] > before
+            if pushed and not pulled:
+                self._laid.push(modal.place())
+        return moves
+
+    def _send(self, line: int, command: str) -> None:
+        number = self.talk.send(command)
+        moves = self._follow(command)
+        self.sent += 1
+        self.trail.send(Step(number, line, moves, self.modal.place()))
+
+    def _commands(self, lines: Iterable[str]) -> Iterator[tuple[int, str]]:
+        for line, text in enumerate(lines, 1):
+            command = command_of(text, line, self._job.limit)
+            if command:
+                if command.startswith("M73"):
+                    self._place.told(command, self.talk.medium.now_s() - self._began_s)
+                elif command.startswith(("M220", "M221")):
+                    self._overridden(command)
+                yield line, command
+            elif text.startswith(";"):
+                self._place.comment(text)
+                self._layer_ended = self._layer_ended or text.startswith(";LAYER_CHANGE")
+
+    def _overridden(self, command: str) -> None:
+        found = dict(requests.words(command))
+        if "S" in found:
+            if command.startswith("M220"):
+                self._feed_percent = found["S"]
+            else:
+                self._flow_percent = found["S"]
+
+    def _between(self, command: str) -> None:
+        """What is due before the next command of the program."""
+        while self._own:
+            self.talk.send(self._own.popleft())
+        if self._verify:
+            self._verify = False
+            self._prove("after the port came back")
+        now_s = self.talk.medium.now_s()
+        if self._journal is not None and self._due(command, now_s):
+            self._check(now_s)
+        if self._pause_s is not None and (not _pushes(command) or now_s - self._pause_s > BOUNDARY_S):
+            self._pause()
+
+    def _due(self, command: str, now_s: float) -> bool:
+        """Whether the position is to be looked at now: at a layer's end, or in a travel where the printer tells little."""
+        ended, self._layer_ended = self._layer_ended, False
+        if self.talk.protocol.advanced:
+            return ended and now_s - self._checked_s >= CHECK_S
+        return (ended or command.startswith("G0")) and now_s - self._checked_s >= CHECK_MUTE_S
+
+    def _check(self, now_s: float) -> None:
+        self._checked_s = now_s
+        told = self.talk.ask_position()
+        self.trail.barrier()
+        if told is not None and (wrong := unlike(self.modal, told.axes, NEAR)):
+            self._say(f"the printer stands at {', '.join(wrong)}")
+        self._mark()
+
+    def _prove(self, when: str) -> None:
+        """Compare the printer's own position with the program's; raises RemoteProtocolError when they differ."""
+        told = self.talk.ask_position()
+        self.trail.barrier()
+        if told is not None and (wrong := unlike(self.modal, told.axes, NEAR)):
+            raise RemoteProtocolError(f"{when} the printer stands at {', '.join(wrong)}: its position can no longer be trusted")
+
+    def _pause(self) -> None:
+        """Leave the print, wait for the wish to go on, and come back to the same place."""
+        self.turn_to("pausing")
+        told = self.talk.ask_position()
+        self.trail.barrier()
+        agreed = told is None or not unlike(self.modal, told.axes, NEAR)
+        way = retreat(self.modal, self._job.profile, self._laid, self._job.standby_c)
+        for command in way.away:
+            self.talk.send(command)
+        self.talk.drain()
+        self.turn_to("paused")
+        self._mark()
+        while not self._resume:
+            self.talk.rest(until=lambda: self._resume or bool(self._own))
+            while self._own:
+                self.talk.send(self._own.popleft())
+        self.turn_to("resuming")
+        for command in way.back:
+            self.talk.send(command)
+        self._pause_s, self._resume = None, False
+        if agreed:
+            self._prove("after the pause")
+        self.turn_to("printing")
+
+    def _finish(self) -> None:
+        """The barrier: the print is done when a question asked after M400 is answered."""
+        talk = self.talk
+        self.turn_to("finishing")
+        if talk.protocol.capabilities.get("AUTOREPORT_TEMP"):
+            talk.send("M155 S0")
+        for name, value in (("M220", self._feed_percent), ("M221", self._flow_percent)):
+            if value != 100.0:
+                talk.send(f"{name} S100")
+        talk.drain()
+        self.trail.barrier()
+        self.state = "finished"
+        self._mark()
+        self.show(talk.medium.now_s())
+
+    def heard(self, event: Event) -> None:
+        """An event of the printer."""
+        if isinstance(event, Ok):
+            window = self.talk.protocol.window
+            if event.line is not None and window.line(event.line) == window.acknowledged:
+                self.trail.acknowledge(window.acknowledged, event.planner_free)
+            if event.temperature is not None:
+                self._felt(event.temperature)
+        elif isinstance(event, Temperature):
+            self._felt(event)
+        elif isinstance(event, Identity):
+            self.firmware = event.text.removeprefix("FIRMWARE_NAME:").strip()
+        elif isinstance(event, Action):
+            self._asked_by_printer(event)
+        elif isinstance(event, Echo) and len(self.warnings) < WARNINGS and any(word in event.text for word in WARNS):
+            self.warnings.append(event.text)
+
+    def _felt(self, told: Temperature) -> None:
+        self.temperature = told
+        self._asked_s = self.talk.medium.now_s()
+        self._watchdog.saw(told, self._asked_s)
+
+    def _asked_by_printer(self, action: Action) -> None:
+        wish = ACTIONS.get(action.name)
+        if wish is not None:
+            self._grant(Request(wish))
+        elif action.name == "disconnect":
+            raise PrinterError("the printer asked to be disconnected (//action:disconnect)")
+        elif action.name not in SILENT_ACTIONS and len(self.warnings) < WARNINGS:
+            self.warnings.append(f"action {action.name} {action.words}".strip())
+
+    def turned(self, now_s: float) -> None:
+        """Once a turn of the talk."""
+        self.trail.acknowledge(self.talk.protocol.window.acknowledged)
+        self.heed()
+        self._watchdog.wait(now_s)
+        if self._journal is not None:
+            self._journal.note(self._moment(), now_s)
+        if now_s - self._shown_s >= PROGRESS_S:
+            self.show(now_s)
+        if now_s - self._asked_s >= ASK_S and self.talk.protocol.room("M105"):
+            self._asked_s = now_s
+            self.talk.protocol.send("M105", now_s)
+
+    def heed(self) -> None:
+        """See what a person wants. Raises CancelledError, EmergencyError."""
+        if self._stop is not None and self._stop.is_set():
+            raise CancelledError
+        while self._control is not None and (request := self._control.take()) is not None:
+            self._grant(request)
+
+    def heed_lost(self) -> None:
+        """The same while there is no port: only the end can be asked for."""
+        now_s = self.talk.medium.now_s()
+        if now_s - self._shown_s >= PROGRESS_S:
+            self.show(now_s)
+        self.heed()
+
+    def _grant(self, request: Request) -> None:
+        wish = request.wish
+        if wish is Wish.EMERGENCY_STOP:
+            raise EmergencyError
+        if wish is Wish.CANCEL:
+            raise CancelledError
+        if wish is Wish.PAUSE:
+            self._pause_s = self.talk.medium.now_s() if self._pause_s is None else self._pause_s
+        elif wish is Wish.RESUME:
+            self._go_on()
+        elif wish is Wish.LINE:
+            self._own_line(request.text)
+        else:
+            self._override(wish, request.value)
+
+    def _go_on(self) -> None:
+        if self.state in ("pausing", "paused"):
+            self._resume = True
+        else:
+            self._pause_s = None
+
+    def _own_line(self, text: str) -> None:
+        why = requests.refusal(text, self.modal.axes, self.state == "paused", self._job.limit)
+        if why is not None:
+            self._say(f"not sent: {text.strip()[:40]!r}: {why}")
+        else:
+            self._own.append(text.partition(";")[0].strip())
+
+    def _override(self, wish: Wish, value: float) -> None:
+        feed = wish is Wish.FEED
+        why = requests.percent(value, requests.FEED_PERCENT if feed else requests.FLOW_PERCENT)
+        if why is not None:
+            self._say(why)
+        elif feed:
+            self._feed_percent = value
+            self._own.append(f"M220 S{value:g}")
+        else:
+            self._flow_percent = value
+            self._own.append(f"M221 S{value:g}")
+
+    def _say(self, message: str) -> None:
+        self._message = message
+        self.show(self.talk.medium.now_s())
+
+    def turn_to(self, state: str) -> None:
+        """Show a new state at once."""
+        self.state = state
+        self.show(self.talk.medium.now_s())
+
+    @contextmanager
+    def apart(self, state: str, message: str) -> Iterator[None]:
+        """Another state for as long as something takes; the position is proved before the print goes on."""
+        before, self.state = self.state, state
+        self._verify = True
+        self._say(message)
+        try:
+            yield
+        finally:
+            self.state = before
+            self._say("")
+
+    def lift(self) -> tuple[str, float] | None:
+        """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or at its end."""
+        if self._job.profile is None:
+            return None
+        machine, following = self._job.profile.machine, self.modal.follows
+        standing = standing_mm(machine, self.modal.place(), following)
+        if standing is None:
+            return None
+        at, pose = standing
+        far = min(machine.lift_mm, machine.z.limits_mm[1] - float(at[2]))
+        return (lift_words(machine, pose, far, following), 60.0 * machine.z.speed_mm_s) if far > 0 else None
+
+    def _moment(self) -> Moment:
+        trail = self.trail
+        number = self.talk.protocol.window.wire(trail.number)
+        return Moment(trail.sent, trail.acknowledged, trail.executed, number, trail.pose, self.state)
+
+    def _mark(self) -> None:
+        if self._journal is not None:
+            self._journal.mark(self._moment())
+
+    def show(self, now_s: float) -> None:
+        """Tell the progress."""
+        self._shown_s = now_s
+        if self._on_progress is None:
+            return
+        elapsed_s, place, done = now_s - self._began_s, self._place, self.trail.commands
+        self._on_progress(
+            Progress(
+                sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
+                left_s=place.left_s(elapsed_s, self._job.total_s), share=place.share(done, self._job.total),
+                temperature=self.temperature, part=place.part, parts=place.parts, layer=place.layer, state=self.state,
+                file_line=self.trail.acknowledged, feed_percent=self._feed_percent, flow_percent=self._flow_percent,
+                message=self._message,
+            )
+        )  # fmt: skip
+
+
+ACTIONS = {"pause": Wish.PAUSE, "resume": Wish.RESUME, "cancel": Wish.CANCEL}
+SILENT_ACTIONS = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prompt_button", "prompt_show", "prompt_end"}
+
+
+def _pushes(command: str) -> bool:
+    """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
+    return command.startswith("MANUAL_STEPPER") or (command[0] == "G" and command[1:2] in "123" and " E" in command)

@@ -1,0 +1,177 @@
+"""Journal: how far a print has come, on disk, so that another run can go on where this one was cut off.
+
+A file of lines: eight hexadecimal digits of a CRC-32, a blank, a JSON value. The first holds what is printed and for which
+machine, every other one a state of its own, so that the last good one is enough. Lines are only ever appended, each in one piece.
+"""
+
+import json
+import os
+import threading
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+from zlib import crc32
+
+from profiles.errors import JournalError, OutputError
+
+FORMAT = 1
+EVERY_LINES = 16  # a record after so many acknowledged lines,
+EVERY_S = 0.1  # or after so long when fewer came
+SYNC_S = 1.0  # so old may the disk be after a power cut of the computer
+LONGEST_BYTES = 1_000_000  # of one record; the first one holds the resolved profile
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What is printed: the program's file with its SHA-256, the name for people, and the resolved profile as plain values."""
+
+    program: str
+    sha256: str
+    name: str
+    profile: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Lines of the program, from 1: sent, acknowledged, surely executed; the newest acknowledged wire number; the pose X Y Z tilt
+    turn E after the acknowledged line, unwrapped, None where it is not known; what the print was doing.
+    """
+
+    sent: int = 0
+    acknowledged: int = 0
+    executed: int = 0
+    number: int = 0
+    pose: tuple[float | None, ...] = ()
+    state: str = "printing"
+
+
+@dataclass(frozen=True)
+class Story:
+    """A journal that was read: its heading, its last moment, and how many records a torn end has cost."""
+
+    heading: Heading
+    last: Moment
+    torn: int
+
+    @property
+    def finished(self) -> bool:
+        """Whether the print ran to its end."""
+        return self.last.state == "finished"
+
+
+class Journal:
+    """`with Journal(path, heading) as journal:` note() as often as wished, mark() what must not be lost.
+
+    Writing costs one system call a record; a thread of its own brings the file to the disk, so that a slow disk never holds up
+    the line. A journal that can no longer be written ends silently, `trouble` says why. Raises OutputError when it cannot be
+    begun.
+    """
+
+    def __init__(self, path: Path, heading: Heading) -> None:
+        self.path, self.trouble = path, ""
+        self.last = Moment()
+        self._noted_s = 0.0
+        self._dirty, self._end = threading.Event(), threading.Event()
+        try:
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+        except FileExistsError:
+            raise OutputError(f"journal {path} exists already: each print has one of its own, choose another name") from None
+        except OSError as error:
+            raise OutputError(f"journal {path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+        self._write({"format": FORMAT} | asdict(heading))
+        self._syncing = threading.Thread(target=self._sync, name="journal", daemon=True)
+        self._syncing.start()
+
+    def note(self, moment: Moment, now_s: float) -> None:
+        """Take note of a moment, now and then."""
+        ahead = moment.acknowledged - self.last.acknowledged
+        if ahead >= EVERY_LINES or (now_s - self._noted_s >= EVERY_S and moment != self.last):
+            self._noted_s = now_s
+            self.mark(moment)
+
+    def mark(self, moment: Moment) -> None:
+        """Write a moment at once."""
+        self.last = moment
+        self._write([moment.sent, moment.acknowledged, moment.executed, moment.number, moment.pose, moment.state])
+
+    def close(self) -> None:
+        """Bring everything to the disk and end."""
+        if not self._end.is_set():
+            self._end.set()
+            self._dirty.set()
+            self._syncing.join()
+            os.close(self._file)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def _write(self, value: Any) -> None:
+        if self.trouble or self._end.is_set():
+            return
+        text = json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
+        try:
+            os.write(self._file, b"%08x %s\n" % (crc32(text), text))
+        except OSError as error:
+            self.trouble = (error.strerror or str(error)).lower()
+        self._dirty.set()
+
+    def _sync(self) -> None:
+        """fsync at most once a second, in a thread: an SD card may take longer over it than a printer waits."""
+        while not self._end.is_set():
+            self._dirty.wait()
+            self._dirty.clear()
+            try:
+                os.fsync(self._file)
+            except OSError as error:
+                self.trouble = self.trouble or (error.strerror or str(error)).lower()
+            self._end.wait(SYNC_S)
+
+
+def read_journal(path: Path) -> Story:
+    """The story of a journal. Raises JournalError with one sentence when it is none, or damaged before its end."""
+    heading: Heading | None = None
+    last, bad = Moment(), 0
+    for number, value in enumerate(_records(path), 1):
+        if value is None:
+            bad += 1
+        elif bad:
+            raise JournalError(f"journal {path} is damaged: record {number - bad} of it cannot be read although later ones can")
+        elif heading is None:
+            heading = _heading(path, value)
+        else:
+            last = _moment(path, value, number)
+        if heading is None:
+            raise JournalError(f"{path} is no journal of a print: its first line is not the heading of one")
+    if heading is None:
+        raise JournalError(f"journal {path} is empty")
+    return Story(heading, last, bad)
+
+
+def _records(path: Path) -> Iterator[Any]:
+    """The value of each line, None where its checksum is wrong or its end is missing."""
+    try:
+        with path.open("rb") as file:
+            while line := file.readline(LONGEST_BYTES):
+                text = line[9:-1]
+                whole = line.endswith(b"\n") and line[:9] == b"%08x " % crc32(text)
+                yield json.loads(text) if whole else None
+    except OSError as error:
+        raise JournalError(f"journal {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+
+
+def _heading(path: Path, value: Any) -> Heading:
+    if not isinstance(value, dict) or value.pop("format", None) != FORMAT:
+        raise JournalError(f"journal {path} is of another version of this program: this one reads format {FORMAT}")
+    return Heading(**value)
+
+
+def _moment(path: Path, value: Any, number: int) -> Moment:
+    if not isinstance(value, list) or len(value) != 6:
+        raise JournalError(f"journal {path} is damaged: record {number} holds no state of a print")
+    sent, acknowledged, executed, wire, pose, state = value
+    return Moment(sent, acknowledged, executed, wire, tuple(pose), state)

@@ -1,0 +1,45 @@
+"""Medium: what a stream runs on, so that a printer, a simulated one in memory, real and virtual time serve alike."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import monotonic, sleep
+from typing import Protocol
+
+from machine.link.port import open_port
+
+Traffic = Callable[[str, bytes], None]  # "<" received or ">" sent, and the bytes
+
+
+class Wire(Protocol):
+    """An open line to a printer; every method raises PortError when the printer cannot be reached any more."""
+
+    name: str
+
+    def write(self, data: bytes) -> None:
+        """Send all bytes."""
+
+    def read(self) -> bytes:
+        """The bytes that have come; waits a little for the first, so that a loop around it does not spin."""
+
+    def discard(self) -> None:
+        """Forget bytes that were handed over but not sent yet."""
+
+    def close(self) -> None:
+        """Close; closing twice is allowed."""
+
+
+@dataclass(frozen=True)
+class Medium:
+    """How a line is opened (name, baud; raises PortError), what time it is (s), and how time is spent (s).
+
+    lost_s: so long a port that vanished in mid-print is waited for; a person finds the plug in two minutes, and a hot nozzle
+    should not stand in the print for longer.
+    """
+
+    open: Callable[[str, int], Wire] = open_port
+    now_s: Callable[[], float] = monotonic
+    wait: Callable[[float], None] = sleep
+    lost_s: float = 120.0
+
+
+SERIAL = Medium()

@@ -1,0 +1,142 @@
+"""Talk: one conversation over an open wire; lines go out as the window allows, and every event of the printer is handed on."""
+
+import re
+from collections.abc import Callable
+from math import inf
+
+from machine.link.events import Event, Ok, Position
+from machine.link.framing import LINE_LIMIT, frame
+from machine.link.medium import Medium, Traffic, Wire
+from machine.link.protocol import Protocol, Timing
+from machine.link.states import State
+from profiles.errors import PortError
+
+GREETING = (State.DRAIN, State.SYNC, State.HELLO)
+LAST_LINE = re.compile(rb"Last Line: (\d{1,10})")
+FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers answers with the last one it has taken
+LAST_LINE_S, BUSY_MOST_S = 3.0, 120.0  # a printer that still works on its queue answers when there is room in it
+TAIL_BYTES = 4096
+
+
+class Talk:
+    """`heard` gets every event after the protocol has seen it, `turned` is called once a turn with the time, s.
+
+    `lost` is asked what to do when the port is gone after the greeting: it returns a new wire to the same printer or raises. The
+    printer's own faults are raised as the protocol tells them. `last_number` is set by ask_last_number().
+    """
+
+    def __init__(
+        self,
+        wire: Wire,
+        medium: Medium,
+        timing: Timing,
+        heard: Callable[[Event], None],
+        turned: Callable[[float], None],
+        lost: Callable[[PortError], Wire],
+        limit: int = LINE_LIMIT,
+        traffic: Traffic | None = None,
+    ) -> None:
+        self.wire, self.medium = wire, medium
+        self.protocol = Protocol(timing, medium.now_s(), limit)
+        self.greeted = False
+        self.last_number: int | None = None
+        self._heard, self._turned, self._lost, self._traffic = heard, turned, lost, traffic
+        self._position: Position | None = None
+
+    def ask_last_number(self) -> None:
+        """Learn, before the greeting sets it back, the number of the last line that the printer has taken in an earlier talk."""
+        self._put(b"\n" + frame(FAR_NUMBER, "M105"))
+        began_s = heard_s = self.medium.now_s()
+        words = b""
+        while (now_s := self.medium.now_s()) - heard_s < LAST_LINE_S and now_s - began_s < BUSY_MOST_S:
+            data = self._take()
+            words = (words + data)[-TAIL_BYTES:]
+            heard_s = now_s if data else heard_s
+            if found := LAST_LINE.search(words):
+                self.last_number = int(found[1])
+                return
+            if b"ok T:" in words:
+                return
+
+    def greet(self) -> None:
+        """Agree on line numbers and learn the printer's habits."""
+        while self.protocol.state in GREETING:
+            self.pump()
+        self.greeted = True
+
+    def send(self, command: str) -> int:
+        """Wait for room and send; returns the line's number, counted from the greeting on."""
+        room = self.protocol.room
+        while not room(command):
+            self.pump()
+        return self.protocol.send(command, self.medium.now_s())
+
+    def settle(self) -> None:
+        """Wait until every line sent is acknowledged."""
+        window = self.protocol.window
+        while window.acknowledged < window.sent or self.protocol.state is not State.OPEN:
+            self.pump()
+
+    def drain(self) -> None:
+        """The barrier: wait until every move sent so far is over. A question asked after M400 has been answered then."""
+        self.send("M400")
+        self.send("M105")
+        self.settle()
+
+    def ask_position(self) -> Position | None:
+        """Where the printer says it stands, all moves over; None when it does not tell."""
+        self.send("M400")
+        self.settle()
+        self._position = None
+        self.send("M114")
+        self.send("M105")
+        self.settle()
+        return self._position
+
+    def rest(self, seconds: float = inf, until: Callable[[], bool] = lambda: False) -> None:
+        """Keep the conversation alive, without sending, for some time or until something has come true."""
+        end_s = self.medium.now_s() + seconds
+        while not until() and self.medium.now_s() < end_s:
+            self.pump()
+
+    def pump(self) -> None:
+        """One turn: write, read, let time pass."""
+        protocol = self.protocol
+        try:
+            if out := protocol.take():
+                self._put(out)
+            data = self._take()
+        except PortError as error:
+            self._mend(error)
+            return
+        now_s = self.medium.now_s()
+        if data:
+            for event in protocol.receive(data, now_s):
+                if isinstance(event, Position):
+                    self._position = event
+                elif isinstance(event, Ok) and event.position is not None:
+                    self._position = event.position
+                self._heard(event)
+        protocol.tick(now_s)
+        if protocol.fault is not None:
+            raise protocol.fault
+        self._turned(now_s)
+
+    def _mend(self, error: PortError) -> None:
+        """Go on over a new wire: the printer is asked what has arrived; one that has restarted answers with its first number."""
+        if not self.greeted or not self.protocol.family.resends:
+            raise error
+        self.wire = self._lost(error)
+        self._put(b"\n")  # ends a half line
+        self.protocol.interrupted(self.medium.now_s())
+
+    def _put(self, data: bytes) -> None:
+        self.wire.write(data)
+        if self._traffic is not None:
+            self._traffic(">", data)
+
+    def _take(self) -> bytes:
+        data = self.wire.read()
+        if data and self._traffic is not None:
+            self._traffic("<", data)
+        return data

@@ -1,0 +1,62 @@
+"""Trail: how far a program has come; its lines sent, acknowledged and surely executed."""
+
+from collections import deque
+from dataclasses import dataclass
+
+MOST_WAITING = 4096  # moves whose end is awaited; of further ones, without any word from the planner, nothing can be known
+PLANNER_BLOCKS = 16  # Marlin's BLOCK_BUFFER_SIZE; a printer that tells of more free places has more
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A command on its way: number on the wire, line of the program, whether it moves something, and the pose after it."""
+
+    number: int
+    line: int
+    moves: bool
+    pose: tuple[float | None, ...]
+
+
+class Trail:
+    """Lines of the program, from 1; 0 or the line before the first one sent means none.
+
+    Acknowledged is not executed: a move may wait in the planner. What ADVANCED_OK tells of free places bounds how many do; a
+    printer that does not tell is only known after a barrier.
+    """
+
+    def __init__(self, before: int = 0) -> None:
+        self.sent = self.acknowledged = self.executed = before
+        self.number = 0  # the newest wire number that is acknowledged
+        self.commands = 0  # acknowledged commands of the program
+        self.pose: tuple[float | None, ...] = ()  # after the newest acknowledged command
+        self._flight: deque[Step] = deque()
+        self._planned: deque[Step] = deque()
+        self._blocks = PLANNER_BLOCKS
+
+    def send(self, step: Step) -> None:
+        """A command has gone out."""
+        self._flight.append(step)
+        self.sent = step.line
+
+    def acknowledge(self, number: int, free: int | None = None) -> None:
+        """All lines up to this number of the wire have been taken; free: places of the planner right after it."""
+        self.number = max(self.number, number)
+        flight, planned = self._flight, self._planned
+        while flight and flight[0].number <= number:
+            step = flight.popleft()
+            self.acknowledged, self.pose = step.line, step.pose
+            self.commands += 1
+            if step.moves and len(planned) < MOST_WAITING:
+                planned.append(step)
+        if free is None:
+            return
+        self._blocks = max(self._blocks, free + 1)
+        waiting = self._blocks - free
+        while len(planned) > waiting:
+            planned.popleft()
+        self.executed = max(self.executed, planned[0].line - 1 if planned else self.acknowledged)
+
+    def barrier(self) -> None:
+        """Every move acknowledged so far is over."""
+        self._planned.clear()
+        self.executed = self.acknowledged
