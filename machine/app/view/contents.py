@@ -49,7 +49,7 @@ def of_print(
         "thinned": {"rows": count, "kept": len(kept)} if len(kept) < count else None,
         "parts": _coloured(_parts(program, profile, found, ends_s, kept)),
         "findings": findings.placed(run, profile.machine, kept),
-        "report": print_report(program, profile, ends_s, rivals),
+        "report": print_report(program, profile, found, ends_s, rivals),
     }
     table = layers.columns(run.program, found, ends_s, height, kept)
     return packed(header, rows | table | scene.surfaces(program.decomposition, profile))

@@ -8,6 +8,7 @@ import struct
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ def _delta(column: Column) -> bytes:
     """Every column's zigzag differences, as far as they fit into 32 bits, as four planes of bytes, the lowest first."""
     whole = _stored(column)
     blocks = []
-    for each in whole.reshape(len(whole), -1).T:
+    for each in whole.reshape(len(whole), prod(whole.shape[1:])).T:
         steps = np.diff(each, prepend=0)
         words = np.minimum((steps << 1) ^ (steps >> 63), MOST).astype("<u4")
         blocks.append(np.ascontiguousarray(words.view(np.uint8).reshape(-1, 4).T).tobytes())

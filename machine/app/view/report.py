@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from machine.app.compare import Rival
 from machine.app.pipeline import Program
 from machine.app.report import duration, risky_before_mm2
+from machine.app.view.layers import Layers
 from machine.app.view.paths import PRIME, WIPE, page_kinds
 from machine.app.view.settings import settings_tables
 from machine.dryrun.dryrun import DryRun, summary
@@ -38,12 +39,14 @@ def parts_report(decomposition: Decomposition, profile: Profile) -> dict[str, An
     return {"facts": facts, "tables": tables}
 
 
-def print_report(program: Program, profile: Profile, ends_s: Floats, rivals: Sequence[Rival] = ()) -> dict[str, Any]:
+def print_report(
+    program: Program, profile: Profile, layers: Layers, ends_s: Floats, rivals: Sequence[Rival] = ()
+) -> dict[str, Any]:
     """The report of a whole print. ends_s: (n,) when each row ends; rivals: the same model printed in one part."""
-    tables = [_parts(program, profile, ends_s), _kinds(program.run, profile)]
+    tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile)]
     if program.decomposition is not None:
         tables.append(_rivals(rivals) if rivals else _areas(program.decomposition, profile))
-    return {"facts": [*_figures(program.run, profile), *_names(profile)], "tables": tables + settings_tables(profile)}
+    return {"facts": [*_figures(program.run, profile, layers), *_names(profile)], "tables": tables + settings_tables(profile)}
 
 
 def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), folded: bool = False) -> Table:
@@ -61,7 +64,7 @@ def _solid(part: Part, decomposition: Decomposition, profile: Profile) -> Row:
     return [str(part.index), *angles, _cm3(part.volume_mm3), share, _mm2(before), _mm2(part.risky_area_mm2)]
 
 
-def _parts(program: Program, profile: Profile, ends_s: Floats) -> Table:
+def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -> Table:
     """Each part with its layers, time and material; what its solid is where the program came from a model."""
     parsed, seconds = program.run.program, np.diff(ends_s, prepend=0.0)
     found = program.decomposition
@@ -124,19 +127,21 @@ def _rivals(rivals: Sequence[Rival]) -> Table:
     return _table("Compared", ["print", "time", "filament", "material", "support", "risky area"], rows, notes)
 
 
-def _figures(run: DryRun, profile: Profile) -> list[Row]:
+def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
     values = summary(run)
+    found = str(len(layers.first)) if layers.by == "comments" else f"{len(layers.first)}, by their heights"
     return [
         ["time", duration(values["time_s"])],
-        ["material", _grams(run.program.e_mm, profile)],
-        ["filament", f"{values['filament_mm'] / 1000:.2f} m"],
-        *[[key, str(values[key])] for key in ("parts", "layers", "reorientations", "retractions")],
+        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {_grams(run.program.e_mm, profile)}"],
+        *([["parts", str(values["parts"])]] if values["parts"] else []),
+        ["layers", found],
+        *[[key, str(values[key])] for key in ("reorientations", "retractions")],
         ["travel", f"{values['travel_mm'] / 1000:.2f} m"],
     ]
 
 
 def _names(profile: Profile) -> list[Row]:
-    return [["machine", profile.machine.name], ["filament", profile.material.name], ["process", profile.process.name]]
+    return [["machine", profile.machine.name], ["material", profile.material.name], ["process", profile.process.name]]
 
 
 def _grams(filament_mm: Any, profile: Profile) -> str:
