@@ -72,12 +72,8 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
     rows = []
     for index in parsed.parts or (0,):
         mine = parsed.part == index
-        layers = len(np.unique(parsed.layer[mine & (parsed.layer > 0)]))
-        made = [
-            str(layers) if parsed.layers else UNTOLD,
-            duration(float(seconds[mine].sum())),
-            _grams(parsed.e_mm[mine], profile),
-        ]
+        count = int((parsed.part[layers.first] == index).sum())
+        made = [str(count), duration(float(seconds[mine].sum())), _grams(parsed.e_mm[mine], profile)]
         rows.append([*solids.get(index, [str(index) if index else "all"]), *made])
     head = SOLID if solids else SOLID[:1]
     return _table("Parts", [*head, "layers", "time", "material"], rows)
