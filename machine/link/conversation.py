@@ -9,13 +9,11 @@ from machine.link.families import MARLIN, Family
 from machine.link.framing import LINE_LIMIT, frame
 from machine.link.hearing import Hearing
 from machine.link.pace import Pace
-from machine.link.patience import QUESTION, Patience, Timing
+from machine.link.patience import PROBES, QUESTION, Patience, Timing
 from machine.link.resends import Resends
 from machine.link.states import TABLE, Signal, State
 from machine.link.window import FIRST_AGAIN, Window
 from profiles.errors import LocalProtocolError, PrinterError
-
-PROBES = 4  # questions in a row without any answer before the printer counts as gone
 
 
 class Conversation:
@@ -97,7 +95,8 @@ class Conversation:
             if patience.greeted_late(now_s):
                 self._turn(Signal.STALL, now_s)
         elif self.window.flight or state is State.RENUMBER:
-            if now_s >= min(self._complain_s, self._again_s) or patience.over(now_s, state, self.window, self.family):
+            late = patience.over(now_s, state, self.window, self.family, self._probes)
+            if late or now_s >= min(self._complain_s, self._again_s):
                 self._turn(Signal.STALL, now_s)
         elif self._worn:
             self._turn(Signal.WORN, now_s)

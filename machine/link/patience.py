@@ -9,6 +9,7 @@ from machine.link.window import Window
 QUIET_MOST_S = 2.0  # a printer that chatters on its own must not hold up a repeat for ever
 TURNS = 3.0  # round trips of silence after which nothing is on its way any more
 QUESTION = "M105"
+PROBES = 4  # questions in a row without any answer before the printer counts as gone
 
 
 @dataclass(frozen=True)
@@ -48,21 +49,22 @@ class Patience:
         """Whether a greeting stays without answer."""
         return now_s - self.progress_s >= self._timing.sync_s
 
-    def over(self, now_s: float, state: State, window: Window, family: Family) -> bool:
-        """Whether an answer is overdue."""
-        return now_s - self.progress_s >= self._wait_s(state, window, family)
+    def over(self, now_s: float, state: State, window: Window, family: Family, asked: int) -> bool:
+        """Whether an answer is overdue after so many questions."""
+        return now_s - self.progress_s >= self._wait_s(state, window, family, asked)
 
     def took(self, seconds: float) -> None:
         """A quick line was answered after this time; the least of the last ones counts, for the others waited in a queue."""
         self._round_trip_s = min(1.05 * self._round_trip_s, seconds) if self._measured else seconds
         self._measured = True
 
-    def _wait_s(self, state: State, window: Window, family: Family) -> float:
+    def _wait_s(self, state: State, window: Window, family: Family, asked: int) -> float:
         timing = self._timing
         known_s = timing.stall_s if self.busy_known else timing.stall_mute_s
         if state is not State.PROBING:
             # A printer in a long move reads nothing: a question must not overflow its buffer.
             return timing.stall_s if window.holds(QUESTION) else known_s
-        if window.flight and window.flight[0].budget_s:
-            return window.flight[0].budget_s
+        if window.flight and (budget_s := window.flight[0].budget_s):
+            # Answer and question may both be lost: asked again ever later, a slow command's lost ok costs half a minute.
+            return budget_s if asked >= PROBES else min(budget_s, timing.stall_mute_s * 4.0 ** (asked - 1))
         return known_s if family.silence_s is None else family.silence_s

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.link.conversation import PROBES
 from machine.link.events import (
     Action,
     Area,
@@ -30,6 +29,7 @@ from machine.link.events import (
 from machine.link.families import FAMILIES, MARLIN
 from machine.link.framing import FRAME, LINE_LIMIT, checksum, command_of, frame
 from machine.link.hearing import HEARD_LIMIT
+from machine.link.patience import PROBES
 from machine.link.protocol import Protocol, Timing
 from machine.link.resends import ASKED_LIMIT
 from machine.link.states import TABLE, Signal, State
@@ -338,13 +338,15 @@ def test_reports_are_no_progress() -> None:
     assert table.protocol.state is State.PROBING
 
 
-def test_heating_may_take_its_time_after_one_question() -> None:
+def test_heating_may_take_its_time_and_is_asked_about_ever_later() -> None:
     table = opened()
     table.send("M109 S200")
-    for _ in range(600):
+    asked = []
+    for second in range(3600):
         table.wait(1.0)
         table.say(b"T:100.00 /200.00 W:?\n")
-    assert table.wire() == frame(12, "M105")
+        asked += [second + 1] * table.wire().count(b"M105")
+    assert asked == [5, 35, 155, 635]
     assert table.protocol.fault is None
     table.say(b"ok N11 P15 B3\nok T:200 /200\n")
     assert table.protocol.state is State.OPEN
