@@ -16,11 +16,12 @@ CONFINED = {
     "onnxruntime": ("mdp/ranker",),
     "serial": ("machine/link/port.py",),
     "pydantic": ("profiles/",),
+    "rich": ("machine/app/",),
     "torch": (),
     "tests": (),
     "tools": (),
 }
-HEAVY = {"numba", "trimesh", "shapely", "manifold3d", "serial", "onnxruntime", "torch"}
+HEAVY = {"numba", "rich", "trimesh", "shapely", "manifold3d", "serial", "onnxruntime", "torch"}
 
 
 def imported(source: str) -> Iterator[str]:

@@ -178,7 +178,12 @@ def print_(
         int | None,
         typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one"),
     ] = None,
-    force: Force = False,
+    log: Annotated[
+        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")
+    ] = False,
     machine: MachineGiven = None,
     material: MaterialGiven = None,
     process: ProcessGiven = None,
@@ -191,7 +196,22 @@ def print_(
         machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
     )
     named = _named(machine=machine, material=material, process=process, settings=settings)
-    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named)
+    watched = (watch_port or 0) if watch or watch_port is not None else None
+    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named, watched, log)
+
+
+@app.command()
+def ports(
+    baud: Annotated[int, typer.Option("--baud", metavar="N", help="rate tried first, bits a second")] = 115200,
+    json: Annotated[bool, typer.Option("--json", help="the list as JSON")] = False,
+    ask: Annotated[
+        bool, typer.Option("--ask/--no-ask", help="open each port and ask what is there; many boards restart when opened")
+    ] = True,
+) -> int:
+    """Serial ports and what answers at each: firmware, axes, rate, or why nothing does."""
+    from machine.app import ports_command
+
+    return ports_command.ports(baud, json, ask)
 
 
 @app.command()

@@ -148,26 +148,31 @@ def print_model(
     force: bool,
     named: frozenset[str] = frozenset(),
     watch_port: int | None = None,
+    log: Path | None = None,
 ) -> int:
-    """Dry-run, then stream a model or a G-code file to a printer, whose port is tried before any work is done.
+    """Dry-run, then stream a model or a G-code file to a printer, which is asked who it is before any work is done.
 
     watch_port: serve the print's page on this port of this computer, 0: on any free one; None: serve nothing.
+    log: file for the traffic of the line; None: a new one in the state folder.
     """
+    _check(log)
     answer = check_port(port, baud, sim_speed)
-    if Path(model).suffix.lower() not in GCODE_SUFFIXES:
+    is_model = Path(model).suffix.lower() not in GCODE_SUFFIXES
+    if is_model:
         check_dialect(profile.machine, port)
         check_printer(answer, profile.machine, force)
     program, profile = program_of(model, profile, ranker, orient, named)
-    check_dialect(profile.machine, port)
-    check_printer(answer, profile.machine, force)
-    check_program(answer, program, profile, Path(model).name, force)
+    if not is_model:
+        check_dialect(profile.machine, port)
+        check_printer(answer, profile.machine, force)
+    check_program(answer, program, profile, model_name(model), force)
     _refuse_errors(program, force)
     show(run_table(program.run))
     if watch_port is None:
-        return print_program(program, profile, port, baud, sim_speed)
+        return print_program(program, profile, port, baud, sim_speed, name=model_name(model), log=log)
     with served(print_page(model_name(model), program, profile, live=True), watch_port) as watched:
         say(f"watch the print at {watched.address}")
-        code = print_program(program, profile, port, baud, sim_speed, watched.follow)
+        code = print_program(program, profile, port, baud, sim_speed, watched.follow, name=model_name(model), log=log)
         watched.end("stopped" if code else "done")
     return code
 

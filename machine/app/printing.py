@@ -3,15 +3,21 @@
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from math import inf, isfinite
+from pathlib import Path
 from types import FrameType
 
+from machine.app.keys import Keyboard, Typing, can_type
+from machine.app.match import printer_at
 from machine.app.pipeline import Program
 from machine.app.progress import Ticker, say
 from machine.app.report import duration, show
+from machine.app.screen import Course, Screen, Words, is_terminal
+from machine.app.traffic import TrafficLog, new_log
 from machine.dialects import DIALECTS
-from machine.link.port import open_port
+from machine.link.answer import Answer
+from machine.link.control import Control
 from machine.link.progress import Progress
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import Outcome, print_lines
@@ -20,15 +26,14 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 SIMULATED = "sim"
+Follow = Callable[[Progress], None]
 
 
-def check_port(port: str, baud: int, sim_speed: float) -> None:
-    """Refuse at once a port that cannot be opened; raises PrinterError."""
+def check_port(port: str, baud: int, sim_speed: float) -> Answer | None:
+    """What answers at a port, refused at once when it is no printer; None for the simulated one. Raises PrinterError."""
     if not (isfinite(sim_speed) and sim_speed >= 0):
         raise PrinterError(f"--sim-speed is {sim_speed:g}: it must be 0 (as fast as possible) or a number above")
-    if port != SIMULATED:
-        with open_port(port, baud):
-            pass
+    return None if port == SIMULATED else printer_at(port, baud)
 
 
 def check_dialect(machine: Machine, port: str) -> None:
@@ -45,16 +50,34 @@ def check_dialect(machine: Machine, port: str) -> None:
 
 
 def print_program(
-    program: Program, profile: Profile, port: str, baud: int, sim_speed: float, follow: Callable[[Progress], None] | None = None
+    program: Program,
+    profile: Profile,
+    port: str,
+    baud: int,
+    sim_speed: float,
+    follow: Follow | None = None,
+    *,
+    name: str = "",
+    log: Path | None = None,
 ) -> int:
     """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible.
 
-    follow: is told, like the person watching, how far the print is.
+    follow: is told the progress besides the person at the terminal; name: of the model; log: file for the traffic, else a
+    new one in the state folder.
     """
-    if port != SIMULATED:
-        return _ended(_stream(program, profile, port, baud, follow))
-    with SimulatedPrinter(profile.machine, sim_speed or inf) as printer:
-        outcome = _stream(program, profile, printer.path, baud, follow)
+    title = f"{name or 'print'} to {'the simulated printer' if port == SIMULATED else port}"
+    with new_log("print", title) if log is None else TrafficLog(log, title) as kept, _pointing_to(kept):
+        if port != SIMULATED:
+            return _ended(streamed(program, profile, port, baud, title, kept, follow))
+        return _print_simulated(program, profile, baud, sim_speed or inf, title, kept, follow)
+
+
+def _print_simulated(
+    program: Program, profile: Profile, baud: int, speed: float, title: str, log: TrafficLog, follow: Follow | None
+) -> int:
+    """Stream to the simulated printer and tell what it has done."""
+    with SimulatedPrinter(profile.machine, speed) as printer:
+        outcome = streamed(program, profile, printer.path, baud, title, log, follow)
         record = printer.record
     if outcome.cancelled:
         return _ended(outcome)
@@ -70,34 +93,81 @@ def print_program(
     return 0
 
 
-def _stream(
-    program: Program, profile: Profile, port: str, baud: int, follow: Callable[[Progress], None] | None = None
+def streamed(
+    program: Program,
+    profile: Profile,
+    port: str,
+    baud: int,
+    title: str,
+    log: TrafficLog,
+    follow: Follow | None = None,
 ) -> Outcome:
-    ticker = Ticker()
-    stop = threading.Event()
+    """Stream a program while a person watches: screen or lines, keys, Ctrl-C, log."""
+    stop, control, words = threading.Event(), Control(), Words()
 
-    def show_progress(progress: Progress) -> None:
-        ticker.tick(status(progress))
-        if follow is not None:
-            follow(progress)
+    def traffic(direction: str, data: bytes) -> None:
+        log.note(direction, data)
+        words.hear(direction, data)
 
-    with _stopping(stop):
-        outcome = print_lines(
+    with _stopping(stop), _shown(title, program, control, words) as tell:
+
+        def on_progress(progress: Progress) -> None:
+            tell(progress)
+            if follow is not None:
+                follow(progress)
+
+        return print_lines(
             program.lines,
             port,
             baud,
-            show_progress,
+            on_progress,
             stop,
             program.run.time_s,
             limit=DIALECTS[profile.machine.dialect].longest_line,
+            control=control,
+            traffic=traffic,
+            profile=profile,
         )
-    ticker.close()
-    return outcome
+
+
+@contextmanager
+def _shown(title: str, program: Program, control: Control, words: Words) -> Iterator[Follow]:
+    """What shows the progress: a screen with keys on a terminal, plain lines elsewhere. Ends with the terminal as before."""
+    if not is_terminal():
+        ticker = Ticker()
+        yield lambda progress: ticker.tick(status(progress))
+        ticker.close()
+        return
+    board = Keyboard(control)
+    with ExitStack() as stack:
+        keys = can_type()
+        if keys:
+            stack.enter_context(Typing(board.press))
+        screen = stack.enter_context(Screen(title, Course(program.run), words, lambda: board.hint, keys))
+
+        def tell(progress: Progress) -> None:
+            board.follow(progress)
+            screen.tell(progress)
+
+        yield tell
+
+
+@contextmanager
+def _pointing_to(log: TrafficLog) -> Iterator[None]:
+    """Say where the traffic is when the print goes wrong, and that it is not kept when it is not."""
+    if log.trouble:
+        say(f"the traffic is not logged: {log.file}: {log.trouble}")
+    try:
+        yield
+    except PrinterError:
+        if not log.trouble:
+            say(f"all that was sent and received is in {log.file}")
+        raise
 
 
 @contextmanager
 def _stopping(stop: threading.Event) -> Iterator[None]:
-    """Ctrl-C and a termination request end the print safely instead of tearing it down; a second one interrupts at once."""
+    """Ctrl-C, a termination request and a closed terminal end the print safely; a second one interrupts at once."""
 
     def ask(number: int, frame: FrameType | None) -> None:
         del number, frame
@@ -105,13 +175,17 @@ def _stopping(stop: threading.Event) -> Iterator[None]:
             raise KeyboardInterrupt
         stop.set()
 
-    signals = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
-    before = {number: signal.signal(number, ask) for number in signals}
+    signals = (signal.SIGINT, signal.SIGTERM, *_HANGUP) if threading.current_thread() is threading.main_thread() else ()
+    # What is ignored stays ignored: that is what nohup asks for.
+    before = {number: signal.signal(number, ask) for number in signals if signal.getsignal(number) is not signal.SIG_IGN}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+_HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
 
 
 def status(progress: Progress) -> str:
@@ -126,7 +200,7 @@ def status(progress: Progress) -> str:
         told.append(f"nozzle {nozzle:.0f} C" + (f", bed {bed:.0f} C" if bed is not None else ""))
     if progress.left_s is not None:
         told.append(f"{duration(progress.left_s)} left")
-    return "printing: " + ", ".join(told)
+    return f"{progress.state}: " + ", ".join(told)
 
 
 def _ended(outcome: Outcome) -> int:

@@ -1,5 +1,6 @@
 """Progress: what long work tells on stderr; a line that is rewritten on a terminal, plain lines elsewhere."""
 
+import os
 import sys
 from time import monotonic
 
@@ -17,7 +18,7 @@ class Ticker:
     """A status that changes often: `tick` shows it at a bearable rate, `close` ends it."""
 
     def __init__(self) -> None:
-        self.live = sys.stderr.isatty()
+        self.live = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
         self.shown_at = monotonic()
         self.open = False
 

@@ -1,0 +1,206 @@
+"""Screen: where a running print stands, drawn on the terminal: part, layer, pose, heat, time left, the printer's words, keys."""
+
+import os
+import sys
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from machine.app.report import duration
+from machine.dryrun.dryrun import DryRun
+from machine.link.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event
+from machine.link.progress import Progress
+
+WORDS_KEPT = 4  # last words of the printer
+HALF_BYTES = 4096
+COLOURS = {"printing": "green", "finishing": "green", "paused": "yellow", "pausing": "yellow", "resuming": "yellow"}
+KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? more"
+
+
+class Course:
+    """What a dry run knows about the way of a print: where the table stands at a line, how many layers a part has."""
+
+    def __init__(self, run: DryRun) -> None:
+        program = run.program
+        self.letters = run.letters
+        self._line, self._angles = program.line, program.end[:, 3:5]
+        self._layers = {part: len(np.unique(program.layer[program.part == part])) for part in program.parts}
+
+    def pose_deg(self, file_line: int) -> tuple[float, float] | None:
+        """Tilt and turn after a line of the program; None before the first move."""
+        row = int(np.searchsorted(self._line, file_line, side="right")) - 1
+        return None if row < 0 else (float(self._angles[row, 0]), float(self._angles[row, 1]))
+
+    def layers(self, part: int | None) -> int | None:
+        """Layers of a part."""
+        return None if part is None else self._layers.get(part)
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What stands on the screen. title: what is printed where; hint: a question or an explanation in place of the keys."""
+
+    title: str
+    progress: Progress
+    course: Course
+    words: tuple[str, ...] = ()
+    hint: str = ""
+    keys: bool = True
+
+
+class Words:
+    """The last things a printer has said that are no mere answers; hear() takes chunks of bytes in the thread of the port."""
+
+    def __init__(self) -> None:
+        self.last: deque[str] = deque(maxlen=WORDS_KEPT)
+        self._half = b""
+
+    def hear(self, direction: str, data: bytes) -> None:
+        """Take what was received ("<")."""
+        if direction != "<":
+            return
+        *lines, self._half = (self._half + data).split(b"\n")
+        self._half = self._half[-HALF_BYTES:]
+        for line in lines:
+            if line[:2] != b"ok" and (text := spoken(line)):
+                self.last.append(text)
+
+    def add(self, text: str) -> None:
+        """Add a word of this program, unless it is the last one already."""
+        if text and (not self.last or self.last[-1] != text):
+            self.last.append(text)
+
+
+def spoken(line: bytes) -> str:
+    """What a line tells a person, "" for reports and answers."""
+    event = read_event(line)
+    if isinstance(event, Start):
+        return "the printer has started"
+    if isinstance(event, Action):
+        return f"the printer asks: {event.name} {event.words}".rstrip()
+    return event.text if isinstance(event, Echo | FirmwareFault | LineError | Unknown) else ""
+
+
+def drawn(sheet: Sheet, now: datetime) -> RenderableType:
+    """The whole screen at a moment."""
+    progress = sheet.progress
+    lines = [_head(sheet), _place(sheet), _heat(progress), _bar(progress), _times(progress, now), *_words(sheet.words)]
+    if sheet.hint or sheet.keys:
+        lines.append(Text(sheet.hint or KEYS, style="bold yellow" if sheet.hint else "dim"))
+    return Group(*lines)
+
+
+def _head(sheet: Sheet) -> RenderableType:
+    row = Table.grid(expand=True)
+    row.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
+    row.add_column(justify="right", no_wrap=True)
+    state = sheet.progress.state
+    row.add_row(Text(sheet.title, style="bold"), Text(state, style=f"bold {COLOURS.get(state, 'red')}"))
+    return row
+
+
+def _place(sheet: Sheet) -> Text:
+    progress, course = sheet.progress, sheet.course
+    told = []
+    if progress.part is not None:
+        told.append(f"part {progress.part}{_of(progress.parts)}")
+    if progress.layer is not None:
+        told.append(f"layer {progress.layer}{_of(course.layers(progress.part))}")
+    pose = course.pose_deg(progress.file_line)
+    if pose is not None:
+        told.append(f"tilt {course.letters[3]} {pose[0]:.1f} deg")
+        told.append(f"turn {course.letters[4]} {pose[1]:.1f} deg")
+    return _joined(told or ["starting"])
+
+
+def _of(count: int | None) -> str:
+    return f" of {count}" if count else ""
+
+
+def _heat(progress: Progress) -> Text:
+    heat = progress.temperature
+    told = [
+        f"{name} {now_c:.1f}" + (f" / {target_c:.0f}" if target_c is not None else "") + " deg C"
+        for name, now_c, target_c in (
+            ("nozzle", heat.nozzle_c, heat.nozzle_target_c),
+            ("bed", heat.bed_c, heat.bed_target_c),
+        )
+        if now_c is not None
+    ]
+    overrides = [f"feed {progress.feed_percent:.0f} %", f"flow {progress.flow_percent:.0f} %"]
+    return _joined([*told, *overrides])
+
+
+def _bar(progress: Progress) -> RenderableType:
+    row = Table.grid(expand=True, padding=(0, 1))
+    row.add_column(ratio=1)
+    row.add_column(justify="right", no_wrap=True)
+    share = progress.share
+    row.add_row(ProgressBar(total=1.0, completed=share or 0.0), Text("" if share is None else f"{100 * share:.0f} %"))
+    return row
+
+
+def _times(progress: Progress, now: datetime) -> Text:
+    told = [f"{duration(progress.elapsed_s)} so far"]
+    if progress.left_s is not None:
+        end = now + timedelta(seconds=progress.left_s)
+        day = "" if end.date() == now.date() else f"{end:%a %d %b} "
+        told += [f"{duration(progress.left_s)} left", f"done at {day}{end:%H:%M}"]
+    told.append(f"line {progress.acknowledged}{_of(progress.total)}")
+    return _joined(told)
+
+
+def _words(words: tuple[str, ...]) -> list[Text]:
+    return [Text(f"  {word}", style="cyan", no_wrap=True, overflow="ellipsis") for word in words]
+
+
+def _joined(told: list[str]) -> Text:
+    return Text("   ".join(told), no_wrap=True, overflow="ellipsis")
+
+
+class Screen:
+    """`with Screen(...) as screen:` screen.tell(progress) redraws; the terminal is as before afterwards.
+
+    A terminal that has gone away (a closed window) ends the drawing, not the print.
+    """
+
+    def __init__(self, title: str, course: Course, words: Words, hint: Callable[[], str], keys: bool) -> None:
+        self._title, self._course, self._words, self._hint, self._keys = title, course, words, hint, keys
+        self._live = Live(console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True)
+        self._gone = False
+
+    def tell(self, progress: Progress) -> None:
+        """Draw where the print stands."""
+        if self._gone:
+            return
+        self._words.add(progress.message)
+        sheet = Sheet(self._title, progress, self._course, tuple(self._words.last), self._hint(), self._keys)
+        try:
+            self._live.update(drawn(sheet, datetime.now()), refresh=True)
+        except OSError:
+            self._gone = True
+
+    def __enter__(self) -> Self:
+        self._live.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        try:
+            self._live.stop()
+        except OSError:
+            return
+
+
+def is_terminal() -> bool:
+    """Whether a screen can be drawn on stderr."""
+    return sys.stderr.isatty() and os.environ.get("TERM", "") not in ("", "dumb")
