@@ -25,7 +25,8 @@ PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
 WARNINGS = 20  # kept of the printer's own words that show a program it does not understand
-WARNS = ("nknown command", "cold extrusion", "too long extrusion")
+WARNS = ("nknown command", "too long extrusion")
+COLD = "cold extrusion prevented"
 BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
 CHECK_S = 30.0  # between looks at the position where a layer ends
 CHECK_MUTE_S = 10.0  # the same for a printer that does not tell what it has executed
@@ -272,8 +273,17 @@ class Feed:
             self.firmware = event.text.removeprefix("FIRMWARE_NAME:").strip()
         elif isinstance(event, Action):
             self._asked_by_printer(event)
-        elif isinstance(event, Echo) and len(self.warnings) < WARNINGS and any(word in event.text for word in WARNS):
-            self.warnings.append(event.text)
+        elif isinstance(event, Echo):
+            self._told(event.text)
+
+    def _told(self, text: str) -> None:
+        """The printer's words for people."""
+        if COLD in text:
+            raise PrinterError(
+                f"the printer said {text!r}: the nozzle is too cold, the filament of a move is missing from the print"
+            )
+        if len(self.warnings) < WARNINGS and any(word in text for word in WARNS):
+            self.warnings.append(text)
 
     def _felt(self, told: Temperature) -> None:
         self.temperature = told

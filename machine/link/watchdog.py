@@ -25,6 +25,7 @@ NOZZLE = Bounds("nozzle", 20.0, 60.0)
 BED = Bounds("bed", 15.0, 180.0, 1.0)
 UNHEARD_S = 120.0  # a report is asked for every few seconds: so many questions do not stay unanswered by chance
 OVER_LIMIT_C = 15.0
+OVER_REPORTS = 2  # in a row: a byte lost on the line makes 200 of 20.0 once
 
 
 @dataclass
@@ -35,6 +36,7 @@ class Heater:
     target_c: float | None = None
     nearest_c: float = inf  # least distance from the target since it was set or reached
     nearest_s: float = 0.0  # when that was
+    over: int = 0  # reports in a row beyond what the machine allows
 
     def saw(self, now_c: float | None, target_c: float | None, now_s: float) -> None:
         """Judge one report; raises PrinterError."""
@@ -66,9 +68,11 @@ class Watchdog:
         self.heard_s = now_s
         pairs = ((told.nozzle_c, told.nozzle_target_c), (told.bed_c, told.bed_target_c))
         for heater, most_c, (now_c, target_c) in zip(self._heaters, self.most_c, pairs, strict=True):
-            if now_c is not None and now_c > most_c + OVER_LIMIT_C:
+            heater.over = heater.over + 1 if now_c is not None and now_c > most_c + OVER_LIMIT_C else 0
+            if heater.over >= OVER_REPORTS:
                 raise PrinterError(f"the {heater.bounds.name} is at {now_c:.0f} deg C: this machine allows at most {most_c:g}")
-            heater.saw(now_c, target_c, now_s)
+            if not heater.over:
+                heater.saw(now_c, target_c, now_s)
 
     def wait(self, now_s: float) -> None:
         """Judge silence while a heater is on; raises PrinterError. A printer that never told anything is not judged."""
