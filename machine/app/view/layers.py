@@ -14,7 +14,7 @@ NONE: dict[str, Column] = {
     **{name: Column(np.zeros(0), "i32") for name in ("layer_part", "layer_number", "layer_first", "layer_rows")},
     **{name: Column(np.zeros(0), "f32") for name in ("layer_z", "layer_time")},
 }  # of a page without paths
-FEWEST = 4  # strokes a layer on average: a text with fewer does not go by layers
+FEWEST = 4  # strokes that a helix takes to rise by a layer, at least: what goes up and down more quickly is no helix
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +43,20 @@ def layers_of(program: ParsedProgram, layer_height_mm: float) -> Layers:
 
 
 def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.int64]:
-    strokes = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
+    """(n,) numbers of layers: a level stroke at another height begins one, and so does a rise of a layer's height in a helix."""
     number = np.zeros(len(program.line), dtype=np.int64)
+    strokes = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
     if not len(strokes):
         return number
-    z = program.end[strokes, 2]
+    before, z = program.start[strokes, 2], program.end[strokes, 2]
+    level = np.abs(z - before) < SAME_MM / 10.0
     steps = np.ones(len(strokes), dtype=np.bool_)
-    steps[1:] = (np.abs(np.diff(z)) > SAME_MM) | np.any(np.diff(program.end[strokes, 3:], axis=0) != 0.0, axis=1)
+    steps[1:] = level[1:] & (np.abs(np.diff(z)) > SAME_MM) | np.any(np.diff(program.end[strokes, 3:], axis=0) != 0.0, axis=1)
     run = np.cumsum(steps) - 1
-    risen = np.floor((z - z[np.flatnonzero(steps)][run] + 1e-6) / layer_height_mm)
-    steps[1:] |= np.diff(risen) != 0
-    if steps.sum() * FEWEST > len(strokes) > FEWEST:
-        steps[1:] = False
+    risen = np.ceil((z - before[steps][run]) / layer_height_mm - 1e-6)
+    rises = np.diff(risen) != 0
+    if rises.sum() * FEWEST < len(strokes):
+        steps[1:] |= rises
     number[strokes[steps]] = 1
     return np.cumsum(number)
 

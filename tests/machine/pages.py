@@ -1,0 +1,63 @@
+"""A page read back by the letter of docs/view.md, with nothing of the code that wrote it."""
+
+import base64
+import json
+import re
+import struct
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+ELEMENT = re.compile(rb'<script type="application/octet-stream" id="tiltprint">([A-Za-z0-9+/=]*)</script>')
+Arrays = dict[str, NDArray[Any]]
+
+
+def opened(page: bytes) -> tuple[dict[str, Any], Arrays]:
+    """Header and arrays of an HTML page."""
+    (text,) = ELEMENT.findall(page)
+    return unpacked(base64.b64decode(text, validate=True))
+
+
+def unpacked(block: bytes) -> tuple[dict[str, Any], Arrays]:
+    """Header and arrays of a packed block; arrays in mm, deg, seconds."""
+    raw = zlib.decompress(block)
+    assert raw[:8] == b"TILTVW01"
+    (length,) = struct.unpack("<I", raw[8:12])
+    assert (12 + length) % 8 == 0
+    header = json.loads(raw[12 : 12 + length])
+    return header, {name: _array(raw[12 + length :], told) for name, told in header["arrays"].items()}
+
+
+def _array(raw: bytes, told: dict[str, Any]) -> NDArray[Any]:
+    assert told["offset"] % 8 == 0
+    rows, *rest = told["shape"]
+    columns = rest[0] if rest else 1
+    if told["coding"] == "plain":
+        kind = {"u8": "<u1", "u16": "<u2", "i32": "<i4", "f32": "<f4"}[told["type"]]
+        values = np.frombuffer(raw, kind, rows * columns, told["offset"]).reshape(rows, columns).astype(float)
+    else:
+        values = np.zeros((rows, columns))
+        for column in range(columns):
+            start = told["offset"] + 4 * rows * column
+            planes = [np.frombuffer(raw, "u1", rows, start + k * rows).astype(np.uint64) for k in range(4)]
+            word = planes[0] | planes[1] << np.uint64(8) | planes[2] << np.uint64(16) | planes[3] << np.uint64(24)
+            step = np.where(word & np.uint64(1), -(word // 2).astype(np.int64) - 1, (word // 2).astype(np.int64))
+            values[:, column] = np.cumsum(step)
+    return (values if rest else values[:, 0]) * told["scale"]
+
+
+def turned_back(axis: dict[str, Any], value_deg: float, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A point turned by the inverse of T(value) or U(value) of docs/view.md, by Rodrigues' formula."""
+    u, angle = np.array(axis["axis"]), np.radians(axis["sign"] * (value_deg - axis["zero_deg"]))
+    across, along = np.cross(u, point), u * (u @ point)
+    turned: NDArray[np.float64] = along + np.cos(angle) * (point - along) + np.sin(angle) * across
+    return turned
+
+
+def on_the_work(machine: dict[str, Any], row: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The workpiece point under the tip for a row X Y Z tilt turn."""
+    a, c = (np.array(machine[axis]["point_mm"]) for axis in ("tilt", "turn"))
+    tip = row[:3] - np.array(machine["tool_mm"])
+    return turned_back(machine["turn"], row[4], turned_back(machine["tilt"], row[3], tip - a) + a - c)
