@@ -22,6 +22,7 @@ LOOK_AHEAD = 128
 EQUAL = 1e-9  # shares of the risky area that differ less are equal but for rounding
 SORTED_FIRST = 256
 UNKNOWN = -1
+FEASIBLE = int(Reason.FEASIBLE)  # a number, for it is compared a hundred thousand times a search
 
 
 class Table:
@@ -110,7 +111,7 @@ class _Ranking:
             return
         if self._table.reason[row] == UNKNOWN:
             self._table.look(self._order[self._next : self._next + LOOK_AHEAD])
-        if self._table.reason[row] == Reason.FEASIBLE:
+        if self._table.reason[row] == FEASIBLE:
             self._found.append(row)
             self._planes.append(plane)
 
@@ -147,8 +148,8 @@ def entries(
     risky_mm2: the model's risky area, which delta and the reductions are shares of. least_reduction: accumulated reduction
     that a candidate must exceed. preferred_mm3: parts of at least this volume come before all smaller ones.
     """
-    side = _side_by_side(tables, risky_mm2)
-    waiting = side.order[(side.residual_sum_mm2 < bound_mm2)[side.order] & (side.reduction > least_reduction)[side.order]]
+    side = _side_by_side(tables, risky_mm2, bound_mm2, least_reduction)
+    waiting = np.arange(len(side.row), dtype=np.int32)
     yield from _relaxed(tables, side, waiting, preferred_mm3, np.inf)
     if preferred_mm3 > 0.0:
         yield from _relaxed(tables, side, waiting, 0.0, preferred_mm3)
@@ -165,7 +166,7 @@ def _relaxed(tables: Sequence[Table], side: "_Side", waiting: Ints, least_mm3: f
             table, row = tables[int(side.table[index])], int(side.row[index])
             if table.reason[row] == UNKNOWN:
                 _look_ahead(tables, side, turn[place : place + LOOK_AHEAD])
-            if table.reason[row] != Reason.FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
+            if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
                 continue
             plane, others = table.plane(row), near[int(side.table[index])]
             if not any(same(plane, other) for other in others):
@@ -178,27 +179,29 @@ def _relaxed(tables: Sequence[Table], side: "_Side", waiting: Ints, least_mm3: f
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """The candidates of all tables side by side, and their order by reduction, larger parts first among equals."""
+    """Candidates of all tables side by side, by reduction, larger parts first among equals."""
 
     table: Ints
     row: Ints
     reduction: Floats
     residual: Floats
-    residual_sum_mm2: Floats
-    order: Ints
 
 
-def _side_by_side(tables: Sequence[Table], risky_mm2: float) -> _Side:
-    table = np.concatenate([np.full(len(t.reason), k, np.int32) for k, t in enumerate(tables)])
-    row = np.concatenate([np.arange(len(t.reason), dtype=np.int32) for t in tables])
-    direction = np.concatenate([t.worth.direction for t in tables])
-    offset = np.concatenate([t.worth.offset_mm for t in tables])
-    saved = np.concatenate([t.worth.gain_mm2 + t.saved_mm2 for t in tables])
-    residual = np.concatenate([t.worth.residual_mm2 for t in tables])
-    residual_sum = np.concatenate([t.worth.residual_mm2 + t.residual_mm2 for t in tables])
-    reduction = np.round(saved / risky_mm2 / EQUAL) * EQUAL
-    order = np.lexsort((direction, table, offset, -reduction)).astype(np.int32)
-    return _Side(table, row, reduction, residual / risky_mm2, residual_sum, order)
+def _side_by_side(tables: Sequence[Table], risky_mm2: float, bound_mm2: float, least_reduction: float) -> _Side:
+    """Those that would leave less than bound_mm2 for ever and reduce more than least_reduction: few of all, so they are
+    chosen before anything is sorted."""
+    found: list[tuple[Ints, Ints, Ints]] = []
+    sums: list[Floats] = []
+    for index, table in enumerate(tables):
+        worth = table.worth
+        reduction = np.round((worth.gain_mm2 + table.saved_mm2) / risky_mm2 / EQUAL) * EQUAL
+        kept = np.flatnonzero((worth.residual_mm2 + table.residual_mm2 < bound_mm2) & (reduction > least_reduction))
+        found.append((np.full(len(kept), index, np.int32), kept.astype(np.int32), worth.direction[kept]))
+        sums.append(np.stack([worth.offset_mm[kept], reduction[kept], worth.residual_mm2[kept] / risky_mm2]))
+    number, row, direction = (np.concatenate(column, dtype=np.int32) for column in zip(*found, strict=True))
+    offset, reduction, residual = np.concatenate(sums, axis=1)
+    order = np.lexsort((direction, number, offset, -reduction))
+    return _Side(number[order], row[order], reduction[order], residual[order])
 
 
 def _look_ahead(tables: Sequence[Table], side: _Side, ahead: Ints) -> None:
