@@ -1,6 +1,8 @@
 // Beads: every extruding row at its true width and height, one instance a slot, so that the slider is a count.
 // Near: a prism of eight sides with a rounded shade, mitred where one bead follows the other, a blunt tip where it ends.
-// Far: two triangles that face the eye and are shaded as if they were round.
+// Far: the two faces of a box that the eye can see, shaded as if their common edge were round.
+
+const CLOSE_PIXELS = 3; // a bead this wide on the screen is drawn as a prism
 
 const BEAD_HEAD = `
 in vec3 before, start, end, after;
@@ -55,43 +57,32 @@ void main() {
 }`;
 
 const BEAD_FAR = `${BEAD_HEAD}
-in vec4 corner; // which end, side
-out vec3 across, facing;
-out float lie;
+in vec4 corner; // which end; across and up, 1: towards the eye; 0: the side's face, 1: the one above or below
+uniform float roundness;
+out vec3 normal;
 void main() {
-  if (hidden()) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); across = facing = vec3(0.0); lie = 0.0; return; }
-  vec3 up = unfolded(vertical), along = normalize(end - start), here = corner.x > 0.5 ? reached() : start;
-  vec3 middle = here - up * 0.5 * size.y, sight = normalize(eye - middle);
-  vec3 beside = cross(along, sight);
-  beside = length(beside) > 1e-4 ? normalize(beside) : normalize(cross(along, up));
-  float round = 0.5 * min(size.x, size.y), flat_ = max(0.5 * (size.x - size.y), 0.0);
-  float half_ = round + flat_ * abs(dot(beside, normalize(cross(along, up))));
-  vec3 place = middle + beside * corner.y * half_ + along * (corner.x > 0.5 ? 0.25 : -0.25) * round;
-  across = mat3(toEye) * beside;
-  facing = mat3(toEye) * normalize(cross(beside, along));
-  if (facing.z < 0.0) facing = -facing;
-  lie = corner.y;
+  if (hidden()) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); normal = vec3(0.0); return; }
+  vec3 up = unfolded(vertical), along = normalize(end - start), side = normalize(cross(along, up));
+  vec3 middle = (corner.x > 0.5 ? reached() : start) - up * 0.5 * size.y, sight = eye - middle;
+  if (dot(sight, side) < 0.0) side = -side;
+  vec3 over = dot(sight, up) < 0.0 ? -up : up;
+  vec3 place = middle + 0.5 * (side * corner.y * size.x + over * corner.z * size.y) + along * (corner.x - 0.5) * 0.5 * size.y;
+  vec3 flat_ = corner.w > 0.5 ? over : side, edge = normalize(side * (corner.y + 0.4) + over * (corner.z + 0.4));
+  normal = mat3(toEye) * normalize(mix(flat_, edge, roundness));
   gl_Position = toClip * vec4(place, 1.0);
 }`;
 
 const BEAD_PAINT = `
 flat in vec4 paint;
 flat in int slot;
+in vec3 normal;
 uniform bool picking;
 out vec4 colour;
 ${LIGHT}
-vec4 painted(vec3 n) {
-  if (!picking) return vec4(lit(paint.rgb, n), 1.0);
-  return vec4(slot & 255, (slot >> 8) & 255, (slot >> 16) & 255, (slot >> 24) & 255) / 255.0;
+void main() {
+  if (picking) colour = vec4(slot & 255, (slot >> 8) & 255, (slot >> 16) & 255, (slot >> 24) & 255) / 255.0;
+  else colour = vec4(lit(paint.rgb, normalize(normal)), 1.0);
 }`;
-const NEAR_PAINT = `${BEAD_PAINT}
-in vec3 normal;
-void main() { colour = painted(normalize(normal)); }`;
-const FAR_PAINT = `${BEAD_PAINT}
-in vec3 across, facing;
-in float lie;
-void main() { colour = painted(normalize(across * lie * 0.85 + facing * sqrt(1.0 - 0.7225 * lie * lie))); }`;
-
 /** The prism's eighteen corners and the tips, and its triangles. */
 function prism() {
   const ring = [[1, 0, 1], [1, 1, 0.4], [1, 1, -0.4], [1, 0, -1], [-1, 0, -1], [-1, -1, -0.4], [-1, -1, 0.4], [-1, 0, 1]];
@@ -103,7 +94,12 @@ function prism() {
   return { corners: new Float32Array(corners), faces: new Uint16Array(faces) };
 }
 
-const strip = () => ({ corners: new Float32Array([0, -1, 0, 0, 0, 1, 0, 0, 1, -1, 0, 0, 1, 1, 0, 0]), faces: new Uint16Array([0, 1, 2, 2, 1, 3]) });
+/** The two faces of a box that look at the eye. */
+function twoFaces() {
+  const face = (w, places) => [0, 1].flatMap((end) => places.flatMap((place) => [end, ...place, w]));
+  const corners = [...face(0, [[1, -1], [1, 1]]), ...face(1, [[1, 1], [-1, 1]])];
+  return { corners: new Float32Array(corners), faces: new Uint16Array([0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 5, 7]) };
+}
 
 function beadsOf(gl, path) {
   const buffers = {
@@ -112,20 +108,21 @@ function beadsOf(gl, path) {
     verticals: bufferOf(gl, path.verticals),
     colours: bufferOf(gl, 4 * path.slots, gl.DYNAMIC_DRAW),
   };
-  const near = bodyOf(gl, BEAD_NEAR, NEAR_PAINT, prism(), buffers);
-  const far = bodyOf(gl, BEAD_FAR, FAR_PAINT, strip(), buffers);
+  const near = bodyOf(gl, BEAD_NEAR, prism(), buffers);
+  const far = bodyOf(gl, BEAD_FAR, twoFaces(), buffers);
   const paint = (colours) => {
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.colours);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, colours);
   };
-  /** seen: {toClip, toEye, eye, close}; ranges: [{first, end, tint}] of slots; moving: {slot, share} of the row under way. */
+  /** seen: {toClip, toEye, eye, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share} of the row under way. */
   const draw = (seen, ranges, moving, stride, picking) => {
-    const body = seen.close ? near : far, { to } = body.program;
+    const body = seen.pixels > CLOSE_PIXELS ? near : far, { to } = body.program;
     body.program.use();
     gl.bindVertexArray(body.vao);
     gl.uniformMatrix4fv(to("toClip"), false, seen.toClip);
     gl.uniformMatrix4fv(to("toEye"), false, seen.toEye);
     gl.uniform3fv(to("eye"), seen.eye);
+    gl.uniform1f(to("roundness"), clamp(seen.pixels / CLOSE_PIXELS - 0.25, 0, 1));
     gl.uniform1i(to("picking"), picking ? 1 : 0);
     gl.uniform1f(to("share"), moving.share);
     gl.uniform1i(to("stride"), stride);
@@ -143,8 +140,8 @@ function beadsOf(gl, path) {
 }
 
 /** One shape of a bead: its program, its corners, and the instances' attributes from any slot on. */
-function bodyOf(gl, vertex, fragment, shape, { points, sizes, verticals, colours }) {
-  const program = programOf(gl, vertex, fragment), vao = gl.createVertexArray();
+function bodyOf(gl, vertex, shape, { points, sizes, verticals, colours }) {
+  const program = programOf(gl, vertex, BEAD_PAINT), vao = gl.createVertexArray();
   gl.bindVertexArray(vao);
   bufferOf(gl, shape.faces, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
   bufferOf(gl, shape.corners);

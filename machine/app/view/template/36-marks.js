@@ -11,23 +11,24 @@ void main() {
 }`;
 const MARK_FRAGMENT = `
 uniform vec3 fill;
+uniform float size;
 uniform int shape; // 0 diamond, 1 triangle down, 2 triangle up
 out vec4 colour;
 float inside(vec2 p) {
   if (shape == 0) return 0.9 - abs(p.x) - abs(p.y);
   float y = shape == 1 ? p.y : -p.y;
-  return min(0.75 - y - 0.1, 0.5 * (y + 0.85) - abs(p.x) + 0.0);
+  return min(0.65 - y, 0.5 * (y + 0.85) - abs(p.x));
 }
 void main() {
   vec2 p = gl_PointCoord * 2.0 - 1.0;
   if (shape != 0) p.y = -p.y;
   float d = inside(p);
   if (d < 0.0) discard;
-  colour = vec4(d < 0.16 ? vec3(0.06) : fill, 1.0);
+  colour = vec4(size > 7.0 && d < 0.2 ? vec3(1.0) : fill, 1.0);
 }`;
 
 const MARKS = {
-  seams: { fill: [1.0, 1.0, 1.0], shape: 0 },
+  seams: { fill: [0.07, 0.08, 0.1], shape: 0 },
   retracts: { fill: [0.84, 0.37, 0.0], shape: 1 },
   primes: { fill: [0.34, 0.71, 0.91], shape: 2 },
 };

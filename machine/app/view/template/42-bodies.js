@@ -1,9 +1,11 @@
 // Bodies: the table, what carries it and the head, as the machine's profile gives them.
 
-const HEAD_ABOVE_MM = 12;
+const HEAD_ABOVE_MM = 12; // how far the hot end is drawn above the last height that the profile tells
+const NOZZLE_MM = 6; // what lies within is drawn as the nozzle
+const ROUND = 96;
 
 function bodiesOf(machine, dark) {
-  const plate = dark ? [58, 63, 71, 255] : [205, 209, 215, 255], frame = dark ? [96, 104, 116, 255] : [150, 156, 166, 255];
+  const plate = dark ? [66, 72, 81, 255] : [232, 235, 239, 255], frame = dark ? [112, 121, 134, 255] : [190, 196, 205, 255];
   const line = dark ? [120, 128, 140, 110] : [120, 126, 136, 120], edge = dark ? [170, 178, 190, 190] : [70, 76, 86, 170];
   return {
     table: { solid: trianglesOf([{ corners: plateCorners(machine.table), colour: plate }]), lines: trianglesOf(plateLines(machine.table, line, edge)) },
@@ -46,8 +48,11 @@ function headOf({ silhouette_mm: silhouette, boxes }, colour, edge) {
   const [least, [radius, height]] = [silhouette[0], silhouette[silhouette.length - 1]];
   const top = height + HEAD_ABOVE_MM;
   const outline = [[0, least[1]], ...silhouette, [radius, top], [0, top]];
-  const brass = [198, 148, 62, 255], low = silhouette.filter(([, h]) => h <= 5), rest = outline.slice(low.length);
-  const solid = [{ corners: revolved(outline.slice(0, low.length + 1), 48), colour: brass }, { corners: revolved(rest, 48), colour }];
+  const brass = [205, 154, 66, 255], low = silhouette.filter(([r, h]) => r <= NOZZLE_MM && h <= NOZZLE_MM).length;
   const around = boxesOf(boxes, colour, edge);
-  return { solid: trianglesOf(solid), boxes: around.solid, lines: around.lines };
+  return {
+    nozzle: trianglesOf([{ corners: revolved(outline.slice(0, low + 1), ROUND), colour: brass }]),
+    solid: trianglesOf([{ corners: revolved(outline.slice(low), ROUND), colour }]),
+    boxes: around.solid, lines: around.lines,
+  };
 }

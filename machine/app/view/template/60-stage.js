@@ -1,6 +1,5 @@
 // Stage: all that is drawn, in the right order, for the scene as it is chosen.
 
-const CLOSE_PIXELS = 2.2; // a bead this wide on the screen is drawn as a prism
 const FAINT = { light: [0.84, 0.86, 0.88, 0.82], dark: [0.2, 0.22, 0.25, 0.85] };
 
 /** Everything on the graphics card; made anew when the context was lost. */
@@ -22,7 +21,7 @@ function stageOf(gl, print, dark) {
     arrows: solidOf(gl, arrowsOf(header.parts, partColour, print.span)),
     table: solidOf(gl, bodies.table.solid), plateLines: linesOf(gl, bodies.table.lines),
     cradle: solidOf(gl, bodies.cradle.solid), cradleLines: linesOf(gl, bodies.cradle.lines),
-    head: solidOf(gl, bodies.head.solid), headBoxes: solidOf(gl, bodies.head.boxes), headLines: linesOf(gl, bodies.head.lines),
+    nozzle: solidOf(gl, bodies.head.nozzle), head: solidOf(gl, bodies.head.solid), headBoxes: solidOf(gl, bodies.head.boxes), headLines: linesOf(gl, bodies.head.lines),
   };
   return stage;
 }
@@ -58,7 +57,7 @@ function paintStage(gl, stage, print, scene, camera) {
   const seenAs = (matrix) => ({ toEye: multiply(view, matrix), toClip: multiply(lens, multiply(view, matrix)) });
   const work = seenAs(stand.work), on = scene.on;
   const pixels = (0.4 * height) / (2 * HALF_HEIGHT * camera.distance);
-  const beadView = { ...work, eye: carried(undone(work.toEye), [0, 0, 0]), close: pixels > CLOSE_PIXELS };
+  const beadView = { ...work, eye: carried(undone(work.toEye), [0, 0, 0]), pixels };
   const ranges = stage.beads ? drawnRanges(print, scene).map((range) => ({ ...range, tint: range.tint ? FAINT[scene.dark ? "dark" : "light"] : [0, 0, 0, 0] })) : [];
   const nearer = 0.6 / camera.distance;
   gl.viewport(0, 0, width, height);
@@ -66,9 +65,11 @@ function paintStage(gl, stage, print, scene, camera) {
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   if (on.beads && stage.beads) stage.beads.draw(beadView, ranges, { slot: print.path.slot(scene.row), share: scene.share }, scene.stride, false);
   if (on.machine) paintTable(stage, seenAs, stand, work);
-  paintPath(stage, ranges, scene, work.toClip, nearer * 0.02, canvas);
+  const head = seenAs(stand.head);
+  if (on.machine) stage.nozzle.draw(head);
+  paintPath(stage, ranges, scene, work.toClip, nearer * 0.02, clamp(pixels * 2.5, 4, 13) * (width / canvas.clientWidth || 1));
   paintModel(stage, print, scene, work, nearer);
-  if (on.machine) paintHead(stage, seenAs(stand.head));
+  if (on.machine) paintHead(stage, head);
   return { work, ranges, beadView };
 }
 
@@ -80,14 +81,13 @@ function paintTable(stage, seenAs, stand, work) {
   stage.cradleLines.draw(cradle.toClip, undefined, undefined, 1e-5);
 }
 
-function paintPath(stage, ranges, scene, toClip, nearer, canvas) {
-  const size = 9 * (canvas.width / canvas.clientWidth || 1);
+function paintPath(stage, ranges, scene, toClip, nearer, size) {
   for (const { firstRow, endRow } of ranges) {
     if (scene.on.travels) stage.ways.draw(toClip, 2 * countUpTo(stage.wayRow, firstRow - 1), 2 * countUpTo(stage.wayRow, endRow - 1));
     if (scene.on.seams) stage.marks.seams.draw(toClip, firstRow, endRow, size, nearer);
     if (!scene.on.retractions) continue;
-    stage.marks.retracts.draw(toClip, firstRow, endRow, size * 1.2, nearer);
-    stage.marks.primes.draw(toClip, firstRow, endRow, size * 1.2, nearer);
+    stage.marks.retracts.draw(toClip, firstRow, endRow, size + 2, nearer);
+    stage.marks.primes.draw(toClip, firstRow, endRow, size + 2, nearer);
   }
 }
 
@@ -105,8 +105,8 @@ function paintModel(stage, print, scene, work, nearer) {
 }
 
 function paintHead(stage, seen) {
-  stage.head.draw(seen, { strength: 0.72 });
-  stage.headBoxes.draw(seen, { ghost: 0.16 });
+  stage.head.draw(seen, { ghost: 0.42 });
+  stage.headBoxes.draw(seen, { ghost: 0.14 });
   stage.headLines.draw(seen.toClip);
 }
 

@@ -24,7 +24,7 @@ function layerSliders(print, scene, bells) {
   show();
 }
 
-const named = (layer) => `${layer.number}\n${layer.z.toFixed(2)}`;
+const named = (layer) => `layer ${layer.number}\n${layer.z.toFixed(2)} mm`;
 
 /** The layer that a row belongs to, as a place in the list of layers; -1 before the first. */
 function layerOf(rows, row) {

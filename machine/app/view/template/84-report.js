@@ -1,5 +1,7 @@
 // Report: figures and tables beside the picture, and the picture that is printed with them.
 
+const WORDY = 24; // letters: a column with longer cells is text, not figures
+
 function showReport({ report, thinned, made_by: maker }) {
   const box = $("report-text");
   const facts = report.facts.flatMap(([name, value]) => [made("dt", { text: name }), made("dd", { text: value })]);
@@ -7,14 +9,14 @@ function showReport({ report, thinned, made_by: maker }) {
   if (thinned) box.append(made("p", { className: "note", text: thinnedTold(thinned) }));
   box.append(made("p", { className: "note", text: `made by ${maker}` }));
   $("print").addEventListener("click", () => window.print());
-  addEventListener("beforeprint", () => box.querySelectorAll("details").forEach((details) => { details.open = true; }));
 }
 
 const thinnedTold = ({ rows, kept }) =>
   `of ${rows.toLocaleString("en")} moves ${kept.toLocaleString("en")} are shown: points inside straight strokes were left out`;
 
 function sectionOf({ title, head, rows, notes, folded }) {
-  const row = (tag, cells) => made("tr", {}, ...cells.map((text) => made(tag, { text })));
+  const wordy = head.map((_, k) => rows.some((cells) => cells[k].length > WORDY));
+  const row = (tag, cells) => made("tr", {}, ...cells.map((text, k) => made(tag, { text, className: wordy[k] ? "words" : "" })));
   const table = made("table", {}, made("thead", {}, row("th", head)), made("tbody", {}, ...rows.map((cells) => row("td", cells))));
   const content = [made("div", { className: "table" }, table), ...notes.map((text) => made("p", { className: "note", text }))];
   if (folded) return made("details", {}, made("summary", { text: title }), ...content);

@@ -37,7 +37,7 @@ function summaryOf({ time_s: seconds, filament_mm: filament, parts }, { count, l
   return told.join(" · ");
 }
 
-/** Puts the work into view, and keeps it there when the frame is changed. */
+/** Puts the work into view, and keeps it there when the table moves and when the frame is changed. */
 function fitting(print, scene, camera, picture, ring) {
   const [least, most] = print.box, middle = scaled(add(least, most), 0.5);
   const work = () => standing(print.chain, scene.place, scene.riding).work;
@@ -49,9 +49,14 @@ function fitting(print, scene, camera, picture, ring) {
   let before = work();
   ring.on("frame", () => {
     camera.target = carried(multiply(work(), undone(before)), camera.target);
+    before = work();
     picture.ask();
   });
-  ring.on("row frame", () => { before = work(); });
+  ring.on("row", () => {
+    const now = work();
+    camera.target = add(camera.target, sub(carried(now, middle), carried(before, middle)));
+    before = now;
+  });
   document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => {
     [camera.yaw, camera.pitch] = VIEWS[button.dataset.view].map((angle) => angle * RAD);
     picture.ask();
