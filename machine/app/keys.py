@@ -1,6 +1,7 @@
 """Keys: what a person presses while a print runs, read from the terminal as it is pressed, and what it asks for."""
 
 import os
+import re
 import select
 import sys
 import threading
@@ -16,7 +17,8 @@ STEP_PERCENT = 10.0
 STANDING = ("pausing", "paused")
 SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
 MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e stops the machine at once (M112)"
-ASCII = {"=": "+", "_": "-", "\x7f": "", "?": "q"}
+SEQUENCE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O[A-Z])")  # arrow and function keys: the letters in them are no keys
+SAME = {"=": "+", "_": "-", "?": "q"}
 
 
 class Keyboard:
@@ -34,7 +36,7 @@ class Keyboard:
 
     def press(self, key: str) -> None:
         """Ask for what a key means; unknown keys mean nothing."""
-        key = ASCII.get(key, key).lower()
+        key = SAME.get(key, key).lower()
         sure, self._sure, self.hint = self._sure, False, ""
         if key == "e":
             self.hint = "emergency stop"
@@ -135,9 +137,8 @@ class Typing:
                 return
             if not typed:
                 return
-            if not typed.startswith(b"\x1b"):  # an arrow or function key: its letters are none
-                for key in typed.decode("ascii", "ignore"):
-                    self._press(key)
+            for key in SEQUENCE.sub(b"", typed).decode("ascii", "ignore"):
+                self._press(key)
 
 
 def can_type() -> bool:

@@ -1,0 +1,159 @@
+"""Keys of a running print: what each asks for, and a terminal that is as before afterwards."""
+
+import os
+import pty
+import sys
+import termios
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from machine.app.keys import MORE, SURE, Keyboard, Typing, can_type
+from machine.link.control import Control, Request, Wish
+from machine.link.events import Temperature
+from machine.link.progress import Progress
+
+
+def asked(*keys: str, state: str = "printing") -> list[Request]:
+    """What a run of keys asks for."""
+    control = Control()
+    board = Keyboard(control)
+    board.follow(Progress(0, 0, None, 0.0, None, None, Temperature(), None, None, None, state=state))
+    for key in keys:
+        board.press(key)
+    return list(iter(control.take, None))
+
+
+def hint_after(*keys: str) -> str:
+    board = Keyboard(Control())
+    for key in keys:
+        board.press(key)
+    return board.hint
+
+
+@pytest.mark.parametrize(("key", "state", "wish"), [
+    ("p", "printing", Wish.PAUSE),
+    ("P", "printing", Wish.PAUSE),
+    ("r", "paused", Wish.RESUME),
+    (" ", "printing", Wish.PAUSE),
+    (" ", "paused", Wish.RESUME),
+    (" ", "pausing", Wish.RESUME),
+    ("e", "printing", Wish.EMERGENCY_STOP),
+    ("E", "paused", Wish.EMERGENCY_STOP),
+])  # fmt: skip
+def test_a_key_asks_for_its_wish_at_once(key: str, state: str, wish: Wish) -> None:
+    assert asked(key, state=state) == [Request(wish)]
+
+
+@pytest.mark.parametrize("keys", ["", "x", "\x1b", "q", "?", "1", "\r", "c", "cx", "cp", "c "])
+def test_other_keys_and_an_unsure_cancel_ask_for_nothing(keys: str) -> None:
+    assert asked(*keys) == []
+
+
+@pytest.mark.parametrize("keys", ["cc", "cy", "CY"])
+def test_cancelling_is_asked_once_more(keys: str) -> None:
+    assert hint_after(keys[0]) == SURE
+    assert asked(*keys) == [Request(Wish.CANCEL)]
+
+
+def test_the_question_goes_away_with_the_answer() -> None:
+    assert hint_after("c", "n") == ""
+
+
+def test_an_emergency_stop_is_never_an_answer_to_a_question() -> None:
+    assert asked("c", "e") == [Request(Wish.EMERGENCY_STOP)]
+
+
+def test_q_is_explained() -> None:
+    assert hint_after("q") == MORE
+
+
+@pytest.mark.parametrize(("keys", "percent"), [
+    ("+", [110.0]), ("++", [110.0, 120.0]), ("=", [110.0]), ("-", [90.0]), ("+-", [110.0, 100.0]), ("_", [90.0]),
+])  # fmt: skip
+def test_the_feed_goes_in_steps(keys: str, percent: list[float]) -> None:
+    assert asked(*keys) == [Request(Wish.FEED, value) for value in percent]
+
+
+def test_overrides_stay_inside_what_the_stream_takes() -> None:
+    assert asked(*"-" * 50)[-1] == Request(Wish.FEED, 10.0)
+    assert asked(*"+" * 50)[-1] == Request(Wish.FEED, 300.0)
+    assert asked(*"]" * 50)[-1] == Request(Wish.FLOW, 200.0)
+    assert asked(*"[" * 50)[-1] == Request(Wish.FLOW, 10.0)
+
+
+class Pressed:
+    """Keys as they come in; wait_for() returns once there are enough."""
+
+    def __init__(self) -> None:
+        self.keys = ""
+        self._more = threading.Condition()
+
+    def __call__(self, key: str) -> None:
+        with self._more:
+            self.keys += key
+            self._more.notify()
+
+    def wait_for(self, count: int) -> str:
+        with self._more:
+            self._more.wait_for(lambda: len(self.keys) >= count, 5.0)
+        return self.keys
+
+
+@pytest.fixture
+def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A terminal as stdin; its other end, where a person's fingers are."""
+    fingers, terminal = pty.openpty()
+    with os.fdopen(terminal, "r") as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        yield fingers
+    os.close(fingers)
+
+
+def test_keys_come_as_they_are_pressed_and_arrows_are_none(keyboard: int) -> None:
+    pressed = Pressed()
+    with Typing(pressed):
+        os.write(keyboard, b"p")
+        assert pressed.wait_for(1) == "p"
+        os.write(keyboard, b"\x1b[C\x1bOP\x1b[15~r")
+        assert pressed.wait_for(2) == "pr"
+
+
+def test_ctrl_c_still_interrupts_and_ctrl_z_does_nothing(keyboard: int) -> None:
+    with Typing(Pressed()):
+        settings = termios.tcgetattr(sys.stdin.fileno())
+    assert not settings[3] & (termios.ICANON | termios.ECHO)
+    assert settings[3] & termios.ISIG
+    assert settings[6][termios.VSUSP] == b"\x00"
+
+
+def _interrupted() -> None:
+    with Typing(Pressed()):
+        raise KeyboardInterrupt
+
+
+def test_the_terminal_is_as_before_on_every_way_out(keyboard: int) -> None:
+    before = termios.tcgetattr(sys.stdin.fileno())
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted()
+    assert termios.tcgetattr(sys.stdin.fileno()) == before
+
+
+def test_no_thread_is_left(keyboard: int) -> None:
+    threads = threading.active_count()
+    with Typing(Pressed()):
+        pass
+    assert threading.active_count() == threads
+
+
+def test_a_terminal_that_goes_away_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    fingers, terminal = pty.openpty()
+    with os.fdopen(terminal, "r") as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        with Typing(Pressed()):
+            os.close(fingers)
+
+
+def test_keys_are_read_from_a_terminal_in_the_foreground_only(keyboard: int) -> None:
+    assert not can_type()  # a terminal, but not the one that controls this process
