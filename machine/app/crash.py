@@ -4,16 +4,19 @@ import platform
 import tempfile
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib.metadata import distributions
 from pathlib import Path
 
 from machine.app.state_folder import state_folder
 
+KEPT = 20  # logs of bugs
 TOLD = {"tiltprint", "numpy", "numba", "manifold3d", "pyserial", "pydantic", "typer", "rich"}
 
 
 def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:
     """Write the traceback and the versions to a new file of the state folder and return its path."""
+    _thin(state_folder())
     versions = sorted(f"{d.name} {d.version}" for d in distributions() if d.name in TOLD)
     with tempfile.NamedTemporaryFile(
         "w", prefix="bug-", suffix=".log", dir=state_folder(), delete=False, encoding="utf-8", errors="backslashreplace"
@@ -21,3 +24,10 @@ def log_bug(error: BaseException, arguments: Sequence[str]) -> Path:
         file.write(f"arguments: {list(arguments)}\npython {platform.python_version()} on {platform.platform()}\n")
         file.write("\n".join(versions) + "\n\n" + "".join(traceback.format_exception(error)))
     return Path(file.name)
+
+
+def _thin(folder: Path) -> None:
+    """Delete the oldest logs of bugs, so that one more makes no more than KEPT."""
+    with suppress(OSError):  # another run may have been quicker
+        for file in sorted(folder.glob("bug-*.log"), key=lambda file: file.stat().st_mtime, reverse=True)[KEPT - 1 :]:
+            file.unlink(missing_ok=True)

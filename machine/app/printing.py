@@ -1,9 +1,11 @@
 """Printing: the stream to a printer, or to the simulated one on a pseudo-terminal, shown to the person watching."""
 
+import os
 import signal
+import stat
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from math import inf, isfinite
 from pathlib import Path
 from types import FrameType
@@ -14,7 +16,7 @@ from machine.app.pipeline import Program
 from machine.app.progress import Ticker, say
 from machine.app.report import duration, show
 from machine.app.screen import Course, Screen, Words, is_terminal
-from machine.app.traffic import TrafficLog, new_log
+from machine.app.traffic import TrafficLog, new_log, tapped
 from machine.dialects import DIALECTS
 from machine.link.answer import Answer
 from machine.link.control import Control
@@ -125,8 +127,8 @@ def streamed(
             program.run.time_s,
             limit=DIALECTS[profile.machine.dialect].longest_line,
             control=control,
-            traffic=traffic,
             profile=profile,
+            medium=tapped(traffic),
         )
 
 
@@ -170,7 +172,9 @@ def _stopping(stop: threading.Event) -> Iterator[None]:
     """Ctrl-C, a termination request and a closed terminal end the print safely; a second one interrupts at once."""
 
     def ask(number: int, frame: FrameType | None) -> None:
-        del number, frame
+        del frame
+        if number in _HANGUP:
+            _leave_terminal()
         if stop.is_set():
             raise KeyboardInterrupt
         stop.set()
@@ -186,6 +190,16 @@ def _stopping(stop: threading.Event) -> Iterator[None]:
 
 
 _HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
+
+
+def _leave_terminal() -> None:
+    """The window is closed: what is still said must not end in an error before the heaters are off."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for descriptor in (0, 1, 2):
+        with suppress(OSError):
+            if stat.S_ISCHR(os.fstat(descriptor).st_mode):
+                os.dup2(nowhere, descriptor)
+    os.close(nowhere)
 
 
 def status(progress: Progress) -> str:

@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from datetime import datetime
 from io import BufferedWriter
 from pathlib import Path
@@ -10,6 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from machine.app.state_folder import state_folder
+from machine.link.medium import SERIAL, Medium, Traffic, Wire
 
 KEPT = 10  # logs of each kind
 LIMIT_BYTES = 64_000_000  # of one log: about 600,000 lines with their answers
@@ -113,6 +115,39 @@ class TrafficLog:
     def _fail(self, error: OSError) -> None:
         self.trouble = (error.strerror or str(error)).lower()
         self._out = None
+
+
+class TappedWire:
+    """A wire whose every byte is told, those of a safe end and of the emergency stop too."""
+
+    def __init__(self, wire: Wire, tell: Traffic) -> None:
+        self._wire, self._tell = wire, tell
+        self.name = wire.name
+
+    def write(self, data: bytes) -> None:
+        """Send all bytes."""
+        self._tell(">", data)
+        self._wire.write(data)
+
+    def read(self) -> bytes:
+        """The bytes that have come."""
+        data = self._wire.read()
+        if data:
+            self._tell("<", data)
+        return data
+
+    def discard(self) -> None:
+        """Forget bytes that were handed over but not sent yet."""
+        self._wire.discard()
+
+    def close(self) -> None:
+        """Close."""
+        self._wire.close()
+
+
+def tapped(tell: Traffic, medium: Medium = SERIAL) -> Medium:
+    """A medium whose wires tell what goes over them."""
+    return replace(medium, open=lambda name, baud: TappedWire(medium.open(name, baud), tell))
 
 
 def _readable(line: bytes) -> str:

@@ -2,13 +2,17 @@
 
 import re
 import tempfile
+import threading
 from pathlib import Path
 
 import pytest
 
 from machine.app import state_folder as state_module
 from machine.app.state_folder import state_folder
-from machine.app.traffic import KEPT, PIECES, TrafficLog, new_log, piece_of
+from machine.app.traffic import KEPT, PIECES, TrafficLog, new_log, piece_of, tapped
+from machine.link.simulator import SimulatedPrinter
+from machine.link.stream import print_lines
+from profiles.profile import load
 
 STAMP = re.compile(r"\d\d:\d\d:\d\d\.\d{3} ")
 
@@ -79,6 +83,18 @@ def test_a_log_that_cannot_be_written_says_so_and_stays_silent(tmp_path: Path) -
     with TrafficLog(tmp_path / "nowhere" / "a.log", "") as log:
         log.note(">", b"G28\n")
     assert log.trouble == "no such file or directory"
+
+
+def test_the_orders_of_a_safe_end_are_logged_too(tmp_path: Path) -> None:
+    stop = threading.Event()
+    with TrafficLog(tmp_path / "a.log", "") as log, SimulatedPrinter(load().machine, speed=20.0) as printer:
+        timer = threading.Timer(1.0, stop.set)
+        timer.start()
+        print_lines(["M104 S200", *["G1 X5 F60", "G1 X0"] * 99], printer.path, stop=stop, medium=tapped(log.note))
+    lines = logged(tmp_path / "a.log")
+    assert any(line.startswith("> N") and "M104 S200" in line for line in lines)
+    assert "> M104 S0" in lines
+    assert any(line.startswith("< ok T:") for line in lines)
 
 
 def test_a_full_disk_ends_the_log_not_the_print() -> None:
