@@ -1,0 +1,116 @@
+"""A running print on a page: who is answered, what is told, and that it ends with the print."""
+
+import http.client
+import json
+import socket
+from collections.abc import Iterator
+from http.client import HTTPResponse
+
+import pytest
+
+from machine.app.view.live import Watched, served, state_of
+from machine.link.events import Temperature
+from machine.link.progress import Progress
+from profiles.errors import OutputError
+
+HALF = Progress(
+    sent=60, acknowledged=50, total=100, elapsed_s=10.0, left_s=9.5, share=0.5,
+    temperature=Temperature(nozzle_c=209.5, nozzle_target_c=210.0), part=2, parts=3, layer=7, file_line=123,
+)  # fmt: skip
+
+
+@pytest.fixture
+def watched(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
+    monkeypatch.setattr("machine.app.view.live.LAST_WORD_S", 0.0)
+    with served(b"<p>the page</p>") as running:
+        yield running
+
+
+def asked(watched: Watched, path: str, method: str = "GET", **headers: str) -> tuple[HTTPResponse, bytes]:
+    """What the server answers."""
+    connection = http.client.HTTPConnection("127.0.0.1", int(watched.address.split(":")[2].strip("/")), timeout=10)
+    connection.request(method, path, headers=headers)
+    answer = connection.getresponse()
+    content = answer.read()
+    connection.close()
+    return answer, content
+
+
+def test_the_page_and_the_state_are_served(watched: Watched) -> None:
+    assert asked(watched, "/")[1] == b"<p>the page</p>"
+    assert json.loads(asked(watched, "/state")[1]) == {"state": "waiting"}
+    watched.follow(HALF)
+    told = json.loads(asked(watched, "/state")[1])
+    assert (told["state"], told["line"], told["acknowledged"], told["total"]) == ("printing", 123, 50, 100)
+    assert (told["nozzle_c"], told["nozzle_target_c"], told["bed_c"]) == (209.5, 210.0, None)
+
+
+@pytest.mark.parametrize("path", ["/etc/passwd", "/../state", "/state/", "/?state", "/favicon.ico"])
+def test_nothing_else_is_served(watched: Watched, path: str) -> None:
+    assert asked(watched, path)[0].status == 404
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "HEAD", "OPTIONS"])
+def test_nothing_can_be_ordered(watched: Watched, method: str) -> None:
+    assert asked(watched, "/state", method)[0].status == 501
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("localhost", 200), ("localhost:8420", 200), ("127.0.0.1:1", 200),
+        ("evil.example", 403), ("evil.example:80", 403), ("127.0.0.1.evil.example:80", 403), ("", 403), ("[::1]:80", 403),
+    ],
+)  # fmt: skip
+def test_only_this_computer_by_name_is_answered(watched: Watched, host: str, status: int) -> None:
+    answer, content = asked(watched, "/state", Host=host)
+    assert answer.status == status
+    assert (b"waiting" in content) == (status == 200)
+
+
+def test_no_other_page_may_frame_it_or_keep_it(watched: Watched) -> None:
+    answer, _ = asked(watched, "/")
+    assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+    assert answer.headers["Cache-Control"] == "no-store"
+    assert answer.headers["Access-Control-Allow-Origin"] is None
+
+
+def test_it_listens_on_this_computer_only(watched: Watched) -> None:
+    assert watched.address.startswith("http://127.0.0.1:")
+    port = int(watched.address.split(":")[2].strip("/"))
+    with pytest.raises(OSError, match=r"refused|unreachable"), socket.create_connection(("127.0.0.2", port), timeout=5):
+        pass
+
+
+def test_a_port_in_use_is_refused_with_a_sentence(watched: Watched) -> None:
+    port = int(watched.address.split(":")[2].strip("/"))
+    with pytest.raises(OutputError, match=rf"--watch-port {port} cannot be used: address already in use"), served(b"", port):
+        pass
+
+
+def test_the_server_ends_with_the_print() -> None:
+    with served(b"page") as running:
+        port = int(running.address.split(":")[2].strip("/"))
+    with pytest.raises(ConnectionRefusedError), socket.create_connection(("127.0.0.1", port), timeout=5):
+        pass
+
+
+def test_a_print_that_fails_is_told_as_stopped() -> None:
+    def failing() -> Iterator[Watched]:
+        with served(b"page") as running:
+            yield running
+            raise KeyboardInterrupt
+
+    print_ = failing()
+    running = next(print_)
+    with pytest.raises(KeyboardInterrupt):
+        next(print_)
+    assert json.loads(running.state()) == {"state": "stopped"}
+
+
+def test_how_it_ended_is_said_once() -> None:
+    watched = Watched(b"")
+    watched.follow(HALF)
+    watched.end("stopped")
+    watched.end("done")
+    assert state_of(HALF, "stopped") == json.loads(watched.state())
