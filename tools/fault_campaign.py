@@ -1,0 +1,191 @@
+"""Fault campaign: seeded random faults in prints on the simulated printer, every one judged; the table stands in RESULTS.md.
+
+A print must end in exactly the program's strokes, each once and in order, or with the error that belongs to its faults, the
+machine safe: heaters off by the printer's own account, nothing moving; or, where nobody can reach the printer any more, with
+a message that says so. Sender and printer share a virtual clock: a print takes a second, and is the same at every run.
+
+Run: python tools/fault_campaign.py [--scripts 1000] [--first 0] [--lines 2000] [--jobs 2]
+"""
+
+import argparse
+import random
+import re
+import time
+from collections import Counter
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from machine.link.faults import HEALED, KINDS, Fault, FaultScript, random_script
+from machine.link.firmware import Habits
+from machine.link.record import Record
+from machine.link.stream import print_lines
+from machine.link.virtual import PATH, EndlessError, VirtualPrinter
+from profiles.errors import PrinterError
+from profiles.profile import load
+
+PROFILE = load()
+HEAT = ["M104 S200", "M109 S200", "G92 E0", "M83"]
+COLD = ["M104 S0", "M140 S0", "M107"]
+MOST_S = 7200.0  # twenty times what a print takes; a host that needs more hangs
+AFTER_S = 900.0  # watched after the end
+OF_THE_LINE = ("too noisy", "torn line", "asks for line", "restarted without a word", "has been silent")
+# What an error may say, by the kinds of faults in its script.
+WORDS: dict[str, tuple[str, ...]] = {
+    "error": ("Heating failed",),
+    "reset": ("restarted", "stands at"),
+    "silent reset": ("restarted", "stands at"),
+    "disconnect": ("was lost", "did not come back"),
+    "stall": ("has been silent", "no temperature"),
+    "block": ("has been silent", "has stopped reading", "no temperature"),
+    "heater failure": ("its heater or its sensor has failed", "Thermal Runaway", "Heating failed", "cold extrusion prevented"),
+    "thermal runaway": ("Thermal Runaway", "halted"),
+}
+UNREACHABLE = ("may still be on",)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One print: the kinds of its faults, the error it ended with ("": none), and what must not be about that."""
+
+    seed: int
+    kinds: tuple[str, ...]
+    error: str
+    virtual_s: float
+    wall_s: float
+    repeated: int
+    wrong: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The group of the table it belongs to."""
+        deadly = [kind for kind in self.kinds if kind not in (*HEALED, "delay")]
+        if not deadly:
+            return "bytes, oks, delays, false resends"
+        return f"with {deadly[0]}" if len(deadly) == 1 else "with several of these"
+
+
+def program(lines: int) -> list[str]:
+    """Heating and so many strokes, no two alike."""
+    strokes = [
+        f"G1 X{20 + k % 60}.{k % 1000:03d} Y{30 + k % 41}.5 E0.{10000 + k:05d} F6000"
+        for k in range(lines - len(HEAT) - len(COLD))
+    ]
+    return [*HEAT, *strokes, *COLD]
+
+
+def wanted(lines: Iterable[str]) -> np.ndarray:
+    """(n, 3) X, Y and filament of the program's strokes."""
+    return np.array([[float(word[1:]) for word in line.split()[1:4]] for line in lines if line.startswith("G1")])
+
+
+def script(seed: int, lines: int) -> FaultScript:
+    """One to twelve faults of up to four kinds; a third of the scripts holds what can be healed, a tenth faults by chance."""
+    rng = random.Random(seed)
+    if seed % 10 == 7:
+        chances = [Fault(kind, chance=rng.uniform(1e-5, 2e-4)) for kind in ("drop", "flip", "duplicate")]
+        oks = [Fault(kind, chance=rng.uniform(1e-3, 1e-2)) for kind in ("swallow ok", "truncate ok", "double ok")]
+        return FaultScript((*chances, *(Fault(f.kind, chance=f.chance, to_host=True) for f in chances), *oks), seed)
+    kinds = (*HEALED, "delay") if seed % 3 == 0 else rng.sample(KINDS, rng.randint(1, 4))
+    return random_script(seed, rng.randint(1, 12), range(5, lines), kinds)
+
+
+def habits(seed: int) -> Habits:
+    """The printer's build options of a trial."""
+    rng = random.Random(~seed)
+    return Habits(*(rng.random() < share for share in (0.5, 0.7, 0.8, 0.7)), rx_ring=128 if seed % 2 else None)
+
+
+def trial(seed: int, lines: int) -> Trial:
+    """Print once and judge."""
+    text, faults, began_s = program(lines), script(seed, lines), time.perf_counter()
+    baud = (None, 250000, 115200)[seed % 4 - 1] if seed % 4 else None
+    printer = VirtualPrinter(PROFILE.machine, habits(seed), faults, baud, MOST_S)
+    error, repeated = "", 0
+    try:
+        repeated = print_lines(text, PATH, medium=printer.medium, profile=PROFILE).repeated
+    except PrinterError as stopped:
+        error = str(stopped)
+    except EndlessError:
+        error = "hangs"
+    end_s = printer.now_s
+    wrong = [] if error == "hangs" else judged(text, faults, printer, error)
+    wrong += ["hangs"] if error == "hangs" else []
+    kinds = tuple(sorted({fault.kind for fault in faults.faults}))
+    return Trial(seed, kinds, error, end_s, time.perf_counter() - began_s, repeated, tuple(wrong))
+
+
+def judged(text: list[str], faults: FaultScript, printer: VirtualPrinter, error: str) -> list[str]:
+    """What is wrong about an end."""
+    end_s = printer.now_s
+    printer.firmware.advance(end_s + AFTER_S)
+    record, strokes = printer.record, wanted(text)
+    wrong = order(record, strokes, whole=not error)
+    if not error:
+        return wrong
+    kinds = {fault.kind for fault in faults.faults}
+    allowed = {*OF_THE_LINE, *(word for kind in kinds for word in WORDS.get(kind, ()))}
+    wrong += [] if any(word in error for word in allowed) else [f"not the right error: {error}"]
+    if not any(word in error for word in UNREACHABLE):
+        wrong += ["a heater is on"] if record.nozzle_target_c or record.bed_target_c else []
+        wrong += ["moves after the end"] if len(record.end) and record.begin_s[-1] > end_s + 5.0 else []
+    elif not {"disconnect", "stall", "block", "reset", "silent reset", "thermal runaway", "error"} & kinds:
+        wrong += ["a printer within reach was left with its heaters on"] if record.nozzle_target_c else []
+    return wrong
+
+
+def order(record: Record, strokes: np.ndarray, whole: bool) -> list[str]:
+    """Whether the executed strokes are the program's, each once and in order; the last may be cut short by a stop."""
+    pushed = record.end[:, 5] - record.start[:, 5]
+    got = np.column_stack([record.end[:, :2], pushed])[pushed > 1e-9]
+    if whole and len(got) != len(strokes):
+        return [f"{len(got)} of {len(strokes)} strokes although no error was told"]
+    if len(got) > len(strokes):
+        return [f"{len(got)} strokes, the program has {len(strokes)}"]
+    far = np.abs(got - strokes[: len(got)]).max(axis=1) > 1e-6
+    if far[:-1].any() or (len(far) and far[-1] and (whole or got[-1, 2] > strokes[len(got) - 1, 2])):
+        return [f"stroke {int(np.flatnonzero(far)[0]) + 1} is not the program's"]
+    return []
+
+
+def table(trials: list[Trial]) -> str:
+    """A row for every group of scripts."""
+    rows = ["| faults | scripts | exact | stopped | wrong | slowest, virtual s |", "|---|---|---|---|---|---|"]
+    for name in sorted({trial.name for trial in trials}):
+        mine = [trial for trial in trials if trial.name == name]
+        good = [trial for trial in mine if not trial.wrong]
+        exact = sum(not trial.error for trial in good)
+        counts = (len(mine), exact, len(good) - exact, len(mine) - len(good), round(max(t.virtual_s for t in mine)))
+        rows.append(f"| {name} | {' | '.join(str(count) for count in counts)} |")
+    return "\n".join(rows)
+
+
+def reasons(trials: list[Trial]) -> str:
+    """How often prints were stopped with which words."""
+    words = Counter(re.sub(r"[\d.]+|N\d+", "#", trial.error.partition(";")[0])[:90] for trial in trials if trial.error)
+    return "\n".join(f"{count:5d}  {text}" for text, count in words.most_common())
+
+
+def main() -> None:
+    """Run the campaign and print its table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default in (("scripts", 1000), ("first", 0), ("lines", 2000), ("jobs", 2)):
+        parser.add_argument(f"--{name}", type=int, default=default)
+    asked = parser.parse_args()
+    began_s, trials = time.perf_counter(), []
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        seeds = range(asked.first, asked.first + asked.scripts)
+        for done in pool.map(partial(trial, lines=asked.lines), seeds, chunksize=4):
+            trials.append(done)
+            for text in done.wrong:
+                print(f"seed {done.seed} ({', '.join(done.kinds)}): {text}", flush=True)
+    print(f"{len(trials)} scripts, {asked.lines} lines each, {time.perf_counter() - began_s:.0f} s")
+    print(f"\n{table(trials)}\n\n{reasons(trials)}")
+    raise SystemExit(any(done.wrong for done in trials))
+
+
+if __name__ == "__main__":
+    main()
