@@ -10,7 +10,7 @@ from machine.link import requests
 from machine.link.control import Control, Request, Wish
 from machine.link.events import Action, Echo, Event, Identity, Ok, Position, Temperature
 from machine.link.framing import LINE_LIMIT, command_of
-from machine.link.journal import Journal, Moment
+from machine.link.journal import FINISHED, Journal, Moment
 from machine.link.modal import Modal, axes_of
 from machine.link.park import Laid, lift_words, standing_mm
 from machine.link.progress import Place, Progress
@@ -30,6 +30,7 @@ COLD = "cold extrusion prevented"
 BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
 CHECK_S = 30.0  # between looks at the position where a layer ends
 CHECK_MUTE_S = 10.0  # the same for a printer that does not tell what it has executed
+WISHES = 16  # a turn: what asks without end must not hold up the print
 NEAR = 0.1  # mm or deg: M114 tells hundredths, motor steps are smaller
 
 
@@ -91,7 +92,7 @@ class Feed:
         self._laid = Laid(machine) if machine is not None else None
         self._watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c)) if machine is not None else Watchdog()
         self.talk: Talk
-        self.state, self._message = "printing", ""
+        self.state, self._message, self.finished = "printing", "", False
         self.temperature, self.firmware = Temperature(), "unknown"
         self.warnings: list[str] = []
         self.sent = 0
@@ -255,7 +256,7 @@ class Feed:
                 talk.send(f"{name} S100")
         talk.drain()
         self.trail.barrier()
-        self.state = "finished"
+        self.finished = True
         self._mark()
         self.show(talk.medium.now_s())
 
@@ -316,7 +317,10 @@ class Feed:
         """See what a person wants. Raises CancelledError, EmergencyError."""
         if self._stop is not None and self._stop.is_set():
             raise CancelledError
-        while self._control is not None and (request := self._control.take()) is not None:
+        for _ in range(WISHES):
+            request = None if self._control is None else self._control.take()
+            if request is None:
+                return
             self._grant(request)
 
     def heed_lost(self) -> None:
@@ -402,7 +406,7 @@ class Feed:
     def _moment(self) -> Moment:
         trail = self.trail
         number = self.talk.protocol.window.wire(trail.number)
-        return Moment(trail.sent, trail.acknowledged, trail.executed, number, trail.pose, self.state)
+        return Moment(trail.sent, trail.acknowledged, trail.executed, number, trail.pose, FINISHED if self.finished else self.state)
 
     def _mark(self) -> None:
         if self._journal is not None:

@@ -17,6 +17,7 @@ from zlib import crc32
 from profiles.errors import JournalError, OutputError
 
 FORMAT = 1
+FINISHED = "finished"
 EVERY_LINES = 16  # a record after so many acknowledged lines,
 EVERY_S = 0.1  # or after so long when fewer came
 SYNC_S = 1.0  # so old may the disk be after a power cut of the computer
@@ -58,7 +59,7 @@ class Story:
     @property
     def finished(self) -> bool:
         """Whether the print ran to its end."""
-        return self.last.state == "finished"
+        return self.last.state == FINISHED
 
 
 class Journal:

@@ -174,7 +174,7 @@ class _Print:
     def _outcome(self, began_s: float, off: bool | None) -> Outcome:
         feed = self.feed
         return Outcome(
-            cancelled=feed.state != "finished",
+            cancelled=not feed.finished,
             sent=feed.sent,
             acknowledged=feed.acknowledged,
             repeated=self.talk.protocol.repeated,
