@@ -18,6 +18,8 @@ def kept_rows(program: ParsedProgram, most: int = MOST_ROWS) -> NDArray[np.int64
     begins or ends a stroke, a turn, a layer or a part stays, and so does every row of another kind, however many there are.
     """
     kept = np.arange(len(program.line))
+    if len(kept) <= most:
+        return kept
     inner = _inside_strokes(program)
     tolerance_mm = FINEST_MM
     while len(kept) > most and inner.any():
