@@ -1,5 +1,6 @@
 // Rows: the moves of the print, one row a straight move, and what follows from them: layers, seams, places on the work.
 
+const TEXELS = 2048; // in a line of the textures that hold the path
 const KIND = { travel: 0, extrude: 1, retract: 2, rotate: 3, wipe: 4, prime: 5 };
 const WALLS = /^(external perimeter|outer wall|wall-outer)$/i;
 
@@ -54,7 +55,8 @@ function placeAt(rows, row, share) {
  */
 function pathOf(rows, chain) {
   const jumps = rows.jumpRow.filter((row) => row > 0), slots = rows.count + jumps.length;
-  const points = new Float32Array(3 * (slots + 1)), verticals = new Int16Array(2 * slots), sizes = new Uint16Array(2 * slots);
+  const texels = Math.max(Math.ceil((slots + 2) / TEXELS), 1) * TEXELS; // whole lines of a texture
+  const points = new Float32Array(3 * texels), verticals = new Int16Array(2 * texels), sizes = new Uint16Array(2 * texels);
   const place = workpieceOf(chain), [x, y, z, tilt, turn] = rows.axes;
   let jump = 0, slot = 0;
   const begin = (k) => place(...rows.jumpStart.map((axis) => axis[k] / 1000), points, 3 * slot);
@@ -70,7 +72,7 @@ function pathOf(rows, chain) {
   }
   const slotOf = jumps.length ? (row) => row + countUpTo(jumps, row) : (row) => row;
   const breaks = jumps.map((row, k) => row + k); // the empty slots
-  return { slots, points, verticals, sizes, slot: slotOf, row: (slot) => slot - countUpTo(breaks, slot) };
+  return { slots, texels, points, verticals, sizes, slot: slotOf, row: (slot) => slot - countUpTo(breaks, slot) };
 }
 
 /** Rows at which something stands to be marked: where an outer wall begins, where filament is pulled back, pushed forward. */

@@ -34,10 +34,3 @@ function bufferOf(gl, content, usage = gl.STATIC_DRAW, target = gl.ARRAY_BUFFER)
   gl.bufferData(target, content, usage);
   return buffer;
 }
-
-/** A buffer with `margin` empty bytes before and behind the content. */
-function framedBuffer(gl, content, margin) {
-  const buffer = bufferOf(gl, content.byteLength + 2 * margin);
-  gl.bufferSubData(gl.ARRAY_BUFFER, margin, content);
-  return buffer;
-}

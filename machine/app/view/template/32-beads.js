@@ -1,51 +1,70 @@
-// Beads: every extruding row at its true width and height, one instance a slot, so that the slider is a count.
+// Beads: every extruding row at its true width and height, in the order of the print, so that the slider is a count.
 // Near: a prism of eight sides with a rounded shade, mitred where one bead follows the other, a blunt tip where it ends.
 // Far: the two faces of a box that the eye can see, shaded as if their common edge were round.
 
+const AT_ONCE = 4096; // beads in one draw
 const CLOSE_PIXELS = 3; // a bead this wide on the screen is drawn as a prism
 
+// One vertex finds its own row: corners are numbered through, so many to a bead. Faster than instances, which cost as much as
+// a draw of their own on some cards and on all processors.
 const BEAD_HEAD = `
-in vec3 before, start, end, after;
-in vec2 sizeBefore, sizeTold, sizeAfter, vertical; // sizes: width and height, thousandths of mm
-in vec4 colour;
+in vec4 corner;
+uniform highp sampler2D points;
+uniform highp usampler2D sizes; // width and height, thousandths of mm
+uniform highp isampler2D verticals;
+uniform lowp sampler2D colours;
 uniform mat4 toClip, toEye;
 uniform vec3 eye;
-uniform int last;
-uniform float share;
 uniform vec4 tint;
-uniform int firstSlot, stride;
+uniform int first, stride, corners, last;
+uniform float share;
 flat out vec4 paint;
 flat out int slot;
+out vec3 normal;
+vec3 start, end, stop, up, along;
 vec2 size;
+ivec2 texel(int k) { return ivec2(k & ${TEXELS - 1}, k >> ${Math.log2(TEXELS)}); }
+vec3 point(int k) { return texelFetch(points, texel(k), 0).xyz; }
+vec2 sizeOf(int k) { return k < 0 ? vec2(0.0) : vec2(texelFetch(sizes, texel(k), 0).xy) * 0.001; }
 vec3 unfolded(vec2 f) {
   vec3 v = vec3(f, 1.0 - abs(f.x) - abs(f.y));
   if (v.z < 0.0) v.xy = (1.0 - abs(v.yx)) * vec2(v.x < 0.0 ? -1.0 : 1.0, v.y < 0.0 ? -1.0 : 1.0);
   return normalize(v);
 }
-bool hidden() {
+/** Takes the bead's values; false where nothing is to be drawn. */
+bool laid() {
+  slot = first + (gl_VertexID / corners) * stride;
+  size = sizeOf(slot);
+  vec4 colour = texelFetch(colours, texel(slot), 0);
+  start = point(slot);
+  end = point(slot + 1);
+  if (colour.a == 0.0 || size.x == 0.0 || start == end) {
+    gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+    return false;
+  }
   paint = vec4(mix(colour.rgb, tint.rgb, tint.a), 1.0);
-  size = sizeTold * 0.001;
-  slot = firstSlot + gl_InstanceID * stride;
-  return colour.a == 0.0 || size.x == 0.0 || start == end;
+  stop = slot == last ? mix(start, end, share) : end;
+  up = unfolded(vec2(texelFetch(verticals, texel(slot), 0).xy) / 32767.0);
+  along = normalize(end - start);
+  return true;
 }
-vec3 reached() { return gl_InstanceID == last ? mix(start, end, share) : end; }
 `;
 
 const BEAD_NEAR = `${BEAD_HEAD}
-in vec4 corner; // which end, side of the flat middle, place on the round: across, up; which end 2, 3: the tips
-out vec3 normal;
+// corner: which end, side of the flat middle, place on the round across and up; ends 2, 3: the tips
 vec3 sideways(vec3 along, vec3 up) { return normalize(cross(along, up)); }
 vec3 mitred(vec3 mine, vec3 other) {
   vec3 middle = normalize(mine + other);
   return middle / max(dot(middle, mine), 0.62);
 }
 void main() {
-  if (hidden()) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); normal = vec3(0.0); return; }
-  vec3 up = unfolded(vertical), stop = reached(), along = normalize(end - start), mine = sideways(along, up), across = mine;
+  if (!laid()) return;
+  vec3 mine = sideways(along, up), across = mine;
   bool ending = mod(corner.x, 2.0) > 0.5, tip = corner.x > 1.5;
-  vec3 here = ending ? stop : start, other = ending ? after - end : start - before;
-  float neighbour = ending ? (gl_InstanceID == last ? 0.0 : sizeAfter.x) : sizeBefore.x;
-  bool joined = neighbour > 0.0 && dot(other, other) > 0.0 && dot(normalize(other), along) > -0.3;
+  vec3 here = ending ? stop : start, other = vec3(0.0);
+  int beside = ending ? slot + 1 : slot - 1;
+  if (sizeOf(beside).x > 0.0 && !(ending && slot == last)) other = point(beside + 1) - point(beside);
+  bool joined = dot(other, other) > 0.0 && dot(normalize(other), along) > -0.3;
   if (joined) across = mitred(mine, sideways(normalize(other), up));
   float round = 0.5 * min(size.x, size.y), flat_ = max(0.5 * (size.x - size.y), 0.0);
   vec3 place = here - up * 0.5 * size.y + across * (corner.y * flat_ + corner.z * round) + up * corner.w * 0.5 * size.y;
@@ -57,13 +76,11 @@ void main() {
 }`;
 
 const BEAD_FAR = `${BEAD_HEAD}
-in vec4 corner; // which end; across and up, 1: towards the eye; 0: the side's face, 1: the one above or below
+// corner: which end; across and up, 1: towards the eye; 0: the side's face, 1: the one above or below
 uniform float roundness;
-out vec3 normal;
 void main() {
-  if (hidden()) { gl_Position = vec4(2.0, 2.0, 2.0, 1.0); normal = vec3(0.0); return; }
-  vec3 up = unfolded(vertical), along = normalize(end - start), side = normalize(cross(along, up));
-  vec3 middle = (corner.x > 0.5 ? reached() : start) - up * 0.5 * size.y, sight = eye - middle;
+  if (!laid()) return;
+  vec3 side = normalize(cross(along, up)), middle = (corner.x > 0.5 ? stop : start) - up * 0.5 * size.y, sight = eye - middle;
   if (dot(sight, side) < 0.0) side = -side;
   vec3 over = dot(sight, up) < 0.0 ? -up : up;
   vec3 place = middle + 0.5 * (side * corner.y * size.x + over * corner.z * size.y) + along * (corner.x - 0.5) * 0.5 * size.y;
@@ -102,68 +119,73 @@ function twoFaces() {
 }
 
 function beadsOf(gl, path) {
-  const buffers = {
-    points: framedBuffer(gl, path.points, 12),
-    sizes: framedBuffer(gl, path.sizes, 4),
-    verticals: bufferOf(gl, path.verticals),
-    colours: bufferOf(gl, 4 * path.slots, gl.DYNAMIC_DRAW),
+  const textures = {
+    points: texture(gl, gl.RGB32F, gl.RGB, gl.FLOAT, path.points, 3),
+    sizes: texture(gl, gl.RG16UI, gl.RG_INTEGER, gl.UNSIGNED_SHORT, path.sizes, 2),
+    verticals: texture(gl, gl.RG16I, gl.RG_INTEGER, gl.SHORT, path.verticals, 2),
+    colours: texture(gl, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4 * path.texels), 4),
   };
-  const near = bodyOf(gl, BEAD_NEAR, prism(), buffers);
-  const far = bodyOf(gl, BEAD_FAR, twoFaces(), buffers);
+  const near = bodyOf(gl, BEAD_NEAR, prism()), far = bodyOf(gl, BEAD_FAR, twoFaces());
   const paint = (colours) => {
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.colours);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, colours);
+    gl.bindTexture(gl.TEXTURE_2D, textures.colours);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, colours.length / 4 / TEXELS, gl.RGBA, gl.UNSIGNED_BYTE, colours);
   };
   /** seen: {toClip, toEye, eye, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share} of the row under way. */
   const draw = (seen, ranges, moving, stride, picking) => {
     const body = seen.pixels > CLOSE_PIXELS ? near : far, { to } = body.program;
     body.program.use();
     gl.bindVertexArray(body.vao);
+    Object.entries(textures).forEach(([name, held], unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, held);
+      gl.uniform1i(to(name), unit);
+    });
     gl.uniformMatrix4fv(to("toClip"), false, seen.toClip);
     gl.uniformMatrix4fv(to("toEye"), false, seen.toEye);
     gl.uniform3fv(to("eye"), seen.eye);
     gl.uniform1f(to("roundness"), clamp(seen.pixels / CLOSE_PIXELS - 0.25, 0, 1));
     gl.uniform1i(to("picking"), picking ? 1 : 0);
+    gl.uniform1i(to("last"), moving.slot);
     gl.uniform1f(to("share"), moving.share);
     gl.uniform1i(to("stride"), stride);
+    gl.uniform1i(to("corners"), body.corners);
     for (const { first, end, tint } of ranges) {
-      if (end <= first) continue;
-      body.point(first, stride);
-      gl.uniform1i(to("firstSlot"), first);
-      gl.uniform1i(to("last"), stride === 1 ? moving.slot - first : -1);
       gl.uniform4fv(to("tint"), tint);
-      gl.drawElementsInstanced(gl.TRIANGLES, body.indices, gl.UNSIGNED_SHORT, 0, Math.ceil((end - first) / stride));
+      for (let from = first; from < end; from += AT_ONCE * stride) {
+        gl.uniform1i(to("first"), from);
+        const beads = Math.min(Math.ceil((end - from) / stride), AT_ONCE);
+        gl.drawElements(gl.TRIANGLES, beads * body.indices, gl.UNSIGNED_INT, 0);
+      }
     }
     gl.bindVertexArray(null);
   };
   return { paint, draw };
 }
 
-/** One shape of a bead: its program, its corners, and the instances' attributes from any slot on. */
-function bodyOf(gl, vertex, shape, { points, sizes, verticals, colours }) {
-  const program = programOf(gl, vertex, BEAD_PAINT), vao = gl.createVertexArray();
+/** Values by slot, TEXELS to a line. */
+function texture(gl, inside, format, type, content, each) {
+  const held = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, held);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
+  gl.texImage2D(gl.TEXTURE_2D, 0, inside, TEXELS, content.length / each / TEXELS, 0, format, type, content);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+  return held;
+}
+
+/** One shape of a bead: its program, and the corners and triangles of as many beads as are drawn at once. */
+function bodyOf(gl, vertex, { corners, faces }) {
+  const program = programOf(gl, vertex, BEAD_PAINT), vao = gl.createVertexArray(), each = corners.length / 4;
+  const all = new Float32Array(corners.length * AT_ONCE), indices = new Uint32Array(faces.length * AT_ONCE);
+  for (let bead = 0; bead < AT_ONCE; bead++) {
+    all.set(corners, bead * corners.length);
+    faces.forEach((corner, k) => { indices[bead * faces.length + k] = bead * each + corner; });
+  }
   gl.bindVertexArray(vao);
-  bufferOf(gl, shape.faces, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-  bufferOf(gl, shape.corners);
+  bufferOf(gl, indices, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
+  bufferOf(gl, all);
   gl.enableVertexAttribArray(program.at("corner"));
   gl.vertexAttribPointer(program.at("corner"), 4, gl.FLOAT, false, 0, 0);
-  const instanced = [
-    ["before", points, 3, gl.FLOAT, false, 12, 0], ["start", points, 3, gl.FLOAT, false, 12, 1],
-    ["end", points, 3, gl.FLOAT, false, 12, 2], ["after", points, 3, gl.FLOAT, false, 12, 3],
-    ["sizeBefore", sizes, 2, gl.UNSIGNED_SHORT, false, 4, 0], ["sizeTold", sizes, 2, gl.UNSIGNED_SHORT, false, 4, 1],
-    ["sizeAfter", sizes, 2, gl.UNSIGNED_SHORT, false, 4, 2], ["vertical", verticals, 2, gl.SHORT, true, 4, 0],
-    ["colour", colours, 4, gl.UNSIGNED_BYTE, true, 4, 0],
-  ].filter(([name]) => program.at(name) >= 0);
-  for (const [name] of instanced) {
-    gl.enableVertexAttribArray(program.at(name));
-    gl.vertexAttribDivisor(program.at(name), 1);
-  }
   gl.bindVertexArray(null);
-  const point = (first, stride) => {
-    for (const [name, buffer, count, type, normalized, bytes, ahead] of instanced) {
-      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      gl.vertexAttribPointer(program.at(name), count, type, normalized, bytes * stride, bytes * (first + ahead));
-    }
-  };
-  return { program, vao, point, indices: shape.faces.length };
+  return { program, vao, corners: each, indices: faces.length };
 }

@@ -6,7 +6,7 @@ const LEFT = { none: 0, printed: 1, straight: 2 };
 /** Corners of all faces and, a part each, which of them are its own. */
 function surfacesOf({ header, array }) {
   const vertices = array("vertices"), faces = array("faces"), [marks] = array("face_marks");
-  if (faces.length < 3) return null;
+  if (!faces[0].length) return null;
   const places = new Float32Array(9 * faces[0].length);
   for (let face = 0, at = 0; face < faces[0].length; face++)
     for (let corner = 0; corner < 3; corner++)

@@ -42,7 +42,7 @@ function spread(rows, value) {
 
 /** Colours of all slots for a mode, hidden types left out (alpha 0), and the legend: entries or a scale. */
 function coloured(mode, rows, path, extra) {
-  const colours = new Uint32Array(path.slots);
+  const colours = new Uint32Array(path.texels);
   const { colour, legend } = mode in SCALES ? scaleOf(mode, rows, extra) : (mode === "kind" ? typesOf : partsOf)(rows, extra);
   const jumps = rows.jumpRow.length > 1;
   for (let i = 0; i < rows.count; i++) {

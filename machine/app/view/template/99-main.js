@@ -21,6 +21,7 @@ async function main() {
   handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => goTo(picture.rowAt(event), scene, player) });
   if (header.live && location.protocol.startsWith("http")) follow(print, scene, player);
   if (header.thinned) notice(thinnedTold(header.thinned));
+  document.documentElement.dataset.openedMs = performance.now().toFixed(0);
   document.documentElement.dataset.state = "ready";
 }
 
