@@ -38,12 +38,6 @@ class Protocol(Conversation):
             self._act(event, now_s)
         self._pass(now_s)
 
-    def interrupted(self, now_s: float) -> None:
-        """The line was broken and is whole again: ask what has arrived. A printer that restarted meanwhile betrays itself."""
-        self._out.clear()
-        self._hearing.receive(b"\n", now_s)  # the rest of a half line will never come
-        self._turn(Signal.STALL, now_s)
-
     def _act(self, event: told.Event, now_s: float) -> None:
         if act := _ACTS.get(type(event)):
             act(self, event, now_s)
