@@ -1,15 +1,23 @@
-"""Base: what part 1 stands on, how well it holds there, and its first layer without the elephant's foot."""
+"""Base: the plate, what part 1 stands on, how well it holds there, and its first layer without the elephant's foot."""
 
 from math import inf
 
 import numpy as np
 
 from mdp.mesh import Floats
+from profiles.machine import Table
 from slicer.polygons import Polygons, contours, grown
 
 PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
 ADHESION_N_MM2 = 0.2  # of plastic to a clean warm plate, a few times less than published peel tests of PLA and PETG give
 TURNS = 36  # directions in which it may tip
+
+
+def plate(table: Table) -> Polygons:
+    """The plate's outline in the frame of a part that is printed with the table level, part 1's."""
+    if table.size_mm is not None:
+        return Polygons.square(table.size_mm, True)
+    return Polygons.circle(table.radius_mm, 180)
 
 
 def tips_over(base: Polygons, height_mm: float) -> bool:

@@ -6,17 +6,18 @@ from profiles.process import Process
 from slicer.base import tips_over
 from slicer.bead import Bead, spacing_mm
 from slicer.paths import Kind
-from slicer.polygons import Polygons, area_mm2, contours, rounded
+from slicer.polygons import Polygons, area_mm2, contours, grown, rounded
 from slicer.seam import begun_at_rear
 
 RANK = -2000
+LEAST_MM2 = 1e-3  # areas smaller than this are rounding
 
 
-def brim(footprint: Polygons, base: Polygons, top_mm: float, process: Process, height_mm: float) -> list[Bead]:
+def brim(footprint: Polygons, base: Polygons, floor: Polygons, top_mm: float, process: Process, height_mm: float) -> list[Bead]:
     """The brim, outermost bead first so that it ends at the part; without a brim the skirt's loops.
 
-    footprint: all that the first layer prints; base: what of it the print stands on; top_mm: how high it will be. A base
-    that would tip over gets a brim of process.small_base_brim_mm.
+    footprint: all that the first layer prints; base: what of it the print stands on; floor: the plate, which no loop leaves;
+    top_mm: how high the print will be. A base that would tip over gets a brim of process.small_base_brim_mm.
     """
     spacing = spacing_mm(process.line_width_mm, height_mm)
     width = process.brim_mm
@@ -26,10 +27,14 @@ def brim(footprint: Polygons, base: Polygons, top_mm: float, process: Process, h
         count, nearest = max(ceil(width / spacing - 1e-9), 1), process.brim_gap_mm + 0.5 * spacing
     else:
         count, nearest = process.skirt_loops, process.skirt_distance_mm + 0.5 * process.line_width_mm
-    outside = _outside(footprint)
+    outside, half = _outside(footprint), 0.5 * process.line_width_mm
     beads: list[Bead] = []
     for k in reversed(range(count)):
-        loops = [loop for loop in contours(rounded(outside, nearest + k * spacing)) if area_mm2(loop) > 0]
+        # Along the plate's edge the loops lie beside each other as they do elsewhere; one that finds no room is left out.
+        around = rounded(outside, nearest + k * spacing) ^ grown(floor, -half - (count - 1 - k) * spacing)
+        if (rounded(outside, min(half, nearest)) - around).area() > LEAST_MM2:
+            continue
+        loops = [loop for loop in contours(around) if area_mm2(loop) > 0]
         beads += [Bead(Kind.SKIRT, begun_at_rear(loop), process.line_width_mm, RANK - k) for loop in loops]
     return beads
 

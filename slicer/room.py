@@ -81,11 +81,11 @@ def rooms(
     process: Process,
     below: Polygons | None,
     forbidden: Sequence[Polygons],
-    far_mm: float,
+    floor: Polygons,
 ) -> Room:
     """The room of as many layers as there are `forbidden`, for the part with these outlines.
 
-    below: plastic just under the base plane, None: the platform, which is ground everywhere up to far_mm from the origin.
+    below: plastic just under the base plane, None: the platform, all of whose floor is ground.
     """
     count, radius = len(forbidden), process.line_width_mm
     top = at.tip_mm
@@ -110,7 +110,7 @@ def rooms(
             stands.append(base)
         ground.append(united(stands))
         if m == 0 and below is None:
-            start = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True)
+            start = grown(floor, -radius)
         else:
             start = ground[m] if m == 0 or reached[-1].is_empty() else _leant(reached[-1], float(lean[m])) + ground[m]
         reached.append(start if start.is_empty() else (start - whole).simplify(FINE_MM))

@@ -91,7 +91,7 @@ def _beside(stack: Stack, layer: int, part: Part, later: Sequence[Part]) -> list
         beads += pedestal_beads(outline, layer, stack.pedestal_layers, process, height_mm)
     if foot:
         top_mm = max(float(each.mesh.bounds_mm[1, 2]) for each in (part, *later))
-        beads += brim(united([outline, props.areas[0]]), outline, top_mm, process, height_mm)
+        beads += brim(united([outline, props.areas[0]]), outline, stack.floor, top_mm, process, height_mm)
     return beads
 
 

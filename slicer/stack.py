@@ -7,7 +7,7 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.base import compensated
+from slicer.base import compensated, plate
 from slicer.contact import Contact, contacts
 from slicer.forbidden import far_mm, forbidden
 from slicer.heights import Heights, heights_of
@@ -28,8 +28,8 @@ class Stack:
 
     outlines: whole sections; own: without the pedestal; walls and regions: of own; contacts: what hangs and what bridges;
     processes: the settings with the extra walls of an interface. beneath: the plastic under the first layer, None on the
-    platform; pedestal_layers: how many of the lowest layers the pedestal takes; density: of the sparse infill's pattern;
-    edges: where a seam would lie on an interface's edge.
+    platform; floor: the plate's outline, of use to part 1; pedestal_layers: how many of the lowest layers the pedestal
+    takes; density: of the sparse infill's pattern; edges: where a seam would lie on an interface's edge.
     """
 
     at: Heights
@@ -41,6 +41,7 @@ class Stack:
     processes: Sequence[Process]
     supports: Supports
     beneath: Polygons | None
+    floor: Polygons
     pedestal_layers: int
     density: float
     edges: Floats
@@ -65,8 +66,8 @@ def stack_of(part: Part, profile: Profile, earlier: Sequence[Part], later: Seque
     below = beneath(part, earlier, outlines[0])
     filled = regions(own, [w.inside for w in walled], below, process)
     over = contacts(mesh, outlines, at.cut_mm, process, below)
-    far = far_mm(mesh)
-    shut = forbidden(part, later, at.tip_mm - at.height_mm, at.tip_mm, process.support_distance_mm, far)
+    shut = forbidden(part, later, at.tip_mm - at.height_mm, at.tip_mm, process.support_distance_mm, far_mm(mesh))
+    floor = plate(profile.machine.table)
     return Stack(
         at=at,
         outlines=outlines,
@@ -75,8 +76,9 @@ def stack_of(part: Part, profile: Profile, earlier: Sequence[Part], later: Seque
         regions=filled,
         contacts=over,
         processes=processes,
-        supports=supports([c.hanging for c in over], outlines, at, process, below, shut, far),
+        supports=supports([c.hanging for c in over], outlines, at, process, below, shut, floor),
         beneath=below,
+        floor=floor,
         pedestal_layers=low,
         density=pattern_density([region.sparse for region in filled], process, process.layer_height_mm),
         edges=interface_edges(part, outlines[0], below, later),

@@ -46,12 +46,12 @@ def supports(
     process: Process,
     below: Polygons | None,
     forbidden: Sequence[Polygons],
-    far_mm: float,
+    floor: Polygons,
 ) -> Supports:
     """Support below the hanging places of each layer.
 
     below: plastic of earlier parts just under the base plane; None: the platform. forbidden: per layer what later parts
-    must find empty. far_mm: no part and no support is farther than this from the origin.
+    must find empty. floor: the plate, which ends somewhere.
     """
     nothing = (Polygons(),) * len(outlines)
     if process.support == "none":
@@ -61,13 +61,13 @@ def supports(
     count = max((k for k, place in enumerate(wanted) if not place.is_empty()), default=-1)
     if count < 0:
         return Supports(nothing, nothing, nothing)
-    room = rooms(outlines, at, process, below, forbidden[:count], far_mm)
+    room = rooms(outlines, at, process, below, forbidden[:count], floor)
     bodies, contacts = _descended(wanted, room, process)
     printed = _standing(rooted(bodies, outlines, room, process), room, process, below is None)
     missed = _missed(wanted, printed, outlines, room, process)
     dense = _dense(printed, contacts, room, process)
     if below is None:
-        printed[0] = _foot(printed[0], outlines, room, process) - forbidden[0]
+        printed[0] = (_foot(printed[0], outlines, room, process) - forbidden[0]) ^ floor
     rest = nothing[len(printed) :]
     return Supports((*printed, *rest), (*dense, *rest), missed)
 

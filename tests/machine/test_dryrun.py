@@ -121,6 +121,13 @@ def test_plastic_on_the_plate_or_high_above_its_rim_is_no_fault(moves: str) -> N
     assert _codes(BEGIN + moves + END) == []
 
 
+def test_a_rectangular_plate_ends_at_its_sides_not_at_its_corners() -> None:
+    oblong = load(settings=["machine.table.size_mm=[190, 100]", "machine.uncalibrated=[]"])
+    strokes = [f"G0 X80 F3000\nG0 Z0.2 F600\nG1 X{x} E0.1" for x in (94, 96)]
+    codes = [{f.code for f in dry_run((BEGIN + stroke + END).splitlines(), oblong).findings} for stroke in strokes]
+    assert ["off-plate" in found for found in codes] == [False, True]
+
+
 def test_a_purge_beside_the_plate_is_no_fault() -> None:
     assert _codes(BEGIN + ";TYPE:Custom\nG0 X101 F3000\nG0 Z0.2 F600\nG1 X110 E0.1" + END) == []
 

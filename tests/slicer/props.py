@@ -12,7 +12,7 @@ from slicer.contact import contacts
 from slicer.forbidden import far_mm, forbidden
 from slicer.heights import heights_of
 from slicer.interface import beneath
-from slicer.polygons import cleaned
+from slicer.polygons import Polygons, cleaned
 from slicer.section import sections
 from slicer.support import Supports, supports
 from tests.slicer.hand import as_shapely, profile
@@ -30,7 +30,7 @@ def supported(part: Part, *settings: str, earlier: Sequence[Part] = (), later: S
     shut = forbidden(part, later, at.tip_mm - at.height_mm, at.tip_mm, process.support_distance_mm, far_mm(mesh))
     hanging = [contact.hanging for contact in contacts(mesh, outlines, at.cut_mm, process, below)]
     values = {"hanging": hanging, "outlines": outlines, "at": at, "process": process, "below": below, "forbidden": shut}
-    return values, supports(**values, far_mm=far_mm(mesh))
+    return values, supports(**values, floor=Polygons.square((400.0, 400.0), True))
 
 
 def assert_sound(values: Any, found: Supports) -> None:

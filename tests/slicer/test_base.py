@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -9,7 +10,7 @@ from slicer.base import compensated, section_modulus_mm3, tips_over
 from slicer.paths import Kind
 from slicer.polygons import Polygons
 from slicer.slice import slice_part
-from tests.shapes import box
+from tests.shapes import box, tee
 from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
 
 
@@ -85,3 +86,21 @@ def test_thin_places_keep_their_width():
     assert less.area == pytest.approx(19.6**2 + 10 * 0.6, abs=0.3)
     assert less.bounds == pytest.approx((0.2, 0.2, 30, 19.8), abs=1e-6)
     assert len(getattr(less, "geoms", [less])) == 1
+
+
+PLATE = "machine.table.radius_mm=14"
+
+
+def test_a_skirt_that_finds_no_room_on_the_plate_follows_its_edge():
+    wide = profile("process.skirt_loops=2", "process.small_base_brim_mm=0", "process.support=none", PLATE)
+    skirt = of_kind(slice_part(whole(box(18, 18, 2)), wide), Kind.SKIRT)
+    farthest = [np.hypot(*path.points.T).max() for path in skirt]
+    assert farthest == pytest.approx([14 - 0.225, 14 - 0.225 - 0.407], abs=0.01)
+    assert all(as_shapely(Polygons.square((18, 18), True)).distance(shapely.LineString(p.points)) > 0.2 for p in skirt)
+
+
+def test_support_stands_on_the_plate_only_and_leans_over_its_edge():
+    near, far = (slice_part(whole(tee()), profile(f"machine.table.radius_mm={radius}")) for radius in (100, 12))
+    reach = [np.hypot(*np.vstack([p.points for p in s.layers[0].paths]).T).max() for s in (near, far)]
+    assert reach[0] > 13 > 12 >= reach[1]
+    assert (near.unsupported_mm2, far.unsupported_mm2) == (0.0, 0.0)
