@@ -49,4 +49,5 @@ class Dialect:
     filament_mode: FilamentMode = "apart"
     macros: bool = False  # knows lines of NAME KEY=VALUE
     value_word: str = "S"  # of temperatures and fans
+    stands: tuple[str, ...] = ()  # after a restart: the axes stand at {x_mm} {y_mm} {z_mm} {tilt_deg} {turn_deg}
     serial: bool = True  # takes numbered lines with checksums over a serial line and answers ok

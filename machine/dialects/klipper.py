@@ -8,6 +8,12 @@ from dataclasses import replace
 
 from machine.dialects.dialect import Dialect
 
+_STANDS = (
+    "SET_KINEMATIC_POSITION X={x_mm} Y={y_mm} Z={z_mm}",
+    "MANUAL_STEPPER STEPPER={tilt_stepper} SET_POSITION={tilt_deg}",
+    "MANUAL_STEPPER STEPPER={turn_stepper} SET_POSITION={turn_deg}",
+)
+
 KLIPPER_STEPPERS = Dialect(
     firmware="Klipper with MANUAL_STEPPER",
     longest_line=120,  # it keeps more; the stream's checksum is made for no longer ones
@@ -25,8 +31,13 @@ KLIPPER_STEPPERS = Dialect(
     largest_delta=True,
     filament_mode="carried",
     macros=True,
+    stands=_STANDS,
 )
 
+_LETTERS = (
+    "MANUAL_STEPPER STEPPER={tilt_stepper} GCODE_AXIS={tilt} LIMIT_VELOCITY={tilt_speed} LIMIT_ACCEL={tilt_acceleration}",
+    "MANUAL_STEPPER STEPPER={turn_stepper} GCODE_AXIS={turn} LIMIT_VELOCITY={turn_speed} LIMIT_ACCEL={turn_acceleration}",
+)
 _FREE = ("MANUAL_STEPPER STEPPER={tilt_stepper} GCODE_AXIS=", "MANUAL_STEPPER STEPPER={turn_stepper} GCODE_AXIS=")
 
 KLIPPER = replace(
@@ -34,9 +45,7 @@ KLIPPER = replace(
     firmware="Klipper with GCODE_AXIS",
     steppers=False,
     before_start=(*_FREE, *KLIPPER_STEPPERS.before_start),
-    after_start=(
-        "MANUAL_STEPPER STEPPER={tilt_stepper} GCODE_AXIS={tilt} LIMIT_VELOCITY={tilt_speed} LIMIT_ACCEL={tilt_acceleration}",
-        "MANUAL_STEPPER STEPPER={turn_stepper} GCODE_AXIS={turn} LIMIT_VELOCITY={turn_speed} LIMIT_ACCEL={turn_acceleration}",
-    ),
+    after_start=_LETTERS,
+    stands=(*_STANDS, *_LETTERS),
     before_end=_FREE,
 )

@@ -19,4 +19,5 @@ MARLIN = Dialect(
     follow_on="G43.4",
     follow_off="G49",
     filament_mode="set",
+    stands=("G92 X{x_mm} Y{y_mm} Z{z_mm} {tilt}{tilt_deg} {turn}{turn_deg}",),
 )

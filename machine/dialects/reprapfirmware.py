@@ -18,4 +18,5 @@ REPRAPFIRMWARE = Dialect(
     parts="M486 T{parts}",
     part_begin='M486 S{index} A"part {number}"',
     part_end="M486 S-1",
+    stands=("G92 X{x_mm} Y{y_mm} Z{z_mm} {tilt}{tilt_deg} {turn}{turn_deg}",),
 )

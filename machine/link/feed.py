@@ -150,14 +150,7 @@ class Feed:
 
     def _follow(self, command: str) -> bool:
         """Keep modal state and the print's outline in step; True when the command moves something."""
-        modal = self.modal
-        before, pulled = modal.at[5], modal.pulled_mm
-        moves = modal.take(command)
-        if moves and self._laid is not None and command.startswith(("G1", "G2", "G3")):
-            pushed = before is None or modal.at[5] is None or modal.at[5] > before
-            if pushed and not pulled:
-                self._laid.push(modal.place())
-        return moves
+        return self.modal.take(command) if self._laid is None else self._laid.follow(self.modal, command)[0]
 
     def _send(self, line: int, command: str) -> None:
         number = self.talk.send(command)

@@ -11,6 +11,7 @@ import numpy as np
 from machine.collide import Printed, bodies, directions, solids, sweep_gaps
 from machine.coordinates import axis_positions, followed, origin_mm
 from machine.kinematics.table import workpiece_points
+from machine.link.modal import E_AXIS, Modal
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
@@ -34,6 +35,18 @@ class Laid:
 
     machine: Machine
     _boxes: dict[tuple[float, float], list[float]] = field(default_factory=dict)
+
+    def follow(self, modal: Modal, command: str) -> tuple[bool, bool]:
+        """Hand a command to `modal` and keep the boxes in step; whether it moves something, and whether it lays plastic."""
+        before, pulled = modal.at[E_AXIS], modal.pulled_mm
+        if not modal.take(command):
+            return False, False
+        after = modal.at[E_AXIS]
+        stroke = command[:2] in ("G1", "G2", "G3") and not command[2:3].isdigit()
+        lays = stroke and not pulled and (before is None or after is None or after > before)
+        if lays:
+            self.push(modal.place())
+        return True, lays
 
     def push(self, place: tuple[float | None, ...]) -> None:
         """Filament was pushed on the way to a place, X Y Z tilt turn."""
@@ -68,7 +81,7 @@ def parked(machine: Machine, printed: Printed, at_mm: Floats, pose: Pose) -> Par
     """Where to wait when the tip stands at at_mm (axis positions X Y Z); None when no way up is proved clear."""
     x, y, z = (float(value) for value in at_mm)
     most = machine.z.limits_mm[1]
-    top = _top_z(machine, printed, pose) + machine.lift_mm
+    top = top_mm(machine, printed, pose) + machine.lift_mm
     height = min(max(top, z + min(machine.lift_mm, most - z)), most)
     while not _clear(machine, pose, np.array([x, y, z]), np.array([x, y, height])):
         height = z + (height - z) / 2.0
@@ -112,7 +125,7 @@ def lift_words(machine: Machine, pose: Pose, far_mm: float, following: bool) -> 
     return " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", step, strict=True) if abs(value) > 5e-4)
 
 
-def _top_z(machine: Machine, printed: Printed, pose: Pose) -> float:
+def top_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
     """Greatest Z of table, cradle and print at a pose."""
     return max(float(reach_of(UP[None])[0]) for _, reach_of in solids(machine, pose, printed))
 

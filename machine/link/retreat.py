@@ -30,21 +30,13 @@ class Retreat:
 
 def retreat(modal: Modal, profile: Profile | None, laid: Laid | None, standby_c: float | None = None) -> Retreat:
     """How to leave a print that stands at modal's place, all moves over. standby_c: the nozzle's temperature meanwhile."""
-    pull, speed, extra = _filament(modal, profile)
+    pull, push = pushing(modal, profile)
     up, down, park = _ways(modal, profile, laid)
-    hot = modal.nozzle_c if pull and modal.nozzle_c > 0 else 0.0
-    away = ["G21", "M83"]
-    if hot:
-        away.append(f"G1 E-{pull:.5f} F{60 * speed:.0f}")
-    away += ["G90", *up]
-    back = []
-    if standby_c is not None and profile is not None and hot and standby_c < hot:
+    away = ["G21", *pull, "G90", *up]
+    if standby_c is not None and profile is not None and pull and standby_c < modal.nozzle_c:
         away.append(DIALECTS[profile.machine.dialect].nozzle.format(number(standby_c)))
-    back += heated(modal, profile)
-    back += ["G21", "G90", *down]
-    if hot:
-        back += ["M83", f"G1 E{pull + extra:.5f} F{60 * speed:.0f}"]
-    return Retreat(tuple(away), (*back, *modal.lines()), park)
+    back = [*heated(modal, profile), "G21", "G90", *down, *push, *modal.lines()]
+    return Retreat(tuple(away), tuple(back), park)
 
 
 def heated(modal: Modal, profile: Profile | None) -> list[str]:
@@ -52,6 +44,15 @@ def heated(modal: Modal, profile: Profile | None) -> list[str]:
     wait = DIALECTS[profile.machine.dialect].nozzle_wait if profile is not None else "M109 S{}"
     bed = [f"M190 S{number(modal.bed_c)}"] if modal.bed_c > 0 else []
     return bed + ([wait.format(number(modal.nozzle_c))] if modal.nozzle_c > 0 else [])
+
+
+def pushing(modal: Modal, profile: Profile | None) -> tuple[list[str], list[str]]:
+    """Commands that pull filament back before the tip leaves a place where it stood still, and that push it after."""
+    pull, speed, extra = _filament(modal, profile)
+    if not modal.nozzle_c or not pull:
+        return [], []
+    feed = f"F{60 * speed:.0f}"
+    return ["M83", f"G1 E-{pull:.5f} {feed}"], ["M83", f"G1 E{pull + extra:.5f} {feed}"]
 
 
 def _filament(modal: Modal, profile: Profile | None) -> tuple[float, float, float]:
