@@ -1,23 +1,64 @@
-"""Measure the serial link: acknowledged lines a second over a pseudo-terminal, and what each half costs alone.
+"""Measure the serial link: its share of a UART's bandwidth, lines a second over a pseudo-terminal, memory over millions of lines.
 
-Run: python tools/bench_link.py [LINES]     (default 100000; figures of a run stand in docs/serial.md)
+Run: python tools/bench_link.py [terminal] [uart] [virtual] [memory] [alone] [--lines 100000]      (without a name: all of them)
 """
 
+import argparse
+import resource
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
 from machine.link.firmware import Firmware, Habits
 from machine.link.framing import frame
+from machine.link.medium import Medium
 from machine.link.protocol import Protocol
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import print_lines
+from machine.link.virtual import PATH, VirtualPrinter
 from profiles.profile import load
+
+BAUDS = (115200, 250000)
+LINE_BYTES = 63
+UART_LINES = 4000
+MILLIONS = (1, 5)
+RESTING = "G1 X100.00000 Y100.00000 Z10.00000 A0.00000 C0.00000 F6000.000"
 
 
 def program(n: int) -> list[str]:
     """n moves of the usual length, heated."""
     moves = [f"G1 X{20 + i % 60}.{i % 1000:03d} Y{10 + i % 50}.517 E0.03214 F2400" for i in range(n)]
     return ["G21", "G90", "M83", "M104 S210", "M109 S210", *moves, "M104 S0"]
+
+
+def resting(n: int) -> list[str]:
+    """n lines that are LINE_BYTES long on the wire and move nothing, so that only the line counts."""
+    return [RESTING[: LINE_BYTES - len(frame(number, ""))] for number in range(4, 4 + n)]
+
+
+def used(lines: list[str], baud: int, habits: Habits, terminal: bool) -> tuple[float, float, int, int]:
+    """Lines a second, share of the bandwidth used from the first to the last line, resends and lost bytes over a paced UART."""
+    machine, sent, times = load().machine, [0], []
+
+    def traffic(way: str, data: bytes) -> None:
+        if way == ">" and b" G1 " in data:
+            sent[0] += len(data)
+            times.append(clock())
+
+    if terminal:
+        clock = perf_counter
+        with SimulatedPrinter(machine, habits=habits, baud=baud, speed=1.0) as printer:
+            outcome = print_lines(lines, printer.path, baud, traffic=traffic)
+            record = printer.record
+    else:
+        virtual = VirtualPrinter(machine, habits, baud=baud)
+        clock = virtual.medium.now_s
+        outcome = print_lines(lines, PATH, baud, traffic=traffic, medium=virtual.medium)
+        record = virtual.record
+    seconds = times[-1] - times[0]
+    return len(lines) / seconds, sent[0] * 10 / baud / seconds, outcome.repeated, record.lost_bytes
 
 
 def over_the_terminal(lines: list[str], habits: Habits) -> tuple[float, float]:
@@ -29,37 +70,115 @@ def over_the_terminal(lines: list[str], habits: Habits) -> tuple[float, float]:
 
 
 def sender_alone(lines: list[str]) -> float:
-    """Seconds that the protocol takes for these lines with answers out of the air."""
-    protocol, began = Protocol(), perf_counter()
+    """Processor seconds that the protocol takes for these lines with answers out of the air."""
+    protocol, began = Protocol(), process_time()
     protocol.tick(1.0)
     protocol.receive(b"ok N0 P15 B3\nok N1 P15 B3\nok T:20.00 /0.00\n", 1.0)
     for number, line in enumerate(lines, 3):
         while not protocol.room(line):
-            protocol.take()
-            protocol.receive(b"ok N%d P15 B3\n" % (number - 1), 1.0)
+            protocol.tick(1.0)
+            if said := answers(protocol.take()):
+                protocol.receive(said, 1.0)
+            else:
+                protocol.receive(b"ok N%d P15 B3\n" % protocol.window.wire(number - 1), 1.0)
         protocol.send(line, 1.0)
-    return perf_counter() - began
+    return process_time() - began
+
+
+def answers(data: bytes) -> bytes:
+    """What a printer says at once to a new beginning of the numbers."""
+    return b"ok N1000 P15 B3\n" if b"M110" in data else b""
 
 
 def firmware_alone(lines: list[str]) -> float:
-    """Seconds that the simulated firmware takes for these lines."""
+    """Processor seconds that the simulated firmware takes for these lines."""
     framed = [frame(number, line) for number, line in enumerate(lines, 1)]
-    firmware, began = Firmware(load().machine), perf_counter()
+    firmware, began = Firmware(load().machine), process_time()
     for line in framed:
         firmware.receive(line)
         firmware.advance()
-    return perf_counter() - began
+    return process_time() - began
+
+
+class Echo:
+    """A wire to a peer that takes every line at once and keeps nothing."""
+
+    name = "echo"
+
+    def __init__(self) -> None:
+        self._said = bytearray()
+
+    def write(self, data: bytes) -> None:
+        """Every numbered line is acknowledged."""
+        for line in data.split(b"\n"):
+            number, _, command = line[1:].partition(b" ")
+            if command.startswith(b"M105"):
+                self._said += b"ok T:20.00 /0.00 B:20.00 /0.00\n"
+            elif line[:1] == b"N":
+                self._said += b"ok N%s P15 B3\n" % (number if not command.startswith(b"M110") else command[6:].partition(b"*")[0])
+
+    def read(self) -> bytes:
+        """All answers so far."""
+        said = bytes(self._said)
+        self._said.clear()
+        return said
+
+    def discard(self) -> None:
+        """Nothing is held back."""
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def memory(millions: int) -> tuple[float, float]:
+    """Greatest resident memory, MB, and lines a second of a process that streams a file of so many lines."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "long.gcode"
+        with path.open("w") as file:
+            for i in range(1_000_000 * millions):
+                file.write(f"G1 X{20 + i % 60}.{i % 1000:03d} Y{10 + i % 50}.517 E0.03214\n")
+        began, now = perf_counter(), [0.0]
+
+        def clock() -> float:
+            now[0] += 1e-4
+            return now[0]
+
+        print_lines(read(path), "echo", medium=Medium(lambda name, baud: Echo(), clock, lambda seconds: None))
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1e6 * millions / (perf_counter() - began)
+
+
+def read(path: Path) -> Iterator[str]:
+    """The lines of a file, one at a time."""
+    with path.open() as file:
+        yield from file
 
 
 def main() -> None:
     """Print one line for each measurement."""
-    lines = program(int(sys.argv[1]) if len(sys.argv) > 1 else 100000)
-    n = len(lines)
-    for name, habits in (("window", Habits()), ("ping-pong", Habits(advanced_ok=False))):
-        wall_s, work_s = over_the_terminal(lines, habits)
-        print(f"{name:10s} {n / wall_s:8.0f} lines/s  ({n} lines in {wall_s:.1f} s, processor {work_s:.1f} s)")
-    print(f"{'sender':10s} {n / sender_alone(lines):8.0f} lines/s alone")
-    print(f"{'firmware':10s} {n / firmware_alone(lines):8.0f} lines/s alone")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", nargs="*", choices=["terminal", "uart", "virtual", "memory", "alone"])
+    parser.add_argument("--lines", type=int, default=100000)
+    asked = parser.parse_args()
+    what = asked.what or ["terminal", "uart", "virtual", "memory", "alone"]
+    lines = program(asked.lines)
+    kinds = (("window", True), ("ping-pong", False))
+    for name, advanced in kinds if "terminal" in what else ():
+        wall_s, work_s = over_the_terminal(lines, Habits(advanced_ok=advanced))
+        print(f"{name:10s} {len(lines) / wall_s:8.0f} lines/s  ({len(lines)} lines in {wall_s:.1f} s, processor {work_s:.1f} s)")
+    for where in (place for place in ("uart", "virtual") if place in what):
+        for baud in BAUDS:
+            for name, advanced in kinds:
+                habits = Habits(advanced_ok=advanced, rx_ring=128)
+                rate, share, again, lost = used(resting(UART_LINES), baud, habits, where == "uart")
+                told = f"{rate:6.1f} lines/s, {100 * share:5.1f} % of the line, {again} resends, {lost} bytes lost"
+                print(f"{where:8s} {baud:7d} {name:10s} {told}", flush=True)
+    if "alone" in what:
+        print(f"{'sender':10s} {len(lines) / sender_alone(lines):8.0f} lines/s alone")
+        print(f"{'firmware':10s} {len(lines) / firmware_alone(lines):8.0f} lines/s alone")
+    for millions in MILLIONS if "memory" in what else ():
+        peak_mb, rate = memory(millions)
+        print(f"memory     {millions} million lines: {peak_mb:.1f} MB at most, {rate:.0f} lines/s")
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":
