@@ -1,83 +1,72 @@
-"""A Marlin-like firmware without I/O: bytes in, bytes out, time is virtual and handed in.
+"""A firmware without I/O: bytes in, bytes out, time is virtual and handed in.
 
-Its habits are Marlin's (gcode/queue.cpp, bugfix-2.1.x of 2024-09), the awkward ones above all: line numbers and checksums with
-its exact words, a repeat of the last line swallowed in silence, `ok` = taken, withheld while the planner is full.
+Its habits are those of the machine's dialect (machine.link.habits), Marlin's awkward ones above all: line numbers and checksums
+with its exact words, a repeat of the last line swallowed in silence, `ok` = taken, withheld while the planner is full.
 """
 
 import re
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from math import inf
 
 from machine.dialects import DIALECTS
-from machine.link.commands import COMMANDS, Body, move, words_of
-from machine.link.framing import checksum
+from machine.link.body import Body, Work, words_of
+from machine.link.commands import TEXTS, commands_of
+from machine.link.habits import Habits
 from machine.link.macros import NAME, VALUE, command_of
-from machine.link.record import Record, moves_of
+from machine.link.moving import move
+from machine.link.reception import Reception
+from machine.link.record import Record, record_of
+from machine.link.telling import introduce
+from machine.link.urgent import Urgent
 from profiles.machine import Machine
 
-BUFSIZE = 4  # lines waiting, the one at work included
-MAX_CMD_SIZE = 96
-HALF_BYTES = 1024
-UNREAD_LINES = 20
 BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
+UNREAD_LINES = 20
 CHATTER_S = 3600.0  # of a longer wait only the last hour is talked through: a jump over years must not fill the memory
-DIGITS = re.compile(rb"\s*([-+]?\d+)")
-COMMAND = re.compile(r"([GMT])\s*0*(\d+(?:\.\d+)?)")
-URGENT = re.compile(rb"\s*(?:N\d+\s*)?M(112|108|410)(?!\d)")
-BANNER = "start\nMarlin bugfix-2.1.x (simulated)\necho: Last Updated: 2024-09-29 | Author: (none, default config)\n"
+COMMAND = re.compile(r"([GMTSPR])\s*0*(\d+(?:\.\d+)?)")
+MOVES = ("G0", "G1", "G2", "G3")
+MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_IDLE
 
-
-@dataclass(frozen=True)
-class Habits:
-    """Build options of a firmware. rx_ring: bytes of a UART's receive ring that overflows; None: USB, which waits."""
-
-    advanced_ok: bool = True
-    emergency_parser: bool = True
-    busy: bool = True
-    autoreport: bool = True
-    rx_ring: int | None = None
+__all__ = ["BUSY_S", "Firmware", "Habits"]
 
 
 class Firmware:
-    """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile."""
+    """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile.
 
-    def __init__(self, machine: Machine, habits: Habits | None = None, busy_s: float = BUSY_S) -> None:
+    kept: how many moves stay on record, None: all. watch: told each line's count before it begins; True: advance() returns first.
+    """
+
+    def __init__(self, machine: Machine, habits: Habits | None = None, busy_s: float = BUSY_S, kept: int | None = None) -> None:
         self._habits = habits or Habits()
         self._said: list[str] = []
-        self.body = Body(machine, self._said.append)
-        self._busy_every_s = busy_s
-        self._longest = DIALECTS[machine.dialect].longest_line
+        self.body = Body(machine, self._said.append, kept)
+        self._manner = self.body.manner
+        self._commands, self._macros = commands_of(machine.dialect), DIALECTS[machine.dialect].macros
+        self.body.busy_every_s = self._busy_default_s = busy_s if self._habits.busy and self._manner.options else 0.0
+        self._reception = Reception(self._manner, DIALECTS[machine.dialect].longest_line, self._habits.rx_ring)
+        self._urgent = Urgent(self._habits.realtime) if self._reads_bytes() else None
         self._busy_s = inf
-        self._lines: deque[bytes] = deque()
-        self._half = b""
-        self._read = 0
-        self._scanned = b""
         self._queue: deque[tuple[str, str]] = deque()
-        self._last = 0
         self._wake_s: float | None = None
         self._work: Iterator[float] | None = None
-        self._lost_bytes = 0
         self._taken = self._watched = 0
-        self.watch: Callable[[int], bool] | None = None  # told each line's count before it begins; True: advance() returns first
+        self.watch: Callable[[int], bool] | None = None
         self.dead = False
+
+    def _reads_bytes(self) -> bool:
+        return self._manner.urgent == "bytes" and (self._habits.emergency_parser or self._habits.realtime)
 
     def receive(self, data: bytes) -> None:
         """Bytes arrive on the line."""
-        if self.dead:
+        if self.dead and not self._manner.answers_dead:
             return
-        if self._habits.emergency_parser:
-            self._read_urgent(data)
-        if self._habits.rx_ring is not None:
-            waiting = len(self._half) + sum(len(line) + 1 for line in self._lines) - self._read
-            kept = data[: max(0, self._habits.rx_ring - 1 - waiting)]
-            self._lost_bytes += len(data) - len(kept)
-            data = kept
-        *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
-        self._lines.extend(lines)
-        if len(self._half) > HALF_BYTES:  # a line without end: what is too long for a command is not kept
-            self._half = self._half[: self._longest]
+        if self._urgent is not None:
+            for order in self._urgent.read(data):
+                self._do_urgent(order)
+        lines = self._reception.receive(data)
+        if self._manner.urgent == "lines" and any(line.strip() == b"M112" for line in lines):
+            self._shut_down("M112", ())
 
     @property
     def has_ring(self) -> bool:
@@ -87,7 +76,7 @@ class Firmware:
     @property
     def full(self) -> bool:
         """Over USB: nothing more is read until there is room again."""
-        return not self.has_ring and len(self._lines) > UNREAD_LINES
+        return not self.has_ring and len(self._reception) >= UNREAD_LINES
 
     def advance(self, until_s: float = inf) -> bytes:
         """Work until a virtual time; with inf until there is nothing to do, the clock jumping over all waits."""
@@ -112,6 +101,8 @@ class Firmware:
                 break
         if until_s < inf:
             body.now_s = max(body.now_s, until_s)
+        if self.dead:
+            self._answer_dead()
         said = "".join([f"{line}\n" for line in self._said])
         self._said.clear()
         return said.encode("ascii", "replace")
@@ -120,158 +111,118 @@ class Firmware:
         """The virtual time at which something happens without further bytes; inf when nothing will."""
         if self.dead:
             return inf
+        body = self.body
+        due_s = min(body.report_s, body.place_s, body.nozzle.trip_s, body.bed.trip_s)
         if self._wake_s is None:
-            return self.body.now_s if self._queue or self._lines else self.body.report_s
-        return min(self._wake_s, self.body.report_s, self._busy_s)
+            return body.now_s if self._queue or len(self._reception) else due_s
+        return min(self._wake_s, due_s, self._busy_s)
 
     def reset(self, banner: bool = True) -> None:
         """The board restarts: counter, queues, position and temperatures are lost."""
         body = self.body
         body.note("reset")
         body.off()
-        body.motion.native[:] = [0.0] * 6
-        body.motion.shift[:] = [0.0] * 6
-        body.motion.relative = body.motion.filament_relative = body.motion.inches = False
-        body.report_s, body.report_every_s, body.waits_for_heat = inf, 0.0, False
+        body.forget()
+        body.motion.forget()
+        body.busy_every_s = self._busy_default_s
         self._forget()
-        self._last, self.dead = 0, False
+        self._reception.last, self.dead = 0, False
         if banner:
-            self._said += BANNER.splitlines()
+            self._said += self._manner.banner
 
     @property
     def last_number(self) -> int:
         """Number of the last numbered line that was taken."""
-        return self._last
+        return self._reception.last
+
+    @property
+    def taken(self) -> int:
+        """How many lines were executed."""
+        return self._taken
 
     def record(self) -> Record:
         """What was done so far."""
-        body = self.body
-        start, end, feed, begin, duration = moves_of(body.motion.rows)
-        return Record(
-            machine=body.machine,
-            start=start,
-            end=end,
-            feed_mm_s=feed,
-            begin_s=begin,
-            duration_s=duration,
-            events=tuple(body.events),
-            nozzle_target_c=body.nozzle.target_c,
-            bed_target_c=body.bed.target_c,
-            fan=body.fan,
-            clamped=body.motion.clamped,
-            unknown=body.unknown,
-            lines=self._taken,
-            lost_bytes=self._lost_bytes,
-        )
+        return record_of(self.body, self._taken, self._reception.lost_bytes)
+
+    def kill(self, error: str) -> None:
+        """The firmware stops for ever with its own words, heaters off."""
+        self._shut_down(error, (f"Error:{error}",))
+
+    def _shut_down(self, event: str, told: tuple[str, ...]) -> None:
+        self.body.note(event)
+        self.body.off()
+        self._said += [*told, *self._manner.kill]
+        self._forget()
+        self.dead = True
 
     def _forget(self) -> None:
-        self._lines.clear()
+        self._reception.forget()
         self._queue.clear()
-        self._half = self._scanned = b""
-        self._read = 0
+        if self._urgent is not None:
+            self._urgent.forget()
         self._wake_s = self._work = None
         self._busy_s = inf
         self._watched = self._taken
 
-    def _read_urgent(self, data: bytes) -> None:
-        """The emergency parser reads M112, M108 and M410 from the raw bytes, whatever waits before them."""
-        scanned = self._scanned + data
-        end = scanned.rfind(b"\n") + 1
-        self._scanned = scanned[end:][-MAX_CMD_SIZE:]
-        if b"M112" not in scanned and b"M108" not in scanned and b"M410" not in scanned:
-            return
-        for line in scanned[:end].split(b"\n"):
-            if found := URGENT.match(line):
-                self._do_urgent(found[1])
+    def _answer_dead(self) -> None:
+        """A firmware on a computer of its own still answers when it has stopped the machine: no, and ok."""
+        while len(self._reception):
+            if self._reception.take() is not None:
+                self._said += [*self._manner.answers_dead, "ok"]
 
-    def _do_urgent(self, number: bytes) -> None:
+    def _do_urgent(self, order: str) -> None:
         body = self.body
-        if number == b"112":
-            self._shut_down("M112", "echo:M112 Shutdown")
-        elif number == b"108":
+        if order in ("S000", "P000", "R000"):
+            if self._habits.realtime:
+                self._said += [MACHINE_STATE[body.motion.planner.next_s() < inf], body.place()]
+        elif not self._habits.emergency_parser:
+            return
+        elif order == "M112":
+            self._shut_down("M112", ("echo:M112 Shutdown",))
+        elif order == "M108":
             body.impatient = True
-            if body.waits_for_heat:
+            if body.waits_for_heat or body.waits_for_person:
                 self._wake_s = body.now_s
-        else:
+        elif order == "M410":
             body.motion.halt(body.now_s)
+            body.note("M410")
             if self._wake_s is not None:
                 self._wake_s = body.now_s
 
-    def kill(self, error: str) -> None:
-        """The firmware stops for ever with its own words, heaters off."""
-        self._shut_down(error, f"Error:{error}")
-
-    def _shut_down(self, event: str, told: str) -> None:
-        self.body.note(event)
-        self.body.off()
-        self._said += [told, "Error:Printer halted. kill() called!", "//action:poweroff"]
-        self._forget()
-        self.dead = True
-
     def _fetch(self) -> None:
-        """Move lines from the receive ring into the queue while it has room, checking number and checksum."""
-        while self._lines and len(self._queue) < BUFSIZE:
-            self._read = 0
-            line = self._lines.popleft().partition(b";")[0][: self._longest].lstrip(b" ")
-            if not line:
-                continue
-            label = ""
-            if line[:1] == b"N":
-                complaint = self._complaint(line)
-                if complaint == "":
-                    continue
-                if complaint is not None:
-                    self._ask_again(complaint)
-                    break
-                label = f" N{self._last}"
-                line = line[1 : line.rindex(b"*")].lstrip(b"-+0123456789").lstrip(b" ")
-            self._queue.append((label, line.decode("ascii", "replace").rstrip()))
-        if not self._lines and len(self._queue) < BUFSIZE:
-            self._read = len(self._half)  # taken from the ring, put together elsewhere
-
-    def _complaint(self, line: bytes) -> str | None:
-        """What is wrong with a numbered line; "" for a repeat that Marlin drops in silence, None when it is taken."""
-        star = line.rfind(b"*")
-        renumbers = b"M110" in line
-        second = line.find(b"N", line.find(b"M110")) if renumbers else -1
-        found = DIGITS.match(line, 1 + max(second, 0))
-        number = int(found[1]) if found else 0
-        if not renumbers and number != self._last + 1:
-            return "" if self._last - 1 <= number <= self._last else "Line Number is not Last Line Number+1"
-        if star < 0:
-            return "No Checksum with line number"
-        told = DIGITS.match(line, star + 1)
-        if (int(told[1]) if told else 0) != checksum(line[:star]):
-            return "checksum mismatch"
-        self._last = number
-        return None
-
-    def _ask_again(self, complaint: str) -> None:
-        self._said += [f"Error:{complaint}, Last Line: {self._last}", f"Resend: {self._last + 1}", "ok"]
-        self._lines.clear()
-        self._half = b""
-        self._read = 0
+        """Move lines from the receive ring into the queue while it has room."""
+        reception, room = self._reception, self._manner.pending
+        while len(reception) and len(self._queue) < room:
+            taken = reception.take()
+            if isinstance(taken, str):
+                self._said += reception.ask_again(taken)
+                break
+            if taken is not None:
+                self._queue.append(taken)
+        if not len(reception) and len(self._queue) < room:
+            reception.idle()
 
     def _run(self) -> None:
         """Begin or go on with the oldest line of the queue."""
         body = self.body
         label, text = self._queue[0]
-        name, rest = _parted(text)
-        if name in ("G1", "G0"):
-            if not body.motion.free(body.now_s):
-                self._sleep(body.motion.next_free_s())
-                return
-            move(body, words_of(rest))
-            self._finish(label)
-            return
         if self._work is None:
-            answer = self._begin(text, name, rest)
-            if self.dead:
-                return
+            name, rest = _parted(text)
+            if name in MOVES[:2]:
+                if not body.motion.planner.free(body.now_s):
+                    self._sleep(body.motion.planner.next_s())
+                    return
+                answer = move(body, words_of(rest), text)
+            else:
+                answer = self._begin(text, name, rest)
+                if self.dead:
+                    return
             if answer is None or isinstance(answer, str):
                 self._finish(label, answer)
                 return
             self._work = answer
+            if name not in MOVES:
+                body.motion.planner.barrier()
         wake_s = next(self._work, None)
         if wake_s is None:
             self._work = None
@@ -279,71 +230,76 @@ class Firmware:
         else:
             self._sleep(wake_s)
 
-    def _begin(self, text: str, name: str, rest: str) -> Iterator[float] | str | None:
+    def _begin(self, text: str, name: str, rest: str) -> Work:
         if name == "M112":
-            self._shut_down("M112", "echo:M112 Shutdown")
+            self._shut_down("M112", ("echo:M112 Shutdown",))
             return None
         if name == "M115":
-            self._introduce()
-            return None
-        if DIALECTS[self.body.machine.dialect].macros and (found := NAME.match(text)):
+            return introduce(self.body, self._habits)
+        if self._macros and (found := NAME.match(text)):
             macro = command_of(found[0].upper())
             if macro is not None:
                 return macro(self.body, dict(VALUE.findall(text[found.end() :])))
-        command = COMMANDS.get(name)
+        command = self._commands.get(name)
         if command is None:
-            self.body.unknown += 1
-            self._said.append(f'echo:Unknown command: "{text}"')
+            if not (self._habits.realtime and name in ("S0", "P0", "R0")):
+                self.body.unknown += 1
+                self._said.append(self._manner.unknown.format(text))
             return None
-        return command(self.body, {} if name == "M117" else words_of(rest), name + rest)
-
-    def _introduce(self) -> None:
-        habits = self._habits
-        letters = self.body.motion.letters[3:5]
-        self._said += [
-            "FIRMWARE_NAME:Marlin bugfix-2.1.x (simulated) PROTOCOL_VERSION:1.0 MACHINE_TYPE:tiltprint EXTRUDER_COUNT:1 "
-            f"AXIS_COUNT:5 ROTARY:{''.join(letters)}",
-            "Cap:SERIAL_XON_XOFF:0",
-            f"Cap:AUTOREPORT_TEMP:{int(habits.autoreport)}",
-            f"Cap:EMERGENCY_PARSER:{int(habits.emergency_parser)}",
-            "Cap:PROGRESS:0",
-        ]
+        answer = command(self.body, {} if name in TEXTS else words_of(rest), name + rest)
+        if self.body.number is not None:
+            self._reception.last, self.body.number = self.body.number, None
+        return answer
 
     def _finish(self, label: str, answer: str | None = None) -> None:
+        """Answer the oldest line of the queue; B counts it as still there, so it is one too low (TFT #2819)."""
         self._queue.popleft()
         self._taken += 1
         self._busy_s = inf
         if answer is not None:
             self._said.append(answer)
-        elif self._habits.advanced_ok:
-            free = min(self.body.motion.free(self.body.now_s), 15)
-            self._said.append(f"ok{label} P{free} B{BUFSIZE - 1 - len(self._queue)}")
+        elif self._habits.advanced_ok and self._manner.options:
+            free = self.body.motion.planner.free(self.body.now_s)
+            self._said.append(f"ok{label} P{free} B{self._manner.pending - 1 - len(self._queue)}")
         else:
             self._said.append("ok")
 
     def _sleep(self, wake_s: float) -> None:
-        """Look again at wake_s; the first such wait of a line starts the clock of the busy messages."""
-        if self._busy_s == inf:
-            self._busy_s = self.body.now_s + self._busy_every_s
+        if self._busy_s == inf and self.body.busy_every_s > 0:
+            self._busy_s = self.body.now_s + self.body.busy_every_s
         if self._wake_s is None:
             self._wake_s = wake_s
 
     def _pass(self, to_s: float) -> None:
         """Let the clock run, saying on the way what is due."""
         body = self.body
-        while True:
-            busy_s = self._busy_s if self._wake_s is not None and self._habits.busy and not body.waits_for_heat else inf
-            due_s = min(busy_s, body.report_s)
+        while not self.dead:
+            busy_s = self._busy_s if self._wake_s is not None and not body.waits_for_heat else inf
+            trip_s = min(body.nozzle.trip_s, body.bed.trip_s)
+            due_s = min(busy_s, body.report_s, body.place_s, trip_s)
             if due_s > to_s or due_s == inf:
                 break
-            body.now_s = max(body.now_s, due_s, to_s - CHATTER_S)
-            if due_s == busy_s:
-                self._said.append("echo:busy: processing")
-                self._busy_s = body.now_s + self._busy_every_s
-            else:
-                self._said.append(f" {body.temperatures()}")
-                body.report_s = body.now_s + body.report_every_s
-        body.now_s = max(body.now_s, to_s)
+            body.now_s = max(body.now_s, due_s, min(to_s - CHATTER_S, trip_s))
+            self._tell(due_s, busy_s, trip_s)
+        if to_s < inf:
+            body.now_s = max(body.now_s, to_s)
+
+    def _tell(self, due_s: float, busy_s: float, trip_s: float) -> None:
+        """Say what is due now."""
+        body = self.body
+        if due_s == trip_s:
+            heater, index = (body.nozzle, "0") if body.nozzle.trip_s == trip_s else (body.bed, "bed")
+            heater.trip_s = inf
+            self.kill(f"{heater.trip}, system stopped! Heater_ID: {index}")
+        elif due_s == busy_s:
+            self._said.append(f"echo:busy: {'paused for user' if body.waits_for_person else 'processing'}")
+            self._busy_s = body.now_s + body.busy_every_s
+        elif due_s == body.report_s:
+            self._said.append(f" {body.temperatures()}")
+            body.report_s = body.now_s + body.report_every_s
+        else:
+            self._said.append(body.place())
+            body.place_s = body.now_s + body.place_every_s
 
 
 def _parted(text: str) -> tuple[str, str]:

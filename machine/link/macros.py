@@ -4,7 +4,9 @@ import re
 from collections.abc import Callable, Iterator
 from math import hypot
 
-from machine.link.commands import Body, Work, drained, heat, heat_and_wait
+from machine.link.body import Body, Work, drained
+from machine.link.heating import heat, heat_and_wait
+from machine.link.moving import homed
 from machine.placeholders import stepper
 
 NAME = re.compile(r"[A-Za-z][A-Za-z_]{2,}[A-Za-z0-9_]*(?= |$)")
@@ -20,12 +22,7 @@ def command_of(name: str) -> Callable[[Body, Values], Work] | None:
 
 
 def _home(body: Body, letters: str) -> Iterator[float]:
-    yield from drained(body)
-    axes = [axis for axis, letter in enumerate(body.motion.letters[:5]) if letter in letters]
-    until_s = body.now_s + body.motion.home(axes)
-    while body.now_s < until_s:
-        yield until_s
-    body.note(f"homed {letters}")
+    yield from homed(body, [axis for axis, letter in enumerate(body.motion.letters[:5]) if letter in letters])
 
 
 def _turn(body: Body, values: Values) -> Work:
@@ -48,18 +45,19 @@ def _turn(body: Body, values: Values) -> Work:
 
 def _turned(body: Body) -> Iterator[float]:
     motion = body.motion
-    while not motion.free(body.now_s):
-        yield motion.next_free_s()
-    places = dict(zip(motion.letters, (n + s for n, s in zip(motion.native, motion.shift, strict=True)), strict=True))
+    while not motion.planner.free(body.now_s):
+        yield motion.planner.next_s()
+    places = dict(zip(motion.letters, motion.coordinates(), strict=True))
     far = {letter: abs(value - places[letter]) for letter, (value, _) in body.turning.items()}
     seconds = max(far[letter] / speed for letter, (_, speed) in body.turning.items())
     words = {letter: value for letter, (value, _) in body.turning.items()}
     body.turning.clear()
     feed, relative = motion.feed, motion.relative
     motion.relative = False
-    motion.go(
-        words | ({"F": 60.0 * hypot(*far.values()) / seconds} if seconds > 0 and not motion.inches else {}), body.now_s, True
-    )
+    target = motion.target(words)
+    if seconds > 0:
+        motion.feed = hypot(*far.values()) / seconds / motion.feed_share
+    motion.reach(target, body.now_s)
     motion.feed, motion.relative = feed, relative
     yield from drained(body)
 

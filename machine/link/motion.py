@@ -1,80 +1,113 @@
-"""The moving half of a simulated printer: positions, coordinate modes, soft limits, and a queue of timed blocks."""
+"""The moving half of a simulated printer: coordinates and their modes, limits, the kinematics, moves for the planner."""
 
-from array import array
-from collections import deque
-from collections.abc import Mapping, Sequence
-from math import ceil, inf, pi
+from collections.abc import Callable, Mapping, Sequence
+from math import ceil, hypot, inf, pi, sqrt
 
 from machine.arcs import centre_of, chords, sweep_rad
+from machine.link.executed import Executed
+from machine.link.following import Following
+from machine.link.planner import BLOCKS, Planner, block_of
 from profiles.machine import Machine
 
-BLOCKS = 16  # Marlin's BLOCK_BUFFER_SIZE
-ROW = 15  # numbers of a recorded move: 6 where it begins, 6 where it ends, feed, begin, duration
 FIRST_FEED = 25.0  # mm/s until a program gives an F: Marlin's 1500 mm/min
 SLACK = 1e-6  # a coordinate printed with few decimals may stand this far outside a limit
+HARD_MM = 2.0  # from a soft limit to where the axis meets its end
 INCH_MM = 25.4
 ARC_MM, CIRCLE_CHORDS = 1.0, 72  # Marlin's MAX_ARC_SEGMENT_MM and MIN_CIRCLE_SEGMENTS
+SEGMENTS_PER_S = 200.0  # into which the firmware cuts a turn that it follows
+STEPS = (80.0, 80.0, 400.0, 80.0, 80.0)  # a mm or degree, for M114's Count
+
+Words = Mapping[str, float]
 
 
 class Motion:
-    """Axes X Y Z tilt turn E; `native` is what the machine means, native + shift what the program means.
+    """Axes X Y Z tilt turn E. `place`: what the firmware believes, in its own coordinates; place + shift: what the program means.
 
-    Moves go into `rows` when they are planned; a move that a stop cuts short is cut short there too.
+    While the firmware follows the table (TCP) place is on the table, else it is the axes' positions. What the axes really do
+    differs by an offset after a reset, or when following is switched at a turned table; `executed` has the real moves.
     """
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        note: Callable[[str], None] = lambda what: None,
+        blocks: int = BLOCKS,
+        kept: int | None = None,
+    ) -> None:
         axes = (machine.x, machine.y, machine.z)
         self.letters = ("X", "Y", "Z", machine.tilt.letter, machine.turn.letter, "E")
-        self._limits = [a.limits_mm for a in axes] + [machine.tilt.limits_deg, machine.turn.limits_deg]
+        self.limits = [a.limits_mm for a in axes] + [machine.tilt.limits_deg, machine.turn.limits_deg]
         self._home = [machine.x.limits_mm[0], machine.y.limits_mm[0], machine.z.limits_mm[1]]
         self._home += [machine.tilt.zero_deg, machine.turn.zero_deg]
-        self._speeds = [a.speed_mm_s for a in axes]
-        self._speeds += [machine.tilt.speed_deg_s, machine.turn.speed_deg_s, machine.extruder_speed_mm_s]
-        self._accelerations = [a.acceleration_mm_s2 for a in axes] + [
-            machine.tilt.acceleration_deg_s2,
-            machine.turn.acceleration_deg_s2,
-            machine.extruder_acceleration_mm_s2,
-        ]
-        self._junction = machine.junction_speed_mm_s
-        self._printing = self._travelling = inf  # mm/s2 told by M204 for X Y Z; inf: what the axes allow
-        self.native = [0.0] * 6
-        self.shift = [0.0] * 6
-        self.relative = self.filament_relative = self.inches = False
+        self.executed = Executed(kept)
+        self.planner = Planner(self.executed.add, blocks)
+        self._machine, self._note = machine, note
+        self._following = Following(machine)
+        self._real = [0.0] * 6  # where the axes stand when all planned blocks are over, filament as a running total
+        self._offset = [0.0] * 5
+        self.clamped = self.halts = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """The board restarts: the axes stay where they are, the firmware believes them at zero and knows its defaults."""
+        machine = self._machine
+        self.place, self.shift = [0.0] * 6, [0.0] * 6
+        self._offset = self._real[:5]
+        self.follows = self.relative = self.filament_relative = self.inches = False
+        self.soft_limits = True
         self.feed = FIRST_FEED
-        self.clamped = 0
-        self.rows = array("d")
-        self._ends: deque[float] = deque()
-        self.end_s = 0.0
+        self.feed_share = self.flow_share = 1.0
+        axes = (machine.x, machine.y, machine.z)
+        self.speeds = [a.speed_mm_s for a in axes]
+        self.speeds += [machine.tilt.speed_deg_s, machine.turn.speed_deg_s, machine.extruder_speed_mm_s]
+        self.accelerations = [a.acceleration_mm_s2 for a in axes]
+        self.accelerations += [machine.tilt.acceleration_deg_s2, machine.turn.acceleration_deg_s2]
+        self.accelerations += [machine.extruder_acceleration_mm_s2]
+        self.jerk_mm_s = machine.junction_speed_mm_s
+        self._printing = self._travelling = inf  # mm/s2 told by M204 for X Y Z; inf: what the axes allow
 
-    def free(self, now_s: float) -> int:
-        """Free places of the queue; blocks that are over leave it."""
-        ends = self._ends
-        while ends and ends[0] <= now_s:
-            ends.popleft()
-        return BLOCKS - len(ends)
-
-    def next_free_s(self) -> float:
-        """When the block under way ends."""
-        return self._ends[0] if self._ends else 0.0
-
-    def go(self, words: Mapping[str, float], now_s: float, extrude: bool) -> None:
-        """Plan one G0 or G1; without `extrude` (cold nozzle) the filament stands still."""
-        start = tuple(self.native)
-        self._aim(words)
+    def target(self, words: Words, extrude: bool = True) -> list[float]:
+        """Where a G0 or G1 leads, its F taken over; without `extrude` (cold nozzle) the filament stands still."""
+        place = self._wanted(words)
+        if self.soft_limits:
+            for axis, (low, high) in enumerate(self.limits):
+                if not low - SLACK <= place[axis] <= high + SLACK:  # Marlin clamps without a word
+                    self.clamped += 1
+                    place[axis] = min(max(place[axis], low), high)
         if not extrude:
-            self.shift[5] += self.native[5] - start[5]
-            self.native[5] = start[5]
-        self._plan(start, now_s)
+            self.shift[5] += place[5] - self.place[5]
+            place[5] = self.place[5]
+        return place
 
-    def arc(self, words: Mapping[str, float], clockwise: bool, extrude: bool) -> list[list[float]]:
-        """Where the chords of a G2 or G3 end, in `native` terms; [] for what Marlin answers with "Bad arc parameters"."""
+    def beyond(self, words: Words) -> list[float] | None:
+        """The program's coordinates of a target outside the soft limits; None for one inside."""
+        place = self._wanted(words)
+        inside = all(low - SLACK <= p <= high + SLACK for p, (low, high) in zip(place, self.limits, strict=False))
+        return None if inside else [p + s for p, s in zip(place, self.shift, strict=True)]
+
+    def _wanted(self, words: Words) -> list[float]:
         scale = INCH_MM if self.inches else 1.0
-        start = list(self.native)
-        self._aim(words)
-        if not extrude:
-            self.shift[5] += self.native[5] - start[5]
-            self.native[5] = start[5]
-        end, self.native[:] = list(self.native), start
+        if words.get("F", 0.0) > 0:
+            self.feed = words["F"] * scale / 60.0
+        place = self.place[:]
+        for axis, letter in enumerate(self.letters):
+            if letter in words:
+                value = words[letter] * (1.0 if 3 <= axis < 5 else scale)
+                relative = self.relative if axis < 5 else self.filament_relative
+                place[axis] = place[axis] + value if relative else value - self.shift[axis]
+        return place
+
+    def pieces(self, target: Sequence[float]) -> list[list[float]]:
+        """Where the straight moves to a target end: one, but many when the firmware follows the turning table."""
+        here = self.place
+        if not self.follows or target[3:5] == here[3:5]:
+            return [list(target)]
+        return _evenly(here, target, max(1, ceil(self._seconds(here, target) * SEGMENTS_PER_S)))
+
+    def arc(self, words: Words, clockwise: bool, extrude: bool) -> list[list[float]]:
+        """Where the chords of a G2 or G3 end; [] for what Marlin answers with "Bad arc parameters"."""
+        scale = INCH_MM if self.inches else 1.0
+        start, end = self.place, self.target(words, extrude)
         begin, finish = (start[0], start[1]), (end[0], end[1])
         if "R" in words:
             centre = centre_of(begin, finish, words["R"] * scale, clockwise)
@@ -83,82 +116,60 @@ class Motion:
         if centre is None or centre == begin:
             return []
         sweep = sweep_rad(begin, finish, centre, clockwise)
-        radius = ((start[0] - centre[0]) ** 2 + (start[1] - centre[1]) ** 2) ** 0.5
+        radius = hypot(start[0] - centre[0], start[1] - centre[1])
         count = max(1, ceil(abs(sweep) * radius / ARC_MM), ceil(abs(sweep) / (2.0 * pi) * CIRCLE_CHORDS))
-        shares = [k / count for k in range(1, count + 1)]
-        return [
-            [x, y, *(a + share * (b - a) for a, b in zip(start[2:], end[2:], strict=True))]
-            for share, (x, y) in zip(shares, chords(begin, finish, centre, sweep, count), strict=True)
-        ]
+        rest = _evenly(start[2:], end[2:], count)
+        return [[x, y, *others] for (x, y), others in zip(chords(begin, finish, centre, sweep, count), rest, strict=True)]
 
     def reach(self, place: Sequence[float], now_s: float) -> None:
-        """Plan one chord of an arc."""
-        start = tuple(self.native)
-        self.native[:] = [self._allowed(axis, value) for axis, value in enumerate(place)]
-        self._plan(start, now_s)
+        """Plan one straight move."""
+        here, real = self.place, self._real
+        positions = self._following.positions(place) if self.follows else place[:5]
+        end = [p + o for p, o in zip(positions, self._offset, strict=True)]
+        self._meet_ends(end)
+        end.append(real[5] + (place[5] - here[5]) * self.flow_share)
+        feed = self.feed * self.feed_share
+        if self.follows and place[:5] != here[:5] and (seconds := self._seconds(here, place)) > 0.0:
+            feed = _length(real, end) / seconds
+        strokes = end[5] != real[5]
+        told = self._printing if strokes else self._travelling
+        block = block_of(real, end, feed, self.speeds, self.accelerations, told)
+        self.place, self._real = list(place), end
+        if block is not None:
+            block.feed = self.feed
+            self.planner.add(block, self.jerk_mm_s, now_s)
 
-    def _aim(self, words: Mapping[str, float]) -> None:
-        """Take over the feed and the target of a move."""
-        scale = INCH_MM if self.inches else 1.0
-        if "F" in words and words["F"] > 0:
-            self.feed = words["F"] * scale / 60.0
-        for axis, letter in enumerate(self.letters):
-            if letter in words:
-                value = words[letter] * (1.0 if 3 <= axis < 5 else scale)
-                relative = self.relative if axis < 5 else self.filament_relative
-                self.native[axis] = self._allowed(axis, self.native[axis] + value if relative else value - self.shift[axis])
+    def _seconds(self, here: Sequence[float], place: Sequence[float]) -> float:
+        """How long F makes a followed move last."""
+        return _length(here, place) / (self.feed * self.feed_share)
 
-    def _plan(self, start: Sequence[float], now_s: float) -> None:
-        deltas = [b - a for a, b in zip(start, self.native, strict=True)]
-        if not any(deltas):
-            return
-        duration_s, begin_s = self._duration_s(deltas), max(now_s, self.end_s)
-        self.end_s = begin_s + duration_s
-        self._ends.append(self.end_s)
-        self.rows.extend((*start, *self.native, self.feed, begin_s, duration_s))
-
-    def _allowed(self, axis: int, value: float) -> float:
-        """Marlin clamps a target outside the soft limits without a word."""
-        if axis == 5:
-            return value
-        low, high = self._limits[axis]
-        if low - SLACK <= value <= high + SLACK:
-            return value
-        self.clamped += 1
-        return min(max(value, low), high)
-
-    def _duration_s(self, deltas: Sequence[float]) -> float:
-        """A trapezoid from junction speed over feed to junction speed, slowed to what every axis can do.
-
-        The feed counts along X Y Z, for moves without them along tilt and turn, else along the filament.
-        """
-        x, y, z, tilt, turn, filament = deltas
-        linear = (x * x + y * y + z * z) ** 0.5
-        length = linear or (tilt * tilt + turn * turn) ** 0.5 or abs(filament)
-        slowest_s, acceleration = length / self.feed, 1e9
-        for delta, speed, most in zip(deltas, self._speeds, self._accelerations, strict=True):
-            if delta:
-                size = abs(delta)
-                slowest_s = max(slowest_s, size / speed)
-                acceleration = min(acceleration, most * length / size)
-        if linear:
-            acceleration = min(acceleration, self._printing if filament else self._travelling)
-        speed = length / slowest_s
-        corner = min(speed, self._junction) if linear else 0.0
-        ramps = (speed * speed - corner * corner) / acceleration
-        if ramps <= length:
-            return 2.0 * (speed - corner) / acceleration + (length - ramps) / speed
-        peak: float = (corner * corner + acceleration * length) ** 0.5
-        return 2.0 * (peak - corner) / acceleration
+    def _meet_ends(self, end: list[float]) -> None:
+        """An axis that is driven against its end stays there, and the firmware does not know."""
+        for axis, (low, high) in enumerate(self.limits):
+            if not low - HARD_MM <= end[axis] <= high + HARD_MM:
+                stopped = min(max(end[axis], low - HARD_MM), high + HARD_MM)
+                self._offset[axis] += stopped - end[axis]
+                end[axis] = stopped
+                self._note(f"{self.letters[axis]} driven against its end")
 
     def home(self, axes: Sequence[int]) -> float:
         """Put axes at their home positions (X Y least, Z greatest, table level); returns how long it takes, s."""
-        travel_s = max((abs(self._home[a] - self.native[a]) / self._speeds[a] for a in axes), default=0.0)
+        travel_s = max((abs(self._home[a] - self._real[a]) / self.speeds[a] for a in axes), default=0.0)
+        real = self._real[:]
         for axis in axes:
-            self.native[axis], self.shift[axis] = self._home[axis], 0.0
+            real[axis], self._offset[axis], self.shift[axis] = self._home[axis], 0.0, 0.0
+        self._real = real
+        self._believe()
         return 2.0 * travel_s + 1.0
 
-    def accelerate(self, words: Mapping[str, float]) -> None:
+    def follow(self, on: bool) -> None:
+        """G43.4, G49: the place stays, as in the firmware that knows them; a turned table is believed elsewhere then."""
+        if on != self.follows:
+            self.follows = on
+            positions = self._following.positions(self.place) if on else self.place[:5]
+            self._offset = [r - p for r, p in zip(self._real, positions, strict=False)]
+
+    def accelerate(self, words: Words) -> None:
         """M204: P for moves that push filament, T for those that do not, S for both; what is not above 0 tells nothing."""
         scale = INCH_MM if self.inches else 1.0
         for letter, value in words.items():
@@ -167,32 +178,58 @@ class Motion:
             if value > 0 and letter in "TS":
                 self._travelling = value * scale
 
-    def call_it(self, words: Mapping[str, float]) -> None:
+    def bound(self, words: Words, bounds: list[float]) -> None:
+        """M201, M203: greatest accelerations or speeds of single axes."""
+        for axis, letter in enumerate(self.letters):
+            if words.get(letter, 0.0) > 0:
+                bounds[axis] = words[letter] * (INCH_MM if self.inches and not 3 <= axis < 5 else 1.0)
+
+    def call_it(self, words: Words) -> None:
         """G92: the place where the axes stand gets these coordinates."""
         for axis, letter in enumerate(self.letters):
             if letter in words:
                 scale = INCH_MM if self.inches and not 3 <= axis < 5 else 1.0
-                self.shift[axis] = words[letter] * scale - self.native[axis]
+                self.shift[axis] = words[letter] * scale - self.place[axis]
 
     def halt(self, now_s: float) -> None:
         """Stop at once: later blocks never happen, the one under way ends where it is."""
-        rows = self.rows
-        while rows and rows[-2] >= now_s:
-            self.native[:] = rows[-ROW : -ROW + 6]
-            del rows[-ROW:]
-        if rows and rows[-2] + rows[-1] > now_s:
-            share = (now_s - rows[-2]) / rows[-1]
-            base = len(rows) - ROW
-            for axis in range(6):
-                rows[base + 6 + axis] = rows[base + axis] + share * (rows[base + 6 + axis] - rows[base + axis])
-            self.native[:] = rows[base + 6 : base + 12]
-            rows[-1] *= share
-        self._ends.clear()
-        self.end_s = now_s
+        self.planner.run(now_s)
+        cut = self.planner.under_way()
+        planned = (cut.end[5], cut.duration_s) if cut is not None else (0.0, 0.0)
+        stopped = self.planner.halt(now_s)
+        self.halts += 1
+        if cut is not None:
+            self.executed.cut(cut, *planned)
+        if stopped is not None:
+            self.place[5] += (stopped[5] - self._real[5]) / (self.flow_share or 1.0)
+            self._real = list(stopped)
+            self._believe()
 
-    def told(self) -> str:
-        """The answer to M114."""
-        logical = [n + s for n, s in zip(self.native, self.shift, strict=True)]
-        place = " ".join(f"{letter}:{value:.2f}" for letter, value in zip(self.letters, logical, strict=True))
-        count = " ".join(f"{letter}:{80 * value:.0f}" for letter, value in zip(self.letters[:5], self.native[:5], strict=True))
-        return f"{place} Count {count}"
+    def _believe(self) -> None:
+        """Work out the place from where the axes stand."""
+        positions = [r - o for r, o in zip(self._real, self._offset, strict=False)]
+        self.place[:5] = self._following.place(positions) if self.follows else positions
+
+    def at(self, now_s: float) -> list[float]:
+        """Where the axes really are now, X Y Z tilt turn."""
+        self.planner.run(now_s)
+        return list(self.planner.at(now_s, self._real))[:5]
+
+    def counts(self, now_s: float) -> list[int]:
+        """Steps of the axes as the firmware counts them, at this moment."""
+        now = zip(self.at(now_s), self._offset, STEPS, strict=True)
+        return [round((position - offset) * steps) for position, offset, steps in now]
+
+    def coordinates(self) -> list[float]:
+        """Where the program believes to be when all planned moves are over."""
+        return [p + s for p, s in zip(self.place, self.shift, strict=True)]
+
+
+def _evenly(here: Sequence[float], target: Sequence[float], count: int) -> list[list[float]]:
+    return [[a + k / count * (b - a) for a, b in zip(here, target, strict=True)] for k in range(1, count + 1)]
+
+
+def _length(a: Sequence[float], b: Sequence[float]) -> float:
+    """What F measures: the way of X Y Z; when they stand still that of the rotary axes; else the filament."""
+    x, y, z, tilt, turn, filament = (q - p for p, q in zip(a, b, strict=True))
+    return sqrt(x * x + y * y + z * z) or hypot(tilt, turn) or abs(filament)

@@ -12,7 +12,8 @@ from typing import Self
 
 from machine.link.cable import Cable
 from machine.link.faults import Fault, FaultScript
-from machine.link.firmware import BUSY_S, Firmware, Habits
+from machine.link.firmware import BUSY_S, Firmware
+from machine.link.habits import Habits
 from machine.link.record import Record
 from machine.link.terminal import Server, Terminal
 from machine.link.uart import Uart

@@ -2,7 +2,7 @@ from math import sqrt
 
 import pytest
 
-from machine.link.motion import ROW, Motion
+from machine.link.motion import Motion
 from profiles.profile import load
 
 
@@ -10,8 +10,8 @@ def _seconds(words: dict[str, float], told: dict[str, float]) -> float:
     """How long one move takes that stands alone, with a corner speed of nothing."""
     motion = Motion(load().machine.model_copy(update={"junction_speed_mm_s": 0.0}))
     motion.accelerate(told)
-    motion.go(words, 0.0, True)
-    return float(motion.rows[ROW - 1])
+    motion.reach(motion.target(words), 0.0)
+    return motion.planner.ahead()[0].duration_s
 
 
 STROKE = {"X": 20.0, "E": 1.0, "F": 60000.0}
