@@ -15,6 +15,7 @@ FOLLOWING = ("marlin", "linuxcnc", "grblhal")  # dialects whose firmware can kee
 LEAST_LEAN_DEG = 1.0  # a table that leans less can print nothing but upright parts
 UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
 Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
+Pixels = Annotated[int, Field(ge=16, le=1024)]
 
 
 class Frozen(BaseModel):
@@ -262,6 +263,9 @@ class Machine(Frozen):
     lift_mm: float = Field(10.0, ge=0, le=500, description="extra height above everything printed while the table moves, mm")
     nozzle_limit_c: float = Field(300.0, gt=0, le=600, description="greatest nozzle temperature, deg C")
     bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed")
+    thumbnails_px: list[tuple[Pixels, Pixels]] = Field(
+        default=[], max_length=4, description="width and height of the pictures in the G-code's head, pixels; web pages show them"
+    )
     uncalibrated: list[str] = Field(default=[], description="keys whose values no source gives; the dry run names them")
     sources: dict[str, str] = Field(default={}, description="for a key or a table of keys: where its value comes from")
     gcode: Blocks

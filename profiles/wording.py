@@ -99,7 +99,7 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
     if origin is tuple:
         return f"a list of {('', '', 'two', 'three')[len(inner)]} numbers"
     if origin is list:
-        return _list(inner[0], any(_bound(each, "min_length") for each in metadata))
+        return _list(inner[0], metadata)
     if hasattr(annotation, "__metadata__"):
         return _allowed(inner[0], [*annotation.__metadata__])
     if annotation is bool:
@@ -113,11 +113,16 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
     return f"a table with the keys {', '.join(model.model_fields)}" if model else "a table of keys"
 
 
-def _list(item: Any, needed: bool) -> str:
+def _list(item: Any, metadata: list[Any]) -> str:
     model = _model(item)
     if model is not None:
         return f"a list of tables with the keys {', '.join(model.model_fields)}"
-    return "a list of texts" if item is str else f"a list of{' one or more' if needed else ''} pairs of numbers"
+    if item is str:
+        return "a list of texts"
+    most = next((most for each in metadata if (most := _bound(each, "max_length"))), None)
+    needed = " one or more" if any(_bound(each, "min_length") for each in metadata) else f" at most {most}" if most else ""
+    number = _allowed(get_args(item)[0], []).removeprefix("a ").replace("number", "numbers")
+    return f"a list of{needed} pairs of {number}"
 
 
 def _range(metadata: list[Any]) -> str:

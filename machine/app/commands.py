@@ -16,7 +16,7 @@ from machine.app.progress import say
 from machine.app.report import agreement_line, parts_table, run_table, show
 from machine.app.view.live import served
 from machine.app.view.page import parts_page, print_page
-from machine.app.warmup import warm_dry_run
+from machine.app.warmup import warm_dry_run, warm_picture
 from machine.dryrun.agreement import Agreement, agreement
 from machine.dryrun.dryrun import dry_run, summary
 from mdp.read import locate, read_mesh
@@ -52,6 +52,8 @@ def decompose(
             write_bytes(out / part_file(part.index), stl(part.mesh))
         write_bytes(out / "decomposition.3mf", threemf(found.decomposition))
         write_json(out / "decomposition.json", told)
+    if png is not None or sheet is not None:
+        warm_picture()
     if png is not None:
         write_png(png, parts_picture(found.decomposition, profile))
     if sheet is not None:

@@ -14,7 +14,7 @@ from mdp.pose import UP, unit
 from profiles.machine import Machine
 from profiles.profile import Profile
 
-__all__ = ["View", "contact_sheet", "draw", "part_colours", "parts_picture", "seen_from", "write_png"]
+__all__ = ["View", "contact_sheet", "draw", "part_colours", "parts_picture", "parts_together", "seen_from", "write_png"]
 
 # Okabe and Ito's colours for all kinds of colour vision, without vermilion, which is too near to the red of risky faces.
 PALETTE = np.array([[86, 180, 233], [230, 159, 0], [0, 158, 115], [204, 121, 167], [240, 228, 66], [0, 114, 178]], dtype=float)
@@ -56,6 +56,14 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
     reds = [residual(part, profile) for part in parts]
     exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], [None, *reds], view, half)
     return np.concatenate([plain, exploded], axis=1)
+
+
+def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[int, int]) -> Image:
+    """The parts in colour where they belong. Returns (h, w, 3), uint8; size is width and height in pixels."""
+    angle = profile.process.self_supporting_angle_deg
+    risky = risky_upright(decomposition.mesh, angle, profile.search.count_platform_faces)
+    parts = [part.mesh for part in decomposition.parts]
+    return draw(parts, list(part_colours(len(parts))), None, _best_view(decomposition.mesh, risky), size)
 
 
 def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: int = 480) -> Image:

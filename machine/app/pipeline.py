@@ -8,6 +8,7 @@ import numpy as np
 
 from machine.app.output import write_bytes
 from machine.app.progress import Ticker, say
+from machine.app.thumbnail import with_thumbnails
 from machine.app.warmup import warm_program, warm_search
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode import write_gcode
@@ -127,7 +128,7 @@ def build(decomposition: Decomposition, profile: Profile) -> Program:
     warm_program(profile)
     sliced = slice_parts(parts, profile, show)
     ticker.tick("planning moves", at_once=ticker.live)
-    lines = tuple(write_gcode(plan(decomposition, sliced, profile), profile))
+    lines = with_thumbnails(tuple(write_gcode(plan(decomposition, sliced, profile), profile)), decomposition, profile)
     ticker.tick("dry run", at_once=ticker.live)
     run = dry_run(lines, profile)
     ticker.close()

@@ -13,6 +13,7 @@ import manifold3d as m3
 import numpy as np
 
 from machine.app.progress import say
+from machine.app.raster import draw
 from machine.dryrun.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.gcode import write_gcode
@@ -28,7 +29,7 @@ from mdp.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 from slicer.slice import slice_part
 
-SEARCH, PROGRAM = "search", "program"
+SEARCH, PROGRAM, PICTURE = "search", "program", "picture"
 LEANING = np.array([0.0, np.sin(0.2), np.cos(0.2)])
 PLANE = Plane(LEANING, 20.0)
 
@@ -69,6 +70,15 @@ def warm_dry_run() -> None:
     """Say that a dry run compiles its kernels, where it does."""
     if not all_kept(PROGRAM).exists():
         _tell()
+
+
+def warm_picture() -> None:
+    """Return when the kernels that draw are compiled."""
+    if not all_kept(PICTURE).exists():
+        began = _tell()
+        draw([mesh_of(_tee())], [(128.0, 128.0, 128.0)], size=(32, 32))
+        _keep(PICTURE)
+        say(f"compiled what pictures need in {perf_counter() - began:.0f} s")
 
 
 def _tell() -> float:
