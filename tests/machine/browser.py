@@ -14,11 +14,12 @@ from types import TracebackType
 from typing import Any, Self
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-FLAGS = (
-    "--headless --no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
-    "--disable-sync --disable-extensions --disable-dev-shm-usage --hide-scrollbars --force-device-scale-factor=1 "
-    "--use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist --remote-debugging-pipe"
-).split()
+FLAGS = [
+    *("--headless", "--no-sandbox", "--no-first-run", "--hide-scrollbars", "--force-device-scale-factor=1"),
+    *("--disable-quic", "--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    *("--disable-extensions", "--disable-dev-shm-usage", "--remote-debugging-pipe"),
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),  # WebGL2 without a graphics card
+]
 PATIENCE_S = 60.0
 
 
@@ -38,7 +39,7 @@ class Browser:
         command = [str(CHROMIUM), *FLAGS, *flags, f"--user-data-dir={self._folder.name}", f"--window-size={size[0]},{size[1]}"]
         self._process = subprocess.Popen(
             [*command, "about:blank"],
-            preexec_fn=lambda: (os.dup2(to_child, 3), os.dup2(from_child, 4)) and None,
+            preexec_fn=lambda: _become(to_child, from_child),
             pass_fds=(3, 4),
             stderr=subprocess.DEVNULL,
         )
@@ -160,6 +161,12 @@ class Browser:
                 self.complaints.append(str([value.get("value") for value in given["args"]]))
             case "Log.entryAdded" if given["entry"]["level"] in ("error", "warning"):
                 self.complaints.append(given["entry"]["text"])
+
+
+def _become(to_child: int, from_child: int) -> None:
+    """In the child: the pipe's ends where the browser looks for them."""
+    os.dup2(to_child, 3)
+    os.dup2(from_child, 4)
 
 
 def _pipe() -> tuple[int, int]:

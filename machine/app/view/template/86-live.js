@@ -16,7 +16,7 @@ function follow({ rows }, scene, player) {
       return setTimeout(ask, 5 * ASK_EVERY_MS);
     }
     badge.textContent = liveTold(state);
-    if (state.line !== null && state.line !== shown && !player.playing) {
+    if (state.line && state.line !== shown && !player.playing) {
       shown = state.line;
       scene.go(Math.max(countUpTo(rows.line, state.line) - 1, 0));
     }
@@ -25,8 +25,8 @@ function follow({ rows }, scene, player) {
   ask();
 }
 
-function liveTold({ state, line, total, left_s: left, nozzle_c: nozzle, nozzle_target_c: wanted, bed_c: bed }) {
+function liveTold({ state, share, line, total, left_s: left, nozzle_c: nozzle, nozzle_target_c: wanted, bed_c: bed, message }) {
   const heat = (name, value, target) => value !== null && value !== undefined && `${name} ${Math.round(value)}${target ? ` of ${Math.round(target)}` : ""} °C`;
-  const told = [state, line && `line ${line}${total ? ` of ${total}` : ""}`, heat("nozzle", nozzle, wanted), heat("bed", bed), left && `${duration(left)} left`];
+  const told = [share ? `${state} ${Math.floor(100 * share)} %` : state, line && `line ${line}${total ? ` of ${total}` : ""}`, heat("nozzle", nozzle, wanted), heat("bed", bed), left && `${duration(left)} left`, message];
   return told.filter(Boolean).join(" · ");
 }

@@ -1,0 +1,346 @@
+"""The page in a real browser: what is read out, what is drawn, what hands, keys and a hostile name do to it."""
+
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from machine.app.pipeline import Program
+from machine.app.view.live import served
+from machine.app.view.page import parts_page, print_page
+from machine.dryrun.dryrun import dry_run
+from machine.link.events import Temperature
+from machine.link.progress import Progress
+from profiles.profile import load
+from tests.machine import hand
+from tests.machine.browser import CHROMIUM, Browser
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
+
+WINDOW = (900, 560)  # a small picture: without a graphics card the processor draws it
+HOSTILE = "</title></script><img src=x onerror=hit=1><script>hit=1</script>.gcode"
+FOREIGN = """G28
+G1 Z0.3 F600
+G1 X0 Y0 F6000
+G1 X30 Y0 E2 F1200
+G1 X30 Y30 E4
+M106 S128
+G1 Z0.6
+G1 X0 Y30 E6 F2400
+G1 X0 Y0 E8
+M106 S255
+G1 X30 Y30 E9
+"""
+# What the canvas holds right after the page has drawn it: in the same frame, for it is empty afterwards.
+PICTURE = """new Promise((done) => {
+  document.getElementById('position').dispatchEvent(new Event('input'));
+  requestAnimationFrame(() => done(document.getElementById('canvas').toDataURL()));
+})"""
+# Pixels of the canvas in the red of risky faces.
+REDS = """new Promise((done) => {
+  document.getElementById('model').dispatchEvent(new Event('change'));
+  requestAnimationFrame(() => {
+    const canvas = document.getElementById('canvas'), copy = document.createElement('canvas');
+    [copy.width, copy.height] = [canvas.width, canvas.height];
+    const pen = copy.getContext('2d');
+    pen.drawImage(canvas, 0, 0);
+    const seen = pen.getImageData(0, 0, copy.width, copy.height).data;
+    let count = 0;
+    for (let k = 0; k < seen.length; k += 4) if (seen[k] > 40 && seen[k] > 3 * seen[k + 1] && seen[k] > 3 * seen[k + 2]) count++;
+    done(count);
+  });
+})"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with Browser() as running:
+        yield running
+
+
+@cache
+def program(machine: str = "generic_ac") -> tuple[Any, Program]:
+    """The post and the arm, dry-run: the arm begins in air, which is found."""
+    profile, decomposition, _, _ = hand.printed(machine)
+    lines = hand.text(machine)
+    return profile, Program(lines, dry_run(lines, profile), decomposition)
+
+
+@pytest.fixture
+def page(browser: Browser, tmp_path: Path) -> Browser:
+    """The post and the arm, opened as a file."""
+    profile, printed = program()
+    return opened(browser, tmp_path, print_page("post and arm", printed, profile))
+
+
+@pytest.fixture
+def foreign(browser: Browser, tmp_path: Path) -> Browser:
+    """A file of another program without comments, under a name that would like to be more than a name."""
+    profile, lines = load(), tuple(FOREIGN.splitlines())
+    return opened(browser, tmp_path, print_page(HOSTILE, Program(lines, dry_run(lines, profile), None), profile, known=False))
+
+
+def opened(browser: Browser, folder: Path, content: bytes) -> Browser:
+    file = folder / "page.html"
+    file.write_bytes(content)
+    browser.prefer("light")
+    browser.resize(*WINDOW)
+    browser.open(file.as_uri())
+    return browser
+
+
+def put(browser: Browser, name: str, value: object) -> None:
+    """A slider or a list set to a value, as by hand."""
+    browser.value(
+        f"(() => {{ const e = document.getElementById('{name}'); e.value = '{value}';"
+        "e.dispatchEvent(new Event(e.tagName === 'SELECT' ? 'change' : 'input')); })()"
+    )
+
+
+def text(browser: Browser, name: str) -> str:
+    return str(browser.value(f"document.getElementById('{name}').textContent"))
+
+
+def row(browser: Browser) -> int:
+    return int(browser.value("Number(document.getElementById('position').value)"))
+
+
+def drawn(browser: Browser) -> int:
+    """Rows in the picture, once it is drawn."""
+    browser.value(PICTURE)
+    return int(browser.value("Number(document.documentElement.dataset.drawn)"))
+
+
+def test_the_page_opens_from_a_file_without_a_complaint_and_asks_for_nothing(page: Browser) -> None:
+    assert page.complaints == []
+    assert page.requests == [page.value("location.href")]
+    assert page.value("document.documentElement.dataset.state") == "ready"
+
+
+def test_readouts_are_the_numbers_of_the_dry_run(page: Browser) -> None:
+    read = program()[1].run.program
+    names = ("line", "x", "y", "z", "tilt", "turn", "e", "part", "layer")
+    for k in (0, 7, 23, 44, 61, 75, len(read.line) - 1):
+        put(page, "position", k)
+        places = [f"{value:.3f}" for value in [*(read.end[k] + 0.0), read.filament_mm[k]]]
+        told = [str(read.line[k]), *places, *(str(number or "–") for number in (read.part[k], read.layer[k]))]
+        assert [text(page, f"readout-{name}") for name in names] == told
+
+
+def test_a_row_that_extrudes_tells_its_type_its_bead_and_its_speed(page: Browser) -> None:
+    read = program()[1].run.program
+    k = int((read.e_mm > 0).nonzero()[0][5])
+    put(page, "position", k)
+    assert text(page, "readout-type") == read.types[read.type[k]]
+    assert text(page, "readout-size") == f"{read.width_mm[k]:.2f} × {read.height_mm[k]:.2f}"
+    assert text(page, "readout-speed") == f"{read.feed[k] / 60:.1f} mm/s"
+
+
+def test_the_same_choice_gives_the_same_picture(page: Browser) -> None:
+    assert page.value(PICTURE) == page.value(PICTURE)
+
+
+def test_each_toggle_changes_the_picture_and_back(page: Browser) -> None:
+    before = page.value(PICTURE)
+    for name in ("beads", "travels", "retractions", "seams", "machine", "planes", "directions"):
+        page.click(f"#show-{name}")
+        assert page.value(PICTURE) != before, name
+        page.click(f"#show-{name}")
+        assert page.value(PICTURE) == before, name
+
+
+def test_every_colouring_has_a_picture_of_its_own(foreign: Browser) -> None:
+    pictures = set()
+    for mode in ("part", "kind", "speed", "layer", "flow", "fan"):
+        put(foreign, "colour-by", mode)
+        pictures.add(foreign.value(PICTURE))
+    assert len(pictures) == 6
+    assert text(foreign, "legend").startswith("fan, %")
+
+
+def test_a_kind_of_line_can_be_left_out(page: Browser) -> None:
+    before = page.value(PICTURE)
+    page.click("#types input")
+    assert page.value(PICTURE) != before
+
+
+def test_the_slider_limits_what_is_drawn(page: Browser) -> None:
+    put(page, "position", 20)
+    assert drawn(page) == 21
+
+
+def test_layers_of_one_part_are_drawn_between_the_two_handles(page: Browser) -> None:
+    read = program()[1].run.program
+    put(page, "others", "hide")
+    put(page, "part", 2)
+    put(page, "layer-low", 1)
+    put(page, "layer-high", 1)
+    assert drawn(page) == ((read.part == 2) & (read.layer == 2)).sum()
+
+
+def test_other_parts_are_shown_or_hidden(page: Browser) -> None:
+    put(page, "part", 2)
+    all_shown = drawn(page)
+    put(page, "others", "hide")
+    assert 0 < drawn(page) < all_shown == len(program()[1].run.program.line)
+
+
+def test_the_frame_of_the_workpiece_shows_the_same_row_otherwise(page: Browser) -> None:
+    turned = int((abs(program()[1].run.program.end[:, 3]) > 30).nonzero()[0][10])
+    put(page, "position", turned)
+    before, read = page.value(PICTURE), text(page, "readout-x")
+    put(page, "frame", "workpiece")
+    assert page.value(PICTURE) != before
+    assert text(page, "readout-x") == read
+
+
+def test_residual_faces_are_red_and_may_be_left_plain(browser: Browser, tmp_path: Path) -> None:
+    profile, decomposition, _, _ = hand.printed()
+    page = opened(browser, tmp_path, parts_page(decomposition, profile))
+    assert page.complaints == []
+    page.click("#show-machine")
+    page.drag((300, 300), (300, 100))  # seen from below
+    put(page, "risky", "none")
+    plain = page.value(REDS)
+    put(page, "risky", "straight")
+    assert page.value(REDS) > plain + 100
+
+
+def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:
+    finding = program()[1].run.findings[0]
+    put(page, "position", 0)
+    page.click("#markers button")
+    assert text(page, "readout-line") == str(finding.line)
+    assert page.value("document.querySelector('#findings .chosen').textContent").startswith(f"error: {finding.code}")
+    assert finding.message in text(page, "findings")
+
+
+def test_a_hostile_name_is_only_text(foreign: Browser) -> None:
+    assert text(foreign, "title") == HOSTILE
+    assert foreign.value("document.title") == HOSTILE
+    assert foreign.value("typeof hit") == "undefined"
+    assert foreign.value("document.images.length") == 0
+    assert foreign.complaints == []
+
+
+def test_a_file_without_comments_is_shown_with_what_is_known(foreign: Browser) -> None:
+    assert text(foreign, "readout-layer") == "2"
+    assert foreign.value("document.getElementById('show-machine').checked") is False
+    assert foreign.value("getComputedStyle(document.querySelector('.solids')).display") == "none"
+
+
+def test_playing_goes_on_until_it_is_paused(page: Browser) -> None:
+    put(page, "position", 3)
+    put(page, "speed", 5)
+    page.click("#play")
+    page.wait("Number(document.getElementById('position').value) > 3")
+    page.click("#play")
+    paused = row(page)
+    page.value(PICTURE)
+    assert row(page) == paused
+
+
+def test_playing_ends_at_the_end(page: Browser) -> None:
+    put(page, "position", 60)
+    put(page, "speed", 1000)
+    page.click("#play")
+    page.wait("document.getElementById('play').getAttribute('aria-label') === 'Play'")
+    assert row(page) == len(program()[1].run.program.line) - 1
+
+
+def test_keys_step_turn_and_choose(page: Browser) -> None:
+    put(page, "position", 40)
+    page.key(".")
+    assert row(page) == 41
+    before = page.value(PICTURE)
+    page.key("ArrowLeft")
+    assert page.value(PICTURE) != before
+    page.key("t")
+    assert page.value("document.getElementById('show-travels').checked") is True
+    page.key("[")
+    assert page.value("document.getElementById('layer-high').value") == "4"
+
+
+def test_dragging_turns_and_the_wheel_zooms(page: Browser) -> None:
+    before = page.value(PICTURE)
+    page.drag((300, 300), (400, 320))
+    turned = page.value(PICTURE)
+    page.value("document.getElementById('canvas').dispatchEvent(new WheelEvent('wheel', {deltaY: -200, cancelable: true}))")
+    assert len({before, turned, page.value(PICTURE)}) == 3
+
+
+def test_a_click_on_a_bead_goes_to_its_row(page: Browser) -> None:
+    put(page, "part", 2)
+    put(page, "model", "hide")
+    page.click("#fit")
+    last = row(page)
+    for x, y in ((x, y) for y in range(80, 500, 8) for x in range(220, 540, 8)):
+        page.press(x, y)
+        if row(page) != last:
+            break
+    assert 0 < row(page) < last
+    assert text(page, "readout-type") in ("External perimeter", "Perimeter")
+
+
+def test_dark_and_light_follow_the_system_until_the_person_chooses(page: Browser) -> None:
+    page.prefer("dark")
+    page.wait("document.documentElement.dataset.theme === 'dark'")
+    dark = page.value("getComputedStyle(document.body).backgroundColor")
+    page.click("#theme")
+    assert page.value("document.documentElement.dataset.theme") == "light"
+    assert page.value("getComputedStyle(document.body).backgroundColor") != dark
+
+
+def test_the_page_fits_a_telephone(page: Browser) -> None:
+    page.resize(360, 740, mobile=True)
+    assert page.value("document.scrollingElement.scrollWidth") <= 360
+    assert drawn(page) > 0
+
+
+def test_the_picture_returns_after_the_graphics_card_has_let_go_of_it(page: Browser) -> None:
+    before = page.value(PICTURE)
+    page.value("window.card = document.getElementById('canvas').getContext('webgl2').getExtension('WEBGL_lose_context')")
+    page.value("card.loseContext()")
+    page.wait("!document.getElementById('notice').hidden")
+    page.value("card.restoreContext()")
+    page.wait("document.getElementById('notice').hidden")
+    assert page.value(PICTURE) == before
+    page.complaints.clear()
+
+
+def test_the_report_holds_every_part_and_is_printed_with_the_picture(page: Browser) -> None:
+    assert page.value("document.querySelectorAll('#report-text section')[0].querySelectorAll('tbody tr').length") == 2
+    assert "External perimeter" in text(page, "report-text")
+    page.value("dispatchEvent(new Event('beforeprint'))")
+    assert page.value("document.getElementById('picture').width === document.getElementById('canvas').width")
+    assert page.pdf().startswith(b"%PDF")
+
+
+def test_without_webgl_the_report_is_shown_and_a_sentence_says_why(tmp_path: Path) -> None:
+    profile, printed = program()
+    with Browser(flags=("--disable-3d-apis",)) as blind:
+        opened(blind, tmp_path, print_page("post and arm", printed, profile))
+        assert "no WebGL2" in text(blind, "notice")
+        assert blind.value("document.getElementById('report').offsetHeight") > 100
+
+
+def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.app.view.live.LAST_WORD_S", 0.0)
+    profile, printed = program()
+    line = int(printed.run.program.line[40])
+    heat = Temperature(nozzle_c=209.6, nozzle_target_c=210.0)
+    now = Progress(
+        sent=60, acknowledged=50, total=100, elapsed_s=10.0, left_s=61.0, share=0.5,
+        temperature=heat, part=2, parts=2, layer=7, file_line=line,
+    )  # fmt: skip
+    with served(print_page("post and arm", printed, profile, live=True)) as watched:
+        watched.follow(now)
+        browser.open(watched.address)
+        browser.wait("Number(document.getElementById('position').value) === 40")
+        assert text(browser, "live").startswith(f"printing 50 % · line {line} of 100 · nozzle 210 of 210 °C")
+            f"printing 50 % · line {line} of 100 · nozzle 210 of 210 °C"
+        )
+        assert {address.rsplit("/", 1)[1] for address in browser.requests} == {"", "state"}
+        assert browser.complaints == []
