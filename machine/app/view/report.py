@@ -29,13 +29,14 @@ MOVES = {
     MoveKind.TRAVEL: "travel", MoveKind.RETRACT: "retraction", PRIME: "prime", WIPE: "wipe", MoveKind.ROTATE: "turning the table",
 }  # fmt: skip
 UNTOLD = "not told"
+RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
 
 
 def parts_report(decomposition: Decomposition, profile: Profile) -> dict[str, Any]:
     """The report of a page of parts alone."""
     facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
-    rows = [_solid(part, decomposition, profile) for part in decomposition.parts]
-    tables = [_table("Parts", SOLID, rows), _areas(decomposition, profile), *settings_tables(profile)]
+    rows = [_solid(part, profile) for part in decomposition.parts]
+    tables = [_table("Parts", SOLID, rows, [RISKY]), _areas(decomposition, profile), *settings_tables(profile)]
     return {"facts": facts, "tables": tables}
 
 
@@ -53,30 +54,30 @@ def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), fo
     return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": folded}
 
 
-SOLID = ["part", "tilt", "turn", "volume", "share", "risky before", "risky after"]
+SOLID = ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²"]
 
 
-def _solid(part: Part, decomposition: Decomposition, profile: Profile) -> Row:
+def _solid(part: Part, profile: Profile) -> Row:
     """A part's shape: pose, volume, and the faces that would and will need support."""
     before = risky_before_mm2(part, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
-    share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
     angles = [f"{part.pose.tilt_deg:.1f}°", f"{part.pose.turn_deg:.1f}°"]
-    return [str(part.index), *angles, _cm3(part.volume_mm3), share, _mm2(before), _mm2(part.risky_area_mm2)]
+    areas = [f"{max(area, 0.0):.1f}" for area in (before, part.risky_area_mm2)]
+    return [str(part.index), *angles, f"{part.volume_mm3 / 1000.0:.2f}", *areas]
 
 
 def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -> Table:
     """Each part with its layers, time and material; what its solid is where the program came from a model."""
     parsed, seconds = program.run.program, np.diff(ends_s, prepend=0.0)
     found = program.decomposition
-    solids = {part.index: _solid(part, found, profile) for part in found.parts} if found is not None else {}
+    solids = {part.index: _solid(part, profile) for part in found.parts} if found is not None else {}
     rows = []
     for index in parsed.parts or (0,):
         mine = parsed.part == index
         count = int((parsed.part[layers.first] == index).sum())
-        made = [str(count), duration(float(seconds[mine].sum())), _grams(parsed.e_mm[mine], profile)]
+        made = [str(count), duration(float(seconds[mine].sum())), f"{_grams(parsed.e_mm[mine], profile):.1f}"]
         rows.append([*solids.get(index, [str(index) if index else "all"]), *made])
     head = SOLID if solids else SOLID[:1]
-    return _table("Parts", [*head, "layers", "time", "material"], rows)
+    return _table("Parts", [*head, "layers", "time", "g"], rows, [RISKY] if solids else [])
 
 
 def _kinds(run: DryRun, profile: Profile) -> Table:
@@ -89,9 +90,9 @@ def _kinds(run: DryRun, profile: Profile) -> Table:
     told = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]
     if run.dwell_s > 0:
         told.append(("waiting", run.dwell_s, 0.0))
-    rows = [[name, duration(s), _share(s, run.time_s), f"{e / 1000:.2f} m", _grams(e, profile)] for name, s, e in told]
+    rows = [[name, duration(s), _share(s, run.time_s), f"{e / 1000:.2f}", f"{_grams(e, profile):.1f}"] for name, s, e in told]
     notes = ["heating and homing are not counted"]
-    return _table("Time and material", ["kind", "time", "share", "filament", "material"], rows, notes)
+    return _table("Time and material", ["kind", "time", "share", "m", "g"], rows, notes)
 
 
 def _areas(decomposition: Decomposition, profile: Profile) -> Table:
@@ -101,13 +102,13 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
     told = [
         ("straight up", decomposition.risky_area_mm2),
         ("best single orientation", single),
-        (_count(len(decomposition.parts)), decomposition.residual_area_mm2),
+        (f"in {len(decomposition.parts)} part{'s' * (len(decomposition.parts) != 1)}", decomposition.residual_area_mm2),
     ]
     whole = decomposition.risky_area_mm2
-    rows = [[name, _mm2(area), _share(whole - area, whole)] for name, area in told]
+    rows = [[name, f"{max(area, 0.0):.1f}", _share(whole - area, whole)] for name, area in told]
     rows[0][2] = ""
     notes = [f"best single orientation: {in_words(best)}", "--compare tells time and material too"]
-    return _table("Compared", ["print", "risky area", "less"], rows, notes)
+    return _table("Compared", ["print", "risky mm²", "less"], rows, notes)
 
 
 def _rivals(rivals: Sequence[Rival]) -> Table:
@@ -117,10 +118,10 @@ def _rivals(rivals: Sequence[Rival]) -> Table:
         made = ["-"] * 4
         if rival.time_s is not None:
             filament, grams, support = rival.filament_mm or 0.0, rival.filament_g or 0.0, rival.support_mm3 or 0.0
-            made = [duration(rival.time_s), f"{filament / 1000:.2f} m", f"{grams:.1f} g", _cm3(support)]
-        rows.append([rival.name, *made, _mm2(rival.risky_mm2)])
+            made = [duration(rival.time_s), f"{filament / 1000:.2f}", f"{grams:.1f}", f"{support / 1000:.2f}"]
+        rows.append([rival.name, *made, f"{max(rival.risky_mm2, 0.0):.1f}"])
     notes = [f"{rival.name}: {note}" for rival in rivals for note in (rival.orientation, rival.message) if note]
-    return _table("Compared", ["print", "time", "filament", "material", "support", "risky area"], rows, notes)
+    return _table("Compared", ["print", "time", "m", "g", "support cm³", "risky mm²"], rows, notes)
 
 
 def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
@@ -128,7 +129,7 @@ def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
     found = str(len(layers.first)) if layers.by == "comments" else f"{len(layers.first)}, by their heights"
     return [
         ["time", duration(values["time_s"])],
-        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {_grams(run.program.e_mm, profile)}"],
+        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {_grams(run.program.e_mm, profile):.1f} g"],
         *([["parts", str(values["parts"])]] if values["parts"] else []),
         ["layers", found],
         *[[key, str(values[key])] for key in ("reorientations", "retractions")],
@@ -140,11 +141,11 @@ def _names(profile: Profile) -> list[Row]:
     return [["machine", profile.machine.name], ["material", profile.material.name], ["process", profile.process.name]]
 
 
-def _grams(filament_mm: Any, profile: Profile) -> str:
+def _grams(filament_mm: Any, profile: Profile) -> float:
     """Weight of filament that was pushed; filament_mm: a length, or the steps that make it."""
     material = profile.material
     volume_mm3 = float(np.sum(filament_mm)) * pi * material.diameter_mm**2 / 4.0
-    return f"{volume_mm3 * material.density_g_cm3 / 1000.0 + 0.0:.1f} g"
+    return volume_mm3 * material.density_g_cm3 / 1000.0
 
 
 def _share(part: float, whole: float) -> str:
@@ -153,11 +154,3 @@ def _share(part: float, whole: float) -> str:
 
 def _cm3(volume_mm3: float) -> str:
     return f"{volume_mm3 / 1000.0:.2f} cm³"
-
-
-def _mm2(area: float) -> str:
-    return f"{max(area, 0.0):.1f} mm²"
-
-
-def _count(parts: int) -> str:
-    return f"in {parts} part{'s' * (parts != 1)}"
