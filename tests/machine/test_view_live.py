@@ -4,14 +4,18 @@ import http.client
 import json
 import socket
 from collections.abc import Iterator
+from contextlib import contextmanager
 from http.client import HTTPResponse
+from pathlib import Path
 
 import pytest
 
+from machine.app.cli import main
 from machine.app.view.live import Watched, served, state_of
 from machine.link.events import Temperature
 from machine.link.progress import Progress
 from profiles.errors import OutputError
+from tests.machine.pages import opened
 
 HALF = Progress(
     sent=60, acknowledged=50, total=100, elapsed_s=10.0, left_s=9.5, share=0.5,
@@ -114,3 +118,24 @@ def test_how_it_ended_is_said_once() -> None:
     watched.end("stopped")
     watched.end("done")
     assert state_of(HALF, "stopped") == json.loads(watched.state())
+
+
+def test_print_watch_follows_the_print_to_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept: list[Watched] = []
+
+    @contextmanager
+    def remembered(page: bytes, port: int) -> Iterator[Watched]:
+        with served(page, port) as running:
+            kept.append(running)
+            yield running
+
+    monkeypatch.setattr("machine.app.commands.served", remembered)
+    file = tmp_path / "moves.gcode"
+    file.write_text("G28\nM109 S200\nG1 Z0.2 F6000\nG1 X10 E1\nG1 Y10 E2\nM104 S0\nM140 S0\n")
+    assert main(["print", str(file), "--port", "sim", "--watch", "--force"]) == 0
+    told, (header, _) = json.loads(kept[0].state()), opened(kept[0].page)
+    assert (told["state"], told["acknowledged"], told["total"]) == ("done", 7, 7)
+    assert header["live"] is True
+    assert f"watch the print at {kept[0].address}" in capsys.readouterr().err

@@ -90,7 +90,7 @@ def _kinds(run: DryRun, profile: Profile) -> Table:
     told = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]
     if run.dwell_s > 0:
         told.append(("waiting", run.dwell_s, 0.0))
-    rows = [[name, duration(s), _share(s, run.time_s), f"{e / 1000:.2f}", f"{_grams(e, profile):.1f}"] for name, s, e in told]
+    rows = [[name, duration(s), _share(s, run.time_s), _fixed(e / 1000, 2), _fixed(_grams(e, profile), 1)] for name, s, e in told]
     notes = ["heating and homing are not counted"]
     return _table("Time and material", ["kind", "time", "share", "m", "g"], rows, notes)
 
@@ -148,8 +148,13 @@ def _grams(filament_mm: Any, profile: Profile) -> float:
     return volume_mm3 * material.density_g_cm3 / 1000.0
 
 
+def _fixed(value: float, digits: int) -> str:
+    """The value with so many digits, without a sign where they are all 0."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
 def _share(part: float, whole: float) -> str:
-    return f"{round(100.0 * part / whole, 1) + 0.0 if whole > 0 else 0.0:.1f} %"
+    return f"{_fixed(100.0 * part / whole if whole > 0 else 0.0, 1)} %"
 
 
 def _cm3(volume_mm3: float) -> str:
