@@ -5,7 +5,7 @@ vec3 lit(vec3 colour, vec3 n) {
   float key = max(dot(n, normalize(vec3(-0.45, 0.55, 0.75))), 0.0);
   float fill = max(dot(n, normalize(vec3(0.7, -0.15, 0.5))), 0.0);
   float gloss = pow(max(dot(n, normalize(vec3(-0.25, 0.35, 1.0))), 0.0), 24.0);
-  return colour * (0.36 + 0.56 * key + 0.2 * fill) + vec3(0.07 * gloss);
+  return colour * (0.42 + 0.58 * key + 0.24 * fill) + vec3(0.07 * gloss);
 }`;
 
 /** A linked program {use, at: place of an attribute, to: place of a uniform}. Raises what the compiler says. */

@@ -12,7 +12,8 @@ function surfacesOf({ header, array }) {
     for (let corner = 0; corner < 3; corner++)
       for (let axis = 0; axis < 3; axis++) places[at++] = vertices[axis][faces[corner][face]] / 1000;
   const parts = header.parts.filter((part) => part.mesh).map((part) => ({ part, range: part.mesh.faces.map((face) => 3 * face) }));
-  return { places, marks, parts };
+  const surfaces = { places, marks, parts };
+  return { ...surfaces, apart: apartOf(surfaces) };
 }
 
 /** Colours of all corners: the part's, and red where a face is risky in the way asked for (none, printed, straight). */
@@ -25,6 +26,27 @@ function surfaceColours({ marks, parts }, colourOf, risky) {
       colours.set([r, g, b, red ? 255 : 254], 4 * corner);
     }
   return colours;
+}
+
+/** Which way each part goes when the model is drawn apart, a map of part to vector: along its direction, and with what it stands on. */
+function apartOf({ places, parts }) {
+  const ways = new Map();
+  parts.forEach(({ part }, k) => {
+    const below = k ? nearest(places, parts.slice(0, k), part.base.centre_mm) : null;
+    ways.set(part, below ? add(ways.get(below), part.direction) : [0, 0, 0]);
+  });
+  return ways;
+}
+
+/** The part whose surface comes nearest to a place. */
+function nearest(places, parts, [x, y, z]) {
+  let best = null, least = Infinity;
+  for (const { part, range } of parts)
+    for (let i = 3 * range[0]; i < 3 * range[1]; i += 3) {
+      const way = (places[i] - x) ** 2 + (places[i + 1] - y) ** 2 + (places[i + 2] - z) ** 2;
+      if (way < least) [best, least] = [part, way];
+    }
+  return best;
 }
 
 /** Two vectors across a direction. */

@@ -3,7 +3,7 @@
 const HALF_HEIGHT = Math.tan(15 * RAD); // of the picture at distance 1
 
 function cameraOf() {
-  const camera = { target: [0, 0, 0], distance: 300, yaw: -55 * RAD, pitch: 24 * RAD, radius: 100 };
+  const camera = { target: [0, 0, 0], distance: 300, yaw: -55 * RAD, pitch: 24 * RAD, radius: 100, machine: 1000 };
   const outward = () => {
     const { yaw, pitch } = camera;
     return [Math.cos(pitch) * Math.cos(yaw), Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch)];
@@ -16,8 +16,8 @@ function cameraOf() {
     return multiply([r[0], u[0], o[0], 0, r[1], u[1], o[1], 0, r[2], u[2], o[2], 0, 0, 0, 0, 1], moved(scaled(camera.eye(), -1)));
   };
   camera.lens = (aspect) => {
-    const reach = camera.radius + length(camera.target) * 0;
-    return perspective(HALF_HEIGHT, aspect, Math.max(camera.distance - 2 * reach, camera.distance / 60), camera.distance + 6 * reach);
+    const near = Math.max(camera.distance - 2 * camera.radius, camera.distance / 60);
+    return perspective(HALF_HEIGHT, aspect, near, camera.distance + Math.max(8 * camera.radius, camera.machine));
   };
   camera.orbit = (dx, dy) => {
     camera.yaw -= dx;
@@ -38,7 +38,7 @@ function cameraOf() {
   camera.fit = ([least, most], aspect) => {
     camera.target = scaled(add(least, most), 0.5);
     camera.radius = Math.max(length(sub(most, least)) / 2, 1);
-    camera.distance = (1.04 * camera.radius) / (HALF_HEIGHT * Math.min(1, aspect));
+    camera.distance = (1.1 * camera.radius) / (HALF_HEIGHT * Math.min(1, aspect));
   };
   return camera;
 }

@@ -68,7 +68,7 @@ function paintStage(gl, stage, print, scene, camera) {
   const head = seenAs(stand.head);
   if (on.machine) stage.nozzle.draw(head);
   paintPath(stage, ranges, scene, work.toClip, nearer * 0.02, clamp(pixels * 2.5, 4, 13) * (width / canvas.clientWidth || 1));
-  paintModel(stage, print, scene, work, nearer);
+  paintModel(stage, print, scene, (shift) => seenAs(multiply(stand.work, moved(shift))), nearer);
   if (on.machine) paintHead(stage, head);
   return { work, ranges, beadView };
 }
@@ -91,12 +91,14 @@ function paintPath(stage, ranges, scene, toClip, nearer, size) {
   }
 }
 
-function paintModel(stage, print, scene, work, nearer) {
-  const whole = scene.model === "solid", { parts = [] } = print.surfaces || {};
+/** seenAt: the work shifted by a vector, as the eye sees it. */
+function paintModel(stage, print, scene, seenAt, nearer) {
+  const whole = scene.model === "solid", { parts = [], apart } = print.surfaces || {}, work = seenAt([0, 0, 0]);
   if (stage.model && scene.model !== "hide")
     for (const { part, range } of parts) {
       if (scene.part !== null && scene.part !== part.index && scene.others === "hide") continue;
-      stage.model.draw(work, { ghost: whole ? 0 : 0.16, range, behind: whole ? 0 : nearer * 0.02 });
+      const seen = scene.apart ? seenAt(scaled(apart.get(part), scene.apart * print.span)) : work;
+      stage.model.draw(seen, { ghost: whole ? 0 : 0.16, range, behind: whole ? 0 : nearer * 0.02 });
     }
   if (scene.on.directions) stage.arrows.draw(work);
   if (!scene.on.planes) return;

@@ -6,7 +6,7 @@ function sceneOf(print, bells) {
     row: last, share: 1, place: [0, 0, 0, 0, 0],
     part: null, others: "faint", low: 0, high: Math.max(rows.layers.length - 1, 0),
     riding: false, dark: false, stride: 1, mode: "part", hidden: new Set(),
-    model: rows.count ? "ghost" : "solid", risky: "printed",
+    model: rows.count ? "ghost" : "solid", risky: "printed", apart: 0,
     on: { beads: true, travels: false, retractions: false, seams: false, machine: header.machine.known, planes: false, directions: false, findings: true },
   };
   scene.layers = () => (scene.part === null ? rows.layers : rows.layers.filter((layer) => layer.part === scene.part));
@@ -39,6 +39,11 @@ function sceneOf(print, bells) {
     [scene.low, scene.high] = [0, Math.max(scene.layers().length - 1, 0)];
     bells.ring("layers");
   };
+  /** Without a path: the table stands as it does for a part, or level. */
+  scene.standFor = (part) => {
+    scene.place = restingPlace(header, part);
+    bells.ring("row");
+  };
   scene.chooseLayers = (low, high) => {
     const most = Math.max(scene.layers().length - 1, 0);
     [scene.low, scene.high] = [clamp(Math.min(low, high), 0, most), clamp(Math.max(low, high), 0, most)];
@@ -47,9 +52,9 @@ function sceneOf(print, bells) {
   return scene;
 }
 
-/** Without a path the machine waits level, the head well above everything. */
-function restingPlace({ machine, parts }) {
-  const high = 30 + Math.max(60, ...parts.map((part) => (part.base ? part.base.centre_mm[2] + part.base.radius_mm : 0)));
-  const origin = carried(chainOf(machine).table(machine.tilt.zero_deg, machine.turn.zero_deg), [0, 0, high]);
-  return [...add(origin, machine.tool_mm), machine.tilt.zero_deg, machine.turn.zero_deg];
+/** Without a path the machine waits, level or as for a part, the head well above everything. */
+function restingPlace({ machine, parts }, { tilt_deg: tilt = machine.tilt.zero_deg, turn_deg: turn = machine.turn.zero_deg } = {}) {
+  const high = 30 + Math.max(60, ...parts.map((part) => (part.base ? length(part.base.centre_mm) + part.base.radius_mm : 0)));
+  const origin = carried(chainOf(machine).table(tilt, turn), [0, 0, 0]);
+  return [...add(add(origin, [0, 0, high]), machine.tool_mm), tilt, turn];
 }

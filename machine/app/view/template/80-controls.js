@@ -13,8 +13,11 @@ function controlsOf(print, scene, bells) {
   select("model", (value) => { scene.model = value; }, "look");
   select("risky", (value) => { scene.risky = value; }, "model");
   select("frame", (value) => { scene.riding = value === "workpiece"; }, "frame");
-  if (!print.rows.count) document.body.classList.add("no-paths");
+  if (!print.rows.count) document.body.classList.add("no-paths"); else document.body.classList.add("has-paths");
   if (!print.surfaces && !print.header.parts.some((part) => part.base)) document.body.classList.add("no-solids");
+  for (const part of print.header.parts) if (part.base) $("stand").append(made("option", { value: part.index, text: `part ${part.index}` }));
+  $("stand").addEventListener("change", () => scene.standFor(print.header.parts.find((part) => String(part.index) === $("stand").value)));
+  $("apart").addEventListener("input", () => { scene.apart = Number($("apart").value); bells.ring("look"); });
   typeBoxes(print, scene, bells);
   tabs();
 }
