@@ -239,3 +239,23 @@ def test_what_is_kept_stays_exact(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_nothing_is_thinned_that_fits() -> None:
     program = parse_gcode(WAVE.split("\n"), PLAIN.machine)
     assert len(kept_rows(program)) == len(program.line)
+
+
+LINES = (
+    *("G1 X10 E1 F600", "G1 X0", "G0 Z5", "G1 Z0.2 E0.1", "G92 E0", "G92 X3", "G1 E-1", "G28", "G4 S2", "G1 A30", "G1 X1e9"),
+    *("G1 X4 A-10 C20 E3", "M106", "M109 S9", "M84", ";LAYER_CHANGE", ";PART:2 of 9", ";PART:1", ";TYPE:Perimeter"),
+    *(";TYPE:<b>", ";WIDTH:0", ";HEIGHT:70", ";UNSUPPORTED:3@1"),
+)
+
+
+@given(st.lists(st.sampled_from(LINES), max_size=25))
+def test_whatever_the_order_of_lines_rows_layers_and_parts_fit_together(lines: list[str]) -> None:
+    header, found = read("\n".join(lines))
+    parsed = parse_gcode(lines, PLAIN.machine)
+    rows = len(parsed.line)
+    assert [len(found[name]) for name in ("end", "time", "line", "kind", "width", "fan")] == [rows] * 6
+    assert all(0 <= part["first_row"] <= part["first_row"] + part["rows"] <= rows for part in header["parts"])
+    ends = found["layer_first"] + found["layer_rows"]
+    assert (found["layer_first"][1:] >= ends[:-1]).all()
+    assert all(ends <= rows)
+    assert all(-1 <= finding["row"] < max(rows, 1) for finding in header["findings"])
