@@ -99,9 +99,9 @@ def flags_of(words: Words, text: str) -> set[str]:
 
 def drained(body: Body) -> Iterator[float]:
     """Until all planned moves are over."""
-    body.motion.planner.barrier()
-    while (next_s := body.motion.planner.next_s()) < inf:
+    planner = body.motion.planner
+    while (next_s := planner.next_s()) < inf:
         if next_s > body.now_s:
             yield next_s
-        body.motion.planner.run(body.now_s)
-    body.motion.planner.barrier()
+        planner.run(body.now_s)
+    planner.barrier(body.now_s)

@@ -50,6 +50,7 @@ class Firmware:
         self._queue: deque[tuple[str, str]] = deque()
         self._wake_s: float | None = None
         self._work: Iterator[float] | None = None
+        self._waits = False  # the program itself waits for the command at work
         self._taken = self._watched = 0
         self.watch: Callable[[int], bool] | None = None
         self.dead = False
@@ -64,6 +65,8 @@ class Firmware:
         if self._urgent is not None:
             for order in self._urgent.read(data):
                 self._do_urgent(order)
+            if self.dead:
+                return
         lines = self._reception.receive(data)
         if self._manner.urgent == "lines" and any(line.strip() == b"M112" for line in lines):
             self._shut_down("M112", ())
@@ -220,12 +223,12 @@ class Firmware:
             if answer is None or isinstance(answer, str):
                 self._finish(label, answer)
                 return
-            self._work = answer
-            if name not in MOVES:
-                body.motion.planner.barrier()
+            self._work, self._waits = answer, name not in MOVES
         wake_s = next(self._work, None)
         if wake_s is None:
             self._work = None
+            if self._waits:
+                body.motion.planner.barrier(body.now_s)
             self._finish(label)
         else:
             self._sleep(wake_s)
@@ -281,7 +284,7 @@ class Firmware:
                 break
             body.now_s = max(body.now_s, due_s, min(to_s - CHATTER_S, trip_s))
             self._tell(due_s, busy_s, trip_s)
-        if to_s < inf:
+        if to_s < inf and not self.dead:
             body.now_s = max(body.now_s, to_s)
 
     def _tell(self, due_s: float, busy_s: float, trip_s: float) -> None:

@@ -127,8 +127,9 @@ class Planner:
             self._gate_s = min(self._gate_s, now_s)
         self._look_back()
 
-    def barrier(self) -> None:
+    def barrier(self, now_s: float) -> None:
         """The program itself waits here: a machine that stands still now has not run dry."""
+        self.run(now_s)
         self._last = None
 
     def ahead(self) -> list[Block]:
