@@ -181,6 +181,9 @@ def print_(
     log: Annotated[
         Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
     ] = None,
+    journal: Annotated[
+        Path | None, typer.Option("--journal", metavar="FILE", help="for resume; else a new file in the state folder")
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")
     ] = False,
@@ -197,7 +200,28 @@ def print_(
     )
     named = _named(machine=machine, material=material, process=process, settings=settings)
     watched = (watch_port or 0) if watch or watch_port is not None else None
-    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named, watched, log)
+    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named, watched, log, journal)
+
+
+@app.command()
+def resume(
+    journal: Annotated[Path, typer.Argument(metavar="JOURNAL", help="journal of the print that was cut off")],
+    port: Annotated[str, typer.Option("--port", metavar="PORT", help="serial port")],
+    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
+    yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
+    further: Annotated[
+        Path | None, typer.Option("--journal", metavar="FILE", help="journal of the rest; else a new file in the state folder")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
+    ] = None,
+    machine: MachineGiven = None,
+) -> int:
+    """Go on with a print that was cut off: by a power cut, a crash, a pulled plug."""
+    from machine.app import resume_command
+
+    given = None if machine is None else _profile(machine, "pla", "standard", None, None, None, None)
+    return resume_command.resume(journal, port, baud, yes, given, further, log)
 
 
 @app.command()

@@ -151,13 +151,15 @@ def print_model(
     named: frozenset[str] = frozenset(),
     watch_port: int | None = None,
     log: Path | None = None,
+    journal: Path | None = None,
 ) -> int:
     """Dry-run, then stream a model or a G-code file to a printer, which is asked who it is before any work is done.
 
     watch_port: serve the print's page on this port of this computer, 0: on any free one; None: serve nothing.
-    log: file for the traffic of the line; None: a new one in the state folder.
+    log: file for the traffic of the line, journal: for what a resume needs; None: a new one in the state folder.
     """
-    _check(log)
+    for file in (log, journal):
+        _check(file)
     answer = check_port(port, baud, sim_speed)
     is_model = Path(model).suffix.lower() not in GCODE_SUFFIXES
     if is_model:
@@ -170,11 +172,13 @@ def print_model(
     check_program(answer, program, profile, model_name(model), force)
     _refuse_errors(program, force)
     show(run_table(program.run))
+    name, source = model_name(model), None if is_model else Path(model)
     if watch_port is None:
-        return print_program(program, profile, port, baud, sim_speed, name=model_name(model), log=log)
+        return print_program(program, profile, port, baud, sim_speed, name=name, log=log, source=source, journal=journal)
     with served(print_page(model_name(model), program, profile, live=True), watch_port) as watched:
         say(f"watch the print at {watched.address}")
-        code = print_program(program, profile, port, baud, sim_speed, watched.follow, name=model_name(model), log=log)
+        follow = watched.follow
+        code = print_program(program, profile, port, baud, sim_speed, follow, name=name, log=log, source=source, journal=journal)
         watched.end("stopped" if code else "done")
     return code
 
@@ -203,7 +207,7 @@ def _gcode_lines(path: Path) -> tuple[str, ...]:
         raise GcodeError(f"G-code file {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
     except UnicodeDecodeError as error:
         raise GcodeError(f"G-code file {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
-    lines = tuple(text.splitlines())
+    lines = tuple(text.removesuffix("\n").split("\n"))  # as GcodeFile counts them, which a resume reads
     if not any(line.strip() for line in lines):
         raise GcodeError(f"G-code file {path} is empty")
     return lines

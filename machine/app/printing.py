@@ -1,15 +1,13 @@
 """Printing: the stream to a printer, or to the simulated one on a pseudo-terminal, shown to the person watching."""
 
-import os
-import signal
-import stat
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from math import inf, isfinite
 from pathlib import Path
-from types import FrameType
 
+from machine.app.interrupts import stopping
+from machine.app.journals import new_journal
 from machine.app.keys import Keyboard, Typing, can_type
 from machine.app.match import printer_at
 from machine.app.pipeline import Program
@@ -20,6 +18,9 @@ from machine.app.traffic import TrafficLog, new_log, tapped
 from machine.dialects import DIALECTS
 from machine.link.answer import Answer
 from machine.link.control import Control
+from machine.link.feed import Begin
+from machine.link.inquiry import Found
+from machine.link.journal import Journal
 from machine.link.progress import Progress
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import Outcome, print_lines
@@ -61,28 +62,40 @@ def print_program(
     *,
     name: str = "",
     log: Path | None = None,
+    source: Path | None = None,
+    journal: Path | None = None,
 ) -> int:
     """Stream a program; sim_speed times real time on the simulated printer, 0: as fast as possible.
 
     follow: is told the progress besides the person at the terminal; name: of the model; log: file for the traffic, else a
-    new one in the state folder.
+    new one in the state folder. source: the G-code file that is printed, None: the program is kept beside the journal;
+    journal: its file, else a new one in the state folder, for a printer that is not simulated.
     """
     title = f"{name or 'print'} to {'the simulated printer' if port == SIMULATED else port}"
-    with new_log("print", title) if log is None else TrafficLog(log, title) as kept, _pointing_to(kept):
+    wanted = port != SIMULATED or journal is not None
+    keeping = new_journal(program.lines, profile, name or "print", source, journal) if wanted else nullcontext()
+    with new_log("print", title) if log is None else TrafficLog(log, title) as kept, _pointing_to(kept), keeping as story:
         if port != SIMULATED:
-            return _ended(streamed(program, profile, port, baud, title, kept, follow))
-        return _print_simulated(program, profile, baud, sim_speed or inf, title, kept, follow)
+            return ended(streamed(program, profile, port, baud, title, kept, follow, story))
+        return _print_simulated(program, profile, baud, sim_speed or inf, title, kept, follow, story)
 
 
 def _print_simulated(
-    program: Program, profile: Profile, baud: int, speed: float, title: str, log: TrafficLog, follow: Follow | None
+    program: Program,
+    profile: Profile,
+    baud: int,
+    speed: float,
+    title: str,
+    log: TrafficLog,
+    follow: Follow | None,
+    journal: Journal | None,
 ) -> int:
     """Stream to the simulated printer and tell what it has done."""
     with SimulatedPrinter(profile.machine, speed) as printer:
-        outcome = streamed(program, profile, printer.path, baud, title, log, follow)
+        outcome = streamed(program, profile, printer.path, baud, title, log, follow, journal)
         record = printer.record
     if outcome.cancelled:
-        return _ended(outcome)
+        return ended(outcome)
     segments, volumes = record.deposited(profile.material.diameter_mm)
     planned = float(program.run.segment_mm3.sum())
     laid = f"{len(segments)} strokes laid {volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f})"
@@ -103,15 +116,26 @@ def streamed(
     title: str,
     log: TrafficLog,
     follow: Follow | None = None,
+    journal: Journal | None = None,
+    begin: Callable[[Found], Begin] | None = None,
 ) -> Outcome:
-    """Stream a program while a person watches: screen or lines, keys, Ctrl-C, log."""
+    """Stream a program while a person watches: screen or lines, keys, Ctrl-C, log, journal. begin: of a resumed print."""
     stop, control, words = threading.Event(), Control(), Words()
 
     def traffic(direction: str, data: bytes) -> None:
         log.note(direction, data)
         words.hear(direction, data)
 
-    with _stopping(stop), _shown(title, program, control, words) as tell:
+    with stopping(stop), ExitStack() as stack:
+        tell = _Late(stack, _shown(title, program, control, words))
+
+        def begun(found: Found) -> Begin:
+            decided = Begin(1, ()) if begin is None else begin(found)
+            tell.open()
+            return decided
+
+        if begin is None:
+            tell.open()
 
         def on_progress(progress: Progress) -> None:
             tell(progress)
@@ -129,7 +153,24 @@ def streamed(
             control=control,
             profile=profile,
             medium=tapped(traffic),
+            journal=journal,
+            begin=None if begin is None else begun,
         )
+
+
+class _Late:
+    """What shows the progress, from open() on: while a person is asked something the terminal is theirs."""
+
+    def __init__(self, stack: ExitStack, shown: AbstractContextManager[Follow]) -> None:
+        self._stack, self._shown = stack, shown
+        self._tell: Follow | None = None
+
+    def open(self) -> None:
+        self._tell = self._stack.enter_context(self._shown)
+
+    def __call__(self, progress: Progress) -> None:
+        if self._tell is not None:
+            self._tell(progress)
 
 
 @contextmanager
@@ -167,41 +208,6 @@ def _pointing_to(log: TrafficLog) -> Iterator[None]:
         raise
 
 
-@contextmanager
-def _stopping(stop: threading.Event) -> Iterator[None]:
-    """Ctrl-C, a termination request and a closed terminal end the print safely; a second one interrupts at once."""
-
-    def ask(number: int, frame: FrameType | None) -> None:
-        del frame
-        if number in _HANGUP:
-            _leave_terminal()
-        if stop.is_set():
-            raise KeyboardInterrupt
-        stop.set()
-
-    signals = (signal.SIGINT, signal.SIGTERM, *_HANGUP) if threading.current_thread() is threading.main_thread() else ()
-    # What is ignored stays ignored: that is what nohup asks for.
-    before = {number: signal.signal(number, ask) for number in signals if signal.getsignal(number) is not signal.SIG_IGN}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-_HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
-
-
-def _leave_terminal() -> None:
-    """The window is closed: what is still said must not end in an error before the heaters are off."""
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for descriptor in (0, 1, 2):
-        with suppress(OSError):
-            if stat.S_ISCHR(os.fstat(descriptor).st_mode):
-                os.dup2(nowhere, descriptor)
-    os.close(nowhere)
-
-
 def status(progress: Progress) -> str:
     """One line that tells where a print stands."""
     told = [f"{100 * progress.share:.0f} %" if progress.share is not None else f"line {progress.acknowledged}"]
@@ -217,7 +223,7 @@ def status(progress: Progress) -> str:
     return f"{progress.state}: " + ", ".join(told)
 
 
-def _ended(outcome: Outcome) -> int:
+def ended(outcome: Outcome) -> int:
     """Tell how the print ended; 130 when a person stopped it."""
     for warning in outcome.warnings:
         say(f"the printer said: {warning}")

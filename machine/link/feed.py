@@ -8,7 +8,7 @@ from threading import Event as Flag
 
 from machine.link import requests
 from machine.link.control import Control, Request, Wish
-from machine.link.events import Action, Echo, Event, Identity, Ok, Position, Temperature
+from machine.link.events import Action, Echo, Event, Identity, Ok, Temperature
 from machine.link.framing import LINE_LIMIT, command_of
 from machine.link.journal import FINISHED, Journal, Moment
 from machine.link.modal import Modal, axes_of
@@ -51,26 +51,14 @@ class Begin:
 
 
 @dataclass(frozen=True)
-class Found:
-    """What a resumed print finds: the newest line number the printer has seen before it was greeted anew, where it says it
-    stands, and its temperatures; None where it does not tell.
-    """
-
-    last_number: int | None
-    position: Position | None
-    temperature: Temperature
-
-
-@dataclass(frozen=True)
 class Job:
-    """What is fixed for a print. total: commands; begin: for a resumed one, decides once the printer has spoken."""
+    """What is fixed for a print. total: commands."""
 
     total: int | None = None
     total_s: float | None = None
     limit: int = LINE_LIMIT
     profile: Profile | None = None
     standby_c: float | None = None
-    begin: Callable[[Found], Begin] | None = None
 
 
 class Feed:
@@ -92,7 +80,8 @@ class Feed:
         self._laid = Laid(machine) if machine is not None else None
         self._watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c)) if machine is not None else Watchdog()
         self.talk: Talk
-        self.state, self._message, self.finished = "printing", "", False
+        self.begin: Begin | None = None  # of a resumed print
+        self.state, self._message, self.begun, self.finished = "printing", "", False, False
         self.temperature, self.firmware = Temperature(), "unknown"
         self.warnings: list[str] = []
         self.sent = 0
@@ -110,9 +99,9 @@ class Feed:
     def run(self, lines: Iterable[str]) -> None:
         """Feed the program from its beginning, or where the job says, to the barrier at its end."""
         talk = self.talk
+        begin, self.begun = self.begin, True
         if talk.protocol.capabilities.get("AUTOREPORT_TEMP"):
             talk.send(f"M155 S{REPORT_S}")
-        begin = self._begin()
         for line, command in self._commands(lines):
             if begin is not None and line < begin.line:
                 self._absorb(command)
@@ -124,21 +113,12 @@ class Feed:
             self._send(line, command)
         self._finish()
 
-    @property
-    def resumes(self) -> bool:
-        """Whether this print goes on where an earlier one ended."""
-        return self._job.begin is not None
-
-    def _begin(self) -> Begin | None:
-        if self._job.begin is None:
-            return None
-        position = self.talk.ask_position()
-        return self._job.begin(Found(self.talk.last_number, position, self.temperature))
-
     def _approach(self, begin: Begin) -> None:
         """What stands before the first line of a resumed print, proved by the printer's own position."""
         self.turn_to("resuming")
         self.trail = Trail(begin.line - 1)
+        self.trail.acknowledge(self.talk.protocol.window.acknowledged)
+        self._mark()
         for command in begin.before:
             self.talk.send(command)
         self._prove("before the print goes on")
@@ -399,7 +379,9 @@ class Feed:
     def _moment(self) -> Moment:
         trail = self.trail
         number = self.talk.protocol.window.wire(trail.number)
-        return Moment(trail.sent, trail.acknowledged, trail.executed, number, trail.pose, FINISHED if self.finished else self.state)
+        return Moment(
+            trail.sent, trail.acknowledged, trail.executed, number, trail.pose, FINISHED if self.finished else self.state
+        )
 
     def _mark(self) -> None:
         if self._journal is not None:

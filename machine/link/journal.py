@@ -8,7 +8,7 @@ import json
 import os
 import threading
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -17,7 +17,7 @@ from zlib import crc32
 from profiles.errors import JournalError, OutputError
 
 FORMAT = 1
-FINISHED = "finished"
+FINISHED, RESUMED = "finished", "resumed in "
 EVERY_LINES = 16  # a record after so many acknowledged lines,
 EVERY_S = 0.1  # or after so long when fewer came
 SYNC_S = 1.0  # so old may the disk be after a power cut of the computer
@@ -50,16 +50,23 @@ class Moment:
 
 @dataclass(frozen=True)
 class Story:
-    """A journal that was read: its heading, its last moment, and how many records a torn end has cost."""
+    """A journal that was read: its heading, its last moment, how many records a torn end has cost, and where that begins."""
 
     heading: Heading
     last: Moment
     torn: int
+    whole_bytes: int
 
     @property
     def finished(self) -> bool:
         """Whether the print ran to its end."""
         return self.last.state == FINISHED
+
+    @property
+    def rest(self) -> str | None:
+        """The journal of the run that went on with this print."""
+        found = self.last.state.partition(RESUMED)
+        return found[2] if found[1] and not found[0] else None
 
 
 class Journal:
@@ -95,7 +102,7 @@ class Journal:
     def mark(self, moment: Moment) -> None:
         """Write a moment at once."""
         self.last = moment
-        self._write([moment.sent, moment.acknowledged, moment.executed, moment.number, moment.pose, moment.state])
+        self._write(_plain(moment))
 
     def close(self) -> None:
         """Bring everything to the disk and end."""
@@ -114,9 +121,10 @@ class Journal:
     def _write(self, value: Any) -> None:
         if self.trouble or self._end.is_set():
             return
-        text = json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
+        record = _record(value)
         try:
-            os.write(self._file, b"%08x %s\n" % (crc32(text), text))
+            if os.write(self._file, record) < len(record):
+                self.trouble = "the disk is full"
         except OSError as error:
             self.trouble = (error.strerror or str(error)).lower()
         self._dirty.set()
@@ -133,11 +141,34 @@ class Journal:
             self._end.wait(SYNC_S)
 
 
+def mark_resumed(path: Path, story: Story, rest: Path) -> None:
+    """Note in a journal which one goes on with its print; a torn end is cut off. Raises JournalError."""
+    try:
+        with path.open("r+b") as file:
+            file.truncate(story.whole_bytes)
+            file.seek(0, os.SEEK_END)
+            file.write(_record(_plain(replace(story.last, state=f"{RESUMED}{rest}"))))
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise JournalError(f"journal {path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+
+
+def _record(value: Any) -> bytes:
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False).encode("ascii")
+    return b"%08x %s\n" % (crc32(text), text)
+
+
+def _plain(moment: Moment) -> list[Any]:
+    return [moment.sent, moment.acknowledged, moment.executed, moment.number, moment.pose, moment.state]
+
+
 def read_journal(path: Path) -> Story:
     """The story of a journal. Raises JournalError with one sentence when it is none, or damaged before its end."""
     heading: Heading | None = None
-    last, bad = Moment(), 0
-    for number, value in enumerate(_records(path), 1):
+    last, bad, whole_bytes = Moment(), 0, 0
+    for number, (value, size) in enumerate(_records(path), 1):
+        whole_bytes += size if value is not None else 0
         if value is None:
             bad += 1
         elif bad:
@@ -150,17 +181,17 @@ def read_journal(path: Path) -> Story:
             raise JournalError(f"{path} is no journal of a print: its first line is not the heading of one")
     if heading is None:
         raise JournalError(f"journal {path} is empty")
-    return Story(heading, last, bad)
+    return Story(heading, last, bad, whole_bytes)
 
 
-def _records(path: Path) -> Iterator[Any]:
-    """The value of each line, None where its checksum is wrong or its end is missing."""
+def _records(path: Path) -> Iterator[tuple[Any, int]]:
+    """The value and size of each line, None where its checksum is wrong or its end is missing."""
     try:
         with path.open("rb") as file:
             while line := file.readline(LONGEST_BYTES):
                 text = line[9:-1]
                 whole = line.endswith(b"\n") and line[:9] == b"%08x " % crc32(text)
-                yield json.loads(text) if whole else None
+                yield (json.loads(text) if whole else None), len(line)
     except OSError as error:
         raise JournalError(f"journal {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
 
@@ -168,7 +199,10 @@ def _records(path: Path) -> Iterator[Any]:
 def _heading(path: Path, value: Any) -> Heading:
     if not isinstance(value, dict) or value.pop("format", None) != FORMAT:
         raise JournalError(f"journal {path} is of another version of this program: this one reads format {FORMAT}")
-    return Heading(**value)
+    try:
+        return Heading(**value)
+    except TypeError:
+        raise JournalError(f"journal {path} is damaged: its heading does not tell program and profile") from None
 
 
 def _moment(path: Path, value: Any, number: int) -> Moment:

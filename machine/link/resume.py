@@ -7,13 +7,14 @@ they stood, the tip rises along the nozzle, X and Y are homed). Z and the table 
 
 from collections.abc import Iterable
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from machine.collide import Printed
-from machine.link.feed import Begin, Found
+from machine.link.feed import Begin
 from machine.link.framing import command_of
+from machine.link.inquiry import Found
 from machine.link.journal import EVERY_LINES, Moment
 from machine.link.modal import E_AXIS, Modal, axes_of
 from machine.link.park import Laid
@@ -27,6 +28,7 @@ from profiles.profile import Profile
 
 WINDOW = 16  # commands on their way at a time, at most
 AHEAD = EVERY_LINES + 2 * WINDOW  # commands beyond the newest acknowledged one on record that the printer may have taken
+SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
 SAME = 0.02  # mm or deg: M114 tells hundredths
 NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: questions have numbers too
 
@@ -57,11 +59,11 @@ class Point:
 
 @dataclass(frozen=True)
 class Way:
-    """How the print goes on: the first line sent, the commands before it, what is certain about it in words."""
+    """How the print goes on: the first line sent, the commands before it, what is certain about it in words; homes: X and Y."""
 
     begin: Begin
     certain: str
-    repeats: int = field(default=0)
+    homes: bool = False
 
 
 def point_of(lines: Iterable[str], moment: Moment, profile: Profile, limit: int) -> Point:
@@ -105,32 +107,33 @@ def way_on(point: Point, found: Found, profile: Profile) -> Way:
     if not point.stroked:
         return Way(Begin(1, ()), "nothing was printed yet: the program begins anew")
     lives = alive(point, found)
-    standing = _standing(point, found) if lives is not False else None
+    standing = _standing(point, found)
     if standing is not None:
         before = (*heated(standing.modal, profile), *standing.modal.lines())
         done = "the printer stands where this line begins: nothing is repeated"
         return Way(Begin(standing.line + 1, before), done)
     _check(point, profile)
     span = f"lines {point.line} to {point.last} may have been printed already"
-    at = _told(point, found) if lives else None
+    at = _told(point, found) if lives or (lives is None and _nonzero(found)) else None
     if at is not None:
         before = _before(point, profile, *at)
-        return Way(Begin(point.line, before), f"the printer has not restarted and knows its place; {span}", _repeats(point))
+        return Way(Begin(point.line, before), f"the printer has not restarted and knows its place; {span}")
+    if lives is not None and _nonzero(found):
+        raise JournalError(
+            f"the printer has not counted its lines on since the print, but stands at {_in_words(found)}: it was moved; "
+            "if it was not, switch the printer off and on first"
+        )
     before = _before_homed(point, profile)
-    return Way(Begin(point.line, before), f"the printer has restarted; {span}", _repeats(point))
-
-
-def _repeats(point: Point) -> int:
-    return len(point.ahead)
+    return Way(Begin(point.line, before), f"the printer has restarted; {span}", homes=True)
 
 
 def _check(point: Point, profile: Profile) -> None:
     missing = [letter for letter, value in zip("XYZ", point.modal.at[:3], strict=True) if value is None]
     if missing:
-        raise JournalError(f"line {point.line}: the program does not tell where {' '.join(missing)} stand, so it cannot go on there")
+        raise JournalError(f"line {point.line}: the program does not tell where {' '.join(missing)} stand: it cannot go on there")
     if profile.machine.coordinates == "workpiece":
         raise JournalError(
-            f"{profile.machine.name} follows the table by itself: a print on it can only go on where the printer still stands at it"
+            f"{profile.machine.name} follows the table by itself: its print can only go on while the printer still stands in it"
         )
 
 
@@ -143,9 +146,18 @@ def _standing(point: Point, found: Found) -> Reached | None:
         pairs = [(told[letter], value) for letter, value in zip(reached.modal.axes.letters, reached.modal.at, strict=True)
                  if value is not None and letter in told]  # fmt: skip
         known = all(value is not None for value in reached.modal.at[:3])
-        if known and all(abs(a - b) <= SAME for a, b in pairs) and sum(abs(b) > SAME for _, b in pairs) >= 3:
+        if known and all(abs(a - b) <= SAME for a, b in pairs) and sum(abs(b) > SAME for _, b in pairs) >= SEVERAL:
             return reached
     return None
+
+
+def _nonzero(found: Found) -> bool:
+    """Whether the printer says that it stands somewhere; one that has just started stands at 0 0 0."""
+    return found.position is not None and sum(abs(value) > SAME for _, value in found.position.axes) >= SEVERAL
+
+
+def _in_words(found: Found) -> str:
+    return " ".join(f"{letter}{value:g}" for letter, value in found.position.axes) if found.position is not None else ""
 
 
 def _told(point: Point, found: Found) -> tuple[Floats, Pose] | None:

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from threading import Event as Flag
 
 from machine.link.control import Control
-from machine.link.feed import Begin, CancelledError, EmergencyError, Feed, Found, Job
+from machine.link.feed import Begin, CancelledError, EmergencyError, Feed, Job
 from machine.link.framing import LINE_LIMIT, command_of
+from machine.link.inquiry import Found, inquire
 from machine.link.journal import Journal
 from machine.link.medium import SERIAL, Medium, Traffic, Wire
 from machine.link.progress import Progress
@@ -77,14 +78,14 @@ def print_lines(
         lines = lines.splitlines()
     if not isinstance(lines, Iterator):
         total = sum(1 for place, line in enumerate(lines, 1) if command_of(line, place, limit))
-    job = Job(total, total_s, limit, profile, standby_c, begin)
+    job = Job(total, total_s, limit, profile, standby_c)
     feed = Feed(job, control, journal, on_progress, stop, medium.now_s())
     name = lasting_name(port)
     wire = medium.open(port, baud)
     talk = Talk(wire, medium, timing or Timing(), feed.heard, feed.turned, _Finder(feed, name, baud, medium), limit, traffic)
     feed.talk = talk
     try:
-        return _Print(feed, talk, medium, journal).run(lines)
+        return _Print(feed, talk, medium, journal).run(lines, begin)
     finally:
         talk.wire.close()
 
@@ -113,11 +114,11 @@ class _Print:
     medium: Medium
     journal: Journal | None
 
-    def run(self, lines: Iterable[str]) -> Outcome:
+    def run(self, lines: Iterable[str], begin: Callable[[Found], Begin] | None) -> Outcome:
         began_s = self.medium.now_s()
         try:
-            if self.feed.resumes:
-                self.talk.ask_last_number()
+            if begin is not None:
+                self.feed.begin = begin(inquire(self.talk.wire, self.medium))
             self.talk.greet()
             self.feed.run(lines)
         except CancelledError:
@@ -125,17 +126,17 @@ class _Print:
         except EmergencyError:
             raise FirmwareError(self._stopped()) from None
         except PrinterError as error:
-            if not self.talk.greeted:
+            if not self.feed.begun:
                 raise
             raise type(error)(f"{error}; {self._left(error)}{self._hint()}") from None
         except BaseException:
-            if self.talk.greeted:
+            if self.feed.begun:
                 self._abandon(SETTLE_S)
             raise
         return self._outcome(began_s, None)
 
     def _cancelled(self) -> bool | None:
-        if not self.talk.greeted:
+        if not self.feed.begun:
             return None
         self.feed.turn_to("cancelling")
         return self._abandon(SETTLE_S)

@@ -1,28 +1,23 @@
 """Talk: one conversation over an open wire; lines go out as the window allows, and every event of the printer is handed on."""
 
-import re
 from collections.abc import Callable
 from math import inf
 
 from machine.link.events import Event, Ok, Position
-from machine.link.framing import LINE_LIMIT, frame
+from machine.link.framing import LINE_LIMIT
 from machine.link.medium import Medium, Traffic, Wire
 from machine.link.protocol import Protocol, Timing
 from machine.link.states import State
 from profiles.errors import PortError
 
 GREETING = (State.DRAIN, State.SYNC, State.HELLO)
-LAST_LINE = re.compile(rb"Last Line: (\d{1,10})")
-FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers answers with the last one it has taken
-LAST_LINE_S, BUSY_MOST_S = 3.0, 120.0  # a printer that still works on its queue answers when there is room in it
-TAIL_BYTES = 4096
 
 
 class Talk:
     """`heard` gets every event after the protocol has seen it, `turned` is called once a turn with the time, s.
 
     `lost` is asked what to do when the port is gone after the greeting: it returns a new wire to the same printer or raises. The
-    printer's own faults are raised as the protocol tells them. `last_number` is set by ask_last_number().
+    printer's own faults are raised as the protocol tells them.
     """
 
     def __init__(
@@ -39,24 +34,8 @@ class Talk:
         self.wire, self.medium = wire, medium
         self.protocol = Protocol(timing, medium.now_s(), limit)
         self.greeted = False
-        self.last_number: int | None = None
         self._heard, self._turned, self._lost, self._traffic = heard, turned, lost, traffic
         self._position: Position | None = None
-
-    def ask_last_number(self) -> None:
-        """Learn, before the greeting sets it back, the number of the last line that the printer has taken in an earlier talk."""
-        self._put(b"\n" + frame(FAR_NUMBER, "M105"))
-        began_s = heard_s = self.medium.now_s()
-        words = b""
-        while (now_s := self.medium.now_s()) - heard_s < LAST_LINE_S and now_s - began_s < BUSY_MOST_S:
-            data = self._take()
-            words = (words + data)[-TAIL_BYTES:]
-            heard_s = now_s if data else heard_s
-            if found := LAST_LINE.search(words):
-                self.last_number = int(found[1])
-                return
-            if b"ok T:" in words:
-                return
 
     def greet(self) -> None:
         """Agree on line numbers and learn the printer's habits."""

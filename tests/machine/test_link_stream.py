@@ -172,7 +172,7 @@ def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         _soon(0.7, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT))
         with pytest.raises(KeyboardInterrupt):
-            print_lines(["M104 S200", *strokes(3000)], printer.path, 250000, timing=QUICK)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, timing=QUICK)
         assert printer.record.nozzle_target_c == 0.0
         assert printer.record.happened("nozzle 200")
 
@@ -184,7 +184,7 @@ def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
 
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         with pytest.raises(ZeroDivisionError):
-            print_lines(["M104 S200", *strokes(3000)], printer.path, 250000, burst, timing=QUICK)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, burst, timing=QUICK)
         assert printer.record.nozzle_target_c == 0.0
 
 
@@ -267,7 +267,7 @@ def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
         other = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
         _soon(0.5, lambda: printer._firmware.receive(b"\nM112\n"))
         with pytest.raises(FirmwareError, match="Printer halted"):
-            print_lines(["M104 S200", *strokes(3000)], printer.path, 250000, timing=QUICK)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, timing=QUICK)
         os.close(other)
         assert printer.record.nozzle_target_c == 0.0
 

@@ -1,0 +1,54 @@
+"""Journals: where those of prints are kept, each with its program beside it, the newest ones only."""
+
+import os
+from collections.abc import Iterable
+from datetime import datetime
+from pathlib import Path
+
+from machine.app.output import write_lines
+from machine.app.state_folder import state_folder
+from machine.link.journal import Heading, Journal
+from machine.link.program import GcodeFile
+from profiles.profile import Profile
+
+KEPT = 20
+PROGRAM = ".gcode"
+
+
+def new_journal(
+    lines: Iterable[str], profile: Profile, name: str, source: Path | None = None, file: Path | None = None
+) -> Journal:
+    """Begin the journal of a print. source: the G-code file that is printed; None: the lines are kept beside the journal.
+
+    file: the journal's own path, else a new one in the state folder, where the oldest ones go. Raises OutputError, GcodeError.
+    """
+    path = file if file is not None else _place(name)
+    if source is None:
+        source = path.with_name(path.name + PROGRAM)
+        write_lines(source, tuple(lines))
+    return continued(GcodeFile(source.resolve()), profile, name, path)
+
+
+def continued(program: GcodeFile, profile: Profile, name: str, file: Path | None = None) -> Journal:
+    """Begin another journal of a program that is on disk already."""
+    heading = Heading(str(program.path), program.sha256(), name, profile.model_dump(mode="json"))
+    return Journal(file if file is not None else _place(name), heading)
+
+
+def _place(name: str) -> Path:
+    """A new file's path, named after the time and the model."""
+    folder = state_folder() / "journals"
+    folder.mkdir(exist_ok=True)
+    _thin(folder)
+    plain = "".join(c if c.isalnum() and c.isascii() else "-" for c in name)[:40].strip("-") or "print"
+    return folder / f"{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}-{plain}.journal"
+
+
+def _thin(folder: Path) -> None:
+    """Leave room for one more: delete all but the newest; a program goes when no journal beside it is left that names it."""
+    for old in sorted(folder.glob("*.journal"), reverse=True)[KEPT - 1 :]:
+        old.unlink(missing_ok=True)
+    kept = b"".join(file.open("rb").readline() for file in folder.glob("*.journal"))
+    for program in folder.glob(f"*{PROGRAM}"):
+        if program.name.encode() not in kept:
+            program.unlink(missing_ok=True)

@@ -1,0 +1,134 @@
+"""Resume: go on with a print that was cut off by a power cut, a crash or a pulled plug, as its journal tells."""
+
+import sys
+from dataclasses import replace
+from math import hypot
+from pathlib import Path
+
+from machine.app.interrupts import interrupting
+from machine.app.journals import continued
+from machine.app.pipeline import Program
+from machine.app.printing import check_dialect, ended, streamed
+from machine.app.progress import say
+from machine.app.traffic import TrafficLog, new_log
+from machine.dialects import DIALECTS
+from machine.dryrun.dryrun import dry_run
+from machine.link.feed import Begin, CancelledError
+from machine.link.inquiry import Found
+from machine.link.journal import Heading, Story, mark_resumed, read_journal
+from machine.link.program import GcodeFile
+from machine.link.resume import Point, Way, heights_mm, point_of, way_on
+from profiles.errors import JournalError
+from profiles.profile import Profile, section
+
+UNSURE_MM = 0.005
+
+
+def resume(
+    journal: Path,
+    port: str,
+    baud: int,
+    yes: bool,
+    given: Profile | None = None,
+    file: Path | None = None,
+    log: Path | None = None,
+) -> int:
+    """Tell where a print goes on, ask, and print the rest; 0 when it was printed, 1 when the answer was no.
+
+    given: the profile whose machine the user has named; file: of the new journal; log: of the traffic.
+    """
+    story = read_journal(journal)
+    profile = _profile(journal, story.heading, given)
+    check_dialect(profile.machine, port)
+    text = _program(journal, story)
+    point = point_of(text, story.last, profile, DIALECTS[profile.machine.dialect].longest_line)
+    lines = tuple(text)
+    _tell(story, point, profile, len(lines))
+
+    def begin(found: Found) -> Begin:
+        way = way_on(point, found, profile)
+        say(_sentence(way, point, profile))
+        if not yes and not _agreed():
+            raise CancelledError
+        # From here on the printer counts its lines anew: only the new journal can tell whether it has restarted.
+        done = way.begin.line - 1
+        further.mark(replace(story.last, sent=done, acknowledged=done, executed=done, state="resuming"))
+        mark_resumed(journal, story, further.path)
+        return way.begin
+
+    title = f"the rest of {story.heading.name} to {port}"
+    program = Program(lines, dry_run(lines, profile), None)
+    with (
+        new_log("print", title) if log is None else TrafficLog(log, title) as kept,
+        continued(text, profile, story.heading.name, file) as further,
+    ):
+        outcome = streamed(program, profile, port, baud, title, kept, journal=further, begin=begin)
+    if outcome.cancelled and outcome.heaters_off is None:
+        further.path.unlink(missing_ok=True)
+        say("nothing was moved or heated")
+        return 1
+    return ended(outcome)
+
+
+def _profile(journal: Path, heading: Heading, given: Profile | None) -> Profile:
+    """The journal's own profile; raises JournalError when another machine was named, ProfileError when it is not valid."""
+    profile = Profile.model_validate({name: section(name, table) for name, table in heading.profile.items()})
+    if given is not None and given.machine != profile.machine:
+        raise JournalError(
+            f"journal {journal} is of a print on {profile.machine.name}; --machine gives another machine ({given.machine.name}), "
+            "or one whose profile has changed since"
+        )
+    return profile
+
+
+def _program(journal: Path, story: Story) -> GcodeFile:
+    """The program, as it was printed. Raises JournalError."""
+    if story.rest is not None:
+        raise JournalError(f"journal {journal}: this print was resumed already, what became of it is in {story.rest}")
+    if story.finished:
+        raise JournalError(f"journal {journal}: this print ran to its end, there is nothing to resume")
+    program = GcodeFile(Path(story.heading.program))
+    if not program.path.is_file():
+        raise JournalError(f"journal {journal}: its program {program.path} is gone")
+    if program.sha256() != story.heading.sha256:
+        raise JournalError(f"journal {journal} is of another program: {program.path} has changed since it was printed")
+    return program
+
+
+def _tell(story: Story, point: Point, profile: Profile, lines: int) -> None:
+    place, at = point.place, point.modal.at
+    where = [f"part {place.part}" + (f" of {place.parts}" if place.parts else "")] if place.part is not None else []
+    where += [f"layer {place.layer}"] if place.layer is not None else []
+    say(f"{story.heading.name}, {', '.join([*where, f'line {point.line} of {lines}'])}")
+    letters = point.modal.axes.letters
+    known = [f"{letter} {value:.3f}" for letter, value in zip(letters[:5], at[:5], strict=True) if value is not None]
+    say(f"surely executed: up to line {point.line - 1}" + (f", at {', '.join(known)}" if known else ""))
+    if story.torn:
+        say(f"the journal's end is torn: {story.torn} of its records could not be read")
+
+
+def _sentence(way: Way, point: Point, profile: Profile) -> str:
+    """What is going to be done, and what the person must make sure of."""
+    told = f"it goes on with line {way.begin.line}: {way.certain}"
+    if not way.homes:
+        return told
+    low, high = heights_mm(point)
+    tilt, turn = (point.modal.at[axis] or 0.0 for axis in (3, 4))
+    machine = profile.machine
+    told += f"; nothing may have been moved by hand: tip on the print at Z {low:.2f}"
+    if high - low > UNSURE_MM:
+        told += f" (it may have stood up to {high - low:.2f} mm higher: look at the first lines)"
+    if hypot(tilt, turn) > 0:
+        turns = f", {int(turn // 360)} whole turns and {turn % 360:.3f}" if abs(turn) >= 360 else ""
+        told += f", table at {machine.tilt.letter} {tilt:.3f} {machine.turn.letter} {turn:.3f}{turns}"
+    return told + "; the nozzle heats where it stands, the tip rises, X and Y are homed, Z and the table are not"
+
+
+def _agreed() -> bool:
+    """Ask; raises JournalError where nobody can answer."""
+    if not sys.stdin.isatty():
+        raise JournalError("whether to go on is asked first: give --yes where there is no terminal to ask at")
+    sys.stderr.write("go on? [y/N] ")
+    sys.stderr.flush()
+    with interrupting():
+        return sys.stdin.readline().strip().lower() in ("y", "yes")
