@@ -239,6 +239,26 @@ def ports(
 
 
 @app.command()
+def simulator(
+    pty: Annotated[Path | None, typer.Option("--pty", metavar="PATH", help="a link to keep on the terminal's path")] = None,
+    tcp: Annotated[int | None, typer.Option("--tcp", metavar="PORT", help="for socket://localhost:PORT; 0: a free one")] = None,
+    faults: Annotated[Path | None, typer.Option("--faults", metavar="FILE", help="fault script: what goes wrong")] = None,
+    speed: Annotated[float, typer.Option("--speed", metavar="X", help="X times real time; 0: as fast as possible")] = 1.0,
+    baud: Annotated[int | None, typer.Option("--baud", metavar="N", help="bytes are as slow as on such a line")] = None,
+    habits: Annotated[
+        str | None, typer.Option("--habits", metavar="LIST", help="how the firmware was built: no-advanced-ok,no-busy,...")
+    ] = None,
+    machine: MachineName = "generic_ac",
+    settings: Settings = None,
+) -> int:
+    """A simulated printer for any host to print on; Ctrl-C ends it."""
+    from machine.app import simulator_command
+
+    profile = _profile(machine, "pla", "standard", settings, None, None, None)
+    return simulator_command.serve(profile.machine, pty, tcp, faults, speed, baud, habits)
+
+
+@app.command()
 def calibrate(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="OUT.gcode", help="program to write, with a sheet beside it to fill in")

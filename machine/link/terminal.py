@@ -7,17 +7,18 @@ from pathlib import Path
 from profiles.errors import PortError
 
 READ_BYTES = 4096
+TERMINALS = ("/dev/pts/", "/dev/tty")
 
 
 class Terminal:
     """A raw pseudo-terminal. link: a symbolic link to keep on its path; PortError when something else is there."""
 
     def __init__(self, link: Path | None = None) -> None:
-        if link is not None and not link.is_symlink() and link.exists():
+        if link is not None and (link.exists() or link.is_symlink()) and not _leads_to_a_terminal(link):
             raise PortError(f"{link} exists and is no link to a terminal: the simulated printer does not replace it")
         self._link = link
         self._master = self._slave = -1
-        self.path = ""
+        self._device = self.path = ""
 
     def open(self) -> None:
         """Open it; after close() again, at another path unless a link leads to it. PortError where there are none."""
@@ -30,10 +31,9 @@ class Terminal:
         # Raw: no echo, no change of newlines. The own slave end stays open, so that the terminal outlives each host.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
+        self._device = self.path = os.ttyname(self._slave)
         if self._link is not None:
-            self._unlink()
-            self._link.symlink_to(self.path)
+            self._make_link(self._link)
             self.path = str(self._link)
 
     def close(self) -> None:
@@ -67,9 +67,24 @@ class Terminal:
         except BlockingIOError:
             return 0
 
+    def _make_link(self, link: Path) -> None:
+        beside = link.with_name(f".{link.name}.{os.getpid()}")
+        try:
+            beside.symlink_to(self._device)
+            beside.replace(link)
+        except OSError as error:
+            self.close()
+            raise PortError(f"the link {link} cannot be made: {(error.strerror or str(error)).lower()}") from None
+
     def _unlink(self) -> None:
-        if self._link is not None and self._link.is_symlink():
+        """Remove the link, unless another simulated printer has taken it over."""
+        if self._link is not None and self._link.is_symlink() and os.readlink(self._link) == self._device:
             self._link.unlink()
+
+
+def _leads_to_a_terminal(link: Path) -> bool:
+    """Whether it is a link to a terminal, of which perhaps nothing is left."""
+    return link.is_symlink() and os.readlink(link).startswith(TERMINALS)
 
 
 class Server:

@@ -1,0 +1,91 @@
+"""The simulated printer as a program of its own: any host prints on it, through a terminal or a TCP port."""
+
+import threading
+from dataclasses import fields, replace
+from math import inf, isfinite
+from pathlib import Path
+
+from machine.app.interrupts import stopping
+from machine.app.progress import say
+from machine.app.report import duration, show
+from machine.dialects import DIALECTS
+from machine.link.faults import FaultScript, read_script
+from machine.link.firmware import Habits
+from machine.link.port import BAUDS
+from machine.link.record import Record
+from machine.link.simulator import RING, SimulatedPrinter
+from profiles.errors import PrinterError
+from profiles.machine import Machine
+
+KEPT = 10000  # moves on record; of the others only the sums are told
+LOOK_S = 0.5
+
+
+def serve(
+    machine: Machine, link: Path | None, tcp: int | None, faults: Path | None, speed: float, baud: int | None, habits: str | None
+) -> int:
+    """Run until Ctrl-C or a termination request, which is its end: 0. The path to open stands on stdout, then what was done."""
+    script = read_script(faults) if faults is not None else FaultScript()
+    _check(machine, link, tcp, speed, baud)
+    chosen = habits_of(habits or "", Habits(rx_ring=RING if baud else None))
+    stop = threading.Event()
+    with (
+        stopping(stop),
+        SimulatedPrinter(machine, speed or inf, chosen, script, link, tcp, baud, KEPT) as printer,
+    ):
+        show(f"{printer.path}\n")
+        say(f"simulated printer ({machine.name}, {DIALECTS[machine.dialect].firmware}) listens there; Ctrl-C ends it")
+        path = printer.path
+        while not stop.wait(LOOK_S):
+            if printer.path != path:
+                path = printer.path
+                show(f"{path}\n")
+        record = printer.record
+    show(summary(record))
+    return 0
+
+
+def _check(machine: Machine, link: Path | None, tcp: int | None, speed: float, baud: int | None) -> None:
+    if not DIALECTS[machine.dialect].serial:
+        streamed = ", ".join(name for name, dialect in DIALECTS.items() if dialect.serial)
+        raise PrinterError(f"{machine.name} speaks {machine.dialect}, which takes no lines: {streamed} are simulated")
+    if not (isfinite(speed) and speed >= 0):
+        raise PrinterError(f"--speed is {speed:g}: it must be 0 (as fast as possible) or a number above")
+    if baud is not None and not BAUDS[0] <= baud <= BAUDS[1]:
+        raise PrinterError(f"--baud is {baud}: {BAUDS[0]} to {BAUDS[1]} is allowed")
+    if tcp is not None and not 0 <= tcp <= 65535:
+        raise PrinterError(f"--tcp is {tcp}: 0 (a free port) to 65535 is allowed")
+    if link is not None and tcp is not None:
+        raise PrinterError("--pty and --tcp are two ways to reach the printer: one of them is allowed")
+
+
+def habits_of(text: str, habits: Habits) -> Habits:
+    """Habits changed by words: `no-advanced-ok,realtime,rx-ring=64`. Raises PrinterError."""
+    names = [field.name for field in fields(Habits)]
+    for word in filter(None, (part.strip() for part in text.split(","))):
+        name, _, value = word.replace("-", "_").partition("=")
+        if name == "rx_ring" and value.isdigit() and int(value) >= 16:
+            habits = replace(habits, rx_ring=int(value))
+        elif name == "no_rx_ring":
+            habits = replace(habits, rx_ring=None)
+        elif not value and name.removeprefix("no_") in names and name != "rx_ring":
+            habits = replace(habits, **{name.removeprefix("no_"): not name.startswith("no_")})
+        else:
+            allowed = ", ".join(known.replace("_", "-") for known in names if known != "rx_ring")
+            raise PrinterError(f"--habits holds {word!r}: {allowed}, with or without no-, and rx-ring=BYTES from 16 are allowed")
+    return habits
+
+
+def summary(record: Record) -> str:
+    """What a simulated print came to."""
+    told = [
+        f"{record.moves} moves in {duration(record.moving_s)}, {record.lines} lines, {record.strokes} strokes of "
+        f"{record.pushed_mm:.1f} mm filament",
+        f"{record.clamped} coordinates out of limits, {record.unknown} unknown commands",
+        f"{record.underruns} stops because no line came in time, {record.slowed} moves slowed down for want of lines",
+    ]
+    if record.lost_bytes:
+        told.append(f"{record.lost_bytes} bytes lost by a full receive ring")
+    told += [f"at {seconds:.1f} s: {event}" for seconds, event in record.events if "driven against" in event or "system" in event]
+    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C"
+    return "".join(f"{line}\n" for line in [*told, heaters])
