@@ -163,11 +163,11 @@ def print_model(
     answer = check_port(port, baud, sim_speed)
     is_model = Path(model).suffix.lower() not in GCODE_SUFFIXES
     if is_model:
-        check_dialect(profile.machine, port)
+        check_dialect(profile.machine)
         check_printer(answer, profile.machine, force)
     program, profile = program_of(model, profile, ranker, orient, named)
     if not is_model:
-        check_dialect(profile.machine, port)
+        check_dialect(profile.machine)
         check_printer(answer, profile.machine, force)
     check_program(answer, program, profile, model_name(model), force)
     _refuse_errors(program, force)

@@ -39,16 +39,12 @@ def check_port(port: str, baud: int, sim_speed: float) -> Answer | None:
     return None if port == SIMULATED else printer_at(port, baud)
 
 
-def check_dialect(machine: Machine, port: str) -> None:
-    """Refuse a machine whose firmware takes no lines over a serial port, or that the simulated printer cannot stand for."""
+def check_dialect(machine: Machine) -> None:
+    """Refuse a machine whose firmware takes no lines over a serial port."""
     if not DIALECTS[machine.dialect].serial:
         streamed = ", ".join(name for name, dialect in DIALECTS.items() if dialect.serial)
         raise PrinterError(
             f"{machine.name} speaks {machine.dialect}, which opens files itself: use export; print serves the dialects {streamed}"
-        )
-    if port == SIMULATED and machine.coordinates == "workpiece":
-        raise PrinterError(
-            f"{machine.name}: the simulated printer does not follow the table: machine.coordinates must be table, not workpiece"
         )
 
 

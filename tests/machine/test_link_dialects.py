@@ -70,9 +70,4 @@ def test_marlin_does_not_know_klipper_s_commands() -> None:
 
 def test_firmwares_that_take_no_lines_are_refused_with_those_that_do() -> None:
     with pytest.raises(PrinterError, match=r"speaks linuxcnc, which opens files itself: use export; .* klipper_steppers$"):
-        check_dialect(profile("linuxcnc").machine, "sim")
-
-
-def test_the_simulated_printer_does_not_follow_the_table() -> None:
-    with pytest.raises(PrinterError, match=r"machine.coordinates must be table"):
-        check_dialect(profile("marlin", "workpiece").machine, "sim")
+        check_dialect(profile("linuxcnc").machine)
