@@ -39,7 +39,7 @@ def resume(
     """
     story = read_journal(journal)
     profile = _profile(journal, story.heading, given)
-    check_dialect(profile.machine, port)
+    check_dialect(profile.machine)
     text = _program(journal, story)
     point = point_of(text, story.last, profile, DIALECTS[profile.machine.dialect].longest_line)
     lines = tuple(text)
