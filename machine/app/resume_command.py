@@ -13,11 +13,12 @@ from machine.app.progress import say
 from machine.app.traffic import TrafficLog, new_log
 from machine.dialects import DIALECTS
 from machine.dryrun.dryrun import dry_run
-from machine.link.feed import Begin, CancelledError
+from machine.link.feed import Begin
 from machine.link.inquiry import Found
 from machine.link.journal import Heading, Story, mark_resumed, read_journal
 from machine.link.program import GcodeFile
 from machine.link.resume import Point, Way, heights_mm, point_of, way_on
+from machine.link.wishes import CancelledError
 from profiles.errors import JournalError
 from profiles.profile import Profile, section
 

@@ -1,45 +1,33 @@
 """Feed: one print under way; the program's commands in order, and between them what person, printer and journal want."""
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Event as Flag
 
-from machine.link import requests
-from machine.link.control import Control, Request, Wish
-from machine.link.events import Action, Echo, Event, Identity, Ok, Temperature
+from machine.link.control import Control
+from machine.link.events import Event, Ok
 from machine.link.framing import LINE_LIMIT, command_of
 from machine.link.journal import FINISHED, Journal, Moment
 from machine.link.modal import Modal, axes_of
 from machine.link.park import Laid, lift_words, standing_mm
 from machine.link.progress import Place, Progress
+from machine.link.reports import Reports
 from machine.link.retreat import retreat, unlike
 from machine.link.talk import Talk
 from machine.link.trail import Step, Trail
 from machine.link.watchdog import Watchdog
-from profiles.errors import PrinterError, RemoteProtocolError
+from machine.link.wishes import Wishes
+from profiles.errors import RemoteProtocolError
 from profiles.profile import Profile
 
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
-WARNINGS = 20  # kept of the printer's own words that show a program it does not understand
-WARNS = ("nknown command", "too long extrusion")
-COLD = "cold extrusion prevented"
 BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
 CHECK_S = 30.0  # between looks at the position where a layer ends
 CHECK_MUTE_S = 10.0  # the same for a printer that does not tell what it has executed
-WISHES = 16  # a turn: what asks without end must not hold up the print
 NEAR = 0.1  # mm or deg: M114 tells hundredths, motor steps are smaller
-
-
-class CancelledError(Exception):
-    """The stop flag was set, or a person or the printer asked for the end."""
-
-
-class EmergencyError(Exception):
-    """A person asked for the emergency stop."""
 
 
 @dataclass(frozen=True)
@@ -73,22 +61,18 @@ class Feed:
         stop: Flag | None,
         began_s: float,
     ) -> None:
-        self._job, self._control, self._journal = job, control, journal
-        self._on_progress, self._stop = on_progress, stop
+        self._job, self._journal, self._on_progress = job, journal, on_progress
         machine = job.profile.machine if job.profile is not None else None
         self.modal, self.trail, self._place = Modal(axes_of(machine)), Trail(), Place()
         self._laid = Laid(machine) if machine is not None else None
-        self._watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c)) if machine is not None else Watchdog()
+        self._wishes = Wishes(self.modal.axes, job.limit, control, stop)
+        watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c)) if machine is not None else Watchdog()
+        self.reports = Reports(watchdog, began_s)
         self.talk: Talk
         self.begin: Begin | None = None  # of a resumed print
-        self.state, self._message, self.begun, self.finished = "printing", "", False, False
-        self.temperature, self.firmware = Temperature(), "unknown"
-        self.warnings: list[str] = []
+        self.state, self._trouble, self.begun, self.finished = "printing", "", False, False
         self.sent = 0
-        self._feed_percent = self._flow_percent = 100.0
-        self._own: deque[str] = deque()
-        self._pause_s: float | None = None
-        self._resume = self._layer_ended = self._verify = False
+        self._layer_ended = self._verify = self._away = False
         self._began_s = self._shown_s = self._asked_s = self._checked_s = began_s
 
     @property
@@ -145,32 +129,29 @@ class Feed:
                 if command.startswith("M73"):
                     self._place.told(command, self.talk.medium.now_s() - self._began_s)
                 elif command.startswith(("M220", "M221")):
-                    self._overridden(command)
+                    self._wishes.told(command)
                 yield line, command
             elif text.startswith(";"):
                 self._place.comment(text)
                 self._layer_ended = self._layer_ended or text.startswith(";LAYER_CHANGE")
 
-    def _overridden(self, command: str) -> None:
-        found = dict(requests.words(command))
-        if "S" in found:
-            if command.startswith("M220"):
-                self._feed_percent = found["S"]
-            else:
-                self._flow_percent = found["S"]
-
     def _between(self, command: str) -> None:
         """What is due before the next command of the program."""
-        while self._own:
-            self.talk.send(self._own.popleft())
+        self._send_own()
         if self._verify:
             self._verify = False
             self._prove("after the port came back")
         now_s = self.talk.medium.now_s()
         if self._journal is not None and self._due(command, now_s):
             self._check(now_s)
-        if self._pause_s is not None and (not _pushes(command) or now_s - self._pause_s > BOUNDARY_S):
+        since_s = self._wishes.pause_s
+        if since_s is not None and (not _pushes(command) or now_s - since_s > BOUNDARY_S):
             self._pause()
+
+    def _send_own(self) -> None:
+        """Commands of the person's own."""
+        while self._wishes.lines:
+            self.talk.send(self._wishes.lines.popleft())
 
     def _due(self, command: str, now_s: float) -> bool:
         """Whether the position is to be looked at now: at a layer's end, or in a travel where the printer tells little."""
@@ -184,7 +165,7 @@ class Feed:
         told = self.talk.ask_position()
         self.trail.barrier()
         if told is not None and (wrong := unlike(self.modal, told.axes, NEAR)):
-            self._say(f"the printer stands at {', '.join(wrong)}")
+            self._trouble = f"the printer stands at {', '.join(wrong)}"
         self._mark()
 
     def _prove(self, when: str) -> None:
@@ -201,21 +182,23 @@ class Feed:
         self.trail.barrier()
         agreed = told is None or not unlike(self.modal, told.axes, NEAR)
         way = retreat(self.modal, self._job.profile, self._laid, self._job.standby_c)
+        self._away = way.park is not None
         for command in way.away:
             self.talk.send(command)
         self.talk.drain()
         self.turn_to("paused")
         self._mark()
-        while not self._resume:
-            self.talk.rest(until=lambda: self._resume or bool(self._own))
-            while self._own:
-                self.talk.send(self._own.popleft())
+        wishes = self._wishes
+        while not wishes.resume:
+            self.talk.rest(until=lambda: wishes.resume or bool(wishes.lines))
+            self._send_own()
         self.turn_to("resuming")
         for command in way.back:
             self.talk.send(command)
-        self._pause_s, self._resume = None, False
+        wishes.resumed()
         if agreed:
             self._prove("after the pause")
+        self._away = False
         self.turn_to("printing")
 
     def _finish(self) -> None:
@@ -224,9 +207,8 @@ class Feed:
         self.turn_to("finishing")
         if talk.protocol.capabilities.get("AUTOREPORT_TEMP"):
             talk.send("M155 S0")
-        for name, value in (("M220", self._feed_percent), ("M221", self._flow_percent)):
-            if value != 100.0:
-                talk.send(f"{name} S100")
+        for command in self._wishes.undone():
+            talk.send(command)
         talk.drain()
         self.trail.barrier()
         self.finished = True
@@ -235,138 +217,52 @@ class Feed:
 
     def heard(self, event: Event) -> None:
         """An event of the printer."""
-        if isinstance(event, Ok):
+        now_s = self.talk.medium.now_s()
+        if isinstance(event, Ok) and event.line is not None:
             window = self.talk.protocol.window
-            if event.line is not None and window.line(event.line) == window.acknowledged:
+            if window.line(event.line) == window.acknowledged:
                 self.trail.acknowledge(window.acknowledged, event.planner_free)
-            if event.temperature is not None:
-                self._felt(event.temperature)
-        elif isinstance(event, Temperature):
-            self._felt(event)
-        elif isinstance(event, Identity):
-            self.firmware = event.text.removeprefix("FIRMWARE_NAME:").strip()
-        elif isinstance(event, Action):
-            self._asked_by_printer(event)
-        elif isinstance(event, Echo):
-            self._told(event.text)
-
-    def _told(self, text: str) -> None:
-        """The printer's words for people."""
-        if COLD in text:
-            raise PrinterError(
-                f"the printer said {text!r}: the nozzle is too cold, the filament of a move is missing from the print"
-            )
-        if len(self.warnings) < WARNINGS and any(word in text for word in WARNS):
-            self.warnings.append(text)
-
-    def _felt(self, told: Temperature) -> None:
-        self.temperature = told
-        self._asked_s = self.talk.medium.now_s()
-        self._watchdog.saw(told, self._asked_s)
-
-    def _asked_by_printer(self, action: Action) -> None:
-        wish = ACTIONS.get(action.name)
-        if wish is not None:
-            self._grant(Request(wish))
-        elif action.name == "disconnect":
-            raise PrinterError("the printer asked to be disconnected (//action:disconnect)")
-        elif action.name not in SILENT_ACTIONS and len(self.warnings) < WARNINGS:
-            self.warnings.append(f"action {action.name} {action.words}".strip())
+        request = self.reports.hear(event, now_s)
+        if request is not None:
+            self._wishes.grant(request, self.state, now_s)
 
     def turned(self, now_s: float) -> None:
         """Once a turn of the talk."""
         self.trail.acknowledge(self.talk.protocol.window.acknowledged)
         self.heed()
-        self._watchdog.wait(now_s)
+        self.reports.wait(now_s)
         if self._journal is not None:
             self._journal.note(self._moment(), now_s)
-        if now_s - self._shown_s >= PROGRESS_S:
-            self.show(now_s)
-        if now_s - self._asked_s >= ASK_S and self.talk.protocol.room("M105"):
+        if now_s - max(self.reports.heard_s, self._asked_s) >= ASK_S and self.talk.protocol.room("M105"):
             self._asked_s = now_s
             self.talk.protocol.send("M105", now_s)
 
     def heed(self) -> None:
-        """See what a person wants. Raises CancelledError, EmergencyError."""
-        if self._stop is not None and self._stop.is_set():
-            raise CancelledError
-        for _ in range(WISHES):
-            request = None if self._control is None else self._control.take()
-            if request is None:
-                return
-            self._grant(request)
-
-    def heed_lost(self) -> None:
-        """The same while there is no port: only the end can be asked for."""
-        now_s = self.talk.medium.now_s()
-        if now_s - self._shown_s >= PROGRESS_S:
+        """See what a person wants, and show where the print stands now and then. Raises CancelledError, EmergencyError."""
+        now_s, message = self.talk.medium.now_s(), self._wishes.message
+        self._wishes.heed(self.state, now_s)
+        if now_s - self._shown_s >= PROGRESS_S or self._wishes.message != message:
             self.show(now_s)
-        self.heed()
-
-    def _grant(self, request: Request) -> None:
-        wish = request.wish
-        if wish is Wish.EMERGENCY_STOP:
-            raise EmergencyError
-        if wish is Wish.CANCEL:
-            raise CancelledError
-        if wish is Wish.PAUSE:
-            self._pause_s = self.talk.medium.now_s() if self._pause_s is None else self._pause_s
-        elif wish is Wish.RESUME:
-            self._go_on()
-        elif wish is Wish.LINE:
-            self._own_line(request.text)
-        else:
-            self._override(wish, request.value)
-
-    def _go_on(self) -> None:
-        if self.state in ("pausing", "paused"):
-            self._resume = True
-        else:
-            self._pause_s = None
-
-    def _own_line(self, text: str) -> None:
-        why = requests.refusal(text, self.modal.axes, self.state == "paused", self._job.limit)
-        if why is not None:
-            self._say(f"not sent: {text.strip()[:40]!r}: {why}")
-        else:
-            self._own.append(text.partition(";")[0].strip())
-
-    def _override(self, wish: Wish, value: float) -> None:
-        feed = wish is Wish.FEED
-        why = requests.percent(value, requests.FEED_PERCENT if feed else requests.FLOW_PERCENT)
-        if why is not None:
-            self._say(why)
-        elif feed:
-            self._feed_percent = value
-            self._own.append(f"M220 S{value:g}")
-        else:
-            self._flow_percent = value
-            self._own.append(f"M221 S{value:g}")
-
-    def _say(self, message: str) -> None:
-        self._message = message
-        self.show(self.talk.medium.now_s())
 
     def turn_to(self, state: str) -> None:
         """Show a new state at once."""
-        self.state = state
+        self.state, self._wishes.message = state, ""
         self.show(self.talk.medium.now_s())
 
     @contextmanager
     def apart(self, state: str, message: str) -> Iterator[None]:
         """Another state for as long as something takes; the position is proved before the print goes on."""
-        before, self.state = self.state, state
-        self._verify = True
-        self._say(message)
+        before, self._verify, self._trouble = self.state, True, message
+        self.turn_to(state)
         try:
             yield
         finally:
-            self.state = before
-            self._say("")
+            self._trouble = ""
+            self.turn_to(before)
 
     def lift(self) -> tuple[str, float] | None:
-        """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or at its end."""
-        if self._job.profile is None:
+        """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or it is away already."""
+        if self._job.profile is None or self._away:
             return None
         machine, following = self._job.profile.machine, self.modal.follows
         standing = standing_mm(machine, self.modal.place(), following)
@@ -397,15 +293,11 @@ class Feed:
             Progress(
                 sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
                 left_s=place.left_s(elapsed_s, self._job.total_s), share=place.share(done, self._job.total),
-                temperature=self.temperature, part=place.part, parts=place.parts, layer=place.layer, state=self.state,
-                file_line=self.trail.acknowledged, feed_percent=self._feed_percent, flow_percent=self._flow_percent,
-                message=self._message,
+                temperature=self.reports.temperature, part=place.part, parts=place.parts, layer=place.layer, state=self.state,
+                file_line=self.trail.acknowledged, feed_percent=self._wishes.feed_percent, flow_percent=self._wishes.flow_percent,
+                message=self._wishes.message or self._trouble,
             )
         )  # fmt: skip
-
-
-ACTIONS = {"pause": Wish.PAUSE, "resume": Wish.RESUME, "cancel": Wish.CANCEL}
-SILENT_ACTIONS = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prompt_button", "prompt_show", "prompt_end"}
 
 
 def _pushes(command: str) -> bool:

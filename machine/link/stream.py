@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from threading import Event as Flag
 
 from machine.link.control import Control
-from machine.link.feed import Begin, CancelledError, EmergencyError, Feed, Job
+from machine.link.feed import Begin, Feed, Job
 from machine.link.framing import LINE_LIMIT, command_of
 from machine.link.inquiry import Found, inquire
 from machine.link.journal import Journal
@@ -15,6 +15,7 @@ from machine.link.protocol import Timing
 from machine.link.reconnect import found_again, lasting_name
 from machine.link.shutdown import SETTLE_S, emergency_stop, heaters_off, lift
 from machine.link.talk import Talk
+from machine.link.wishes import CancelledError, EmergencyError
 from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
 from profiles.profile import Profile
 
@@ -99,7 +100,7 @@ class _Finder:
     def __call__(self, error: PortError) -> Wire:
         self._feed.talk.wire.close()
         with self._feed.apart("reconnecting", f"{error}; waiting {self._medium.lost_s:.0f} s for it to come back"):
-            wire = found_again(self._name, self._baud, self._medium, self._feed.heed_lost)
+            wire = found_again(self._name, self._baud, self._medium, self._feed.heed)
         if wire is None:
             raise PortError(f"{error}; it did not come back within {self._medium.lost_s:.0f} s")
         return wire
@@ -180,7 +181,7 @@ class _Print:
             acknowledged=feed.acknowledged,
             repeated=self.talk.protocol.repeated,
             elapsed_s=self.medium.now_s() - began_s,
-            firmware=feed.firmware,
-            warnings=tuple(feed.warnings),
+            firmware=feed.reports.firmware,
+            warnings=tuple(feed.reports.warnings),
             heaters_off=off,
         )
