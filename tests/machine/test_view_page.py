@@ -6,11 +6,14 @@ from hashlib import sha256
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from machine.app.cli import main
+from machine.app.pipeline import build, decompose_model
 from machine.app.view.contents import of_parts
-from machine.app.view.page import page
+from machine.app.view.page import page, print_page
+from machine.kinematics.table import workpiece_path
 from mdp.save import stl
 from profiles.profile import load
 from tests.machine import hand
@@ -197,3 +200,20 @@ def test_another_machine_is_held_against_its_own_shipped_values() -> None:
 
     profile = load(machine="fractal5pro", settings=["machine.clearance_mm=3"])
     assert [row[0] for row in settings_tables(profile)[0]["rows"]] == ["machine.clearance_mm"]
+
+
+KITTEN = Path(__file__).parents[2].parent / "shared" / "models" / "kitten.off"
+
+
+@pytest.mark.slow
+def test_a_page_takes_a_third_of_what_it_may_and_holds_the_path_to_a_hundredth() -> None:
+    profile = load()
+    model = str(KITTEN) if KITTEN.exists() else "demo:figure"
+    program = build(decompose_model(model, profile, "classic", to_build=True).decomposition, profile)
+    content = print_page(model, program, profile)
+    header, found = opened(content)
+    moves = len(program.run.program.line)
+    assert len(content) < 8e6 / 3 * max(moves / 300_000, 1.0) + 0.3e6
+    on_work = workpiece_path(profile.machine, found["end"])
+    assert np.linalg.norm(on_work - workpiece_path(profile.machine, program.run.program.end), axis=1).max() < 0.01
+    assert header["time_s"] == pytest.approx(found["time"][-1], abs=0.001)
