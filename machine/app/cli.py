@@ -239,6 +239,28 @@ def ports(
 
 
 @app.command()
+def console(
+    port: Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")],
+    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
+    speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
+    reports: Annotated[bool, typer.Option("--reports/--no-reports", help="show temperatures that the printer reports")] = True,
+    leave_heaters: Annotated[
+        bool, typer.Option("--leave-heaters", help="heaters stay as they are on leaving; else they are switched off")
+    ] = False,
+    log: Annotated[
+        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
+    ] = None,
+    machine: MachineName = "generic_ac",
+    settings: Settings = None,
+) -> int:
+    """Talk to a printer: lines typed, or piped in, are sent; its answers are shown."""
+    from machine.app import console_command
+
+    profile = _profile(machine, "pla", "standard", settings, None, None, None)
+    return console_command.console(profile.machine, port, baud, speed, reports, leave_heaters, log)
+
+
+@app.command()
 def simulator(
     pty: Annotated[Path | None, typer.Option("--pty", metavar="PATH", help="a link to keep on the terminal's path")] = None,
     tcp: Annotated[int | None, typer.Option("--tcp", metavar="PORT", help="for socket://localhost:PORT; 0: a free one")] = None,

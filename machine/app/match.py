@@ -7,7 +7,7 @@ from machine.app.pipeline import Program
 from machine.app.progress import say
 from machine.dryrun.dryrun import summary
 from machine.link.answer import Answer, Kind, ask_at_any_rate
-from machine.link.port import open_port
+from machine.link.port import Port, open_port
 from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError, SilenceError
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -30,7 +30,13 @@ AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
 def printer_at(port: str, baud: int) -> Answer:
     """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is."""
     with open_port(port, baud) as wire:
-        answer, rate = ask_at_any_rate(wire, baud)
+        return printer_on(wire, baud)
+
+
+def printer_on(wire: Port, baud: int) -> Answer:
+    """The same for a port that is open already."""
+    port = wire.name
+    answer, rate = ask_at_any_rate(wire, baud)
     if answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED) and rate != baud:
         raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: use --baud {rate}")
     if answer.kind is not Kind.PRINTER:
