@@ -1,0 +1,359 @@
+"""Pause, overrides, user lines, cancel, emergency stop, a lost port: on a simulated printer whose time is its own."""
+
+import re
+from collections.abc import Callable
+from threading import Event as Flag
+
+import numpy as np
+import pytest
+
+from machine.collide import bodies, directions, solids
+from machine.kinematics.table import machine_points
+from machine.link.control import Control, Wish
+from machine.link.faults import Fault, FaultScript
+from machine.link.medium import Medium, Wire
+from machine.link.modal import Modal, axes_of
+from machine.link.park import Laid, lift_words, parked, standing_mm
+from machine.link.progress import Progress
+from machine.link.retreat import retreat
+from machine.link.stream import Outcome, print_lines
+from machine.link.virtual import PATH, VirtualPrinter
+from mdp.pose import UP, Pose, rotation
+from profiles.errors import FirmwareError, PortError
+from profiles.profile import load
+
+PROFILE = load()
+MACHINE = PROFILE.machine
+START = ["G21", "G90", "M83", "M140 S60", "M104 S200", "G28 X Y Z", "G92 A0 C0", "M190 S60", "M109 S200", "G92 E0", "M106 S128"]
+POSED = ["G0 Z120 F900", "G0 A30 C725 F6000", "G0 X10 Y10 F6000", "G0 Z60 F900", "M204 P800 T1200", "G1 F1500"]
+# strokes with a travel after every tenth, where a pause can begin
+BODY = [
+    f"G1 X{10 + i % 7}.{i:03d} Y{10 + i % 5} E0.05" if i % 10 else f"G0 X{10 + i % 7}.{i:03d} Y{10 + i % 5}" for i in range(400)
+]
+PROGRAM = [*START, *POSED, *BODY, "M104 S0", "M140 S0"]
+
+
+class Watcher:
+    """Asks for things when the print has come to a line or a state, and remembers what was shown and sent."""
+
+    def __init__(self, printer: VirtualPrinter) -> None:
+        self.printer, self.control = printer, Control()
+        self.shown: list[Progress] = []
+        self.sent = b""
+        self.when: dict[str | int, Callable[[], None]] = {}
+
+    def see(self, progress: Progress) -> None:
+        self.shown.append(progress)
+        line = next((at for at in self.when if isinstance(at, int) and progress.file_line >= at), None)
+        for key in (line, progress.state):
+            if key is not None and key in self.when:
+                self.when.pop(key)()
+
+    def traffic(self, direction: str, data: bytes) -> None:
+        self.sent += data if direction == ">" else b""
+
+    def lines(self) -> list[str]:
+        """The commands sent, without number and checksum."""
+        return [re.sub(r"^N\d+ |\*\d+$", "", line) for line in self.sent.decode().splitlines()]
+
+    def run(self, program: list[str], medium: Medium | None = None, stop: Flag | None = None) -> Outcome:
+        return print_lines(
+            program,
+            PATH,
+            on_progress=self.see,
+            stop=stop,
+            control=self.control,
+            traffic=self.traffic,
+            profile=PROFILE,
+            medium=medium or self.printer.medium,
+        )
+
+    def ask(self, wish: Wish, value: float = 100.0, text: str = "") -> Callable[[], None]:
+        return lambda: self.control.ask(wish, value, text)
+
+
+def watched(faults: tuple[Fault, ...] = (), seed: int = 1) -> Watcher:
+    script = FaultScript(faults, seed) if faults else None
+    return Watcher(VirtualPrinter(MACHINE, faults=script, most_s=20000.0))
+
+
+def strokes(printer: VirtualPrinter) -> np.ndarray:
+    """X, Y and pushed filament of the executed moves that push while they move across."""
+    record = printer.record
+    pushed = record.end[:, 5] - record.start[:, 5]
+    rows = (pushed > 1e-9) & (record.end[:, :2] != record.start[:, :2]).any(axis=1)
+    return np.column_stack([record.end[rows, :2], pushed[rows]])
+
+
+def planned(program: list[str]) -> np.ndarray:
+    found = [re.fullmatch(r"G1 X(\S+) Y(\S+) E(\S+)", line) for line in program]
+    return np.array([[float(m[1]), float(m[2]), float(m[3])] for m in found if m])
+
+
+def test_a_pause_at_a_tilted_pose_returns_to_the_same_pose_filament_feed_and_modes() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Wish.PAUSE), "paused": watcher.ask(Wish.RESUME)}
+    assert not watcher.run(PROGRAM).cancelled
+    lines = watcher.lines()
+    back = lines[lines.index("M114") :]
+    after = back[back.index("M109 S200") : back.index("M114", 5)]
+    assert not [line for line in back if re.search(r"[AC]-?\d", line)]  # neither to 5 nor to 725: the table never moves
+    assert [line for line in after if line.startswith("G92")] == [f"G92 E{filament_before_pause(lines):.5f}"]
+    assert {"G90", "M83", "G21", "G1 F1500", "M106  S128", "M204 P800 T1200"} <= set(after)
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert watcher.printer.record.end[-1, 4] == 725.0
+
+
+def filament_before_pause(lines: list[str]) -> float:
+    """The sum of the program's pushes up to the first M400."""
+    return sum(float(m[1]) for line in lines[: lines.index("M400")] if (m := re.search(r" E(\S+)$", line)))
+
+
+def test_the_states_of_a_pause_are_told_in_order() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Wish.PAUSE), "paused": watcher.ask(Wish.RESUME)}
+    watcher.run(PROGRAM)
+    told = list(dict.fromkeys(progress.state for progress in watcher.shown))
+    assert told == ["printing", "pausing", "paused", "resuming", "finishing"]
+
+
+def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Wish.PAUSE), "paused": watcher.ask(Wish.RESUME)}
+    watcher.run(PROGRAM)
+    lines = watcher.lines()
+    stop = lines.index("M400")
+    assert " E" in lines[stop - 1]
+    assert lines[stop + 3 : stop + 5] == ["G21", "M83"]
+    away = lines[stop + 5 : stop + 9]
+    assert re.fullmatch(r"G1 E-\S+ F\d+", away[0])
+    assert re.fullmatch(r"G0 Z\S+ F\d+", away[2])
+    assert re.fullmatch(r"G0 X\S+ Y\S+ F\d+", away[3])
+
+
+@pytest.mark.parametrize("action", ["pause", "cancel"])
+def test_the_printer_may_ask_for_a_pause_or_the_end(action: str) -> None:
+    watcher = watched()
+    speak = [watcher.printer.firmware]
+    watcher.when = {150: lambda: speak[0]._said.append(f"//action:{action}"), "paused": watcher.ask(Wish.RESUME)}
+    outcome = watcher.run(PROGRAM)
+    assert outcome.cancelled == (action == "cancel")
+    assert any(progress.state == "pausing" for progress in watcher.shown) == (action == "pause")
+
+
+def test_cancelling_lifts_the_tip_and_neither_homes_nor_turns() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Wish.CANCEL)}
+    outcome = watcher.run(PROGRAM)
+    record = watcher.printer.record
+    assert (outcome.cancelled, outcome.heaters_off) == (True, True)
+    assert record.end[-1, 2] == pytest.approx(60.0 + MACHINE.lift_mm)
+    assert (record.end[-1, 3], record.end[-1, 4]) == (30.0, 725.0)
+    assert [text for _, text in record.events if text.startswith("homed")] == ["homed XYZ"]
+
+
+def test_a_cancel_while_the_tip_is_parked_leaves_it_there() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Wish.PAUSE), "paused": watcher.ask(Wish.CANCEL)}
+    outcome = watcher.run(PROGRAM)
+    assert outcome.heaters_off
+    assert "G91" not in watcher.lines()
+
+
+def test_the_emergency_stop_is_the_next_thing_on_the_wire_and_no_line_follows() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Wish.EMERGENCY_STOP)}
+    written: list[bytes] = []
+    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"):
+        watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written))
+    assert written[-1] == b"\nM112\n"
+    assert watcher.printer.record.happened("M112")
+
+
+def test_an_emergency_stop_without_answer_is_given_twice_and_says_to_cut_the_power() -> None:
+    watcher = watched()
+    written: list[bytes] = []
+    watcher.when = {150: watcher.ask(Wish.EMERGENCY_STOP)}
+    with pytest.raises(FirmwareError, match="did not confirm M112: cut the power"):
+        watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written, deaf=b"M112"))
+    assert written[-2:] == [b"\nM112\n", b"\nM112\n"]
+
+
+class _Tap:
+    """A wire that keeps what is written; what holds `deaf` does not arrive."""
+
+    def __init__(self, wire: Wire, written: list[bytes], deaf: bytes) -> None:
+        self._wire, self._written, self._deaf, self.name = wire, written, deaf, wire.name
+        self.read, self.discard, self.close = wire.read, wire.discard, wire.close
+
+    def write(self, data: bytes) -> None:
+        self._written.append(data)
+        if not self._deaf or self._deaf not in data:
+            self._wire.write(data)
+
+
+def _written(medium: Medium, written: list[bytes], deaf: bytes = b"") -> Medium:
+    return Medium(lambda name, baud: _Tap(medium.open(name, baud), written, deaf), medium.now_s, medium.wait)
+
+
+@pytest.mark.parametrize(("wish", "value", "sent", "undone"), [
+    (Wish.FEED, 150.0, "M220 S150", "M220 S100"), (Wish.FLOW, 95.0, "M221 S95", "M221 S100"),
+])  # fmt: skip
+def test_overrides_are_sent_told_and_taken_back_at_the_end(wish: Wish, value: float, sent: str, undone: str) -> None:
+    watcher = watched()
+    watcher.when = {100: watcher.ask(wish, value)}
+    watcher.run(PROGRAM)
+    lines, last = watcher.lines(), watcher.shown[-1]
+    assert lines.index(sent) < lines.index(undone)
+    assert value in (last.feed_percent, last.flow_percent)
+
+
+@pytest.mark.parametrize(("wish", "value"), [(Wish.FEED, 5.0), (Wish.FEED, 1000.0), (Wish.FLOW, 0.0), (Wish.FLOW, 250.0)])
+def test_an_override_outside_its_limits_is_refused_with_what_is_allowed(wish: Wish, value: float) -> None:
+    watcher = watched()
+    watcher.when = {100: watcher.ask(wish, value)}
+    watcher.run(PROGRAM)
+    assert any(re.search(r"is not possible: 10 to [23]00 % are allowed", progress.message) for progress in watcher.shown)
+    assert not [line for line in watcher.lines() if line.startswith("M22")]
+
+
+@pytest.mark.parametrize("text", [
+    "M110 N5", "M112", "M0", "G28", "G28 X", "g28", "G1 A5", "G0 Z0", "G1 X5 E1", "G92 E0", "G91", "M82", "T1", "M84", "M18 E",
+    "MANUAL_STEPPER STEPPER=stepper_a MOVE=3", "HOME_AB", "G1 X1*5", "M117 schön", "", "; nothing", "M600",
+])  # fmt: skip
+def test_a_line_that_would_spoil_the_print_is_not_sent(text: str) -> None:
+    watcher = watched()
+    watcher.when = {100: watcher.ask(Wish.LINE, text=text), 120: watcher.ask(Wish.PAUSE), "paused": watcher.ask(Wish.RESUME)}
+    watcher.run(PROGRAM)
+    assert any(progress.message.startswith("not sent") for progress in watcher.shown)
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+
+
+def test_a_harmless_line_goes_out_between_those_of_the_program() -> None:
+    watcher = watched()
+    watcher.when = {100: watcher.ask(Wish.LINE, text="M117 half way ; a note")}
+    watcher.run(PROGRAM)
+    assert "M117 half way" in watcher.lines()
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+
+
+def test_filament_may_be_changed_in_a_pause_and_the_count_is_restored() -> None:
+    watcher = watched()
+
+    def change() -> None:
+        for text in ("G1 E-50 F300", "G1 E60 F300"):
+            watcher.control.ask(Wish.LINE, text=text)
+        watcher.control.ask(Wish.RESUME)
+
+    watcher.when = {150: watcher.ask(Wish.PAUSE), "paused": change}
+    watcher.run(PROGRAM)
+    lines = watcher.lines()
+    assert f"G92 E{filament_before_pause(lines):.5f}" in lines[lines.index("G1 E60 F300") :]
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+
+
+@pytest.mark.parametrize("length_s", [0.5, 30.0])
+def test_a_port_that_comes_back_to_a_printer_that_went_on_loses_and_doubles_nothing(length_s: float) -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=length_s),))
+    assert not watcher.run(PROGRAM).cancelled
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert "reconnecting" in {progress.state for progress in watcher.shown}
+
+
+def test_a_port_that_comes_back_to_a_restarted_printer_ends_the_print() -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=2.0),))
+    reset = watcher.printer.firmware.reset
+    watcher.when = {"reconnecting": lambda: reset(False)}
+    with pytest.raises(FirmwareError, match="restarted"):
+        watcher.run(PROGRAM)
+    assert len(strokes(watcher.printer)) < len(planned(PROGRAM))
+
+
+def test_a_port_that_stays_away_ends_the_print_in_bounded_time() -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=1e6),))
+    with pytest.raises(PortError, match=r"did not come back within 120 s; its heaters may still be on"):
+        watcher.run(PROGRAM)
+    assert watcher.printer.now_s < 1000.0
+
+
+def test_the_stop_flag_ends_the_wait_for_a_lost_port() -> None:
+    watcher, stop = watched((Fault("disconnect", at=120, unit="line", seconds=1e6),)), Flag()
+    watcher.when = {"reconnecting": stop.set}
+    outcome = watcher.run(PROGRAM, stop=stop)
+    assert (outcome.cancelled, outcome.heaters_off) == (True, False)
+
+
+POSES = [Pose(0.0, 0.0), Pose(30.0, 725.0), Pose(-60.0, 45.0), Pose(85.0, 10.0)]
+
+
+def printing(pose: Pose) -> tuple[Laid, np.ndarray]:
+    """A print 20 mm wide and 10 mm high in a pose, and where the tip stands on its top, 80 mm above the table."""
+    laid, at = Laid(MACHINE), machine_points(MACHINE, pose, np.array([[0.0, 0.0, 80.0]]))[0]
+    for step in ((-10.0, -10.0, -10.0), (10.0, 10.0, 0.0)):
+        laid.push((*(at + step), pose.tilt_deg, pose.turn_deg, 0.0))
+    return laid, at
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_the_way_to_the_parking_place_is_clear_of_table_cradle_and_print(pose: Pose) -> None:
+    laid, at = printing(pose)
+    printed, park = laid.printed(), parked(MACHINE, laid.printed(), at, pose)
+    assert park is not None
+    tried = np.vstack([directions(rotation(MACHINE, pose) @ UP), UP])
+    for place in np.linspace(park.lift_mm, park.stand_mm, 40):
+        for name, reach in solids(MACHINE, pose, printed):
+            for body in bodies(MACHINE):
+                assert float((tried @ place + body.least(tried) - reach(tried)).max()) >= body.need_mm - 1e-6, name
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_parking_goes_straight_up_first_and_stays_within_the_axes(pose: Pose) -> None:
+    laid, at = printing(pose)
+    park = parked(MACHINE, laid.printed(), at, pose)
+    assert park is not None
+    assert park.lift_mm[:2] == tuple(at[:2])
+    assert park.lift_mm[2] == park.stand_mm[2] > at[2]
+    for value, axis in zip(park.stand_mm, (MACHINE.x, MACHINE.y, MACHINE.z), strict=True):
+        assert axis.limits_mm[0] <= value <= axis.limits_mm[1]
+
+
+def test_at_the_top_of_the_axis_the_tip_only_goes_aside() -> None:
+    top = MACHINE.z.limits_mm[1]
+    park = parked(MACHINE, printing(POSES[0])[0].printed(), np.array([0.0, 0.0, top]), POSES[0])
+    assert park is not None
+    assert park.lift_mm == (0.0, 0.0, top)
+    assert park.stand_mm[2] == top
+
+
+def test_where_the_table_stands_in_the_way_up_the_tip_stays() -> None:
+    laid, _ = printing(Pose(85.0, 0.0))
+    assert parked(MACHINE, laid.printed(), np.array([0.0, 0.0, 20.0]), Pose(85.0, 0.0)) is None
+
+
+def test_a_pause_before_the_place_is_known_moves_filament_only() -> None:
+    modal = Modal(axes_of(MACHINE))
+    modal.take("M104 S200")
+    way = retreat(modal, PROFILE, Laid(MACHINE))
+    assert way.park is None
+    assert not [line for line in (*way.away, *way.back) if re.match(r"G[01] .*[XYZ]", line)]
+
+
+def test_filament_that_the_program_has_pulled_back_already_is_not_pulled_again() -> None:
+    modal = Modal(axes_of(MACHINE))
+    for command in ("M104 S200", "M83", "G92 E0", "G1 E5", f"G1 E-{PROFILE.material.retract_mm}"):
+        modal.take(command)
+    assert not [line for line in retreat(modal, PROFILE, None).away if "E" in line]
+
+
+def test_a_lift_under_a_firmware_that_follows_the_table_goes_along_the_nozzle() -> None:
+    words = lift_words(MACHINE, Pose(90.0, 0.0), 10.0, True)
+    told = {word[0]: float(word[1:]) for word in words.split()}
+    step = np.array([told.get(letter, 0.0) for letter in "XYZ"])
+    assert rotation(MACHINE, Pose(90.0, 0.0)) @ step == pytest.approx([0.0, 0.0, 10.0], abs=1e-3)
+
+
+def test_the_place_of_a_program_without_rotary_words_is_that_of_a_level_table() -> None:
+    found = standing_mm(MACHINE, (1.0, 2.0, 3.0, None, None, None), False)
+    assert found is not None
+    assert (found[0].tolist(), found[1]) == ([1.0, 2.0, 3.0], Pose(0.0, 0.0))
+    assert standing_mm(MACHINE, (1.0, 2.0, None, 0.0, 0.0, 0.0), False) is None
