@@ -24,21 +24,18 @@ FLOOR = (236.0, 238.0, 241.0)
 NOZZLE = (128.0, 131.0, 138.0)
 SPREAD = 0.13  # gap between exploded parts as a share of the model's size
 SEGMENTS = 96
-DIGITS = [
-    digit.split()
-    for digit in (
-        "111 101 101 101 111",
-        "010 110 010 010 111",
-        "111 001 111 100 111",
-        "111 001 111 001 111",
-        "101 101 111 001 001",
-        "111 100 111 001 111",
-        "111 100 111 101 111",
-        "111 001 001 010 010",
-        "111 101 111 101 111",
-        "111 101 111 001 111",
-    )
-]
+# A font of 3 x 5: rows of each letter, top to bottom; letters of rotary axes only.
+FONT = {
+    letter: rows.split()
+    for letter, rows in {
+        "0": "111 101 101 101 111", "1": "010 110 010 010 111", "2": "111 001 111 100 111", "3": "111 001 111 001 111",
+        "4": "101 101 111 001 001", "5": "111 100 111 001 111", "6": "111 100 111 101 111", "7": "111 001 001 010 010",
+        "8": "111 101 111 101 111", "9": "111 101 111 001 111", "-": "000 000 111 000 000", ".": "000 000 000 000 010",
+        "A": "010 101 111 101 101", "B": "110 101 110 101 110", "C": "111 100 100 100 111", "I": "111 010 010 010 111",
+        "J": "001 001 001 101 111", "K": "101 101 110 101 101", "U": "101 101 101 101 111", "V": "101 101 101 101 010",
+        "W": "101 101 111 111 101", " ": "000 000 000 000 000",
+    }.items()
+}  # fmt: skip
 
 
 def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[int, int] = (1600, 800)) -> Image:
@@ -81,7 +78,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
         meshes = [floor.moved(part.rotation), *printed, nozzle.moved(np.eye(3), _last_point(printed[-1]))]
         paints = [FLOOR, *([PRINTED] * (part.index - 1)), colour, NOZZLE]
         frame = draw(meshes, paints, None, view, (frame_pixels, frame_pixels), span)
-        frames.append(_numbered(frame, part.index))
+        frames.append(_labelled(frame, part, machine))
     return _tiled(frames)
 
 
@@ -171,13 +168,21 @@ def _tiled(frames: list[Image]) -> Image:
     return np.concatenate([np.concatenate(filled[row * columns : (row + 1) * columns], axis=1) for row in range(rows)], axis=0)
 
 
-def _numbered(image: Image, number: int) -> Image:
-    """The image with a number in its upper left corner, drawn with a 3 x 5 font."""
-    rows = np.array(
-        [[int(bit) for bit in " ".join(DIGITS[int(c)][row] for c in str(number)).replace(" ", "0")] for row in range(5)]
-    )
-    size = max(image.shape[0] // 96, 1)
-    marks = np.kron(rows, np.ones((size, size), dtype=np.uint8)).astype(bool)
-    out = image.copy()
-    out[3 * size : 8 * size, 3 * size : 3 * size + marks.shape[1]][marks] = 90
+def _labelled(image: Image, part: Part, machine: Machine) -> Image:
+    """The image with the part's number in its upper left corner, and where the table stands in the lower left one."""
+    pose, size = part.pose, max(image.shape[0] // 96, 1)
+    out, small = image.copy(), max(3 * size // 5, 1)
+    _write(out, str(part.index), 3 * size, size, 90)
+    axes = ((machine.tilt.letter, pose.tilt_deg), (machine.turn.letter, pose.turn_deg)) if machine.tilts else ()
+    for row, (letter, value) in enumerate(axes):
+        _write(out, f"{letter} {round(value, 1) + 0.0:.1f}", len(image) - 3 * size - (13 - 8 * row) * small, small, 120)
     return out
+
+
+def _write(image: Image, text: str, top: int, size: int, grey: int) -> None:
+    """Letters of the font, size pixels a dot, along the image's left margin."""
+    rows = np.array([[int(dot) for letter in text for dot in FONT[letter][row] + "0"] for row in range(5)])
+    marks = np.kron(rows, np.ones((size, size), dtype=np.uint8)).astype(bool)
+    left = 3 * max(len(image) // 96, 1)
+    place = image[top : top + marks.shape[0], left : left + marks.shape[1]]
+    place[marks[:, : place.shape[1]]] = grey

@@ -139,6 +139,17 @@ def test_the_contact_sheet_has_a_frame_for_every_part_with_that_part_in_colour()
     assert share_like(sheet[:160, :160], part_colours(2)[1]) == 0.0
 
 
+def test_a_frame_tells_its_number_and_where_the_table_stands() -> None:
+    letters = {96: 1, 480: 5}
+    for pixels, dot in letters.items():
+        corner = contact_sheet(example(), PROFILE.machine, pixels)[3 * dot : 8 * dot : dot, 3 * dot : 6 * dot : dot, 0]
+        assert (corner == 90).tolist() == [[bool(int(mark)) for mark in row] for row in ("010", "110", "010", "010", "111")]
+    still = load(machine="three_axis").machine
+    told, silent = (contact_sheet(example(), machine, 480)[-60:, :100, 0] for machine in (PROFILE.machine, still))
+    assert (told == 120).sum() > 100
+    assert (silent == 120).sum() == 0
+
+
 def test_the_same_scene_gives_the_same_bytes() -> None:
     first, second = (png_bytes(parts_picture(example(), PROFILE, (160, 80))) for _ in range(2))
     assert first == second
