@@ -32,7 +32,7 @@ class Browser:
     def __init__(self, size: tuple[int, int] = (1280, 800), flags: tuple[str, ...] = ()) -> None:
         self.complaints: list[str] = []
         self.requests: list[str] = []
-        self._folder = tempfile.TemporaryDirectory(prefix="browser")
+        self._folder = tempfile.TemporaryDirectory(prefix="browser", ignore_cleanup_errors=True)
         self._count, self._read, self._session = 0, b"", ""
         to_child, self._out = _pipe()
         self._in, from_child = _pipe()
@@ -55,7 +55,8 @@ class Browser:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._process.terminate()
+        self._session = ""
+        self._send("Browser.close")
         self._process.wait(PATIENCE_S)
         os.close(self._in)
         os.close(self._out)

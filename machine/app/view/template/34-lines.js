@@ -38,7 +38,7 @@ function linesOf(gl, { places, colours }) {
     gl.drawArrays(gl.LINES, first, end - first);
     gl.bindVertexArray(null);
   };
-  return { draw };
+  return { draw, corners: count };
 }
 
 /** Pairs of places for every row that moves and lays nothing; turns of the table are arcs. row: of each pair, rising. */

@@ -64,7 +64,7 @@ function solidOf(gl, { places, colours }) {
     gl.disable(gl.BLEND);
     gl.bindVertexArray(null);
   };
-  return { draw, paint };
+  return { draw, paint, corners: places.length / 3 };
 }
 
 /** Corners of triangles put together, all of one colour a piece. */

@@ -61,23 +61,25 @@ function discOf({ normal, centre_mm: centre, radius_mm: radius }) {
   return circle(radius * 1.12, 0, 72).map(([u, v]) => add(centre, add(scaled(a, u), scaled(b, v))));
 }
 
+const based = (parts) => parts.filter((part) => part.base && part.direction && part.base.radius_mm > 0);
+
+/** Discs where the parts are cut, their rims, and an arrow along each part's direction: as many corners a part. */
 function planesOf(parts, colourOf) {
-  const cut = parts.filter((part) => part.base && part.base.radius_mm > 0);
-  const pieces = cut.map((part) => {
-    const disc = discOf(part.base);
-    return { corners: disc.flatMap((place, k) => [part.base.centre_mm, place, disc[(k + 1) % disc.length]]), colour: [...colourOf(part), 255] };
-  });
-  const edges = cut.map((part) => ({ corners: chained(discOf(part.base)), colour: [...colourOf(part), 255] }));
-  return { discs: trianglesOf(pieces), edges: trianglesOf(edges) };
+  const discs = [], rims = [];
+  for (const part of based(parts)) {
+    const disc = discOf(part.base), colour = [...colourOf(part), 255];
+    discs.push({ corners: disc.flatMap((place, k) => [part.base.centre_mm, place, disc[(k + 1) % disc.length]]), colour });
+    rims.push({ corners: chained(disc), colour });
+  }
+  return { discs: trianglesOf(discs), rims: trianglesOf(rims) };
 }
 
-/** An arrow along each part's direction: a shaft and a head. */
 function arrowsOf(parts, colourOf, span) {
-  const pieces = parts.filter((part) => part.base && part.direction).map((part) => {
-    const long = 0.3 * span, [a, b] = beside(part.direction);
-    const outline = [[0, 0], [0.018 * long * 2, 0], [0.018 * long * 2, 0.72 * long], [0.1 * long, 0.72 * long], [0, long]];
+  const long = 0.3 * span, outline = [[0, 0], [0.036 * long, 0], [0.036 * long, 0.72 * long], [0.1 * long, 0.72 * long], [0, long]];
+  const surface = revolved(outline, 24);
+  return trianglesOf(based(parts).map((part) => {
+    const [a, b] = beside(part.direction);
     const place = ([u, v, w]) => add(part.base.centre_mm, add(add(scaled(a, u), scaled(b, v)), scaled(part.direction, w)));
-    return { corners: revolved(outline, 24).map(place), colour: [...colourOf(part), 255] };
-  });
-  return trianglesOf(pieces);
+    return { corners: surface.map(place), colour: [...colourOf(part), 255] };
+  }));
 }

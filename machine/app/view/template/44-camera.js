@@ -43,7 +43,8 @@ function cameraOf() {
   return camera;
 }
 
-const VIEWS = { iso: [-55, 24], front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
+const CORNERS = [-55, 55, -125, 125];
+const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
 
 /** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom. */
 function handle(canvas, camera, { changed, pressed }) {

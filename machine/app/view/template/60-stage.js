@@ -17,7 +17,7 @@ function stageOf(gl, print, dark) {
     marks: Object.fromEntries(Object.entries(MARKS).map(([name, look]) => [name, marksAt(gl, marks[name], path, look)])),
     model: surfaces && solidOf(gl, { places: surfaces.places, colours: surfaceColours(surfaces, partColour, "printed") }),
     planes: solidOf(gl, planes.discs),
-    rims: linesOf(gl, planes.edges),
+    rims: linesOf(gl, planes.rims),
     arrows: solidOf(gl, arrowsOf(header.parts, partColour, print.span)),
     table: solidOf(gl, bodies.table.solid), plateLines: linesOf(gl, bodies.table.lines),
     cradle: solidOf(gl, bodies.cradle.solid), cradleLines: linesOf(gl, bodies.cradle.lines),
@@ -64,19 +64,21 @@ function paintStage(gl, stage, print, scene, camera) {
   gl.clearColor(0, 0, 0, 0);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   if (on.beads && stage.beads) stage.beads.draw(beadView, ranges, { slot: print.path.slot(scene.row), share: scene.share }, scene.stride, false);
-  if (on.machine) paintTable(stage, seenAs, stand, work);
+  const below = beadView.eye[2] < 0;
+  if (on.machine && !below) paintTable(stage, seenAs(stand.cradle), work, {});
   const head = seenAs(stand.head);
   if (on.machine) stage.nozzle.draw(head);
   paintPath(stage, ranges, scene, work.toClip, nearer * 0.02, clamp(pixels * 2.5, 4, 13) * (width / canvas.clientWidth || 1));
   paintModel(stage, print, scene, (shift) => seenAs(multiply(stand.work, moved(shift))), nearer);
+  if (on.machine && below) paintTable(stage, seenAs(stand.cradle), work, { strength: 0.18 });
   if (on.machine) paintHead(stage, head);
   return { work, ranges, beadView };
 }
 
-function paintTable(stage, seenAs, stand, work) {
-  const cradle = seenAs(stand.cradle);
-  stage.table.draw(work);
-  stage.cradle.draw(cradle);
+/** From below the table is a ghost, or it would hide everything. */
+function paintTable(stage, cradle, work, look) {
+  stage.table.draw(work, look);
+  stage.cradle.draw(cradle, look);
   stage.plateLines.draw(work.toClip, undefined, undefined, 1e-5);
   stage.cradleLines.draw(cradle.toClip, undefined, undefined, 1e-5);
 }
@@ -93,17 +95,18 @@ function paintPath(stage, ranges, scene, toClip, nearer, size) {
 
 /** seenAt: the work shifted by a vector, as the eye sees it. */
 function paintModel(stage, print, scene, seenAt, nearer) {
-  const whole = scene.model === "solid", { parts = [], apart } = print.surfaces || {}, work = seenAt([0, 0, 0]);
-  if (stage.model && scene.model !== "hide")
-    for (const { part, range } of parts) {
-      if (scene.part !== null && scene.part !== part.index && scene.others === "hide") continue;
-      const seen = scene.apart ? seenAt(scaled(apart.get(part), scene.apart * print.span)) : work;
-      stage.model.draw(seen, { ghost: whole ? 0 : 0.16, range, behind: whole ? 0 : nearer * 0.02 });
-    }
-  if (scene.on.directions) stage.arrows.draw(work);
+  const { parts = [], apart } = print.surfaces || {}, whole = scene.model === "solid";
+  const seen = (part) => seenAt(apart && scene.apart ? scaled(apart.get(part), scene.apart * print.span) : [0, 0, 0]);
+  for (const { part, range } of scene.model === "hide" ? [] : parts) {
+    if (scene.part !== null && scene.part !== part.index && scene.others === "hide") continue;
+    stage.model.draw(seen(part), { ghost: whole ? 0 : 0.16, range, behind: whole ? 0 : nearer * 0.02 });
+  }
+  const cut = based(print.header.parts);
+  const piece = (solid, k) => [k, k + 1].map((n) => (n * solid.corners) / cut.length);
+  if (scene.on.directions) cut.forEach((part, k) => stage.arrows.draw(seen(part), { range: piece(stage.arrows, k) }));
   if (!scene.on.planes) return;
-  stage.rims.draw(work.toClip);
-  stage.planes.draw(work, { strength: 0.3 });
+  cut.forEach((part, k) => k && stage.rims.draw(seen(part).toClip, ...piece(stage.rims, k))); // the first stands on the platform
+  cut.forEach((part, k) => k && stage.planes.draw(seen(part), { strength: 0.3, range: piece(stage.planes, k) }));
 }
 
 function paintHead(stage, seen) {

@@ -2,6 +2,7 @@
 
 const SLOW_MS = 50;
 const STILL_MS = 180;
+const COARSEST = 64;
 
 /** {ask, paint, moved, rowAt}, or null where there is no WebGL2. */
 function pictureOf(print, scene, camera, bells, showMarkers) {
@@ -18,8 +19,10 @@ function pictureOf(print, scene, camera, bells, showMarkers) {
     const { dataset } = document.documentElement;
     dataset.drawn = last.ranges.reduce((sum, range) => sum + range.endRow - range.firstRow, 0);
     dataset.frameMs = (performance.now() - start).toFixed(1);
+    ease.painted(start);
   };
   const ask = () => { if (!asked) { asked = true; requestAnimationFrame(paint); } };
+  const ease = easing(scene, ask);
   const colour = () => {
     const { colours, legend } = coloured(scene.mode, print.rows, print.path, { ...print, parts: print.header.parts, hidden: scene.hidden });
     stage.beads?.paint(colours);
@@ -36,6 +39,7 @@ function pictureOf(print, scene, camera, bells, showMarkers) {
   bells.on("model", () => { if (stage) reds(); ask(); });
   bells.on("theme", build);
   bells.on("row layers look", ask);
+  bells.on("moving", ease.moved);
   new ResizeObserver(ask).observe(canvas);
   outlive(canvas, () => { stage = null; }, build);
   addEventListener("beforeprint", () => { paint(); keepPicture(canvas); });
@@ -45,7 +49,7 @@ function pictureOf(print, scene, camera, bells, showMarkers) {
     const place = [Math.floor((event.clientX - box.left) * scale), canvas.height - 1 - Math.floor((event.clientY - box.top) * scale)];
     return print.path.row(slotAt(gl, stage, last, place));
   };
-  return { canvas, ask, rowAt, moved: easing(scene, ask) };
+  return { canvas, ask, rowAt, moved: ease.moved };
 }
 
 function fill(canvas) {
@@ -64,16 +68,23 @@ function outlive(canvas, drop, build) {
   canvas.addEventListener("webglcontextrestored", () => { notice(""); build(); });
 }
 
-/** Called whenever the eye has moved: where frames come slowly only every second, fourth ... bead is drawn until it rests. */
+/**
+ * moved() is called whenever eye or slider move, painted() after each picture: where pictures come slowly only every second,
+ * fourth ... bead is drawn until all rests.
+ */
 function easing(scene, ask) {
-  let timer = 0, before = 0, wanted = 1;
-  return () => {
-    const now = performance.now(), took = now - before;
-    before = now;
-    if (took < 1000) wanted = took > SLOW_MS ? Math.min(wanted * 2, 64) : took < SLOW_MS / 3 ? Math.max(wanted / 2, 1) : wanted;
-    scene.stride = wanted;
+  let timer = 0, wanted = 1;
+  const rest = () => { timer = 0; scene.stride = 1; ask(); };
+  const moved = () => {
     clearTimeout(timer);
-    timer = setTimeout(() => { scene.stride = 1; ask(); }, STILL_MS);
+    timer = setTimeout(rest, STILL_MS);
+    scene.stride = wanted;
     ask();
   };
+  const painted = (start) => timer && requestAnimationFrame(() => {
+    const took = performance.now() - start;
+    if (took > SLOW_MS) wanted = Math.min(wanted * 2 ** Math.ceil(Math.log2(took / SLOW_MS)), COARSEST);
+    else if (took < SLOW_MS / 3) wanted = Math.max(wanted / 2, 1);
+  });
+  return { moved, painted };
 }

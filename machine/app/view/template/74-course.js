@@ -9,7 +9,11 @@ function courseOf(print, scene, bells) {
   for (const speed of PLAYING) $("speed").append(made("option", { value: speed, text: `${speed}×`, selected: speed === USUAL }));
   const total = rows.count ? rows.time[rows.count - 1] / 1000 : 0;
   const player = playerOf(scene, bells, total);
-  position.addEventListener("input", () => { player.stop(); scene.go(Number(position.value)); });
+  position.addEventListener("input", (event) => {
+    player.stop();
+    scene.go(Number(position.value));
+    if (event.isTrusted) bells.ring("moving");
+  });
   $("play").addEventListener("click", player.toggle);
   $("back").addEventListener("click", () => { player.stop(); scene.go(scene.row - 1); });
   $("forth").addEventListener("click", () => { player.stop(); scene.go(scene.row + 1); });
@@ -30,6 +34,7 @@ function playerOf(scene, bells, total) {
     const next = scene.time() + (Math.min(now - before, 250) / 1000) * Number($("speed").value);
     before = now;
     scene.goToTime(Math.min(next, total));
+    bells.ring("moving");
     if (next >= total) player.stop(); else requestAnimationFrame(step);
   };
   const tell = () => {

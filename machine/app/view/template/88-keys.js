@@ -19,7 +19,7 @@ function keysOf({ scene, camera, player, look, fit, toggleTheme }) {
     r: () => { $("frame").value = scene.riding ? "machine" : "workpiece"; $("frame").dispatchEvent(new Event("change")); },
     f: fit, d: toggleTheme, "?": () => $("help").showModal(),
   };
-  ["iso", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
+  ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || $("help").open) return;
     const { tagName, type } = event.target, own = tagName === "SELECT" || (tagName === "INPUT" && type === "range");

@@ -58,13 +58,25 @@ function fitting(print, scene, camera, picture, ring) {
     camera.target = add(camera.target, sub(carried(now, middle), carried(before, middle)));
     before = now;
   });
-  document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => {
-    [camera.yaw, camera.pitch] = VIEWS[button.dataset.view].map((angle) => angle * RAD);
+  const views = { ...VIEWS, corner: [bestCorner(print), 24] };
+  const look = (name) => {
+    [camera.yaw, camera.pitch] = views[name].map((angle) => angle * RAD);
     picture.ask();
-  }));
+  };
+  document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => look(button.dataset.view)));
   $("fit").addEventListener("click", fit);
+  look("corner");
   fit();
   return fit;
+}
+
+/** The corner that sees most of the table's upper side while the parts are printed. */
+function bestCorner({ header, chain }) {
+  const seen = (yaw) => header.parts.reduce((sum, { rows = 1, tilt_deg: tilt = 0, turn_deg: turn = 0 }) => {
+    const up = turned(chain.table(tilt, turn), [0, 0, 1]);
+    return sum + rows * (up[0] * Math.cos(yaw * RAD) + up[1] * Math.sin(yaw * RAD));
+  }, 0);
+  return CORNERS.reduce((best, yaw) => (seen(yaw) > seen(best) + 1e-6 ? yaw : best));
 }
 
 function withoutPicture() {
