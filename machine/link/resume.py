@@ -28,6 +28,7 @@ from profiles.profile import Profile
 
 WINDOW = 16  # commands on their way at a time, at most
 AHEAD = EVERY_LINES + 2 * WINDOW  # commands beyond the newest acknowledged one on record that the printer may have taken
+ANEW = "hardly anything was printed: the program begins anew"
 SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
 SAME = 0.02  # mm or deg: M114 tells hundredths
 NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: questions have numbers too
@@ -104,15 +105,15 @@ def alive(point: Point, found: Found) -> bool | None:
 
 def way_on(point: Point, found: Found, profile: Profile) -> Way:
     """Decide. Raises JournalError where going on would be a guess."""
-    if not point.stroked:
-        return Way(Begin(1, ()), "nothing was printed yet: the program begins anew")
-    lives = alive(point, found)
     standing = _standing(point, found)
     if standing is not None:
         before = (*heated(standing.modal, profile), *standing.modal.lines())
         done = "the printer stands where this line begins: nothing is repeated"
         return Way(Begin(standing.line + 1, before), done)
+    if not point.stroked:
+        return Way(Begin(1, ()), f"{ANEW}, clear the table of the little there may be")
     _check(point, profile)
+    lives = alive(point, found)
     span = f"lines {point.line} to {point.last} may have been printed already"
     at = _told(point, found) if lives or (lives is None and _nonzero(found)) else None
     if at is not None:
