@@ -91,3 +91,13 @@ def test_every_row_is_as_long_as_its_head_and_all_is_text() -> None:
     report = print_report(program, profile, layers_of(program.run.program, 0.2), end_times_s(program.run))
     for table in report["tables"]:
         assert all(len(row) == len(table["head"]) and all(isinstance(cell, str) for cell in row) for row in table["rows"])
+
+
+def test_of_a_file_that_does_not_tell_its_machine_nothing_is_pretended() -> None:
+    profile, program = example()
+    named = (layers_of(program.run.program, 0.2), end_times_s(program.run))
+    report = print_report(program, profile, *named, known=False, ours=False)
+    assert dict(report["facts"])["machine"].startswith("not told")
+    assert dict(report["facts"])["material"] == "not told: weights as of PLA"
+    assert report["tables"][1]["notes"][-1] == "times as on generic A/C table"
+    assert "All settings" not in [table["title"] for table in report["tables"]]

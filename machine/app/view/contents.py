@@ -40,7 +40,8 @@ def of_print(
     height = np.zeros(len(ends_s))
     height[kept] = rows["height"].values
     count = len(ends_s)
-    header = _head(name, _source(program), profile, known) | {
+    source = _source(program)
+    header = _head(name, source, profile, known) | {
         "live": live,
         "time_s": run.time_s,
         "filament_mm": float(np.max(run.program.filament_mm, initial=0.0)),
@@ -48,8 +49,8 @@ def of_print(
         "layers_by": found.by,
         "thinned": {"rows": count, "kept": len(kept)} if len(kept) < count else None,
         "parts": _coloured(_parts(program, profile, found, ends_s, kept)),
-        "findings": findings.placed(run, profile.machine, kept),
-        "report": print_report(program, profile, found, ends_s, rivals),
+        "findings": findings.placed(run, profile.machine, known, kept),
+        "report": print_report(program, profile, found, ends_s, rivals, known, source != "foreign"),
     }
     table = layers.columns(run.program, found, ends_s, height, kept)
     return packed(header, rows | table | scene.surfaces(program.decomposition, profile))

@@ -9,12 +9,17 @@ from machine.dryrun.dryrun import DryRun
 from machine.kinematics.table import workpiece_path
 from profiles.machine import Machine
 
+MACHINES_OWN = frozenset({"axis-limit", "axis-speed", "collision", "contact", "off-plate", "uncalibrated"})
 
-def placed(run: DryRun, machine: Machine, kept: NDArray[np.int64]) -> list[dict[str, Any]]:
-    """The findings in their order; row: the first row kept from the finding's line on, -1 for one about the whole."""
+
+def placed(run: DryRun, machine: Machine, known: bool, kept: NDArray[np.int64]) -> list[dict[str, Any]]:
+    """The findings in their order; row: the first row kept from the finding's line on, -1 for one about the whole.
+
+    known: False leaves out what only the right machine could tell.
+    """
     program = run.program
     told = []
-    for finding in run.findings:
+    for finding in run.findings if known else [f for f in run.findings if f.code not in MACHINES_OWN]:
         row = int(np.searchsorted(program.line, finding.line)) if finding.line > 0 else len(program.line)
         place = min(int(np.searchsorted(kept, row)), len(kept) - 1) if row < len(program.line) else -1
         places: dict[str, Any] = {"workpiece_mm": None, "machine_mm": None}

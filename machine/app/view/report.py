@@ -41,13 +41,24 @@ def parts_report(decomposition: Decomposition, profile: Profile) -> dict[str, An
 
 
 def print_report(
-    program: Program, profile: Profile, layers: Layers, ends_s: Floats, rivals: Sequence[Rival] = ()
+    program: Program,
+    profile: Profile,
+    layers: Layers,
+    ends_s: Floats,
+    rivals: Sequence[Rival] = (),
+    known: bool = True,
+    ours: bool = True,
 ) -> dict[str, Any]:
-    """The report of a whole print. ends_s: (n,) when each row ends; rivals: the same model printed in one part."""
-    tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile)]
+    """The report of a whole print. ends_s: (n,) when each row ends; rivals: the same model printed in one part.
+
+    known: the machine is no guess; ours: the file was made with this profile, else its settings are not told.
+    """
+    tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile, "" if known else profile.machine.name)]
     if program.decomposition is not None:
         tables.append(_rivals(rivals) if rivals else _areas(program.decomposition, profile))
-    return {"facts": [*_figures(program.run, profile, layers), *_names(profile)], "tables": tables + settings_tables(profile)}
+    names = _names(profile) if ours else _guessed(profile, known)
+    facts = [*_figures(program.run, profile, layers), *names]
+    return {"facts": facts, "tables": tables + (settings_tables(profile) if ours else [])}
 
 
 def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), folded: bool = False) -> Table:
@@ -80,8 +91,11 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
     return _table("Parts", [*head, "layers", "time", "g"], rows, [RISKY] if solids else [])
 
 
-def _kinds(run: DryRun, profile: Profile) -> Table:
-    """Time and material by what is printed, then the ways between, then waiting; they add up to the whole print."""
+def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
+    """Time and material by what is printed, then the ways between, then waiting; they add up to the whole print.
+
+    guess: name of the machine whose speeds were taken where the file tells none.
+    """
     program, kind = run.program, page_kinds(run.program)
     groups: list[tuple[str, NDArray[np.bool_]]] = [
         (name or UNTOLD, (kind == MoveKind.EXTRUDE) & (program.type == place)) for place, name in enumerate(program.types)
@@ -91,7 +105,7 @@ def _kinds(run: DryRun, profile: Profile) -> Table:
     if run.dwell_s > 0:
         told.append(("waiting", run.dwell_s, 0.0))
     rows = [[name, duration(s), _share(s, run.time_s), _fixed(e / 1000, 2), _fixed(_grams(e, profile), 1)] for name, s, e in told]
-    notes = ["heating and homing are not counted"]
+    notes = ["heating and homing are not counted", *([f"times as on {guess}"] if guess else [])]
     return _table("Time and material", ["kind", "time", "share", "m", "g"], rows, notes)
 
 
@@ -139,6 +153,12 @@ def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
 
 def _names(profile: Profile) -> list[Row]:
     return [["machine", profile.machine.name], ["material", profile.material.name], ["process", profile.process.name]]
+
+
+def _guessed(profile: Profile, known: bool) -> list[Row]:
+    """The same of a file that does not tell them."""
+    machine = profile.machine.name if known else f"{UNTOLD}: limits, clearance and the plate were not judged"
+    return [["machine", machine], ["material", f"{UNTOLD}: weights as of {profile.material.name}"]]
 
 
 def _grams(filament_mm: Any, profile: Profile) -> float:
