@@ -42,6 +42,7 @@ class Motion:
         self.executed = Executed(kept)
         self.planner = Planner(self.executed.add, blocks)
         self._machine, self._note = machine, note
+        self._known = range(6) if machine.tilts else (0, 1, 2, 5)  # a word of another axis tells nothing
         self._following = Following(machine)
         self._real = [0.0] * 6  # where the axes stand when all planned blocks are over, filament as a running total
         self._offset = [0.0] * 5
@@ -91,7 +92,7 @@ class Motion:
             self.feed = words["F"] * scale / 60.0
         place = self.place[:]
         for axis, letter in enumerate(self.letters):
-            if letter in words:
+            if letter in words and axis in self._known:
                 value = words[letter] * (1.0 if 3 <= axis < 5 else scale)
                 relative = self.relative if axis < 5 else self.filament_relative
                 place[axis] = place[axis] + value if relative else value - self.shift[axis]

@@ -166,6 +166,12 @@ def test_a_machine_without_rotary_axes_says_so() -> None:
     assert said[-2].startswith("X:0.00 Y:0.00 Z:0.00 E:0.00 Count X:0 Y:0 Z:0")
 
 
+def test_a_machine_without_rotary_axes_takes_no_notice_of_their_words() -> None:
+    firmware = Firmware(load(machine="three_axis").machine, PLAIN)
+    assert answer(firmware, "G1 X5 A30 C90\n") == ["ok"]
+    assert (firmware.record().end[0, 3:5].tolist(), firmware.record().clamped) == ([0.0, 0.0], 0)
+
+
 def test_actions_for_the_host_end_with_carriage_return_and_newline() -> None:
     assert answer(printer(), "M118 A1 action:pause\nM118 E1 hello X5\nM118 hi\n") == [
         "//action:pause\r", "ok", "echo:hello X5", "ok", "hi", "ok"]  # fmt: skip
