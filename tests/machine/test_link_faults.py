@@ -172,6 +172,13 @@ def test_a_script_is_read_from_a_file(tmp_path: Path) -> None:
     )
 
 
+def test_the_page_s_example_is_a_script_and_its_table_has_all_kinds(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "serial.md").read_text(encoding="utf-8")
+    (tmp_path / "faults.toml").write_text(page.partition("```toml\n")[2].partition("```")[0])
+    assert [fault.kind for fault in read_script(tmp_path / "faults.toml").faults] == ["flip", "swallow ok", "disconnect"]
+    assert all(f"`{kind}`" in page for kind in KINDS)
+
+
 @pytest.mark.parametrize(("text", "words"), [
     ("x = 1", "x is not known: seed and"),
     ("seed = 1.5", "seed is 1.5: a whole number"),
