@@ -64,9 +64,10 @@ class Session:
         return FirmwareError("emergency stop: the printer did not confirm M112: cut the power")
 
     def heated(self) -> str:
-        """Which heaters are on, as words; "" when none is. Asks the printer where nothing else is under way."""
-        if self._idle():
-            self.command("M105")
+        """Which heaters are on, as words; "" when none is. A command under way may have switched them on a moment ago."""
+        if not self._idle():
+            return "heaters, for a command was under way"
+        self.command("M105")
         told = (("nozzle", self._heat.nozzle_target_c), ("bed", self._heat.bed_target_c))
         return " and ".join(f"{name} set to {target_c:.0f} deg C" for name, target_c in told if target_c)
 

@@ -1,0 +1,89 @@
+"""A person at a terminal: a command in a pseudo-terminal of its own, what is typed, and what is seen."""
+
+import os
+import pty
+import re
+import select
+import signal
+import sys
+import termios
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+ROOT = Path(__file__).parents[2]
+ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+PATIENCE_S = 30.0
+
+
+class Person:
+    """`with Person("console", "--port", "sim") as person:` see(text), press(keys), end() -> exit code."""
+
+    def __init__(self, *arguments: str, term: str = "xterm-256color") -> None:
+        self._command = [sys.executable, "-m", "machine.app.cli", *arguments]
+        self._term = term
+        self.raw = ""
+
+    @property
+    def seen(self) -> str:
+        """All that was shown, without colours and cursor moves."""
+        return ESCAPES.sub("", self.raw)
+
+    def see(self, text: str) -> None:
+        """Wait until something is shown, after what was seen before."""
+        end_s = time.monotonic() + PATIENCE_S
+        while (place := self.seen.find(text, self._looked)) < 0:
+            if not self._read() or time.monotonic() > end_s:
+                raise AssertionError(f"{text!r} was never seen, only {self.seen[-2000:]!r}")
+        self._looked = place + len(text)
+
+    def press(self, keys: str) -> None:
+        """Press keys."""
+        os.write(self._terminal, keys.encode())
+
+    def settings(self) -> list[object]:
+        """The terminal's settings, as long as somebody has it open."""
+        return termios.tcgetattr(self._terminal)
+
+    def end(self) -> int:
+        """Wait for the command to end; its exit code."""
+        while self._read():
+            pass
+        code = os.waitstatus_to_exitcode(os.waitpid(self._child, 0)[1])
+        self._child = 0
+        return code
+
+    def hang_up(self) -> int:
+        """Close the terminal's window and wait for the command to end; its exit code."""
+        os.close(self._terminal)
+        self._terminal = -1
+        code = os.waitstatus_to_exitcode(os.waitpid(self._child, 0)[1])
+        self._child = 0
+        return code
+
+    def _read(self) -> bool:
+        """Take what there is; False when the command has ended."""
+        if not select.select([self._terminal], [], [], 1.0)[0]:
+            return True
+        try:
+            data = os.read(self._terminal, 65536)
+        except OSError:
+            return False
+        self.raw += data.decode("utf-8", "replace")
+        return bool(data)
+
+    def __enter__(self) -> Self:
+        self._looked = 0
+        self._child, self._terminal = pty.fork()
+        if self._child == 0:
+            os.chdir(ROOT)
+            os.execve(sys.executable, self._command, {**os.environ, "TERM": self._term, "COLUMNS": "100", "LINES": "30"})
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._child:
+            os.kill(self._child, signal.SIGKILL)
+            os.waitpid(self._child, 0)
+        if self._terminal >= 0:
+            os.close(self._terminal)
