@@ -196,6 +196,13 @@ def test_a_finding_stands_at_its_line() -> None:
     assert mistake["machine_mm"] == [9999.0, 0.0, 0.0]
 
 
+def test_a_finding_about_another_layer_stands_where_that_begins() -> None:
+    text = ";PART:1\n;UNSUPPORTED:3@2\n;LAYER_CHANGE\nG1 Z0.2 F600\nG1 X9 E1\n;LAYER_CHANGE\nG0 Z0.4\nG1 X0 E2"
+    header, found = read(text)
+    (told,) = [finding for finding in header["findings"] if finding["code"] == "unsupported"]
+    assert (told["line"], told["layer"], found["line"][told["row"]]) == (2, 2, 8)
+
+
 def test_a_guessed_machine_finds_nothing_of_its_own() -> None:
     text = "G28\nG1 Z0.2 F600\nG1 X9999\nG1 X0 E1"
     lines = tuple(text.split("\n"))

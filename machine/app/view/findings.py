@@ -6,21 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
+from machine.dryrun.findings import Finding
 from machine.kinematics.table import workpiece_path
+from machine.parsed import MoveKind, ParsedProgram
 from profiles.machine import Machine
 
 MACHINES_OWN = frozenset({"axis-limit", "axis-speed", "collision", "contact", "off-plate", "uncalibrated"})
 
 
 def placed(run: DryRun, machine: Machine, known: bool, kept: NDArray[np.int64]) -> list[dict[str, Any]]:
-    """The findings in their order; row: the first row kept from the finding's line on, -1 for one about the whole.
+    """The findings in their order; row: where the page shows it, -1 for one about the whole.
 
     known: False leaves out what only the right machine could tell.
     """
     program = run.program
     told = []
     for finding in run.findings if known else [f for f in run.findings if f.code not in MACHINES_OWN]:
-        row = int(np.searchsorted(program.line, finding.line)) if finding.line > 0 else len(program.line)
+        row = _row(program, finding)
         place = min(int(np.searchsorted(kept, row)), len(kept) - 1) if row < len(program.line) else -1
         places: dict[str, Any] = {"workpiece_mm": None, "machine_mm": None}
         if place >= 0:
@@ -33,3 +35,15 @@ def placed(run: DryRun, machine: Machine, known: bool, kept: NDArray[np.int64]) 
             } | places
         )  # fmt: skip
     return told
+
+
+def _row(program: ParsedProgram, finding: Finding) -> int:
+    """The first row from the finding's line on, or of the layer it names when that lies elsewhere; n for one about the whole."""
+    if finding.line <= 0:
+        return len(program.line)
+    row = int(np.searchsorted(program.line, finding.line))
+    there = (program.part == finding.part) & (program.layer == finding.layer)
+    if finding.layer > 0 and there.any() and not there[row : row + 1].any():
+        strokes = np.flatnonzero(there & (program.kind == MoveKind.EXTRUDE))
+        return int(strokes[0]) if len(strokes) else int(np.argmax(there))
+    return row
