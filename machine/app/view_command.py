@@ -3,7 +3,7 @@
 import webbrowser
 from pathlib import Path
 
-from machine.app.commands import machine_known, program_of
+from machine.app.commands import GCODE_SUFFIXES, machine_known, program_of
 from machine.app.compare import compared
 from machine.app.output import check_writable, write_bytes
 from machine.app.pipeline import model_name
@@ -11,7 +11,7 @@ from machine.app.progress import say
 from machine.app.report import show
 from machine.app.view.page import DATA, print_page
 from machine.app.view.thinning import MOST_ROWS
-from profiles.errors import GcodeError, OutputError
+from profiles.errors import GcodeError, OutputError, ProfileError
 from profiles.profile import Profile
 
 
@@ -21,6 +21,8 @@ def view(
     """Write the page, and show it in the browser where asked; what the dry run finds is shown in it and stops nothing."""
     path = _beside(model) if out is None else out
     check_writable(path)
+    if compare and Path(model).suffix.lower() in GCODE_SUFFIXES:
+        raise ProfileError(f"--compare goes with a model: {model} is G-code, which prints in one way only")
     given = profile
     program, profile = program_of(model, profile, ranker, orient, named)
     count = len(program.run.program.line)

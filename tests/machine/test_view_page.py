@@ -150,6 +150,12 @@ def test_what_cannot_be_shown_is_one_sentence(
     assert [file.name for file in folder.iterdir()] == [name]
 
 
+def test_g_code_is_not_compared_with_itself(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("moves.gcode").write_text(MOVES)
+    assert main(["view", "moves.gcode", "--compare"]) == 1
+    assert "--compare goes with a model" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", [["view", "-o"], ["simulate", "--html"], ["decompose", "--html"]])
 def test_a_page_that_could_not_be_written_is_refused_before_any_work(
     folder: Path, capsys: pytest.CaptureFixture[str], command: list[str]
