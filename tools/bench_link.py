@@ -7,6 +7,8 @@ import argparse
 import resource
 import sys
 from collections.abc import Iterator
+from multiprocessing import Pipe, Process
+from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
@@ -24,7 +26,7 @@ BAUDS = (115200, 250000)
 LINE_BYTES = 63
 UART_LINES = 4000
 MILLIONS = (1, 5)
-RESTING = "G1 X100.00000 Y100.00000 Z10.00000 A0.00000 C0.00000 F6000.000"
+RESTING = "G1 F12000 X100.00000 Y100.00000 Z10.00000 A0.00000 C0.0000000"
 
 
 def program(n: int) -> list[str]:
@@ -35,12 +37,19 @@ def program(n: int) -> list[str]:
 
 def resting(n: int) -> list[str]:
     """n lines that are LINE_BYTES long on the wire and move nothing, so that only the line counts."""
-    return [RESTING[: LINE_BYTES - len(frame(number, ""))] for number in range(4, 4 + n)]
+    return [_padded(number) for number in range(4, 4 + n)]
+
+
+def _padded(number: int) -> str:
+    """M115, M105 and M155 come before number 4; the checksum has one to three digits."""
+    whole = LINE_BYTES - len(frame(number, ""))
+    lengths = (length for length in range(whole - 2, whole + 3) if len(frame(number, RESTING[:length])) == LINE_BYTES)
+    return RESTING[: next(lengths, whole)]
 
 
 def used(lines: list[str], baud: int, habits: Habits, terminal: bool) -> tuple[float, float, int, int]:
     """Lines a second, share of the bandwidth used from the first to the last line, resends and lost bytes over a paced UART."""
-    machine, sent, times = load().machine, [0], []
+    sent, times = [0], []
 
     def traffic(way: str, data: bytes) -> None:
         if way == ">" and b" G1 " in data:
@@ -48,17 +57,28 @@ def used(lines: list[str], baud: int, habits: Habits, terminal: bool) -> tuple[f
             times.append(clock())
 
     if terminal:
-        clock = perf_counter
-        with SimulatedPrinter(machine, habits=habits, baud=baud, speed=1.0) as printer:
-            outcome = print_lines(lines, printer.path, baud, traffic=traffic)
-            record = printer.record
+        clock, (here, there) = perf_counter, Pipe()
+        printer = Process(target=serve, args=(there, habits, baud))
+        printer.start()
+        outcome = print_lines(lines, here.recv(), baud, traffic=traffic)
+        here.send("end")
+        lost = here.recv()
+        printer.join()
     else:
-        virtual = VirtualPrinter(machine, habits, baud=baud)
+        virtual = VirtualPrinter(load().machine, habits, baud=baud)
         clock = virtual.medium.now_s
         outcome = print_lines(lines, PATH, baud, traffic=traffic, medium=virtual.medium)
-        record = virtual.record
+        lost = virtual.record.lost_bytes
     seconds = times[-1] - times[0]
-    return len(lines) / seconds, sent[0] * 10 / baud / seconds, outcome.repeated, record.lost_bytes
+    return len(lines) / seconds, sent[0] * 10 / baud / seconds, outcome.repeated, lost
+
+
+def serve(host: Connection, habits: Habits, baud: int) -> None:
+    """A paced printer in a process of its own, until the host says that it has enough."""
+    with SimulatedPrinter(load().machine, habits=habits, baud=baud, speed=1.0) as printer:
+        host.send(printer.path)
+        host.recv()
+        host.send(printer.record.lost_bytes)
 
 
 def over_the_terminal(lines: list[str], habits: Habits) -> tuple[float, float]:
