@@ -1,0 +1,204 @@
+"""The journal: records that survive a torn end, what is surely executed, bounded cost."""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from zlib import crc32
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from machine.app.journals import KEPT, new_journal
+from machine.link.journal import EVERY_LINES, Heading, Journal, Moment, mark_resumed, read_journal
+from machine.link.program import GcodeFile
+from machine.link.trail import PLANNER_BLOCKS, Step, Trail
+from profiles.errors import GcodeError, JournalError, OutputError
+from profiles.profile import load
+
+HEADING = Heading("/prints/a.gcode", "00" * 32, "a", {"machine": {"name": "m"}})
+POSE = (1.5, -2.0, 60.25, 30.0, 725.0, 12.34567)
+
+
+def at(line: int, state: str = "printing") -> Moment:
+    return Moment(line + 4, line, max(0, line - 16), line + 5, POSE, state)
+
+
+def written(path: Path, moments: list[Moment]) -> Path:
+    with Journal(path, HEADING) as journal:
+        for moment in moments:
+            journal.mark(moment)
+    return path
+
+
+def test_what_was_marked_is_read_back(tmp_path: Path) -> None:
+    story = read_journal(written(tmp_path / "j", [at(16), at(32)]))
+    assert (story.heading, story.last, story.torn, story.finished) == (HEADING, at(32), 0, False)
+
+
+def test_every_record_is_one_checked_line_of_text(tmp_path: Path) -> None:
+    lines = written(tmp_path / "j", [at(16), at(32)]).read_bytes().splitlines()
+    assert len(lines) == 3
+    for line in lines:
+        assert line[:8] == b"%08x" % crc32(line[9:])
+        json.loads(line[9:])
+
+
+@given(cut=st.integers(0, 400))
+def test_a_torn_end_costs_only_what_is_torn(tmp_path_factory: pytest.TempPathFactory, cut: int) -> None:
+    path = written(tmp_path_factory.mktemp("torn") / "j", [at(16 * k) for k in range(1, 9)])
+    whole = path.read_bytes()
+    left = whole[: max(len(whole) - cut, whole.index(b"\n") + 1)]
+    path.write_bytes(left)
+    records = left.count(b"\n") - 1
+    assert read_journal(path).last == (at(16 * records) if records else Moment())
+
+
+def test_a_disk_that_left_zeros_at_the_end_costs_only_the_end(tmp_path: Path) -> None:
+    path = written(tmp_path / "j", [at(16), at(32)])
+    path.write_bytes(path.read_bytes() + bytes(3000))
+    story = read_journal(path)
+    assert (story.last, story.torn) == (at(32), 1)
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_record_damaged_before_the_end_is_refused_by_its_number(tmp_path: Path, place: int) -> None:
+    path = written(tmp_path / "j", [at(16), at(32), at(48)])
+    lines = path.read_bytes().splitlines(keepends=True)
+    lines[place] = lines[place].replace(b"1", b"2").replace(b"0", b"1")
+    path.write_bytes(b"".join(lines))
+    with pytest.raises(JournalError, match=r"is no journal|damaged: record 2|damaged: record 3"):
+        read_journal(path)
+
+
+@pytest.mark.parametrize(("content", "words"), [
+    (b"", "is empty"),
+    (b"G28\nG1 X5\n", "is no journal of a print"),
+    (b"%08x {}\n" % crc32(b"{}"), "another version"),
+    (b'%08x {"format":1}\n' % crc32(b'{"format":1}'), "does not tell program and profile"),
+    (os.urandom(5000), "is no journal"),
+])  # fmt: skip
+def test_what_is_no_journal_is_refused_with_a_sentence(tmp_path: Path, content: bytes, words: str) -> None:
+    (tmp_path / "j").write_bytes(content)
+    with pytest.raises(JournalError, match=words):
+        read_journal(tmp_path / "j")
+
+
+def test_a_journal_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(JournalError, match="cannot be read: no such file"):
+        read_journal(tmp_path / "none")
+
+
+def test_a_journal_never_replaces_another(tmp_path: Path) -> None:
+    written(tmp_path / "j", [at(16)])
+    with pytest.raises(OutputError, match="exists already"):
+        Journal(tmp_path / "j", HEADING)
+
+
+def test_a_folder_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot be written: no such file or directory"):
+        Journal(tmp_path / "none" / "j", HEADING)
+
+
+def test_notes_are_taken_every_sixteen_lines_or_tenth_of_a_second(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", HEADING) as journal:
+        for line in range(1, 10 * EVERY_LINES + 1):
+            journal.note(at(line), 0.0)
+        journal.note(at(161), 5.0)
+        journal.note(at(162), 5.05)
+    assert len((tmp_path / "j").read_bytes().splitlines()) == 1 + 10 + 1
+
+
+def test_nothing_new_is_not_noted(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", HEADING) as journal:
+        for second in range(100):
+            journal.note(at(3), float(second))
+    assert len((tmp_path / "j").read_bytes().splitlines()) == 2
+
+
+def test_a_resumed_journal_names_the_one_that_goes_on_even_after_a_torn_end(tmp_path: Path) -> None:
+    path = written(tmp_path / "j", [at(16), at(32)])
+    path.write_bytes(path.read_bytes() + b"0123abcd [4")
+    mark_resumed(path, read_journal(path), tmp_path / "rest")
+    story = read_journal(path)
+    assert (story.rest, story.last.executed, story.torn) == (str(tmp_path / "rest"), 16, 0)
+
+
+def test_the_program_of_a_model_is_kept_beside_its_journal(tmp_path: Path) -> None:
+    with new_journal(["G28", "G1 X5"], load(), "demo:figure", None, tmp_path / "j") as journal:
+        pass
+    heading = read_journal(journal.path).heading
+    assert heading.program == str((tmp_path / "j.gcode").resolve())
+    assert list(GcodeFile(Path(heading.program))) == ["G28", "G1 X5"]
+    assert heading.sha256 == GcodeFile(tmp_path / "j.gcode").sha256()
+
+
+def test_only_the_newest_journals_and_their_programs_are_kept() -> None:
+    for number in range(KEPT + 3):
+        with new_journal([f"G1 X{number}"], load(), f"model {number}") as journal:
+            pass
+    folder = journal.path.parent
+    assert len(list(folder.glob("*.journal"))) == len(list(folder.glob("*.gcode"))) == KEPT
+    assert journal.path.exists()
+
+
+def test_a_gcode_file_is_read_line_by_line_as_often_as_wanted(tmp_path: Path) -> None:
+    (tmp_path / "p").write_bytes("\ufeffG28\r\nG1 X5 ; ü\n\nM84".encode())
+    file = GcodeFile(tmp_path / "p")
+    assert list(file) == list(file) == ["G28", "G1 X5 ; ü", "", "M84"]
+
+
+@pytest.mark.parametrize(("content", "words"), [(None, "cannot be read: no such file"), (b"G1 X\xff\n", "is not text")])
+def test_a_gcode_file_that_cannot_be_read_is_one_sentence(tmp_path: Path, content: bytes | None, words: str) -> None:
+    if content is not None:
+        (tmp_path / "p").write_bytes(content)
+    with pytest.raises(GcodeError, match=words):
+        list(GcodeFile(tmp_path / "p"))
+
+
+def moves(count: int) -> Iterator[Step]:
+    """Commands of lines 1, 2, ..., wire numbers from 4 on; every fourth moves nothing."""
+    for line in range(1, count + 1):
+        yield Step(line + 3, line, bool(line % 4), POSE)
+
+
+def test_acknowledged_moves_are_executed_as_far_as_the_planner_has_room() -> None:
+    trail = Trail()
+    for step in moves(40):
+        trail.send(step)
+    trail.acknowledge(33, PLANNER_BLOCKS - 1)
+    assert (trail.sent, trail.acknowledged, trail.executed) == (40, 30, 29)
+    trail.acknowledge(33, 5)
+    assert trail.executed == 29
+
+
+@given(st.lists(st.integers(0, 15), min_size=1, max_size=60))
+def test_what_counts_as_executed_never_holds_a_move_that_waits(free: list[int]) -> None:
+    """The planner is simulated: it holds at most 15 moves, the oldest leave as many places as `free` asks for."""
+    trail, waiting = Trail(), []
+    for step, places in zip(moves(len(free)), free, strict=True):
+        trail.send(step)
+        waiting += [step.line] if step.moves else []
+        del waiting[: max(0, len(waiting) - (15 - places))]
+        trail.acknowledge(step.number, 15 - len(waiting))
+        assert trail.executed < min(waiting, default=len(free) + 1)
+
+
+def test_without_word_of_the_planner_only_a_barrier_tells() -> None:
+    trail = Trail()
+    for step in moves(40):
+        trail.send(step)
+        trail.acknowledge(step.number)
+    assert (trail.acknowledged, trail.executed) == (40, 0)
+    trail.barrier()
+    assert trail.executed == 40
+
+
+def test_a_trail_of_a_mute_printer_stays_small() -> None:
+    trail = Trail()
+    for step in moves(20000):
+        trail.send(step)
+        trail.acknowledge(step.number)
+    assert len(trail._planned) < 5000
+    assert trail.commands == 20000
