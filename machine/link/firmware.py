@@ -25,6 +25,8 @@ BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
 UNREAD_LINES = 20
 CHATTER_S = 3600.0  # of a longer wait only the last hour is talked through: a jump over years must not fill the memory
 COMMAND = re.compile(r"([GMTSPR])\s*0*(\d+(?:\.\d+)?)")
+EARLY = ("M108", "M112", "M410")
+IDLE_S = 1.0  # Marlin's NO_TIMEOUTS: `wait` is said so often
 MOVES = ("G0", "G1", "G2", "G3")
 MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_IDLE
 
@@ -46,7 +48,7 @@ class Firmware:
         self.body.busy_every_s = self._busy_default_s = busy_s if self._habits.busy and self._manner.options else 0.0
         self._reception = Reception(self._manner, DIALECTS[machine.dialect].longest_line, self._habits.rx_ring)
         self._urgent = Urgent(self._habits.realtime) if self._reads_bytes() else None
-        self._busy_s = inf
+        self._busy_s = self._wait_s = inf
         self._queue: deque[tuple[str, str]] = deque()
         self._wake_s: float | None = None
         self._work: Iterator[float] | None = None
@@ -117,7 +119,7 @@ class Firmware:
         body = self.body
         due_s = min(body.report_s, body.place_s, body.nozzle.trip_s, body.bed.trip_s)
         if self._wake_s is None:
-            return body.now_s if self._queue or len(self._reception) else due_s
+            return body.now_s if self._queue or len(self._reception) else min(due_s, self._wait_s)
         return min(self._wake_s, due_s, self._busy_s)
 
     def reset(self, banner: bool = True) -> None:
@@ -164,7 +166,7 @@ class Firmware:
         if self._urgent is not None:
             self._urgent.forget()
         self._wake_s = self._work = None
-        self._busy_s = inf
+        self._busy_s = self._wait_s = inf
         self._watched = self._taken
 
     def _answer_dead(self) -> None:
@@ -178,9 +180,12 @@ class Firmware:
         if order in ("S000", "P000", "R000"):
             if self._habits.realtime:
                 self._said += [MACHINE_STATE[body.motion.planner.next_s() < inf], body.place()]
-        elif not self._habits.emergency_parser:
-            return
-        elif order == "M112":
+        elif self._habits.emergency_parser:
+            self._act_at_once(order)
+
+    def _act_at_once(self, order: str) -> None:
+        body = self.body
+        if order == "M112":
             self._shut_down("M112", ("echo:M112 Shutdown",))
         elif order == "M108":
             body.impatient = True
@@ -193,15 +198,20 @@ class Firmware:
                 self._wake_s = body.now_s
 
     def _fetch(self) -> None:
-        """Move lines from the receive ring into the queue while it has room."""
+        """Move lines from the receive ring into the queue while it has room.
+
+        Without an emergency parser Marlin looks for its orders here: a line is seen when it enters the queue.
+        """
         reception, room = self._reception, self._manner.pending
         while len(reception) and len(self._queue) < room:
             taken = reception.take()
             if isinstance(taken, str):
-                self._said += reception.ask_again(taken)
+                self._said += reception.ask_again(taken, self._habits.resend_ok)
                 break
             if taken is not None:
                 self._queue.append(taken)
+                if self._urgent is None and self._manner.urgent == "bytes" and taken[1] in EARLY:
+                    self._act_at_once(taken[1])
         if not len(reception) and len(self._queue) < room:
             reception.idle()
 
@@ -259,6 +269,8 @@ class Firmware:
         self._queue.popleft()
         self._taken += 1
         self._busy_s = inf
+        if self._habits.waits:
+            self._wait_s = self.body.now_s + IDLE_S
         if answer is not None:
             self._said.append(answer)
         elif self._habits.advanced_ok and self._manner.options:
@@ -279,7 +291,8 @@ class Firmware:
         while not self.dead:
             busy_s = self._busy_s if self._wake_s is not None and not body.waits_for_heat else inf
             trip_s = min(body.nozzle.trip_s, body.bed.trip_s)
-            due_s = min(busy_s, body.report_s, body.place_s, trip_s)
+            wait_s = self._wait_s if self._wake_s is None and not self._queue else inf
+            due_s = min(busy_s, wait_s, body.report_s, body.place_s, trip_s)
             if due_s > to_s or due_s == inf:
                 break
             body.now_s = max(body.now_s, due_s, min(to_s - CHATTER_S, trip_s))
@@ -294,6 +307,9 @@ class Firmware:
             heater, index = (body.nozzle, "0") if body.nozzle.trip_s == trip_s else (body.bed, "bed")
             heater.trip_s = inf
             self.kill(f"{heater.trip}, system stopped! Heater_ID: {index}")
+        elif due_s == self._wait_s:
+            self._said.append("wait")
+            self._wait_s = body.now_s + IDLE_S
         elif due_s == busy_s:
             self._said.append(f"echo:busy: {'paused for user' if body.waits_for_person else 'processing'}")
             self._busy_s = body.now_s + body.busy_every_s

@@ -15,7 +15,8 @@ BANNER = ("start", "Marlin bugfix-2.1.x (simulated)", "echo: Last Updated: 2024-
 class Habits:
     """Build options. rx_ring: bytes of a UART's receive ring that overflows; None: USB, which waits.
 
-    realtime: Marlin's REALTIME_REPORTING_COMMANDS; geometry: its M115_GEOMETRY_REPORT.
+    realtime: Marlin's REALTIME_REPORTING_COMMANDS; geometry: its M115_GEOMETRY_REPORT; waits: its NO_TIMEOUTS, `wait` every
+    second when idle; resend_ok: an `ok` follows each Resend (Smoothieware has none).
     """
 
     advanced_ok: bool = True
@@ -25,6 +26,8 @@ class Habits:
     rx_ring: int | None = None
     realtime: bool = False
     geometry: bool = True
+    waits: bool = False
+    resend_ok: bool = True
 
 
 @dataclass(frozen=True)

@@ -70,10 +70,10 @@ class Reception:
             line = line[: line.rindex(b"*")]
         return label, line.decode("ascii", "replace").rstrip()
 
-    def ask_again(self, complaint: str) -> list[str]:
+    def ask_again(self, complaint: str, ok: bool) -> list[str]:
         """What is said of a bad line; all that has come behind it is thrown away."""
         self.forget()
-        return [f"Error:{complaint}, Last Line: {self.last}", f"Resend: {self.last + 1}", "ok"]
+        return [f"Error:{complaint}, Last Line: {self.last}", f"Resend: {self.last + 1}", *(["ok"] if ok else [])]
 
     def _unnumbered(self, line: bytes) -> bytes:
         """The command of a numbered line where nothing is asked for again; b"": it is dropped without a word."""
