@@ -29,8 +29,12 @@ async function inflated(bytes) {
 function columnsOf(buffer, start, told) {
   if (!told) return [new Int32Array(0)];
   const [count, width = 1] = told.shape, Holds = HOLDS[told.type], at = start + told.offset;
-  if (told.coding === "delta")
-    return Array.from({ length: width }, (_, k) => summed(new Uint8Array(buffer, at + 4 * count * k, 4 * count), new Holds(count)));
+  if (told.coding === "delta") {
+    return Array.from({ length: width }, (_, k) => {
+      const planes = new Uint8Array(buffer, at + 4 * count * k, 4 * count);
+      return summed(planes, new Holds(count));
+    });
+  }
   const flat = new Holds(buffer, at, count * width);
   if (width === 1) return [flat];
   return Array.from({ length: width }, (_, k) => Holds.from({ length: count }, (_, i) => flat[i * width + k]));

@@ -6,12 +6,14 @@ async function printOf(text) {
   const layerTime = new Float32Array(rows.count);
   for (const layer of rows.layers) layerTime.fill(layer.time, layer.first, layer.last + 1);
   const box = boxOf(rows, path, surfaces, header), area = (Math.PI * header.filament.diameter_mm ** 2) / 4;
-  return { header, chain, rows, path, surfaces, layerTime, box, span: length(sub(box[1], box[0])), flow: flowOf(rows, path, area), marks: marksOf(rows) };
+  const worked = { box, span: length(sub(box[1], box[0])), flow: flowOf(rows, path, area), marks: marksOf(rows) };
+  return { header, chain, rows, path, surfaces, layerTime, ...worked };
 }
 
 /** What is to be seen of the work: plastic and surfaces, else the room over the table. */
 function boxOf(rows, path, surfaces, { machine }) {
-  const corners = surfaces ? bounds(surfaces.places).flat() : [], laid = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
+  const corners = surfaces ? bounds(surfaces.places).flat() : [];
+  const laid = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
   for (let i = 0; i < rows.count; i++) {
     if (rows.kind[i] !== KIND.extrude || !rows.width[i]) continue;
     for (let at = 3 * path.slot(i) + 3, k = 0; k < 3; k++) {

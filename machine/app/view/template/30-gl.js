@@ -8,8 +8,18 @@ vec3 lit(vec3 colour, vec3 n) {
   return colour * (0.42 + 0.58 * key + 0.24 * fill) + vec3(0.07 * gloss);
 }`;
 
-/** A linked program {use, at: place of an attribute, to: place of a uniform}. Raises what the compiler says. */
+const PROGRAMS = new WeakMap(); // of each context: a program is made once, however many things are drawn with it
+
+const forgetPrograms = (gl) => PROGRAMS.set(gl, new Map());
+
 function programOf(gl, vertex, fragment) {
+  const made = PROGRAMS.get(gl), name = vertex + fragment;
+  if (!made.has(name)) made.set(name, linked(gl, vertex, fragment));
+  return made.get(name);
+}
+
+/** A linked program {use, at: place of an attribute, to: place of a uniform}. Raises what the compiler says. */
+function linked(gl, vertex, fragment) {
   const program = gl.createProgram();
   for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(kind);
@@ -33,4 +43,11 @@ function bufferOf(gl, content, usage = gl.STATIC_DRAW, target = gl.ARRAY_BUFFER)
   gl.bindBuffer(target, buffer);
   gl.bufferData(target, content, usage);
   return buffer;
+}
+
+/** The bound vertex array takes an attribute from a buffer. */
+function attribute(gl, place, buffer, count, type, normalized) {
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  gl.enableVertexAttribArray(place);
+  gl.vertexAttribPointer(place, count, type, normalized, 0, 0);
 }

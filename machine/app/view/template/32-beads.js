@@ -130,8 +130,11 @@ function beadsOf(gl, path) {
     gl.bindTexture(gl.TEXTURE_2D, textures.colours);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, colours.length / 4 / TEXELS, gl.RGBA, gl.UNSIGNED_BYTE, colours);
   };
-  /** seen: {toClip, toEye, eye, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share} of the row under way. */
-  const draw = (seen, ranges, moving, stride, picking) => {
+  /**
+   * seen: {toClip, toEye, eye, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share} of
+   * the row under way; stride: 1, or only every second, third ... bead.
+   */
+  const draw = (seen, ranges, moving, stride, picking = false) => {
     const body = seen.pixels > CLOSE_PIXELS ? near : far, { to } = body.program;
     body.program.use();
     gl.bindVertexArray(body.vao);
@@ -183,9 +186,7 @@ function bodyOf(gl, vertex, { corners, faces }) {
   }
   gl.bindVertexArray(vao);
   bufferOf(gl, indices, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-  bufferOf(gl, all);
-  gl.enableVertexAttribArray(program.at("corner"));
-  gl.vertexAttribPointer(program.at("corner"), 4, gl.FLOAT, false, 0, 0);
+  attribute(gl, program.at("corner"), bufferOf(gl, all), 4, gl.FLOAT, false);
   gl.bindVertexArray(null);
   return { program, vao, corners: each, indices: faces.length };
 }

@@ -4,37 +4,35 @@ const LINE_VERTEX = `
 in vec3 place;
 in vec4 colour;
 uniform mat4 toClip;
-uniform float nearer;
+uniform float lift;
 out vec4 paint;
 void main() {
   paint = colour;
   gl_Position = toClip * vec4(place, 1.0);
-  gl_Position.z -= nearer * gl_Position.w;
+  gl_Position.z -= lift * gl_Position.w;
 }`;
 const LINE_FRAGMENT = `
 in vec4 paint;
 out vec4 colour;
 void main() { colour = vec4(paint.rgb * paint.a, paint.a); }`;
 
-const WAYS = { [KIND.travel]: [76, 126, 196, 200], [KIND.rotate]: [224, 122, 32, 235], [KIND.wipe]: [140, 112, 190, 200], [KIND.retract]: [76, 126, 196, 200], [KIND.prime]: [76, 126, 196, 200] };
+const PLAIN_WAY = [76, 126, 196, 200];
+const WAYS = { [KIND.rotate]: [224, 122, 32, 235], [KIND.wipe]: [140, 112, 190, 200] };
 const TURN_STEP_DEG = 3;
 
 function linesOf(gl, { places, colours }) {
   const program = programOf(gl, LINE_VERTEX, LINE_FRAGMENT), vao = gl.createVertexArray();
   gl.bindVertexArray(vao);
-  for (const [name, content, count, type, normalized] of [["place", places, 3, gl.FLOAT, false], ["colour", colours, 4, gl.UNSIGNED_BYTE, true]]) {
-    bufferOf(gl, content);
-    gl.enableVertexAttribArray(program.at(name));
-    gl.vertexAttribPointer(program.at(name), count, type, normalized, 0, 0);
-  }
+  attribute(gl, program.at("place"), bufferOf(gl, places), 3, gl.FLOAT, false);
+  attribute(gl, program.at("colour"), bufferOf(gl, colours), 4, gl.UNSIGNED_BYTE, true);
   gl.bindVertexArray(null);
   const count = places.length / 3;
-  const draw = (toClip, first = 0, end = count, nearer = 0) => {
+  const draw = (toClip, { first = 0, end = count, lift = 0 } = {}) => {
     if (end <= first) return;
     program.use();
     gl.bindVertexArray(vao);
     gl.uniformMatrix4fv(program.to("toClip"), false, toClip);
-    gl.uniform1f(program.to("nearer"), nearer);
+    gl.uniform1f(program.to("lift"), lift);
     gl.drawArrays(gl.LINES, first, end - first);
     gl.bindVertexArray(null);
   };
@@ -43,24 +41,29 @@ function linesOf(gl, { places, colours }) {
 
 /** Pairs of places for every row that moves and lays nothing; turns of the table are arcs. row: of each pair, rising. */
 function waysOf(rows, path, chain) {
-  const places = [], colours = [], row = [], point = [0, 0, 0];
-  const place = workpieceOf(chain), p = path.points;
-  const pair = (i, a, b) => { places.push(...a, ...b); colours.push(...WAYS[rows.kind[i]], ...WAYS[rows.kind[i]]); row.push(i); };
+  const places = [], colours = [], row = [], p = path.points;
+  const pair = (i, a, b) => {
+    const colour = WAYS[rows.kind[i]] || PLAIN_WAY;
+    places.push(a[0], a[1], a[2], b[0], b[1], b[2]);
+    for (let k = 0; k < 8; k++) colours.push(colour[k & 3]);
+    row.push(i);
+  };
   for (let i = 0; i < rows.count; i++) {
     if (rows.kind[i] === KIND.extrude) continue;
     const s = 3 * path.slot(i), first = [p[s], p[s + 1], p[s + 2]], end = [p[s + 3], p[s + 4], p[s + 5]];
-    const [from, to] = rows.kind[i] === KIND.rotate ? [placeAt(rows, i, 0), placeAt(rows, i, 1)] : [null, null];
-    if (!from) {
-      if (length(sub(first, end)) > 0) pair(i, first, end);
-      continue;
-    }
-    const steps = Math.min(Math.ceil(Math.max(Math.abs(to[3] - from[3]), Math.abs(to[4] - from[4])) / TURN_STEP_DEG), 360);
-    let here = first;
-    for (let k = 1; k <= steps; k++) {
-      place(...from.map((value, axis) => mix(value, to[axis], k / steps)), point, 0);
-      pair(i, here, point);
-      here = [...point];
-    }
+    const way = rows.kind[i] === KIND.rotate ? arcOf(rows, i, chain) : [first, end];
+    for (let k = 1; k < way.length; k++) if (length(sub(way[k], way[k - 1])) > 0) pair(i, way[k - 1], way[k]);
   }
   return { places: new Float32Array(places), colours: new Uint8Array(colours), row: Int32Array.from(row) };
+}
+
+/** The tip's places on the work while the table turns. */
+function arcOf(rows, i, chain) {
+  const place = workpieceOf(chain), from = placeAt(rows, i, 0), to = placeAt(rows, i, 1);
+  const steps = clamp(Math.ceil(Math.max(Math.abs(to[3] - from[3]), Math.abs(to[4] - from[4])) / TURN_STEP_DEG), 1, 360);
+  return Array.from({ length: steps + 1 }, (_, k) => {
+    const point = [0, 0, 0];
+    place(...from.map((value, axis) => mix(value, to[axis], k / steps)), point, 0);
+    return point;
+  });
 }

@@ -3,10 +3,10 @@
 const MARK_VERTEX = `
 in vec3 place;
 uniform mat4 toClip;
-uniform float size, nearer;
+uniform float size, lift;
 void main() {
   gl_Position = toClip * vec4(place, 1.0);
-  gl_Position.z -= nearer * gl_Position.w;
+  gl_Position.z -= lift * gl_Position.w;
   gl_PointSize = size;
 }`;
 const MARK_FRAGMENT = `
@@ -35,21 +35,20 @@ const MARKS = {
 
 /** Marks of one kind at the beginnings of rows. */
 function marksAt(gl, marked, path, { fill, shape }) {
-  const program = programOf(gl, MARK_VERTEX, MARK_FRAGMENT), vao = gl.createVertexArray(), places = new Float32Array(3 * marked.length);
+  const program = programOf(gl, MARK_VERTEX, MARK_FRAGMENT), vao = gl.createVertexArray();
+  const places = new Float32Array(3 * marked.length);
   marked.forEach((row, k) => places.set(path.points.subarray(3 * path.slot(row), 3 * path.slot(row) + 3), 3 * k));
   gl.bindVertexArray(vao);
-  bufferOf(gl, places);
-  gl.enableVertexAttribArray(program.at("place"));
-  gl.vertexAttribPointer(program.at("place"), 3, gl.FLOAT, false, 0, 0);
+  attribute(gl, program.at("place"), bufferOf(gl, places), 3, gl.FLOAT, false);
   gl.bindVertexArray(null);
-  const draw = (toClip, firstRow, endRow, size, nearer) => {
+  const draw = (toClip, firstRow, endRow, size, lift) => {
     const first = countUpTo(marked, firstRow - 1), end = countUpTo(marked, endRow - 1);
     if (end <= first) return;
     program.use();
     gl.bindVertexArray(vao);
     gl.uniformMatrix4fv(program.to("toClip"), false, toClip);
     gl.uniform1f(program.to("size"), size);
-    gl.uniform1f(program.to("nearer"), nearer);
+    gl.uniform1f(program.to("lift"), lift);
     gl.uniform3fv(program.to("fill"), fill);
     gl.uniform1i(program.to("shape"), shape);
     gl.drawArrays(gl.POINTS, first, end - first);

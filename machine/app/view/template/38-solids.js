@@ -32,12 +32,9 @@ void main() {
 function solidOf(gl, { places, colours }) {
   const program = programOf(gl, SOLID_VERTEX, SOLID_FRAGMENT), vao = gl.createVertexArray();
   gl.bindVertexArray(vao);
-  bufferOf(gl, places);
-  gl.enableVertexAttribArray(program.at("place"));
-  gl.vertexAttribPointer(program.at("place"), 3, gl.FLOAT, false, 0, 0);
+  attribute(gl, program.at("place"), bufferOf(gl, places), 3, gl.FLOAT, false);
   const painted = bufferOf(gl, colours, gl.DYNAMIC_DRAW);
-  gl.enableVertexAttribArray(program.at("colour"));
-  gl.vertexAttribPointer(program.at("colour"), 4, gl.UNSIGNED_BYTE, true, 0, 0);
+  attribute(gl, program.at("colour"), painted, 4, gl.UNSIGNED_BYTE, true);
   gl.bindVertexArray(null);
   const paint = (colours) => {
     gl.bindBuffer(gl.ARRAY_BUFFER, painted);
@@ -82,7 +79,8 @@ const quad = (a, b, c, d) => [a, b, c, a, c, d];
 
 function boxCorners([x0, y0, z0], [x1, y1, z1]) {
   const at = (i) => [i & 1 ? x1 : x0, i & 2 ? y1 : y0, i & 4 ? z1 : z0];
-  return [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]].flatMap((side) => quad(...side.map(at)));
+  const sides = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+  return sides.flatMap((side) => quad(...side.map(at)));
 }
 
 function boxEdges([x0, y0, z0], [x1, y1, z1]) {

@@ -11,7 +11,8 @@ function surfacesOf({ header, array }) {
   for (let face = 0, at = 0; face < faces[0].length; face++)
     for (let corner = 0; corner < 3; corner++)
       for (let axis = 0; axis < 3; axis++) places[at++] = vertices[axis][faces[corner][face]] / 1000;
-  const parts = header.parts.filter((part) => part.mesh).map((part) => ({ part, range: part.mesh.faces.map((face) => 3 * face) }));
+  const meshed = header.parts.filter((part) => part.mesh);
+  const parts = meshed.map((part) => ({ part, range: part.mesh.faces.map((face) => 3 * face) }));
   const surfaces = { places, marks, parts };
   return { ...surfaces, apart: apartOf(surfaces) };
 }
@@ -28,7 +29,7 @@ function surfaceColours({ marks, parts }, colourOf, risky) {
   return colours;
 }
 
-/** Which way each part goes when the model is drawn apart, a map of part to vector: along its direction, and with what it stands on. */
+/** Which way each part goes when the model is drawn apart: along its direction, and with what it stands on. Part -> vector. */
 function apartOf({ places, parts }) {
   const ways = new Map();
   parts.forEach(({ part }, k) => {
@@ -75,7 +76,7 @@ function planesOf(parts, colourOf) {
 }
 
 function arrowsOf(parts, colourOf, span) {
-  const long = 0.3 * span, outline = [[0, 0], [0.036 * long, 0], [0.036 * long, 0.72 * long], [0.1 * long, 0.72 * long], [0, long]];
+  const outline = [[0, 0], [0.036, 0], [0.036, 0.72], [0.1, 0.72], [0, 1]].map((place) => place.map((x) => 0.3 * span * x));
   const surface = revolved(outline, 24);
   return trianglesOf(based(parts).map((part) => {
     const [a, b] = beside(part.direction);

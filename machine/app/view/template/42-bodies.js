@@ -7,8 +7,9 @@ const ROUND = 96;
 function bodiesOf(machine, dark) {
   const plate = dark ? [66, 72, 81, 255] : [232, 235, 239, 255], frame = dark ? [112, 121, 134, 255] : [190, 196, 205, 255];
   const line = dark ? [120, 128, 140, 110] : [120, 126, 136, 120], edge = dark ? [170, 178, 190, 190] : [70, 76, 86, 170];
+  const table = [{ corners: plateCorners(machine.table), colour: plate }];
   return {
-    table: { solid: trianglesOf([{ corners: plateCorners(machine.table), colour: plate }]), lines: trianglesOf(plateLines(machine.table, line, edge)) },
+    table: { solid: trianglesOf(table), lines: trianglesOf(plateLines(machine.table, line, edge)) },
     cradle: boxesOf(machine.cradle, frame, edge),
     head: headOf(machine.head, frame, edge),
   };
@@ -33,8 +34,8 @@ function plateLines({ radius_mm: radius, size_mm: size }, line, edge) {
     const [a, b] = [size[0] / 2, size[1] / 2], rows = [];
     for (let x = -Math.floor(a / step) * step; x <= a; x += step) rows.push([x, -b, z], [x, b, z]);
     for (let y = -Math.floor(b / step) * step; y <= b; y += step) rows.push([-a, y, z], [a, y, z]);
-    pieces.push({ corners: rows, colour: line }, { corners: chained([[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]]), colour: edge });
-    pieces.push({ corners: [[0, 0, z], [a, 0, z]], colour: edge });
+    const rim = chained([[-a, -b, z], [a, -b, z], [a, b, z], [-a, b, z]]);
+    pieces.push({ corners: rows, colour: line }, { corners: [...rim, [0, 0, z], [a, 0, z]], colour: edge });
     return pieces;
   }
   for (let r = step; r < radius; r += step) pieces.push({ corners: chained(circle(r, z, 96)), colour: line });

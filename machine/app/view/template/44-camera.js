@@ -1,9 +1,10 @@
 // Camera: an eye that circles a target, z up, moved by mouse, fingers and keys.
 
+const FARTHEST_MM = 1000; // behind the work: room for the machine
 const HALF_HEIGHT = Math.tan(15 * RAD); // of the picture at distance 1
 
 function cameraOf() {
-  const camera = { target: [0, 0, 0], distance: 300, yaw: -55 * RAD, pitch: 24 * RAD, radius: 100, machine: 1000 };
+  const camera = { target: [0, 0, 0], distance: 300, yaw: -55 * RAD, pitch: 24 * RAD, radius: 100 };
   const outward = () => {
     const { yaw, pitch } = camera;
     return [Math.cos(pitch) * Math.cos(yaw), Math.cos(pitch) * Math.sin(yaw), Math.sin(pitch)];
@@ -16,8 +17,8 @@ function cameraOf() {
     return multiply([r[0], u[0], o[0], 0, r[1], u[1], o[1], 0, r[2], u[2], o[2], 0, 0, 0, 0, 1], moved(scaled(camera.eye(), -1)));
   };
   camera.lens = (aspect) => {
-    const near = Math.max(camera.distance - 2 * camera.radius, camera.distance / 60);
-    return perspective(HALF_HEIGHT, aspect, near, camera.distance + Math.max(8 * camera.radius, camera.machine));
+    const far = camera.distance + Math.max(8 * camera.radius, FARTHEST_MM);
+    return perspective(HALF_HEIGHT, aspect, camera.distance / 40, far);
   };
   camera.orbit = (dx, dy) => {
     camera.yaw -= dx;
@@ -50,7 +51,8 @@ const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
 function handle(canvas, camera, { changed, pressed }) {
   const fingers = new Map();
   let path = 0;
-  const middle = () => [...fingers.values()].reduce((sum, p) => [sum[0] + p[0] / fingers.size, sum[1] + p[1] / fingers.size], [0, 0]);
+  const mean = (k) => [...fingers.values()].reduce((sum, place) => sum + place[k] / fingers.size, 0);
+  const middle = () => [mean(0), mean(1)];
   const spread = () => {
     const [a, b] = [...fingers.values()];
     return b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : 0;
@@ -69,7 +71,8 @@ function handle(canvas, camera, { changed, pressed }) {
     if (!fingers.has(event.pointerId)) return;
     const [from, wide] = [middle(), spread()];
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
-    const to = middle(), dx = to[0] - from[0], dy = to[1] - from[1], shifts = fingers.size > 1 || event.buttons & 6 || event.shiftKey;
+    const to = middle(), dx = to[0] - from[0], dy = to[1] - from[1];
+    const shifts = fingers.size > 1 || event.buttons & 6 || event.shiftKey;
     path += Math.abs(dx) + Math.abs(dy);
     if (shifts) camera.pan(dx / canvas.clientHeight, dy / canvas.clientHeight);
     else camera.orbit(dx * 0.008, dy * 0.008);

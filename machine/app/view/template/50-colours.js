@@ -58,7 +58,7 @@ function scaleOf(mode, rows, extra) {
   const [from, width] = [bend(low), bend(high) - bend(low)];
   const colour = (i) => STEPS[clamp(Math.round(width > 0 ? ((bend(value(i)) - from) / width) * 255 : 128), 0, 255)];
   const at = (share) => (bend === Math.log ? Math.exp(from + share * width) : from + share * width);
-  const marks = width > 1e-9 ? [0, 0.25, 0.5, 0.75, 1].map((share) => [share, at(share).toFixed(digits)]) : [[0.5, low.toFixed(digits)]];
+  const marks = (width > 1e-9 ? [0, 0.25, 0.5, 0.75, 1] : [0]).map((share) => at(share).toFixed(digits));
   return { colour, legend: { unit, marks } };
 }
 

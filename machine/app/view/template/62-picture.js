@@ -24,7 +24,8 @@ function pictureOf(print, scene, camera, bells, showMarkers) {
   const ask = () => { if (!asked) { asked = true; requestAnimationFrame(paint); } };
   const ease = easing(scene, ask);
   const colour = () => {
-    const { colours, legend } = coloured(scene.mode, print.rows, print.path, { ...print, parts: print.header.parts, hidden: scene.hidden });
+    const { rows, path, header } = print, extra = { ...print, parts: header.parts, hidden: scene.hidden };
+    const { colours, legend } = coloured(scene.mode, rows, path, extra);
     stage.beads?.paint(colours);
     showLegend(print, scene.mode, legend);
   };
@@ -37,7 +38,10 @@ function pictureOf(print, scene, camera, bells, showMarkers) {
   };
   bells.on("colours", () => { if (stage) colour(); ask(); });
   bells.on("model", () => { if (stage) reds(); ask(); });
-  bells.on("theme", build);
+  bells.on("theme", () => {
+    if (stage) stage.bodies = bodiesOn(gl, print.header.machine, scene.dark);
+    ask();
+  });
   bells.on("row layers look", ask);
   bells.on("moving", ease.moved);
   new ResizeObserver(ask).observe(canvas);
@@ -46,8 +50,8 @@ function pictureOf(print, scene, camera, bells, showMarkers) {
   build();
   const rowAt = (event) => {
     const box = canvas.getBoundingClientRect(), scale = canvas.width / box.width;
-    const place = [Math.floor((event.clientX - box.left) * scale), canvas.height - 1 - Math.floor((event.clientY - box.top) * scale)];
-    return print.path.row(slotAt(gl, stage, last, place));
+    const [x, y] = [event.clientX - box.left, event.clientY - box.top].map((part) => Math.floor(part * scale));
+    return print.path.row(slotAt(gl, stage, last, [x, canvas.height - 1 - y]));
   };
   return { canvas, ask, rowAt, moved: ease.moved };
 }

@@ -13,15 +13,17 @@ function readoutsOf(print, scene, bells) {
     ["part", "part", (i) => rows.part[i] || "–"], ["layer", "layer", (i) => rows.layer[i] || "–"],
     ["type", "doing", (i) => KINDS[rows.kind[i]] || rows.types[rows.type[i]] || "extruding"],
     ["speed", "speed", (i) => `${(rows.speed[i] / 1000).toFixed(1)} ${rows.kind[i] === KIND.rotate ? "°/s" : "mm/s"}`],
-    ["size", "bead", (i) => (rows.width[i] ? `${(rows.width[i] / 1000).toFixed(2)} × ${(rows.height[i] / 1000).toFixed(2)}` : "–")],
-    ["flow", "flow", (i) => (flow[i] ? `${flow[i].toFixed(2)} mm³/s` : "–")], ["fan", "fan", (i) => `${Math.round(rows.fan[i] / 2.55)} %`],
+    ["size", "bead", (i) => (rows.width[i] ? [rows.width[i], rows.height[i]].map((x) => (x / 1000).toFixed(2)).join(" × ") : "–")],
+    ["flow", "flow", (i) => (flow[i] ? `${flow[i].toFixed(2)} mm³/s` : "–")],
+    ["fan", "fan", (i) => `${Math.round(rows.fan[i] / 2.55)} %`],
     ["nozzle", "nozzle", (i) => (rows.nozzle[i] ? `${(rows.nozzle[i] / 10).toFixed(0)} °C` : "–")],
     ["bed", "bed", (i) => (rows.bed[i] ? `${(rows.bed[i] / 10).toFixed(0)} °C` : "–")],
   ];
   const less = new Set(["fan", "flow", "nozzle", "bed", "size"]);
   for (const [id, label] of told) {
     const className = [id === "type" ? "wide" : "", less.has(id) ? "less" : ""].join(" ");
-    $("readouts").append(made("dt", { text: label, className: less.has(id) ? "less" : "" }), made("dd", { className }, made("output", { id: `readout-${id}` })));
+    const term = made("dt", { text: label, className: less.has(id) ? "less" : "" });
+    $("readouts").append(term, made("dd", { className }, made("output", { id: `readout-${id}` })));
   }
   bells.on("row", () => { for (const [id, , of] of told) $(`readout-${id}`).textContent = rows.count ? of(scene.row) : "–"; });
 }

@@ -15,8 +15,9 @@ function controlsOf(print, scene, bells) {
   select("frame", (value) => { scene.riding = value === "workpiece"; }, "frame");
   if (!print.rows.count) document.body.classList.add("no-paths"); else document.body.classList.add("has-paths");
   if (!print.surfaces && !print.header.parts.some((part) => part.base)) document.body.classList.add("no-solids");
-  for (const part of print.header.parts) if (part.base) $("stand").append(made("option", { value: part.index, text: `part ${part.index}` }));
-  $("stand").addEventListener("change", () => scene.standFor(print.header.parts.find((part) => String(part.index) === $("stand").value)));
+  const posed = print.header.parts.filter((part) => part.base);
+  $("stand").append(...posed.map((part) => made("option", { value: part.index, text: `part ${part.index}` })));
+  $("stand").addEventListener("change", () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)));
   $("apart").addEventListener("input", () => { scene.apart = Number($("apart").value); bells.ring("look"); });
   typeBoxes(print, scene, bells);
   tabs();
@@ -36,7 +37,8 @@ function typeBoxes({ rows }, scene, bells) {
     const box = made("input", { type: "checkbox", checked: true });
     box.addEventListener("change", () => { scene.hidden[box.checked ? "delete" : "add"](place); bells.ring("colours"); });
     const share = ((100 * seconds[place]) / whole).toFixed(1);
-    $("types").append(made("label", {}, box, swatch(typeColour(name)), name || "not told", made("span", { className: "share", text: `${share} %` })));
+    const told = made("span", { className: "share", text: `${share} %` });
+    $("types").append(made("label", {}, box, swatch(typeColour(name)), name || "not told", told));
   });
 }
 
@@ -46,19 +48,20 @@ function swatch(colour) {
   return mark;
 }
 
-const TITLES = { part: "part", kind: "kind of line", speed: "speed", layer: "layer time", flow: "flow", fan: "fan", nozzle: "nozzle", height: "height", width: "width" };
+const TITLES = { kind: "kind of line", layer: "layer time" }; // where the title is not the word itself
 
 function showLegend({ rows, header }, mode, legend) {
   const box = $("legend");
-  box.replaceChildren(made("b", { text: TITLES[mode] + (legend ? `, ${legend.unit}` : "") }));
+  box.replaceChildren(made("b", { text: (TITLES[mode] || mode) + (legend ? `, ${legend.unit}` : "") }));
   if (legend) {
     const scale = made("canvas", { width: 256, height: 1 });
     const pen = scale.getContext("2d");
     STEPS.forEach((_, k) => { pen.fillStyle = hex(ramp(k / 255)); pen.fillRect(k, 0, 1, 1); });
-    box.append(scale, made("div", { className: "marks" }, ...legend.marks.map(([, text]) => made("span", { text }))));
+    box.append(scale, made("div", { className: "marks" }, ...legend.marks.map((text) => made("span", { text }))));
     return;
   }
-  const entries = mode === "kind" ? kindEntries(rows) : header.parts.map((part) => [part.colour, part.index ? `${part.index}` : "the file"]);
+  const parts = header.parts.map((part) => [part.colour, part.index ? `${part.index}` : "the file"]);
+  const entries = mode === "kind" ? kindEntries(rows) : parts;
   box.append(...entries.slice(0, 24).map(([colour, text]) => made("span", {}, swatch(colour), text)));
 }
 

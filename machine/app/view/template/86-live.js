@@ -25,8 +25,14 @@ function follow({ rows }, scene, player) {
   ask();
 }
 
-function liveTold({ state, share, line, total, left_s: left, nozzle_c: nozzle, nozzle_target_c: wanted, bed_c: bed, message }) {
-  const heat = (name, value, target) => value !== null && value !== undefined && `${name} ${Math.round(value)}${target ? ` of ${Math.round(target)}` : ""} °C`;
-  const told = [share ? `${state} ${Math.floor(100 * share)} %` : state, line && `line ${line}${total ? ` of ${total}` : ""}`, heat("nozzle", nozzle, wanted), heat("bed", bed), left && `${duration(left)} left`, message];
-  return told.filter(Boolean).join(" · ");
+function liveTold(told) {
+  const heat = (name, value, target) => value != null && `${name} ${Math.round(value)}${target ? ` of ${Math.round(target)}` : ""} °C`;
+  return [
+    told.share ? `${told.state} ${Math.floor(100 * told.share)} %` : told.state,
+    told.line && `line ${told.line}`,
+    heat("nozzle", told.nozzle_c, told.nozzle_target_c),
+    heat("bed", told.bed_c, told.bed_target_c),
+    told.left_s && `${duration(told.left_s)} left`,
+    told.message,
+  ].filter(Boolean).join(" · ");
 }

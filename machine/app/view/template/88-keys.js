@@ -2,7 +2,10 @@
 
 function keysOf({ scene, camera, player, look, fit, toggleTheme }) {
   const turn = 6 * RAD, shift = 0.05;
-  const arrow = (x, y) => (event) => { if (event.shiftKey) camera.pan(-x * shift, y * shift); else camera.orbit(-x * turn, y * turn); look(); };
+  const arrow = (x, y) => (event) => {
+    if (event.shiftKey) camera.pan(-x * shift, y * shift); else camera.orbit(-x * turn, y * turn);
+    look();
+  };
   const zoom = (factor) => () => { camera.zoom(factor); look(); };
   const step = (rows) => () => { player.stop(); scene.go(scene.row + rows); };
   const press = (id) => () => $(id).click();
@@ -22,13 +25,18 @@ function keysOf({ scene, camera, player, look, fit, toggleTheme }) {
   ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || $("help").open) return;
-    const { tagName, type } = event.target, own = tagName === "SELECT" || (tagName === "INPUT" && type === "range");
-    const pressing = tagName === "BUTTON" || tagName === "SUMMARY" || tagName === "INPUT";
-    if ((own && /^(Arrow|Page|Home|End)/.test(event.key)) || (pressing && event.key === " ") || (tagName === "SELECT" && event.key.length === 1)) return;
+    if (taken(event)) return;
     const act = keys[event.key] || keys[event.key.toLowerCase()];
     if (!act) return;
     event.preventDefault();
     act(event);
   });
   $("help-button").addEventListener("click", () => $("help").showModal());
+}
+
+/** Keys that the element in focus needs itself: a list, a slider, a button. */
+function taken({ key, target: { tagName, type } }) {
+  if (tagName === "SELECT") return key.length === 1 || /^(Arrow|Page|Home|End)/.test(key);
+  if (tagName === "INPUT" && type === "range" && /^(Arrow|Page|Home|End)/.test(key)) return true;
+  return key === " " && ["BUTTON", "SUMMARY", "INPUT"].includes(tagName);
 }
