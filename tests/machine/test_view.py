@@ -105,6 +105,16 @@ def test_a_row_tells_its_kind_bead_heat_and_fan() -> None:
     assert found["speed"][1] == 10.0
 
 
+def test_beads_laid_while_the_table_turns_are_shown_on_the_work() -> None:
+    header, found = read("G28\nM83\nG0 X30 Y0 Z5 F600\nG1 C30 E0.8\nG1 X31 C60 E0.8\nG1 C0\nG1 X0 E1")
+    assert found["kind"].tolist() == [0, 1, 1, 3, 1]
+    ways = np.diff([on_the_work(header["machine"], row) for row in found["end"][:3]], axis=0)
+    pushed = 0.8 * np.pi * 1.75**2 / 4.0
+    for way, width, height in zip(ways, found["width"][1:3], found["height"][1:3], strict=True):
+        assert pushed == pytest.approx(np.linalg.norm(way) * ((width - height) * height + np.pi * height**2 / 4), rel=0.01)
+    assert found["layer"].tolist() == [0, 1, 1, 1, 2]
+
+
 def test_a_row_that_begins_elsewhere_is_a_jump() -> None:
     _, found = read("G28\nG1 X5 F600\nG92 X0\nG1 X1\nG1 X2")
     assert found["jump_row"].tolist() == [0, 1]

@@ -43,11 +43,15 @@ def layers_of(program: ParsedProgram, layer_height_mm: float) -> Layers:
 
 
 def _by_heights(program: ParsedProgram, layer_height_mm: float) -> NDArray[np.int64]:
-    """(n,) numbers of layers: a level stroke at another height begins one, and so does a rise of a layer's height in a helix."""
+    """(n,) numbers of layers: a level stroke at another height begins one, and so does a rise of a layer's height in a helix.
+
+    What is laid while the table turns has no height of its own: it is one layer, or goes on with the one before.
+    """
     number = np.zeros(len(program.line), dtype=np.int64)
+    number[np.flatnonzero((program.kind == MoveKind.ROTATE) & (program.e_mm > 0.0))[:1]] = 1
     strokes = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
     if not len(strokes):
-        return number
+        return np.cumsum(number)
     before, z = program.start[strokes, 2], program.end[strokes, 2]
     level = np.abs(z - before) < SAME_MM / 10.0
     steps = np.ones(len(strokes), dtype=np.bool_)

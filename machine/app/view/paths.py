@@ -10,6 +10,7 @@ from machine.app.view.layers import Layers
 from machine.dialects import DIALECTS
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.ground import beads
+from machine.kinematics.table import workpiece_path
 from machine.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.machine import Machine
@@ -40,11 +41,18 @@ def end_times_s(run: DryRun) -> Floats:
 
 
 def page_kinds(program: ParsedProgram) -> NDArray[np.int8]:
-    """(n,) kinds as the page tells them: wipes apart from travels, primes apart from retractions."""
+    """(n,) kinds as the page tells them: wipes and primes apart, beads laid while the table turns are beads."""
     kind = program.kind.copy()
+    kind[turning_strokes(program)] = MoveKind.EXTRUDE
     kind[(kind == MoveKind.TRAVEL) & (program.e_mm < -STILL)] = WIPE
     kind[(kind == MoveKind.RETRACT) & (program.e_mm > 0)] = PRIME
     return kind
+
+
+def turning_strokes(program: ParsedProgram) -> NDArray[np.bool_]:
+    """(n,) moves that lay a bead while the table turns, as programs of curved layers do."""
+    laid: NDArray[np.bool_] = (program.kind == MoveKind.ROTATE) & (program.e_mm > STILL)
+    return laid
 
 
 def columns(run: DryRun, profile: Profile, layers: Layers, ends_s: Floats, kept: NDArray[np.int64]) -> dict[str, Column]:
@@ -82,9 +90,12 @@ def _jumps(program: ParsedProgram, kept: NDArray[np.int64]) -> NDArray[np.int64]
 
 def _bead_sizes(run: DryRun, profile: Profile) -> tuple[Floats, Floats]:
     """(n,) width and height of the beads, mm, as the file tells or as the filament makes them; 0 where none is laid."""
-    laid = beads(run.program, run.segments_mm, run.segment_row, profile)
-    width, height = np.zeros(len(run.times_s)), np.zeros(len(run.times_s))
-    width[laid.rows], height[laid.rows] = laid.width_mm, laid.height_mm
+    program, width, height = run.program, np.zeros(len(run.times_s)), np.zeros(len(run.times_s))
+    turning = np.flatnonzero(turning_strokes(program))
+    ways = np.stack([workpiece_path(profile.machine, side[turning]) for side in (program.start, program.end)], axis=1)
+    for segments, rows in ((run.segments_mm, run.segment_row), (ways, turning)):
+        laid = beads(program, segments, rows, profile)
+        width[rows], height[rows] = laid.width_mm, laid.height_mm
     return width, height
 
 
