@@ -117,6 +117,9 @@ class Feed:
         return self.modal.take(command) if self._laid is None else self._laid.follow(self.modal, command)[0]
 
     def _send(self, line: int, command: str) -> None:
+        if self._journal is not None and self._journal.behind(line):
+            self.trail.sent = line
+            self._mark()
         number = self.talk.send(command)
         moves = self._follow(command)
         self.sent += 1

@@ -18,8 +18,8 @@ from profiles.errors import JournalError, OutputError
 
 FORMAT = 1
 FINISHED, RESUMED = "finished", "resumed in "
-EVERY_LINES = 16  # a record after so many acknowledged lines,
-EVERY_S = 0.1  # or after so long when fewer came
+EVERY_LINES = 16  # the sender never gets so many lines ahead of the newest record,
+EVERY_S = 0.1  # which is not older than this when something has happened since
 SYNC_S = 1.0  # so old may the disk be after a power cut of the computer
 LONGEST_BYTES = 1_000_000  # of one record; the first one holds the resolved profile
 
@@ -93,11 +93,14 @@ class Journal:
         self._syncing.start()
 
     def note(self, moment: Moment, now_s: float) -> None:
-        """Take note of a moment, now and then."""
-        ahead = moment.acknowledged - self.last.acknowledged
-        if ahead >= EVERY_LINES or (now_s - self._noted_s >= EVERY_S and moment != self.last):
+        """Take note of a moment when the newest record is old."""
+        if now_s - self._noted_s >= EVERY_S and moment != self.last:
             self._noted_s = now_s
             self.mark(moment)
+
+    def behind(self, line: int) -> bool:
+        """Whether a record is due before this line is sent."""
+        return line - self.last.sent >= EVERY_LINES
 
     def mark(self, moment: Moment) -> None:
         """Write a moment at once."""

@@ -157,7 +157,7 @@ class Modal:
 
     def _blow(self, name: str, rest: str) -> bool:
         fan = dict(_words(rest)).get("P", 0.0)
-        self.fans[f"{fan:g}"] = f"{name} {rest}".strip()
+        self.fans[f"{fan:g}"] = f"{name} {rest.strip()}".strip()
         return False
 
     def _follow(self, name: str, rest: str) -> bool:

@@ -26,8 +26,6 @@ from mdp.pose import Pose
 from profiles.errors import JournalError
 from profiles.profile import Profile
 
-WINDOW = 16  # commands on their way at a time, at most
-AHEAD = EVERY_LINES + 2 * WINDOW  # commands beyond the newest acknowledged one on record that the printer may have taken
 ANEW = "hardly anything was printed: the program begins anew"
 SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
 SAME = 0.02  # mm or deg: M114 tells hundredths
@@ -73,7 +71,6 @@ def point_of(lines: Iterable[str], moment: Moment, profile: Profile, limit: int)
     first, stroked = moment.executed + 1, False
     before: tuple[Modal, Place] | None = None
     ahead: list[Reached] = []
-    beyond = 0
     for number, text in enumerate(lines, 1):
         command = command_of(text, number, limit)
         if not command:
@@ -82,14 +79,13 @@ def point_of(lines: Iterable[str], moment: Moment, profile: Profile, limit: int)
             continue
         if number >= first and before is None:
             before = deepcopy(modal), deepcopy(place)
-        if before is not None and beyond >= AHEAD:
+        if before is not None and number >= moment.sent + EVERY_LINES:
             break
         _, pushed = laid.follow(modal, command)
         if before is None:
             stroked = stroked or pushed
         else:
             ahead.append(Reached(number, deepcopy(modal)))
-            beyond += number > moment.acknowledged
     if before is None:
         raise JournalError("all of the program has been executed: there is nothing left to resume")
     last = ahead[-1].line if ahead else first

@@ -101,13 +101,17 @@ def test_a_folder_that_does_not_exist_is_refused(tmp_path: Path) -> None:
         Journal(tmp_path / "none" / "j", HEADING)
 
 
-def test_notes_are_taken_every_sixteen_lines_or_tenth_of_a_second(tmp_path: Path) -> None:
+def test_notes_are_taken_ten_times_a_second(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", HEADING) as journal:
-        for line in range(1, 10 * EVERY_LINES + 1):
-            journal.note(at(line), 0.0)
-        journal.note(at(161), 5.0)
-        journal.note(at(162), 5.05)
-    assert len((tmp_path / "j").read_bytes().splitlines()) == 1 + 10 + 1
+        for step in range(1, 101):
+            journal.note(at(step), 0.1 + step / 100)
+    assert len((tmp_path / "j").read_bytes().splitlines()) == 1 + 10
+
+
+def test_the_sender_is_never_sixteen_lines_ahead_of_the_record(tmp_path: Path) -> None:
+    with Journal(tmp_path / "j", HEADING) as journal:
+        journal.mark(at(100))
+        assert [journal.behind(104 + ahead) for ahead in (0, EVERY_LINES - 1, EVERY_LINES)] == [False, False, True]
 
 
 def test_nothing_new_is_not_noted(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def test_a_pause_at_a_tilted_pose_returns_to_the_same_pose_filament_feed_and_mod
     after = back[back.index("M109 S200") : back.index("M114", 5)]
     assert not [line for line in back if re.search(r"[AC]-?\d", line)]  # neither to 5 nor to 725: the table never moves
     assert [line for line in after if line.startswith("G92")] == [f"G92 E{filament_before_pause(lines):.5f}"]
-    assert {"G90", "M83", "G21", "G1 F1500", "M106  S128", "M204 P800 T1200"} <= set(after)
+    assert {"G90", "M83", "G21", "G1 F1500", "M106 S128", "M204 P800 T1200"} <= set(after)
     assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
     assert watcher.printer.record.end[-1, 4] == 725.0
 

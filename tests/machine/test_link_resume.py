@@ -1,0 +1,418 @@
+"""Resuming: where a print goes on after its host or its printer has died, and the way back to it."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from machine.app.cli import main
+from machine.link.events import Position, Temperature
+from machine.link.faults import Fault, FaultScript
+from machine.link.feed import Begin
+from machine.link.inquiry import Found
+from machine.link.journal import Heading, Journal, Moment, Story, read_journal
+from machine.link.medium import Medium, Wire
+from machine.link.modal import Modal, axes_of
+from machine.link.program import GcodeFile
+from machine.link.resume import Point, Way, point_of, way_on
+from machine.link.simulator import SimulatedPrinter
+from machine.link.stream import print_lines
+from machine.link.virtual import PATH, VirtualPrinter
+from profiles.errors import FirmwareError, JournalError, PrinterError
+from profiles.profile import Profile, load
+
+PROFILE = load()
+LIMIT = 95
+START = ["G21", "G90", "M83", "M140 S60", "M104 S200", "G28 X Y Z", "G92 A0 C0", "M190 S60", "M109 S200", "G92 E0", "M106 S128"]
+
+
+def part(number: int, tilt: int, turn: int, strokes: int = 90) -> list[str]:
+    way = [f";PART:{number} of 3", "G1 E-2 F2100", "G0 Z150 F900", f"G0 A{tilt} C{turn} F6000", f"G0 X10 Y10 F{6000 + number}"]
+    lines = [f"G1 X{10 + 7 * i % 23 + 0.01 * i:.2f} Y{10 + 5 * i % 19} E0.0{5 + i % 3} F1800" for i in range(strokes)]
+    layer = [";LAYER_CHANGE", f"G0 Z{60 + number}.2 F900"]
+    return [*way, f"G0 Z{60 + number} F900", "G1 E2 F2100", *lines[: strokes // 2], *layer, *lines[strokes // 2 :]]
+
+
+PROGRAM = [*START, *part(1, 5, 15), *part(2, 30, 725), *part(3, -20, 360), "M104 S0", "M140 S0"]
+
+
+class KilledError(BaseException):
+    """The host is no more: nothing is done on its way out."""
+
+
+class _Mortal:
+    """A wire whose host dies after so many writings: from then on nothing is sent and nothing heard."""
+
+    def __init__(self, wire: Wire, writings: int) -> None:
+        self._wire, self._left, self.name = wire, writings, wire.name
+        self.discard, self.close = wire.discard, wire.close
+
+    def write(self, data: bytes) -> None:
+        self._left -= 1
+        if self._left < 0:
+            raise KilledError
+        self._wire.write(data)
+
+    def read(self) -> bytes:
+        if self._left < 0:
+            raise KilledError
+        return self._wire.read()
+
+
+@pytest.fixture
+def text(tmp_path: Path) -> GcodeFile:
+    (tmp_path / "p.gcode").write_text("\n".join(PROGRAM) + "\n", encoding="utf-8")
+    return GcodeFile(tmp_path / "p.gcode")
+
+
+def journal_of(text: GcodeFile, name: str) -> Journal:
+    profile = PROFILE.model_dump(mode="json")
+    return Journal(text.path.with_name(name), Heading(str(text.path), text.sha256(), "p", profile))
+
+
+def killed(text: GcodeFile, printer: VirtualPrinter, writings: int) -> Story:
+    """Print until the host dies."""
+    medium = replace(printer.medium, open=lambda name, baud: _Mortal(printer.medium.open(name, baud), writings))
+    with journal_of(text, "first") as journal, pytest.raises(KilledError):
+        print_lines(text, PATH, medium=medium, profile=PROFILE, journal=journal)
+    return read_journal(journal.path)
+
+
+def resumed(text: GcodeFile, printer: VirtualPrinter, story: Story) -> tuple[Way, list[str]]:
+    """Resume; the decision, and the commands sent."""
+    found: list[Way] = []
+    sent: list[bytes] = []
+
+    def begin(seen: Found) -> Begin:
+        found.append(way_on(point_of(text, story.last, PROFILE, LIMIT), seen, PROFILE))
+        return found[0].begin
+
+    with journal_of(text, "rest") as journal:
+        print_lines(
+            text,
+            PATH,
+            medium=printer.medium,
+            profile=PROFILE,
+            journal=journal,
+            begin=begin,
+            traffic=lambda way, data: sent.append(data) if way == ">" else None,
+        )
+    assert read_journal(journal.path).finished
+    return found[0], [re.sub(r"^N\d+ |\*\d+$", "", line) for line in b"".join(sent).decode().splitlines()]
+
+
+def moved(printer: VirtualPrinter) -> np.ndarray:
+    """X Y Z A C of the ends and the filament of the executed moves."""
+    record = printer.record
+    return np.column_stack([record.end[:, :5], record.end[:, 5] - record.start[:, 5]]).round(4)
+
+
+@pytest.fixture(scope="module")
+def whole() -> np.ndarray:
+    printer = VirtualPrinter(PROFILE.machine)
+    print_lines(PROGRAM, PATH, medium=printer.medium)
+    return moved(printer)
+
+
+@pytest.mark.parametrize("writings", [50, 77, 90, 120, 180, 200, 233])
+def test_after_the_host_has_died_the_rest_follows_without_gap_or_overlap(
+    text: GcodeFile, whole: np.ndarray, writings: int
+) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, writings)
+    way, _ = resumed(text, printer, story)
+    assert way.certain.endswith("nothing is repeated")
+    assert np.array_equal(moved(printer), whole)
+
+
+def test_a_print_that_had_hardly_begun_begins_anew(text: GcodeFile, whole: np.ndarray) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    way, _ = resumed(text, printer, killed(text, printer, 9))
+    assert way.begin == Begin(1, ())
+    assert np.array_equal(moved(printer)[-len(whole) :], whole)
+
+
+def cold(text: GcodeFile, writings: int) -> tuple[VirtualPrinter, Story, Way, list[str]]:
+    """The power goes for host and printer, and comes back."""
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, writings)
+    printer.firmware.reset()
+    return printer, story, *resumed(text, printer, story)
+
+
+def test_after_a_power_cut_all_that_was_not_surely_printed_is_printed_again(text: GcodeFile, whole: np.ndarray) -> None:
+    printer, story, way, _ = cold(text, 233)
+    assert way.begin.line == story.last.executed + 1
+    done = moved(printer)[:, [0, 1, 5]]
+    rest = whole[sum(is_move(line) for line in PROGRAM[: way.begin.line - 1]) :][:, [0, 1, 5]]
+    assert np.array_equal(done[-len(rest) :], rest)
+
+
+def is_move(line: str) -> bool:
+    return re.match(r"G[01] .*[XYZACE]", line) is not None
+
+
+def test_after_a_power_cut_z_and_the_table_are_neither_homed_nor_turned(text: GcodeFile) -> None:
+    _, _, way, _ = cold(text, 233)
+    homed = [line for line in way.begin.before if line.startswith("G28")]
+    assert homed == ["G28 X Y"]
+    assert not [line for line in way.begin.before if re.match(r"G[01] .*[AC]", line)]
+
+
+def test_after_a_power_cut_the_bed_heats_first_and_the_tip_rises_before_anything_else_moves(text: GcodeFile) -> None:
+    _, _, way, _ = cold(text, 233)
+    order = [next(i for i, line in enumerate(way.begin.before) if line.startswith(word)) for word in (
+        "G92 X", "M190 S60", "M109 S200", "G1 E-", "G0 Z", "G28 X Y", "G0 X", "G1 Z", "M106")]  # fmt: skip
+    assert order == sorted(order)
+
+
+def test_the_turns_of_the_table_are_not_forgotten(text: GcodeFile) -> None:
+    _, _, way, _ = cold(text, 150)
+    assert any(line.startswith("G92 X") and line.endswith("A30 C725") for line in way.begin.before)
+
+
+def test_a_parked_printer_whose_host_has_died_comes_back_without_homing(text: GcodeFile, whole: np.ndarray) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, 233)
+    line = printer.medium.open(PATH, 0)
+    line.write(b"G91\nG0 Z20 F900\nG90\nG0 X-100 Y-100 F6000\nM400\n")
+    printer.medium.wait(30.0)
+    line.close()
+    way, sent = resumed(text, printer, story)
+    assert "has not restarted and knows its place" in way.certain
+    assert not [line for line in sent if line.startswith(("G28", "G92 X"))]
+    rest = whole[sum(is_move(line) for line in PROGRAM[: way.begin.line - 1]) :]
+    assert np.array_equal(moved(printer)[-len(rest) :], rest)
+
+
+def test_a_second_death_is_resumed_from_the_second_journal(text: GcodeFile, whole: np.ndarray) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, 120)
+    medium = replace(printer.medium, open=lambda name, baud: _Mortal(printer.medium.open(name, baud), 60))
+    with journal_of(text, "second") as journal, pytest.raises(KilledError):
+        print_lines(
+            text, PATH, medium=medium, profile=PROFILE, journal=journal,
+            begin=lambda seen: way_on(point_of(text, story.last, PROFILE, LIMIT), seen, PROFILE).begin,
+        )  # fmt: skip
+    again = read_journal(journal.path)
+    assert again.last.executed > story.last.executed
+    resumed(text, printer, again)
+    assert np.array_equal(moved(printer), whole)
+
+
+@pytest.mark.parametrize("advanced", [True, False])
+def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: GcodeFile, advanced: bool) -> None:
+    from machine.link.habits import Habits
+
+    for line in range(20, len(PROGRAM), 17):
+        fault = FaultScript((Fault("reset", at=line, unit="line"),))
+        printer = VirtualPrinter(PROFILE.machine, None if advanced else Habits(advanced_ok=False), fault)
+        with journal_of(text, f"at {line}") as journal, pytest.raises(FirmwareError):
+            print_lines(text, PATH, medium=printer.medium, profile=PROFILE, journal=journal)
+        last = read_journal(journal.path).last
+        surely = sum(is_move(each) for each in PROGRAM[: last.executed])
+        assert surely <= len(printer.record.start), line
+        assert last.executed <= last.acknowledged <= last.sent
+
+
+def point(executed: int, acknowledged: int | None = None, number: int = 100) -> Point:
+    moment = Moment(acknowledged or executed, acknowledged or executed, executed, number)
+    return point_of(PROGRAM, moment, PROFILE, LIMIT)
+
+
+def found(position: dict[str, float] | None = None, last: int | None = 0) -> Found:
+    return Found(last, Position(tuple(position.items())) if position is not None else None, Temperature())
+
+
+LINE = PROGRAM.index(";PART:2 of 3") + 40
+
+
+def test_the_point_knows_part_layer_pose_and_modes() -> None:
+    at = point(LINE)
+    assert (at.line, at.place.part, at.place.parts) == (LINE + 1, 2, 3)
+    assert at.modal.at[3:5] == [30.0, 725.0]
+    assert (at.modal.filament_relative, at.modal.relative, at.modal.feed, at.modal.nozzle_c) == (True, False, 1800.0, 200.0)
+    assert at.stroked
+
+
+def test_a_printer_that_stands_at_several_lines_ends_is_taken_at_the_first() -> None:
+    still = [*START, "G0 X10 Y20 Z30", "G1 X11 E1 F600", "M106 S10", "M106 S20", "M106 S30", "G1 X12 E1"]
+    at = point_of(still, Moment(13, 13, 13, 5), PROFILE, LIMIT)
+    way = way_on(at, found({"X": 11.0, "Y": 20.0, "Z": 30.0, "E": 1.0}), PROFILE)
+    assert way.begin.line == still.index("M106 S10") + 1
+
+
+def test_a_table_that_was_turning_when_the_power_went_is_refused() -> None:
+    line = PROGRAM.index("G0 A30 C725 F6000")
+    with pytest.raises(JournalError, match=r"the table was turning about A.*machine\.gcode\.resume"):
+        way_on(point(line, line + 5), found(), PROFILE)
+
+
+def test_a_profiles_own_block_homes_instead() -> None:
+    block = "G28 Z\nG28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
+    profile = load(settings=[f"machine.gcode.resume={block!r}"])
+    before = way_on(point(LINE), found(), with_block(profile, block)).begin.before
+    assert before[before.index("G28 Z") : before.index("G28 Z") + 3] == ("G28 Z", "G28 X Y", "HOME_AC")
+    assert "G0 A30 C725" in before
+    assert not [line for line in before if line.startswith("G92 X")]
+
+
+def with_block(profile: Profile, block: str) -> Profile:
+    gcode = profile.machine.gcode.model_copy(update={"resume": block})
+    return profile.model_copy(update={"machine": profile.machine.model_copy(update={"gcode": gcode})})
+
+
+def test_a_printer_that_was_moved_since_it_restarted_is_refused() -> None:
+    with pytest.raises(JournalError, match="stands at X50 Y50 Z50: it was moved"):
+        way_on(point(LINE), found({"X": 50.0, "Y": 50.0, "Z": 50.0}), PROFILE)
+
+
+def test_a_program_that_does_not_tell_where_it_stands_is_refused() -> None:
+    lines = [*START, "G1 X1 E1", "G28", *(f"M106 S{k}" for k in range(60)), "G1 X5 E1"]
+    with pytest.raises(JournalError, match="does not tell where X Y Z stand"):
+        way_on(point_of(lines, Moment(14, 14, 13, 5), PROFILE, LIMIT), found(), PROFILE)
+
+
+def test_a_firmware_that_follows_the_table_goes_on_only_where_it_stands() -> None:
+    machine = PROFILE.machine.model_copy(update={"coordinates": "workpiece"})
+    with pytest.raises(JournalError, match="follows the table by itself"):
+        way_on(point(LINE), found(), PROFILE.model_copy(update={"machine": machine}))
+
+
+def test_when_the_table_must_turn_back_it_turns_above_everything() -> None:
+    turned = {"X": 20.0, "Y": 14.0, "Z": 150.0, "A": -20.0, "C": 360.0, "E": 3.0}
+    way = way_on(point(LINE, number=10), found(turned, last=20), PROFILE)
+    lines = list(way.begin.before)
+    turn = next(i for i, line in enumerate(lines) if re.match(r"G0 A30\S* C725", line))
+    heights = [float(m[1]) for line in lines[:turn] if (m := re.match(r"G0 Z(\S+)", line))]
+    assert heights[0] >= 80.0
+
+
+MODES: list[tuple[str, Callable[[Modal], object], object]] = [
+    ("G91", lambda modal: (modal.relative, modal.filament_relative), (True, True)),
+    ("M82", lambda modal: modal.filament_relative, False),
+    ("G20", lambda modal: modal.inches, True),
+    ("G1 F7200", lambda modal: modal.feed, 7200.0),
+    ("G01X5Y6", lambda modal: modal.at[:2], [5.0, 6.0]),
+    ("M106 P1 S9", lambda modal: modal.fans["1"], "M106 P1 S9"),
+    ("M204 P500", lambda modal: modal.kept["M204P"], "M204 P500"),
+    ("M568 P0 S230", lambda modal: modal.nozzle_c, 230.0),
+    ("SET_HEATER_TEMPERATURE HEATER=extruder TARGET=215", lambda modal: modal.nozzle_c, 215.0),
+    ("G92 C1085", lambda modal: modal.at[4], 1085.0),
+    ("G28", lambda modal: modal.at[:5], [None] * 5),
+]
+
+
+@pytest.mark.parametrize(("command", "look", "expected"), MODES)
+def test_what_a_firmware_remembers_of_a_command(command: str, look: Callable[[Modal], object], expected: object) -> None:
+    modal = Modal(axes_of(PROFILE.machine))
+    modal.take(command)
+    assert look(modal) == expected
+
+
+def test_saying_all_again_leads_to_the_same_state() -> None:
+    first, second = Modal(axes_of(PROFILE.machine)), Modal(axes_of(PROFILE.machine))
+    for command in [*START, "M204 P500 T900", "G20", "G91", "G1 X1 E2 F50", "M106 P1 S3"]:
+        first.take(command)
+    for command in first.lines():
+        second.take(command)
+    assert second.lines() == first.lines()
+
+
+@pytest.mark.parametrize("dialect", ["open5x_voron0", "open5x_jubilee", "fractal5pro"])
+def test_every_firmware_is_told_where_its_axes_stand(dialect: str) -> None:
+    profile = load(dialect)
+    letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
+    x, y = (0.5 * sum(axis.limits_mm) for axis in (profile.machine.x, profile.machine.y))
+    lines = [f"G92 {letters[0]}0 {letters[1]}0", f"G0 X{x} Y{y} Z60 F600", "M109 S200", *(f"G1 X{x + k} E1" for k in range(9))]
+    way = way_on(point_of(lines, Moment(6, 6, 6, 5), profile, 120), found(), profile)
+    assert re.search(r"(G92 X\S+ Y\S+ Z60|SET_KINEMATIC_POSITION X=\S+ Y=\S+ Z=60)", "\n".join(way.begin.before))
+    assert "G28 X Y" in way.begin.before
+
+
+def cancelled(text: GcodeFile, port: str) -> Path:
+    """A print on a pseudo-terminal that was stopped in its second part."""
+    from threading import Event
+
+    stop = Event()
+    with journal_of(text, "first") as journal:
+        outcome = print_lines(
+            text, port, 250000, lambda told: stop.set() if told.file_line > 190 else None, stop, profile=PROFILE, journal=journal
+        )
+    assert outcome.cancelled
+    return journal.path
+
+
+def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
+    text: GcodeFile, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with SimulatedPrinter(PROFILE.machine, speed=100.0) as printer:
+        journal = cancelled(text, printer.path)
+        assert main(["resume", str(journal), "--port", printer.path, "--yes", "--journal", str(journal.with_name("rest"))]) == 0
+        record = printer.record
+        assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
+    told = capsys.readouterr().err
+    assert re.search(r"p, part [23] of 3, (layer 1, )?line \d+ of 310", told)
+    assert "has not restarted and knows its place" in told
+    assert "was resumed already, what became of it is in" in told
+    assert record.end[-1, 3:5].tolist() == [-20.0, 360.0]
+
+
+@pytest.mark.parametrize(("spoil", "words"), [
+    (lambda path: path.write_text("G28\n"), "is of another program"),
+    (lambda path: path.unlink(), "is gone"),
+])  # fmt: skip
+def test_the_command_refuses_a_journal_of_another_program(
+    text: GcodeFile, spoil: Callable[[Path], object], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with journal_of(text, "j") as journal:
+        journal.mark(Moment(20, 20, 10, 20))
+    spoil(text.path)
+    assert main(["resume", str(journal.path), "--port", "/dev/none"]) == 1
+    assert words in capsys.readouterr().err
+
+
+def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that_nobody_gives(
+    text: GcodeFile, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with journal_of(text, "j") as journal:
+        journal.mark(Moment(50, 50, 40, 20))
+    with SimulatedPrinter(PROFILE.machine) as printer:
+        assert main(["resume", str(journal.path), "--port", printer.path, "--machine", "gen5x"]) == 1
+        assert main(["resume", str(journal.path), "--port", printer.path]) == 1
+        assert not printer.record.happened("nozzle")
+    with journal_of(text, "done") as journal:
+        journal.mark(Moment(120, 120, 100, 20, state="finished"))
+    assert main(["resume", str(journal.path), "--port", "x"]) == 1
+    told = capsys.readouterr().err
+    assert "--machine gives another machine" in told
+    assert "give --yes where there is no terminal" in told
+    assert "ran to its end" in told
+
+
+def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, 233)
+    deaf = Medium(lambda name, baud: _Deaf(printer.medium.open(name, baud)), printer.medium.now_s, printer.medium.wait)
+    seen: list[Found] = []
+
+    def begin(asked: Found) -> Begin:
+        seen.append(asked)
+        return way_on(point_of(text, story.last, PROFILE, LIMIT), asked, PROFILE).begin
+
+    with pytest.raises(PrinterError, match="greetings|answer"):
+        print_lines(text, PATH, medium=deaf, profile=PROFILE, begin=begin)
+    assert seen == [Found(None, None, Temperature())]
+
+
+class _Deaf:
+    """A wire on which nothing arrives."""
+
+    def __init__(self, wire: Wire) -> None:
+        self.name, self.read, self.discard, self.close = wire.name, wire.read, wire.discard, wire.close
+
+    def write(self, data: bytes) -> None:
+        pass
