@@ -27,7 +27,7 @@ class Body:
         self.machine, self.say = machine, say
         self.manner: Manner = manner_of(machine.dialect)
         self.now_s = 0.0
-        self.motion = Motion(machine, self.note, self.manner.blocks, kept)
+        self.motion = Motion(machine, self.note, self.manner.blocks, kept, self.manner.min_segment_s)
         self.nozzle = Heater("nozzle", machine.nozzle_limit_c, NOZZLE_S)
         self.bed = Heater("bed", machine.bed_limit_c, BED_S)
         self.events: list[tuple[float, str]] = []

@@ -6,7 +6,7 @@ Marlin: gcode/queue.cpp, bugfix-2.1.x of 2024-09. RepRapFirmware: GCodeBuffer/St
 from dataclasses import dataclass
 from typing import Literal
 
-from machine.link.planner import BLOCKS
+from machine.link.planner import BLOCKS, MIN_SEGMENT_S
 
 BANNER = ("start", "Marlin bugfix-2.1.x (simulated)", "echo: Last Updated: 2024-09-29 | Author: (none, default config)")
 
@@ -40,7 +40,8 @@ class Manner:
     unknown, cold, beyond: what is said of such commands; {}: the command or the coordinates. cold_moves: a cold move is made
     without filament. beyond "": a target outside the limits is clamped without a word. tells_place: G28 and G92 print it.
     answers_dead: what is said, with ok, to every line after a kill. options: knows Habits' options of build.
-    talks_in_ok: answers of one line stand behind the ok. lacks: commands it does not know.
+    talks_in_ok: answers of one line stand behind the ok. min_segment_s: shorter moves are stretched while few wait. lacks:
+    commands it does not know.
     """
 
     identity: str
@@ -58,6 +59,7 @@ class Manner:
     answers_dead: tuple[str, ...] = ()
     options: bool = False
     talks_in_ok: bool = False
+    min_segment_s: float = 0.0
     lacks: frozenset[str] = frozenset()
 
 
@@ -74,6 +76,7 @@ MARLIN = Manner(
     kill=("Error:Printer halted. kill() called!", "//action:poweroff"),
     tells_place=True,
     options=True,
+    min_segment_s=MIN_SEGMENT_S,
     lacks=frozenset({"M116", "M568"}),
 )
 REPRAPFIRMWARE = Manner(

@@ -6,7 +6,7 @@ from math import ceil, hypot, inf, pi, sqrt
 from machine.arcs import centre_of, chords, sweep_rad
 from machine.link.executed import Executed
 from machine.link.following import Following
-from machine.link.planner import BLOCKS, Planner, block_of
+from machine.link.planner import BLOCKS, MIN_SEGMENT_S, Planner, block_of
 from profiles.machine import Machine
 
 FIRST_FEED = 25.0  # mm/s until a program gives an F: Marlin's 1500 mm/min
@@ -33,6 +33,7 @@ class Motion:
         note: Callable[[str], None] = lambda what: None,
         blocks: int = BLOCKS,
         kept: int | None = None,
+        min_segment_s: float = MIN_SEGMENT_S,
     ) -> None:
         axes = (machine.x, machine.y, machine.z)
         self.letters = ("X", "Y", "Z", machine.tilt.letter, machine.turn.letter, "E")
@@ -40,7 +41,7 @@ class Motion:
         self._home = [machine.x.limits_mm[0], machine.y.limits_mm[0], machine.z.limits_mm[1]]
         self._home += [machine.tilt.zero_deg, machine.turn.zero_deg]
         self.executed = Executed(kept)
-        self.planner = Planner(self.executed.add, blocks)
+        self.planner = Planner(self.executed.add, blocks, min_segment_s)
         self._machine, self._note = machine, note
         self._known = range(6) if machine.tilts else (0, 1, 2, 5)  # a word of another axis tells nothing
         self._following = Following(machine)

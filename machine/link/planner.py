@@ -71,8 +71,8 @@ class Planner:
     underruns: how often it ran dry although the machine need not have stopped; slowed: blocks made slower since few waited.
     """
 
-    def __init__(self, begun: Callable[[Block], None], blocks: int = BLOCKS) -> None:
-        self._begun, self._blocks = begun, blocks
+    def __init__(self, begun: Callable[[Block], None], blocks: int = BLOCKS, min_segment_s: float = MIN_SEGMENT_S) -> None:
+        self._begun, self._blocks, self._min_segment_s = begun, blocks, min_segment_s
         self._waiting: deque[Block] = deque()
         self._current: Block | None = None
         self._last: Block | None = None  # the one that ended last, while nothing has told the machine to wait
@@ -171,8 +171,8 @@ class Planner:
     def _slow_down(self, block: Block, queued: int) -> None:
         """Marlin's SLOWDOWN: time for the host to send more."""
         seconds = block.length / block.cruise
-        if seconds < MIN_SEGMENT_S:
-            block.cruise = block.length / (seconds + 2.0 * (MIN_SEGMENT_S - seconds) / queued)
+        if seconds < self._min_segment_s:
+            block.cruise = block.length / (seconds + 2.0 * (self._min_segment_s - seconds) / queued)
             self.slowed += 1
 
     def _look_back(self) -> None:

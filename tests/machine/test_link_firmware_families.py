@@ -113,3 +113,10 @@ def test_each_family_greets_in_its_own_words(machine, greeting: bytes) -> None: 
     firmware = Firmware(machine)
     firmware.reset()
     assert Cable(firmware).exchange(b"").startswith(greeting)
+
+
+@pytest.mark.parametrize(("machine", "slowed"), [(MARLIN, 3), (RRF, 0), (KLIPPER, 0)])
+def test_only_marlin_stretches_short_moves_while_few_wait(machine, slowed: int) -> None:  # type: ignore[no-untyped-def]
+    firmware = Firmware(machine)
+    answer(firmware, "".join(f"G1 X0.{k} F6000\n" for k in range(1, 6)), until_s=0.0)
+    assert firmware.record().slowed == slowed
