@@ -22,17 +22,23 @@ from slicer.chords import chains
 from slicer.halfedges import opposites
 
 SMOOTHINGS = 3  # moving averages over three points
+REACH = 0.1  # of the width: a shorter way between two corners is none
+REACHES = 4  # points on it, at which the line may change its width
 SPUR = 1.0  # a branch shorter than this many widths is a corner of the boundary, not a limb
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """points: (n, 2) mm; width_mm: mean width of the place along it; place, area_mm2: which place, and its whole area."""
+    """points: (n, 2) mm; width_mm: mean width of the place along it; place, area_mm2: which place, and its whole area.
+
+    ends: whether its first and its last point are ends, or the next piece of a line goes on there.
+    """
 
     points: Floats
     width_mm: float
     place: int
     area_mm2: float
+    ends: tuple[bool, bool] = (True, True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +106,7 @@ def _smooth(points: Floats) -> Floats:
 def _pruned(found: list[_Chain]) -> list[_Chain]:
     """Without the branches that only run into a corner: from a fork to a tip (end -1) and short for the fork's width.
 
-    A place that has no other branches keeps its longest.
+    A place that has no other branches keeps its longest. What is left of a fork with two corners reaches between them.
     """
     fork_width: dict[int, float] = defaultdict(float)
     for chain in found:
@@ -111,11 +117,32 @@ def _pruned(found: list[_Chain]) -> list[_Chain]:
         if chain.place not in longest or chain.length_mm > longest[chain.place].length_mm:
             longest[chain.place] = chain
     kept = []
+    corners: dict[int, list[Floats]] = defaultdict(list)
     for chain in found:
         corner = (chain.ends[0] < 0) != (chain.ends[1] < 0) and chain.length_mm <= SPUR * fork_width[max(chain.ends)]
         if not corner or chain is longest[chain.place]:
             kept.append(chain)
-    return kept
+        else:
+            corners[max(chain.ends)].append(chain.points[-1 if chain.ends[1] < 0 else 0])
+    pairs = {fork: (tips[0], tips[1]) for fork, tips in corners.items() if len(tips) == 2}
+    return [_reaching(_reaching(chain, pairs).reversed, pairs).reversed for chain in kept]
+
+
+def _reaching(chain: _Chain, pairs: dict[int, tuple[Floats, Floats]]) -> _Chain:
+    """The chain led on from its end between the two corners behind that, so far that the round end of its bead meets the
+    middle between them; at a blunt end, where the fork lies half a width before the edge, that is no way at all."""
+    if chain.ends[1] not in pairs:
+        return chain
+    one, other = pairs[chain.ends[1]]
+    way = 0.5 * (one + other) - chain.points[-1]
+    length, width, last = float(np.hypot(*way)), float(chain.widths[-1]), float(np.hypot(*(one - other)))
+    wider = max(last - width, 0.0) / max(length, 1e-9)
+    share = (length - 0.5 * width) / (1.0 + 0.5 * wider) / max(length, 1e-9)
+    if share * length < REACH * width:
+        return chain
+    shares = share * np.arange(1, REACHES + 1)[:, None] / REACHES
+    points, widths = chain.points[-1] + shares * way, width + shares[:, 0] * (last - width)
+    return _Chain(np.vstack([chain.points, points]), np.append(chain.widths, widths), (chain.ends[0], -1), chain.place)
 
 
 def _merged(found: list[_Chain]) -> list[_Chain]:
@@ -147,7 +174,8 @@ def _lines(found: list[_Chain], areas: Floats, even: float, shortest_mm: float) 
         points = _smooth(chain.points)
         cuts, widths = _even(points, chain.widths, np.log(even), shortest_mm)
         for a, b, width in zip(cuts[:-1], cuts[1:], widths, strict=True):
-            lines.append(Line(points[a : b + 1], float(width), chain.place, float(areas[chain.place])))
+            ends = (bool(a == 0), bool(b == len(points) - 1))
+            lines.append(Line(points[a : b + 1], float(width), chain.place, float(areas[chain.place]), ends))
     return lines
 
 

@@ -1,6 +1,7 @@
 """Gaps: beads for the places that the walls and the skin leave because no pair of beads fits."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import groupby
 from math import pi
 
@@ -25,7 +26,14 @@ SHORTEST = 0.25  # of the line width: what is shorter is no stroke
 STEP = 0.5  # of the line width: sampling of the boundary for the centreline
 LOOSE, CLOSE = (1.2, 1.25), (1.06, 0.4)  # factor of the width and line widths of length in which a bead keeps one width
 
-Stroke = tuple[Floats, float]  # points and width of the place across them
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """points: (n, 2) mm; across_mm: width of the place across them; ends: whether each end is one, or another stroke goes on."""
+
+    points: Floats
+    across_mm: float
+    ends: tuple[bool, bool] = (True, True)
 
 
 def gaps(
@@ -39,32 +47,37 @@ def gaps(
     """
     beads: list[Bead] = []
     borders = None if section is None or places.is_empty() else edges(section)
-    for area, strokes in _strokes(places, line_width_mm, *(LOOSE if section is None else CLOSE)):
-        long = [stroke for stroke in strokes if length_mm(stroke[0]) > SHORTEST * line_width_mm]
+    least = (0.5 if section is None else LEAST_LINE) * line_width_mm
+    for area, strokes in _strokes(
+        places, line_width_mm, 0.0 if section is None else least, *(LOOSE if section is None else CLOSE)
+    ):
+        long = [stroke for stroke in strokes if length_mm(stroke.points) > SHORTEST * line_width_mm]
         if borders is not None:
-            inside = (_kept_inside(borders, *stroke, SPARE * line_width_mm) for stroke in long)
-            long = [stroke for stroke in inside if length_mm(stroke[0]) > SHORTEST * line_width_mm]
-        drawn = sum(length_mm(points) * across for points, across in long)
-        for points, across in long:
-            wished = width_for_mm(across, height_mm) if section is None else across
-            width = min(max(wished, (0.5 if section is None else LEAST_LINE) * line_width_mm), 2.0 * line_width_mm)
+            inside = (_kept_inside(borders, stroke, SPARE * line_width_mm) for stroke in long)
+            long = [stroke for stroke in inside if length_mm(stroke.points) > SHORTEST * line_width_mm]
+        drawn = sum(length_mm(stroke.points) * stroke.across_mm for stroke in long)
+        for stroke in long:
+            wished = width_for_mm(stroke.across_mm, height_mm) if section is None else stroke.across_mm
+            width = min(max(wished, least), 2.0 * line_width_mm)
             flow = area / drawn * min(wished / width, 1.0)
             if section is not None:
                 flow *= bulged(width, height_mm, 2, bulge * line_width_mm)
-            beads.append(Bead(Kind.GAP, points, width, RANK, float(np.clip(flow, LEAST_FLOW, MOST_FLOW))))
+            beads.append(Bead(Kind.GAP, stroke.points, width, RANK, float(np.clip(flow, LEAST_FLOW, MOST_FLOW))))
     return beads
 
 
-def _kept_inside(borders: Floats, points: Floats, across: float, spare_mm: float) -> Stroke:
+def _kept_inside(borders: Floats, stroke: Stroke, spare_mm: float) -> Stroke:
     """The stroke without ends that run into a corner, as wide as its way to the borders allows."""
+    points = stroke.points
     clear = _clearances(borders, points)
     fits = np.flatnonzero(clear >= TAPER * np.median(clear))
-    first, last = min(int(fits[0]), len(points) - 2), max(int(fits[-1]), 1)
+    first = min(int(fits[0]), len(points) - 2) if stroke.ends[0] else 0
+    last = max(int(fits[-1]), 1) if stroke.ends[1] else len(points) - 1
     if last <= first:
         first, last = 0, len(points) - 1
     kept = np.sort(clear[first : last + 1])
     reach = min(float(kept[len(kept) // 10]), float(kept[0]) + spare_mm)
-    return points[first : last + 1], min(across, 2.0 * reach)
+    return Stroke(points[first : last + 1], min(stroke.across_mm, 2.0 * reach), stroke.ends)
 
 
 @kernel
@@ -84,8 +97,10 @@ def _clearances(borders: Floats, points: Floats) -> Floats:
     return least
 
 
-def _strokes(places: Polygons, line_width_mm: float, even: float, shortest: float) -> Iterable[tuple[float, list[Stroke]]]:
-    """For each place its area and the strokes that fill it."""
+def _strokes(
+    places: Polygons, line_width_mm: float, least_mm: float, even: float, shortest: float
+) -> Iterable[tuple[float, list[Stroke]]]:
+    """For each place its area and the strokes that fill it; rings keep inside it with beads of at least least_mm."""
     long: list[Polygons] = []
     for island in places.decompose() if not places.is_empty() else []:
         loops = contours(island)
@@ -93,7 +108,7 @@ def _strokes(places: Polygons, line_width_mm: float, even: float, shortest: floa
         if not loops or island.area() < FEW_MM2 * line_width_mm**2:
             continue
         if len(loops) == 1 and 4.0 * pi * area_mm2(loops[0]) > COMPACT * perimeter**2:
-            yield island.area(), _ring(island, perimeter)
+            yield island.area(), _ring(island, perimeter, least_mm)
         else:
             long.append(island)
     outlines = [loop for island in long for loop in contours(island)]
@@ -101,10 +116,10 @@ def _strokes(places: Polygons, line_width_mm: float, even: float, shortest: floa
         centrelines(outlines, STEP * line_width_mm, even, shortest * line_width_mm), key=lambda line: line.place
     ):
         several = list(lines)
-        yield several[0].area_mm2, [(line.points, line.width_mm) for line in several]
+        yield several[0].area_mm2, [Stroke(line.points, line.width_mm, line.ends) for line in several]
 
 
-def _ring(island: Polygons, perimeter_mm: float) -> list[Stroke]:
-    """A ring whose two sides meet in the middle of a round place."""
+def _ring(island: Polygons, perimeter_mm: float, least_mm: float) -> list[Stroke]:
+    """A ring whose two sides meet in the middle of a round place, or overlap there."""
     radius = 2.0 * island.area() / perimeter_mm
-    return [(closed(loop), radius) for loop in contours(grown(island, -0.5 * radius))]
+    return [Stroke(closed(loop), radius) for loop in contours(grown(island, -0.5 * max(radius, least_mm)))]

@@ -134,6 +134,23 @@ def test_no_place_of_a_tapering_plate_wider_than_half_a_line_stays_empty(start, 
     assert max((part.area for part in shapely.get_parts(rest)), default=0.0) < WIDTH**2
 
 
+@pytest.mark.parametrize("radius", [0.13, 0.16, 0.2, 0.3])
+def test_the_bead_of_a_thin_pin_stays_inside_it(radius):
+    pin = Polygons.circle(radius, 48)
+    beads = gaps(walls(pin, 3, WIDTH, HEIGHT).free, WIDTH, HEIGHT, pin)
+    plastic = shapely.union_all([shapely.LineString(b.points).buffer(b.width_mm / 2) for b in beads])
+    assert plastic.difference(as_shapely(pin).buffer(0.01)).area == pytest.approx(0.0, abs=1e-6)
+    assert plastic.area > 0.5 * pin.area()
+
+
+@pytest.mark.parametrize(("thin", "over", "wide"), [(0.16, 0.7, 0.6), (0.16, 1.5, 1.0), (0.2, 1.0, 0.6), (0.25, 0.7, 0.6)])
+def test_a_thin_plate_that_widens_into_a_block_is_filled_up_to_its_walls(thin, over, wide):
+    half = [(0, thin / 2), (4, thin / 2), (4 + over, wide / 2), (4.5 + over, 3), (12, 3)]
+    shape = Polygons([np.array([(x, -y) for x, y in half] + half[::-1])])
+    rest = uncovered(shape, walls(shape, 3, WIDTH, HEIGHT))
+    assert max(2 * shapely.maximum_inscribed_circle(part).length for part in shapely.get_parts(rest)) < WIDTH / 2
+
+
 @pytest.mark.parametrize("arms", [3, 4, 5, 7])
 @pytest.mark.parametrize("thickness", [0.4, 0.7, 1.0, 1.6, 2.1])
 def test_no_place_where_thin_arms_meet_stays_empty(arms, thickness):
