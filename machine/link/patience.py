@@ -67,4 +67,7 @@ class Patience:
         if window.flight and (budget_s := window.flight[0].budget_s):
             # Answer and question may both be lost: asked again ever later, a slow command's lost ok costs half a minute.
             return budget_s if asked >= PROBES else min(budget_s, timing.stall_mute_s * 4.0 ** (asked - 1))
-        return known_s if family.silence_s is None else family.silence_s
+        if family.silence_s is not None:
+            return family.silence_s
+        # Of the first questions one may be lost itself; the last ones wait out the longest move.
+        return timing.stall_s if self.busy_known else 0.25 * timing.stall_mute_s * 2.0 ** (asked - 1)

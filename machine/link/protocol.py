@@ -50,7 +50,8 @@ class Protocol(Conversation):
             self._turn(Signal.UNCHECKED, now_s, verdict.torn(self._line()))
             return
         if self.state is State.SYNC:
-            self._turn(Signal.SYNCED, now_s)
+            if ok.line is not None or ok.planner_free is None:  # else it belongs to the rest of a line torn by a restart
+                self._turn(Signal.SYNCED, now_s)
         elif self.state is State.QUIET:
             if self._alone and ok.line is None and ok.temperature is None:
                 self._turn(Signal.HUSH, now_s)  # the ok that belongs to the Resend, and nothing else is on its way

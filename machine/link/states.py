@@ -10,7 +10,7 @@ from enum import Enum, auto
 class State(Enum):
     """Where the conversation stands."""
 
-    DRAIN = auto()  # port just opened: old words and a start-up banner are listened to
+    DRAIN = auto()  # port just opened, or the printer just started: old answers and the banner are listened to
     SYNC = auto()  # M110 sent, the line numbers are not agreed yet
     HELLO = auto()  # M115 and M105 sent: the printer's habits are learned
     OPEN = auto()  # lines may be sent, as many as the window allows
@@ -45,21 +45,20 @@ class Signal(Enum):
 TABLE: dict[State, dict[Signal, State]] = {
     State.DRAIN: {
         Signal.HUSH: State.SYNC,
-        Signal.START: State.SYNC,
     },
     State.SYNC: {
         Signal.SYNCED: State.HELLO,
         Signal.STALL: State.SYNC,
-        Signal.START: State.SYNC,
+        Signal.START: State.DRAIN,
         Signal.SILENT: State.LOST,
         Signal.FAULT: State.HALTED,
     },
     State.HELLO: {
         Signal.GREETED: State.OPEN,
-        Signal.RESEND: State.SYNC,
-        Signal.DOUBT: State.SYNC,
+        Signal.RESEND: State.DRAIN,
+        Signal.DOUBT: State.DRAIN,
         Signal.STALL: State.SYNC,
-        Signal.START: State.SYNC,
+        Signal.START: State.DRAIN,
         Signal.FAULT: State.HALTED,
     },
     State.OPEN: {

@@ -205,11 +205,15 @@ def test_a_board_that_restarts_on_opening_is_greeted_again() -> None:
     table.wait(0.6)
     table.wire()
     table.wait(1.0)
-    table.say(b"start\necho: Last Updated\n")
+    table.say(b"start\necho: Last Updated\nok P15 B3\n")
+    assert table.wire() == b""
+    table.wait(0.6)
     assert table.wire() == b"\nN0 M110 N0*125\n"
+    table.say(b"ok P15 B3\n")
+    assert table.protocol.state is State.SYNC
     table.say(b"ok\n")
     table.say(b"start\n")
-    assert table.protocol.state is State.SYNC
+    assert table.protocol.state is State.DRAIN
     assert table.protocol.fault is None
 
 
@@ -700,6 +704,7 @@ def test_rubbish_of_a_wrong_baud_rate_is_recognised_and_other_rates_are_named() 
 def test_rubbish_of_a_boot_loader_before_the_banner_is_forgiven() -> None:
     table = Table()
     table.say(RUBBISH + b"start\nMarlin 2.1.2\n")
+    table.wait(0.6)
     table.say(b"ok\nok\nok T:20 /0\n")
     assert table.protocol.state is State.OPEN
 
