@@ -16,7 +16,7 @@ from serial.tools import list_ports
 
 from profiles.errors import PortError
 
-READ_S = 0.05  # read() gives up after this, so that stops and time-outs are noticed
+READ_S = 0.02  # read() gives up after this: an emergency stop is to be on the wire within 50 ms
 READ_BYTES = 4096
 WRITE_S = 10.0  # a printer whose buffers stay full for longer has stopped reading
 BAUDS = (1200, 4_000_000)  # slowest and fastest rate that an adapter is known to take

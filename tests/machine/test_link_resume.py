@@ -12,6 +12,7 @@ from machine.app.cli import main
 from machine.link.events import Position, Temperature
 from machine.link.faults import Fault, FaultScript
 from machine.link.feed import Begin
+from machine.link.habits import Habits
 from machine.link.inquiry import Found
 from machine.link.journal import Heading, Journal, Moment, Story, read_journal
 from machine.link.medium import Medium, Wire
@@ -205,8 +206,6 @@ def test_a_second_death_is_resumed_from_the_second_journal(text: GcodeFile, whol
 
 @pytest.mark.parametrize("advanced", [True, False])
 def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: GcodeFile, advanced: bool) -> None:
-    from machine.link.habits import Habits
-
     for line in range(20, len(PROGRAM), 17):
         fault = FaultScript((Fault("reset", at=line, unit="line"),))
         printer = VirtualPrinter(PROFILE.machine, None if advanced else Habits(advanced_ok=False), fault)
@@ -346,6 +345,7 @@ def cancelled(text: GcodeFile, port: str) -> Path:
     return journal.path
 
 
+@pytest.mark.slow
 def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
     text: GcodeFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -403,7 +403,7 @@ def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
         seen.append(asked)
         return way_on(point_of(text, story.last, PROFILE, LIMIT), asked, PROFILE).begin
 
-    with pytest.raises(PrinterError, match="greetings|answer"):
+    with pytest.raises(PrinterError, match=r"greetings|answer"):
         print_lines(text, PATH, medium=deaf, profile=PROFILE, begin=begin)
     assert seen == [Found(None, None, Temperature())]
 

@@ -1,0 +1,81 @@
+"""The watchdog: heaters that stay away from their target, or of which nothing is heard, end a print; others do not."""
+
+from collections.abc import Callable
+
+import pytest
+
+from machine.link.events import Temperature
+from machine.link.faults import Fault, FaultScript
+from machine.link.stream import print_lines
+from machine.link.virtual import PATH, VirtualPrinter
+from machine.link.watchdog import Watchdog
+from profiles.errors import PrinterError
+from profiles.profile import load
+
+PROFILE = load()
+
+
+def watched(nozzle: Callable[[float], float], target_c: float = 200.0, seconds: int = 600, every_s: int = 2) -> Watchdog:
+    """A watchdog that has seen a nozzle with a course of its own, and a bed at rest."""
+    watchdog = Watchdog((300.0, 110.0))
+    for second in range(0, seconds, every_s):
+        watchdog.saw(Temperature(nozzle(second), target_c, 60.0, 60.0), float(second))
+        watchdog.wait(float(second))
+    return watchdog
+
+
+@pytest.mark.parametrize("course", [
+    lambda s: 200.0,
+    lambda s: 20.0 + 0.31 * s,  # ten minutes to the target
+    lambda s: 200.0 + 15.0 * (-1) ** (s // 2),  # a poor thermostat
+    lambda s: 260.0 - 0.3 * s if s < 200 else 200.0,  # cooling down to it
+    lambda s: 150.0 if s % 100 < 50 else 200.0,  # a gust of air, and back in time
+], ids=["steady", "slow", "swinging", "cooling", "gusts"])  # fmt: skip
+def test_a_heater_that_is_or_comes_near_its_target_is_left_alone(course: Callable[[float], float]) -> None:
+    watched(course)
+
+
+@pytest.mark.parametrize(("course", "words"), [
+    (lambda s: 200.0 if s < 100 else 150.0, r"nozzle has been at 150 deg C for 6\d s although 200 is wanted"),
+    (lambda s: 20.0, "nozzle has been at 20 deg C"),
+    (lambda s: min(200.0 + 0.5 * s, 260.0), "nozzle has been at 2"),
+    (lambda s: 320.0, "nozzle is at 320 deg C: this machine allows at most 300"),
+], ids=["fell off", "never warm", "runs away", "too hot"])  # fmt: skip
+def test_a_heater_that_stays_away_from_its_target_ends_the_print(course: Callable[[float], float], words: str) -> None:
+    with pytest.raises(PrinterError, match=words):
+        watched(course)
+
+
+def test_a_heater_that_is_off_may_have_any_temperature() -> None:
+    watched(lambda s: 150.0 - 0.1 * s, target_c=0.0)
+
+
+def test_a_cold_bed_is_noticed_too() -> None:
+    watchdog = Watchdog()
+    for second in range(180):
+        watchdog.saw(Temperature(200.0, 200.0, 20.0, 60.0), float(second))
+    with pytest.raises(PrinterError, match="the bed has been at 20 deg C for 181 s although 60 is wanted"):
+        watchdog.saw(Temperature(200.0, 200.0, 20.0, 60.0), 181.0)
+
+
+def test_silence_about_a_heater_that_is_on_ends_the_print() -> None:
+    watchdog = watched(lambda s: 200.0, seconds=100)
+    watchdog.wait(200.0)
+    with pytest.raises(PrinterError, match=r"has told no temperature for 1.. s although a heater is on"):
+        watchdog.wait(230.0)
+
+
+def test_silence_of_a_printer_that_is_cold_or_never_told_anything_is_not_judged() -> None:
+    watched(lambda s: 20.0, target_c=0.0, seconds=100)
+    cold = Watchdog()
+    cold.saw(Temperature(20.0, 0.0), 0.0)
+    cold.wait(1e6)
+    Watchdog().wait(1e6)
+
+
+def test_a_heater_that_fails_in_mid_print_ends_it_with_heaters_off() -> None:
+    lines = ["M104 S200", "M109 S200", *(f"G1 X{k % 50} F600" for k in range(3000))]
+    printer = VirtualPrinter(PROFILE.machine, faults=FaultScript((Fault("heater failure", at=40, unit="line"),)), most_s=5000.0)
+    with pytest.raises(PrinterError, match=r"nozzle|cold|Heating|Thermal"):
+        print_lines(lines, PATH, medium=printer.medium, profile=PROFILE)
+    assert printer.record.nozzle_target_c == 0.0
