@@ -6,11 +6,13 @@ import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 
 from machine.link import port as port_module
 from machine.link.firmware import Firmware, Habits
+from machine.link.medium import SERIAL
 from machine.link.port import Port, open_port, serial_devices
 from machine.link.protocol import Timing
 from machine.link.simulator import SimulatedPrinter
@@ -149,15 +151,16 @@ def test_a_network_printer_lost_in_mid_print_ends_it_and_leaves_no_thread() -> N
 
         def serve() -> None:
             host, _ = server.accept()
+            server.close()
             with host:
                 while firmware.record().lines < 100:
                     firmware.receive(host.recv(4096))
                     host.sendall(firmware.advance())
 
-        thread = threading.Thread(target=serve)
+        thread, address = threading.Thread(target=serve), f"socket://localhost:{server.getsockname()[1]}"
         thread.start()
         with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
-            print_lines(PROGRAM, f"socket://localhost:{server.getsockname()[1]}", 115200, timing=QUICK)
+            print_lines(PROGRAM, address, 115200, timing=QUICK, medium=replace(SERIAL, lost_s=0.2))
         thread.join(5)
     assert threading.active_count() == threads
 
