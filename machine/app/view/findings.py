@@ -14,14 +14,16 @@ from profiles.machine import Machine
 MACHINES_OWN = frozenset({"axis-limit", "axis-speed", "collision", "contact", "off-plate", "uncalibrated"})
 
 
-def placed(run: DryRun, machine: Machine, known: bool, kept: NDArray[np.int64]) -> list[dict[str, Any]]:
-    """The findings in their order; row: where the page shows it, -1 for one about the whole.
+def judged(run: DryRun, known: bool) -> list[Finding]:
+    """The findings in their order; known: False leaves out what only the right machine could tell."""
+    return [finding for finding in run.findings if known or finding.code not in MACHINES_OWN]
 
-    known: False leaves out what only the right machine could tell.
-    """
+
+def placed(run: DryRun, machine: Machine, known: bool, kept: NDArray[np.int64]) -> list[dict[str, Any]]:
+    """What was judged, as the page tells it; row: where it is shown, -1 for a finding about the whole."""
     program = run.program
     told = []
-    for finding in run.findings if known else [f for f in run.findings if f.code not in MACHINES_OWN]:
+    for finding in judged(run, known):
         row = _row(program, finding)
         place = min(int(np.searchsorted(kept, row)), len(kept) - 1) if row < len(program.line) else -1
         places: dict[str, Any] = {"workpiece_mm": None, "machine_mm": None}
