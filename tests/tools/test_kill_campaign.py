@@ -10,8 +10,8 @@ WHOLE = [[float(k), 0.0] for k in range(10)]
 @pytest.mark.parametrize(("moves", "gap", "twice"), [
     (WHOLE, 0, 0),
     (WHOLE[:6] + WHOLE[6:], 0, 0),
-    (WHOLE[:6] + [[99.0, 0.0]] + WHOLE[4:], 0, 2),
-    (WHOLE[:6] + [[99.0, 0.0]] + WHOLE[8:], 2, 0),
+    ([*WHOLE[:6], [99.0, 0.0], *WHOLE[4:]], 0, 2),
+    ([*WHOLE[:6], [99.0, 0.0], *WHOLE[8:]], 2, 0),
     (WHOLE[:6], 4, 0),
     ([], 10, 0),
 ])  # fmt: skip
