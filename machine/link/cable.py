@@ -167,6 +167,8 @@ class Cable:
                 done = at + 1
             elif fault.kind == "delay":
                 way.open_s = max(way.open_s, now_s + fault.seconds)
+            elif fault.kind == "garbage":
+                way.put(self._foreign(fault))
             else:
                 if way is self._in:
                     self._work(now_s, until_s)

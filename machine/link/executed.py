@@ -1,6 +1,7 @@
 """Executed: the moves a simulated printer has begun, as rows of numbers, all of them or the last ones only, and their sums."""
 
 from array import array
+from collections.abc import Sequence
 
 from machine.link.planner import Block
 
@@ -37,7 +38,7 @@ class Executed:
             self.rows[base + 6 + axis] = block.end[axis]
         self.rows[-1] = block.duration_s
 
-    def _count(self, start, end, duration_s: float, times: int) -> None:  # type: ignore[no-untyped-def]
+    def _count(self, start: Sequence[float], end: Sequence[float], duration_s: float, times: int) -> None:
         self.moves += times
         self.moving_s += times * duration_s
         pushed = end[5] - start[5]

@@ -52,6 +52,12 @@ def test_answers_bytes_are_counted_apart_from_commands_bytes() -> None:
     assert answers(Fault("drop", 1, to_host=True)) == b"o\nok\nok\n"
 
 
+def test_garbage_among_bytes_goes_their_way() -> None:
+    firmware = Heard()
+    assert Cable(firmware, FaultScript((Fault("garbage", 2, unit="byte", text="xx"),))).exchange(b"G21\n") != b"ok\n"
+    assert firmware.heard == b"G2xx1\n"
+
+
 def test_delayed_bytes_come_later_and_in_order() -> None:
     cable = Cable(Firmware(MACHINE, PLAIN), FaultScript((Fault("delay", 4, seconds=2.0),)))
     assert cable.exchange(b"G21\nG21\n", now_s=1.0) == b"ok\n"
