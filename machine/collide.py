@@ -8,88 +8,18 @@ right. A move along a line is tried as the convex body it sweeps: one direction 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
-from math import pi
 
 import numpy as np
 from manifold3d import Manifold
 
 from machine.kinematics.table import machine_points
+from mdp.head import Body, corners, directions, spread
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
-from profiles.machine import CradleBox, Machine, Vector
+from profiles.machine import CradleBox, Machine
 
-FIELD = 120
 FAR_MM = 1e9
 REFINEMENTS = 40
-
-
-@dataclass(frozen=True)
-class Ring:
-    """A piece of the hot end: the hull of discs [radius, height above the tip] and everything above them."""
-
-    name: str
-    discs_mm: tuple[tuple[float, float], ...]
-    need_mm: float
-
-    def least(self, directions: Floats) -> Floats:
-        """(k,) least d . x over the body, tip at the origin, for (k, 3) directions; minus infinity for downward ones."""
-        across = np.hypot(directions[:, 0], directions[:, 1])
-        lowest = np.min([directions[:, 2] * h - across * r for r, h in self.discs_mm], axis=0)
-        return np.where(directions[:, 2] >= 0.0, lowest, -np.inf)
-
-
-@dataclass(frozen=True)
-class Block:
-    """A box that moves with the head, relative to the tip."""
-
-    name: str
-    min_mm: Vector
-    max_mm: Vector
-    need_mm: float
-
-    def least(self, directions: Floats) -> Floats:
-        """(k,) least d . x over the body, tip at the origin, for (k, 3) directions."""
-        least: Floats = np.where(directions > 0, directions * self.min_mm, directions * self.max_mm).sum(axis=1)
-        return least
-
-
-Body = Ring | Block
-
-
-def bodies(machine: Machine) -> tuple[Body, ...]:
-    """The head's bodies with the distance each must keep: clearance_mm, or its own height above the tip when that is less.
-
-    (The tip itself prints one layer above the table, so what hangs lower than clearance_mm cannot keep clearance_mm.)
-    """
-    profile = machine.head.silhouette_mm
-    rings = [
-        Ring("hot end" if height > 0 else "nozzle tip", tuple(profile[i : i + 2]), min(machine.clearance_mm, height))
-        for i, (_, height) in enumerate(profile)
-    ]
-    boxes = [Block(box.name, box.min_mm, box.max_mm, min(machine.clearance_mm, box.min_mm[2])) for box in machine.head.boxes]
-    return (*rings, *boxes)
-
-
-def directions(normal: Floats) -> Floats:
-    """(k, 3) unit directions to try against a table of this normal: between it and up, beside it, and all around."""
-    share = np.linspace(0.0, 1.0, 9)[:, None]
-    across = np.array([normal[0], normal[1], 0.0])
-    fan = [(1.0 - share) * normal + share * UP, (1.0 - share) * UP - share * across, (1.0 - share) * normal + share * across]
-    faces = np.vstack([np.eye(3), -np.eye(3)])
-    tried = np.vstack([*fan, faces, spread(FIELD)])
-    size = np.linalg.norm(tried, axis=1)
-    kept: Floats = tried[size > 1e-9] / size[size > 1e-9][:, None]
-    return kept
-
-
-def spread(count: int) -> Floats:
-    """(count, 3) unit directions spread evenly over the sphere (Fibonacci lattice)."""
-    k = np.arange(count) + 0.5
-    z = 1.0 - 2.0 * k / count
-    angle = pi * (1.0 + 5.0**0.5) * k
-    around = np.sqrt(1.0 - z * z)
-    return np.column_stack([around * np.cos(angle), around * np.sin(angle), z])
 
 
 def table_reach(machine: Machine, pose: Pose, tried: Floats) -> Floats:
@@ -110,11 +40,6 @@ def cradle_reach(machine: Machine, box: CradleBox, pose: Pose, tried: Floats) ->
     """(k,) greatest d . x over a body of the cradle, which tilts with the table and does not turn with it."""
     tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
     return _corner_reach(machine_points(machine, tilted, corners(box.min_mm, box.max_mm)), tried)
-
-
-def corners(least_mm: Vector, most_mm: Vector) -> Floats:
-    """(8, 3) corners of a box."""
-    return np.array(list(product(*zip(least_mm, most_mm, strict=True))))
 
 
 def _corner_reach(points: Floats, tried: Floats) -> Floats:

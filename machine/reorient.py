@@ -12,8 +12,9 @@ from math import ceil, hypot, inf, radians
 
 import numpy as np
 
-from machine.collide import Printed, bodies, directions, solids, spread, sweep_gaps, swing_mm
+from machine.collide import Printed, solids, sweep_gaps, swing_mm
 from machine.dryrun.timeline import move_times
+from mdp.head import bodies, directions, spread
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.errors import MoveError

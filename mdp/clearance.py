@@ -3,14 +3,15 @@
 By construction nothing printed stands above the base plane of the part being printed, so the head can only meet the table.
 A body point at b from the tip is n . b + z above the table, n the table's normal in the machine frame and z the tip's height
 above the table; with the table unbounded, z >= max over the bodies of -n . b keeps all of them clear. For one body reaching y
-across the tilt axis on the rising side at height h this is z >= y sin t - h cos t.
+across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. What of the cradle stands higher than the
+table is not under that plane: it is tried against the head wherever the tip goes.
 """
 
-from itertools import product
 from math import hypot
 
 import numpy as np
 
+from mdp.head import bodies, corners, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, poses, rotation, shift
 from profiles.machine import Machine
@@ -24,8 +25,7 @@ def least_tip_height_mm(machine: Machine, pose: Pose) -> float:
         return 0.0
     needed = [radius * across - height * along for radius, height in machine.head.silhouette_mm]
     for box in machine.head.boxes:
-        corners = np.array(list(product(*zip(box.min_mm, box.max_mm, strict=True))))
-        needed.append(float(-(corners @ normal).min()))
+        needed.append(float(-(corners(box.min_mm, box.max_mm) @ normal).min()))
     return max(0.0, max(needed) + machine.clearance_mm)
 
 
@@ -42,6 +42,24 @@ def allowed_poses(machine: Machine, direction: Floats, points_mm: Floats, near_t
         reached = points_mm @ rotation(machine, pose).T + shift(machine, pose)
         limits = np.array([axis.limits_mm for axis in (machine.x, machine.y, machine.z)])
         inside = (reached.min(axis=0) >= limits[:, 0]).all() and (reached.max(axis=0) <= limits[:, 1]).all()
-        if inside and lowest >= least_tip_height_mm(machine, pose):
+        if inside and lowest >= least_tip_height_mm(machine, pose) and _clear_of_cradle(machine, pose, reached):
             found.append(pose)
     return found
+
+
+def _clear_of_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> bool:
+    """Whether the head keeps off all of the cradle that stands higher than the table, the tip anywhere in the hull of (n, 3)
+    machine points: one direction must part each body there from each box."""
+    higher = [box for box in machine.cradle if box.max_mm[2] > 0.0]
+    if not higher:
+        return True
+    tried = directions(rotation(machine, pose) @ UP)
+    least = (tried @ tips_mm.T).min(axis=1)
+    tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)  # the cradle does not turn with the table
+    for box in higher:
+        reached = corners(box.min_mm, box.max_mm) @ rotation(machine, tilted).T + shift(machine, tilted)
+        reach = (tried @ reached.T).max(axis=1)
+        for body in bodies(machine):
+            if float((least + body.least(tried) - reach).max()) < body.need_mm:
+                return False
+    return True

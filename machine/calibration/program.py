@@ -7,7 +7,6 @@ from math import pi
 import numpy as np
 
 from machine.blocks import filled
-from machine.collide import corners
 from machine.dialects import DIALECTS
 from machine.gcode import BLOCKS
 from machine.kinematics.table import machine_points
@@ -16,6 +15,7 @@ from machine.pen import Pen, number
 from machine.placeholders import placeholders
 from machine.turning import turn
 from mdp.clearance import least_tip_height_mm
+from mdp.head import corners
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.errors import MoveError

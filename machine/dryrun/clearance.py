@@ -6,11 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.collide import (
-    Body,
     Printed,
     Reach,
-    bodies,
-    directions,
     gaps_of,
     hull,
     refined_gap,
@@ -22,6 +19,7 @@ from machine.collide import (
 from machine.dryrun.findings import MOST, Finding, cut_short
 from machine.dryrun.stretches import stretches
 from machine.parsed import MoveKind, ParsedProgram
+from mdp.head import Body, bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine

@@ -8,10 +8,11 @@ from itertools import product
 
 import numpy as np
 
-from machine.collide import Printed, bodies, directions, solids, sweep_gaps
+from machine.collide import Printed, solids, sweep_gaps
 from machine.coordinates import axis_positions, followed, origin_mm
 from machine.kinematics.table import workpiece_points
 from machine.link.modal import E_AXIS, Modal
+from mdp.head import bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine

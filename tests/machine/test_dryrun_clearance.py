@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from machine.collide import Block, Ring, bodies, directions, hull, refined_gap, spread, sweep_gaps, table_reach
+from machine.collide import hull, refined_gap, sweep_gaps, table_reach
 from machine.dryrun import dry_run
 from machine.kinematics.table import machine_points
+from mdp.head import Block, Ring, bodies, directions, spread
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Box, Head, Machine
 from profiles.profile import Profile, load

@@ -7,7 +7,7 @@ from threading import Event as Flag
 import numpy as np
 import pytest
 
-from machine.collide import bodies, directions, solids
+from machine.collide import solids
 from machine.kinematics.table import machine_points
 from machine.link.control import Control, Wish
 from machine.link.faults import Fault, FaultScript
@@ -18,6 +18,7 @@ from machine.link.progress import Progress
 from machine.link.retreat import retreat
 from machine.link.stream import Outcome, print_lines
 from machine.link.virtual import PATH, VirtualPrinter
+from mdp.head import bodies, directions
 from mdp.pose import UP, Pose, rotation
 from profiles.errors import FirmwareError, PortError
 from profiles.profile import load

@@ -5,9 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from machine.collide import corners, hull
+from machine.collide import hull
 from machine.kinematics.table import machine_points
 from machine.reorient import Speeds, poses_between, route, stands, way_s
+from mdp.head import corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
 from profiles.machine import CradleBox, Machine

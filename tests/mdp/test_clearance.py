@@ -1,0 +1,56 @@
+"""What of a cradle stands higher than the table keeps poses out: checked with solids that manifold3d cuts with one another."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mdp.clearance import allowed_poses
+from mdp.head import Block, bodies, corners
+from mdp.pose import Pose, rotation, shift, unit
+from profiles.machine import CradleBox, Machine
+from profiles.profile import load
+
+MACHINE = load(settings=["machine.clearance_mm=0"]).machine
+PART = corners((-5.0, -5.0, 30.0), (5.0, 5.0, 45.0))
+LEANING = unit((0.0, -0.6, 0.8))
+
+
+def with_post(machine: Machine, y_mm: float, height_mm: float) -> Machine:
+    """The machine with a post of the cradle 20 mm wide beside the table."""
+    post = CradleBox(name="post", min_mm=(-10.0, y_mm, -20.0), max_mm=(10.0, y_mm + 8.0, height_mm))
+    return machine.model_copy(update={"cradle": [post]})
+
+
+def meet(machine: Machine, pose: Pose) -> bool:
+    """Whether the head's boxes, over all places of the tip, share room with the post; by exact solids."""
+    tips = PART @ rotation(machine, pose).T + shift(machine, pose)
+    tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
+    box = machine.cradle[0]
+    post = corners(box.min_mm, box.max_mm) @ rotation(machine, tilted).T + shift(machine, tilted)
+    swept = [
+        (tips[:, None] + corners(body.min_mm, body.max_mm)[None]).reshape(-1, 3)
+        for body in bodies(machine)
+        if isinstance(body, Block)
+    ]
+    return any((m3.Manifold.hull_points(each) ^ m3.Manifold.hull_points(post)).volume() > 1e-6 for each in swept)
+
+
+@given(st.floats(-140, 140), st.floats(5, 120))
+def test_no_pose_is_allowed_at_which_the_head_meets_a_post_of_the_cradle(y_mm: float, height_mm: float) -> None:
+    machine = with_post(MACHINE, y_mm, height_mm)
+    assert not any(meet(machine, pose) for pose in allowed_poses(machine, LEANING, PART))
+
+
+@pytest.mark.parametrize(("height", "count"), [(5.0, 2), (200.0, 0)])
+def test_a_low_post_far_out_leaves_both_poses_and_a_tall_one_beside_the_part_none(height: float, count: int) -> None:
+    free = len(allowed_poses(MACHINE.model_copy(update={"cradle": []}), LEANING, PART))
+    beside = with_post(MACHINE, 110.0 if height < 100 else 10.0, height)
+    assert (free, len(allowed_poses(beside, LEANING, PART))) == (2, count)
+
+
+def test_what_lies_under_the_table_changes_nothing() -> None:
+    under = MACHINE.model_copy(update={"cradle": [CradleBox(name="arm", min_mm=(-10, 60, -40), max_mm=(10, 80, -1))]})
+    assert allowed_poses(under, LEANING, PART) == allowed_poses(MACHINE, LEANING, PART)
+    assert np.isfinite([pose.turn_deg for pose in allowed_poses(under, LEANING, PART)]).all()
