@@ -3,6 +3,7 @@
 import http.client
 import json
 import socket
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.client import HTTPResponse
@@ -77,6 +78,19 @@ def test_no_other_page_may_frame_it_or_keep_it(watched: Watched) -> None:
     assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
     assert answer.headers["Cache-Control"] == "no-store"
     assert answer.headers["Access-Control-Allow-Origin"] is None
+
+
+def test_who_hangs_up_leaves_the_terminal_alone(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.app.view.live.LAST_WORD_S", 0.0)
+    with served(b"x" * 20_000_000) as running:
+        port = int(running.address.split(":")[2].strip("/"))
+        for _ in range(3):
+            with socket.create_connection(("127.0.0.1", port), timeout=5) as rude:
+                rude.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                rude.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                rude.recv(10)
+        assert asked(running, "/state")[0].status == 200
+    assert capfd.readouterr().err == ""
 
 
 def test_it_listens_on_this_computer_only(watched: Watched) -> None:

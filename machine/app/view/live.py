@@ -5,6 +5,7 @@ state by letting its own name point here (DNS rebinding).
 """
 
 import json
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http import HTTPStatus
@@ -106,6 +107,11 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
 
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Who asked has gone: nothing to tell. Anything else is told as the library does."""
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
+
 
 def _handler(watched: Watched) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
@@ -131,10 +137,7 @@ def _handler(watched: Watched) -> type[BaseHTTPRequestHandler]:
             for name, value in HEADERS.items():
                 self.send_header(name, value)
             self.end_headers()
-            try:
-                self.wfile.write(content)
-            except (BrokenPipeError, ConnectionResetError):  # who asked has gone
-                self.close_connection = True
+            self.wfile.write(content)
 
         def log_message(self, format: str, *words: Any) -> None:
             """Nothing: the terminal belongs to the print."""
