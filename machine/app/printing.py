@@ -11,9 +11,9 @@ from machine.app.journals import new_journal
 from machine.app.keys import Keyboard, Typing, can_type
 from machine.app.match import printer_at
 from machine.app.pipeline import Program
-from machine.app.progress import Ticker, say
+from machine.app.progress import Ticker, is_terminal, say
 from machine.app.report import duration, show
-from machine.app.screen import Course, Screen, Words, is_terminal
+from machine.app.screen import Course, Screen, Words
 from machine.app.traffic import TrafficLog, new_log, tapped
 from machine.dialects import DIALECTS
 from machine.link.answer import Answer
@@ -173,9 +173,7 @@ class _Late:
 def _shown(title: str, program: Program, control: Control, words: Words) -> Iterator[Follow]:
     """What shows the progress: a screen with keys on a terminal, plain lines elsewhere. Ends with the terminal as before."""
     if not is_terminal():
-        ticker = Ticker()
-        yield lambda progress: ticker.tick(status(progress))
-        ticker.close()
+        yield _Lines()
         return
     board = Keyboard(control)
     with ExitStack() as stack:
@@ -189,6 +187,17 @@ def _shown(title: str, program: Program, control: Control, words: Words) -> Iter
             screen.tell(progress)
 
         yield tell
+
+
+class _Lines:
+    """Plain lines: one every few seconds, and at once when something has changed."""
+
+    def __init__(self) -> None:
+        self._ticker, self._last = Ticker(), ("", "")
+
+    def __call__(self, progress: Progress) -> None:
+        before, self._last = self._last, (progress.state, progress.message)
+        self._ticker.tick(status(progress), at_once=before != self._last)
 
 
 @contextmanager
@@ -216,7 +225,7 @@ def status(progress: Progress) -> str:
         told.append(f"nozzle {nozzle:.0f} C" + (f", bed {bed:.0f} C" if bed is not None else ""))
     if progress.left_s is not None:
         told.append(f"{duration(progress.left_s)} left")
-    return f"{progress.state}: " + ", ".join(told)
+    return f"{progress.state}: " + ", ".join(told) + (f"; {progress.message}" if progress.message else "")
 
 
 def ended(outcome: Outcome) -> int:

@@ -14,11 +14,16 @@ def say(text: str) -> None:
     sys.stderr.flush()
 
 
+def is_terminal() -> bool:
+    """Whether stderr is a terminal on which lines can be rewritten."""
+    return sys.stderr.isatty() and os.environ.get("TERM", "") not in ("", "dumb")
+
+
 class Ticker:
     """A status that changes often: `tick` shows it at a bearable rate, `close` ends it."""
 
     def __init__(self) -> None:
-        self.live = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+        self.live = is_terminal()
         self.shown_at = monotonic()
         self.open = False
 

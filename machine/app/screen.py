@@ -1,7 +1,5 @@
 """Screen: where a running print stands, drawn on the terminal: part, layer, pose, heat, time left, the printer's words, keys."""
 
-import os
-import sys
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -63,7 +61,7 @@ class Words:
 
     def __init__(self) -> None:
         self.last: deque[str] = deque(maxlen=WORDS_KEPT)
-        self._half = b""
+        self._half, self._message = b"", ""
 
     def hear(self, direction: str, data: bytes) -> None:
         """Take what was received ("<")."""
@@ -76,9 +74,10 @@ class Words:
                 self.last.append(text)
 
     def add(self, text: str) -> None:
-        """Add a word of this program, unless it is the last one already."""
-        if text and (not self.last or self.last[-1] != text):
+        """Take the stream's message of this moment; one that stays is added once."""
+        if text and text != self._message:
             self.last.append(text)
+        self._message = text
 
 
 def spoken(line: bytes) -> str:
@@ -199,8 +198,3 @@ class Screen:
             self._live.stop()
         except OSError:
             return
-
-
-def is_terminal() -> bool:
-    """Whether a screen can be drawn on stderr."""
-    return sys.stderr.isatty() and os.environ.get("TERM", "") not in ("", "dumb")

@@ -105,7 +105,7 @@ def test_without_a_terminal_plain_lines_tell_the_progress(hours: str) -> None:
     command = [sys.executable, "-m", "machine.app.cli", *print_of(hours)]
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT)
     assert process.stderr is not None
-    line = next(line for line in process.stderr if line.startswith(b"printing:"))
+    line = next(line for line in process.stderr if line.startswith(b"printing:") and b"nozzle" in line)
     os.kill(process.pid, signal.SIGHUP)
     assert process.wait(60) == 130
     process.communicate()

@@ -111,11 +111,13 @@ def test_words_cut_anywhere_are_put_together_and_the_last_four_kept() -> None:
     assert list(words.last) == ["word 5", "word 6", "word 7", "word 8"]
 
 
-def test_a_message_that_stays_is_told_once() -> None:
+def test_a_message_that_stays_is_told_once_whatever_the_printer_says_meanwhile() -> None:
     words = Words()
     for text in ("pausing", "pausing", "", "paused"):
         words.add(text)
-    assert list(words.last) == ["pausing", "paused"]
+        words.hear("<", b"ok\n" if text else b"echo:busy here\n")
+        words.add(text)
+    assert list(words.last) == ["pausing", "busy here", "paused"]
 
 
 def test_a_printer_that_never_ends_its_line_takes_no_memory() -> None:
