@@ -29,6 +29,11 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 SIMULATED = "sim"
+HEATERS = {
+    True: "heaters off",
+    False: "the printer did not confirm that its heaters are off: look at it",
+    None: "nothing had been sent yet",
+}
 Follow = Callable[[Progress], None]
 
 
@@ -193,7 +198,7 @@ class _Lines:
     """Plain lines: one every few seconds, and at once when something has changed."""
 
     def __init__(self) -> None:
-        self._ticker, self._last = Ticker(), ("", "")
+        self._ticker, self._last = Ticker(), ("printing", "")
 
     def __call__(self, progress: Progress) -> None:
         before, self._last = self._last, (progress.state, progress.message)
@@ -233,8 +238,7 @@ def ended(outcome: Outcome) -> int:
     for warning in outcome.warnings:
         say(f"the printer said: {warning}")
     if outcome.cancelled:
-        heaters = "heaters off" if outcome.heaters_off else "the printer did not confirm that its heaters are off: look at it"
-        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
+        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {HEATERS[outcome.heaters_off]}")
         return 130
     told = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
     show(f"{told} ({outcome.firmware[:60]})\n")
