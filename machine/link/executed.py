@@ -29,10 +29,13 @@ class Executed:
         if self._most is not None and len(rows) >= self._most:
             del rows[: -self._most // 2]
 
-    def cut(self, block: Block, planned_mm: float, planned_s: float) -> None:
-        """The block that began last ends early: it has its new end and duration; planned: filament's end and duration before."""
+    def cut(self, block: Block, planned: Sequence[float], planned_s: float) -> None:
+        """The block that began last ends early: it has its new end and duration; planned: those it had before."""
         base = len(self.rows) - ROW
-        self._count(block.start, (*block.end[:5], planned_mm), planned_s, -1)
+        self._count(block.start, planned, planned_s, -1)
+        if list(block.start) == list(block.end):  # it had only just begun
+            del self.rows[base:]
+            return
         self._count(block.start, block.end, block.duration_s, 1)
         for axis in range(6):
             self.rows[base + 6 + axis] = block.end[axis]

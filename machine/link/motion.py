@@ -197,11 +197,11 @@ class Motion:
         """Stop at once: later blocks never happen, the one under way ends where it is."""
         self.planner.run(now_s)
         cut = self.planner.under_way()
-        planned = (cut.end[5], cut.duration_s) if cut is not None else (0.0, 0.0)
+        planned, planned_s = (cut.end, cut.duration_s) if cut is not None else ((), 0.0)
         stopped = self.planner.halt(now_s)
         self.halts += 1
         if cut is not None:
-            self.executed.cut(cut, *planned)
+            self.executed.cut(cut, planned, planned_s)
         if stopped is not None:
             self.place[5] += (stopped[5] - self._real[5]) / (self.flow_share or 1.0)
             self._real = list(stopped)

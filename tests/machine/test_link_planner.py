@@ -112,6 +112,13 @@ def test_a_halt_leaves_the_axes_where_the_ramps_had_brought_them() -> None:
     assert (record.moves, record.moving_s) == (1, pytest.approx(0.02))
 
 
+def test_a_stroke_halted_before_it_moves_never_was() -> None:
+    firmware = ran(["M302 P1", "M83", "G1 X10 E4 F600", "G1 X20 E4", "G1 X30 E4"], until_s=0.0)
+    firmware.body.motion.halt(0.0)
+    record = firmware.record()
+    assert (record.moves, record.strokes, record.pushed_mm, record.moving_s, len(record.end)) == (0, 0, 0.0, 0.0, 0)
+
+
 def test_a_halt_forgets_the_filament_that_was_not_pushed() -> None:
     firmware = ran(["M302 P1", "M83", "M221 S50", "G1 X10 E4 F600", "G1 X20 E4", "G1 X30 E4"], until_s=1.0)
     firmware.body.motion.halt(1.0)
