@@ -119,6 +119,9 @@ def simulate(
         str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
     ] = None,
     html: HtmlFile = None,
+    baud: Annotated[
+        int | None, typer.Option("--baud", metavar="N", help="find moves that a line of N bits a second brings too late")
+    ] = None,
     machine: MachineGiven = None,
     material: MaterialGiven = None,
     process: ProcessGiven = None,
@@ -131,7 +134,7 @@ def simulate(
         machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
     )
     named = _named(machine=machine, material=material, process=process, settings=settings)
-    return commands.simulate(model, profile, ranker, orient, json, named, beside, html)
+    return commands.simulate(model, profile, ranker, orient, json, named, beside, html, baud)
 
 
 @app.command()

@@ -19,6 +19,7 @@ from machine.app.view.page import parts_page, print_page
 from machine.app.warmup import warm_dry_run, warm_picture
 from machine.dryrun.agreement import Agreement, agreement
 from machine.dryrun.dryrun import dry_run, summary
+from machine.dryrun.starvation import check_baud, starved
 from mdp.read import locate, read_mesh
 from mdp.save import part_file, stl, threemf, values
 from profiles.errors import GcodeError, MoveError, ProfileError
@@ -112,13 +113,17 @@ def simulate(
     named: frozenset[str] = frozenset(),
     beside: str | None = None,
     html: Path | None = None,
+    baud: int | None = None,
 ) -> int:
     """Dry-run a model or a G-code file; 1 when a finding is an error.
 
-    named: profiles given, not taken from the file. beside: the model that a G-code file's plastic is held against.
+    named: profiles given, not taken from the file. beside: the model that a G-code file's plastic is held against. baud: of a
+    line whose speed is judged too.
     """
     for file in (json, html):
         _check(file)
+    if baud is not None:
+        check_baud(baud)
     if beside is not None:
         if Path(model).suffix.lower() not in GCODE_SUFFIXES:
             raise ProfileError(f"--model {beside}: {model} is a model itself; --model goes with a G-code file")
@@ -132,6 +137,8 @@ def simulate(
     if mesh is not None:
         found, run = agreement(program.run, mesh, profile)
         program = replace(program, run=run)
+    if baud is not None:
+        program = replace(program, run=starved(program.run, program.lines, profile.machine, baud))
     if html is not None:
         known = machine_known(program, profile, given, named)
         write_bytes(html, print_page(model_name(model), program, profile, known))

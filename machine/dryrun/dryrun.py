@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, heat, laying, made, motion, plate, sequence
+from machine.dryrun import clearance, heat, laying, made, motion, plate, sequence, switching
 from machine.dryrun.findings import Finding
 from machine.dryrun.ground import Ground, beads, walk
 from machine.dryrun.timeline import move_times
@@ -74,6 +74,7 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
         *clearance.findings(program, segments, rows, machine),
         *laying.findings(program, deposited, ground),
         *sequence.findings(program, profile),
+        *switching.findings(program, machine),
         *made.findings(text, program, profile),
         *plate.findings(program, segments, rows, profile),
         *heat.findings(program, profile),

@@ -15,6 +15,7 @@ def dispatch(reader: Reader, name: str, words: Words) -> None:
     if reader.turning:
         flush(reader)
     if name in (dialect.follow_on, dialect.follow_off):
+        reader.note(name, 0.0, "")
         follow(reader, name == dialect.follow_on)
         return
     action = CODES.get(name)

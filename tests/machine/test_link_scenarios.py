@@ -512,6 +512,16 @@ def test_scenario_34_stalls_of_sixty_milliseconds_never_overflow_a_ring_of_128_b
     assert (done.record.lost_bytes, done.outcome.repeated) == (0, 0)
 
 
+def test_scenario_35_short_segments_are_slowed_by_the_line_and_no_byte_is_lost() -> None:
+    """That the dry run predicts it, and how often the printer runs dry, is tested beside the dry run."""
+    strokes = [f"G1 X{20 + k / 10:.1f} Y30 E0.{10000 + k} F3600" for k in range(300)]
+    paced = [printed(habits=Habits(rx_ring=128), lines=[*HEAT, *strokes], baud=baud) for baud in (9600, 115200, 1_000_000)]
+    assert [done.record.underruns > 20 for done in paced] == [True, False, False]
+    assert paced[0].record.slowed > 10 < paced[1].record.slowed > paced[2].record.slowed
+    for done in paced:
+        assert_exact(done, strokes=strokes)
+
+
 def test_scenario_36_two_waits_with_a_line_in_flight_find_the_lost_one() -> None:
     habits = replace(PLAIN, waits=True, busy=False)
     done = printed(lost(LINE, habits), habits)
