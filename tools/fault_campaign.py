@@ -28,6 +28,8 @@ from profiles.errors import PrinterError
 from profiles.profile import load
 
 PROFILE = load()
+# Firmwares that never ask for a line again, over a line that loses no bytes of theirs.
+TRUSTING = {5: load(settings=["machine.dialect=klipper"]), 13: load(settings=["machine.dialect=reprapfirmware"])}
 HEAT = ["M104 S200", "M109 S200", "G92 E0", "M83"]
 COLD = ["M104 S0", "M140 S0", "M107"]
 MOST_S = 7200.0  # twenty times what a print takes; a host that needs more hangs
@@ -43,6 +45,9 @@ WORDS: dict[str, tuple[str, ...]] = {
     "block": ("has been silent", "has stopped reading", "no temperature"),
     "heater failure": ("its heater or its sensor has failed", "Thermal Runaway", "Heating failed", "cold extrusion prevented"),
     "thermal runaway": ("Thermal Runaway", "halted"),
+    "swallow ok": ("was not answered",),
+    "truncate ok": ("was not answered",),
+    "garbage": ("was not answered",),
 }
 UNREACHABLE = ("may still be on",)
 
@@ -52,6 +57,7 @@ class Trial:
     """One print: the kinds of its faults, the error it ended with ("": none), and what must not be about that."""
 
     seed: int
+    dialect: str
     kinds: tuple[str, ...]
     error: str
     virtual_s: float
@@ -63,6 +69,8 @@ class Trial:
     def name(self) -> str:
         """The group of the table it belongs to."""
         deadly = [kind for kind in self.kinds if kind not in (*HEALED, "delay")]
+        if self.dialect != "marlin":
+            return f"{self.dialect}: all but lost bytes"
         if not deadly:
             return "bytes, oks, delays, false resends"
         return f"with {deadly[0]}" if len(deadly) == 1 else "with several of these"
@@ -85,6 +93,9 @@ def wanted(lines: Iterable[str]) -> np.ndarray:
 def script(seed: int, lines: int) -> FaultScript:
     """One to twelve faults of up to four kinds; a third of the scripts holds what can be healed, a tenth faults by chance."""
     rng = random.Random(seed)
+    if seed % 16 in TRUSTING:
+        safe = [kind for kind in KINDS if kind not in ("drop", "flip", "duplicate", "delay", "spurious resend")]
+        return random_script(seed, rng.randint(1, 3), range(5, lines), rng.sample(safe, rng.randint(1, 3)))
     if seed % 10 == 7:
         chances = [Fault(kind, chance=rng.uniform(1e-5, 2e-4)) for kind in ("drop", "flip", "duplicate")]
         oks = [Fault(kind, chance=rng.uniform(1e-3, 1e-2)) for kind in ("swallow ok", "truncate ok", "double ok")]
@@ -102,11 +113,12 @@ def habits(seed: int) -> Habits:
 def trial(seed: int, lines: int) -> Trial:
     """Print once and judge."""
     text, faults, began_s = program(lines), script(seed, lines), time.perf_counter()
-    baud = (None, 250000, 115200)[seed % 4 - 1] if seed % 4 else None
-    printer = VirtualPrinter(PROFILE.machine, habits(seed), faults, baud, MOST_S)
+    profile = TRUSTING.get(seed % 16, PROFILE)
+    baud = None if profile is not PROFILE else (None, None, 250000, 115200)[seed % 4]
+    printer = VirtualPrinter(profile.machine, habits(seed), faults, baud, MOST_S)
     error, repeated = "", 0
     try:
-        repeated = print_lines(text, PATH, medium=printer.medium, profile=PROFILE).repeated
+        repeated = print_lines(text, PATH, medium=printer.medium, profile=profile).repeated
     except PrinterError as stopped:
         error = str(stopped)
     except EndlessError:
@@ -115,7 +127,7 @@ def trial(seed: int, lines: int) -> Trial:
     wrong = [] if error == "hangs" else judged(text, faults, printer, error)
     wrong += ["hangs"] if error == "hangs" else []
     kinds = tuple(sorted({fault.kind for fault in faults.faults}))
-    return Trial(seed, kinds, error, end_s, time.perf_counter() - began_s, repeated, tuple(wrong))
+    return Trial(seed, profile.machine.dialect, kinds, error, end_s, time.perf_counter() - began_s, repeated, tuple(wrong))
 
 
 def judged(text: list[str], faults: FaultScript, printer: VirtualPrinter, error: str) -> list[str]:
