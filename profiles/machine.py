@@ -248,6 +248,12 @@ class Machine(Frozen):
     junction_speed_mm_s: float = Field(
         8.0, ge=0, le=100, description="speed change that the firmware makes at once at a corner (jerk), mm/s"
     )
+    receive_bytes: int = Field(
+        128,
+        ge=64,
+        le=65536,
+        description="receive buffer of the board's serial port, bytes (Marlin: RX_BUFFER_SIZE): less is on its way at a time",
+    )
     extruder_speed_mm_s: float = Field(60.0, gt=0, le=500, description="greatest speed of the filament, mm/s")
     extruder_acceleration_mm_s2: float = Field(1500.0, gt=0, le=100000, description="acceleration of the filament, mm/s2")
     arcs: bool = Field(

@@ -8,7 +8,6 @@ import numpy as np
 
 from mdp.kernel import floats, kernel, part
 
-RING_BYTES = 127.0  # of an AVR's receive ring: so many bytes are in flight at most
 LINES = 4  # Marlin's BUFSIZE: more lines are never in flight
 OK_BYTES = 17.0  # of `ok N12345 P15 B3`, during which the printer reads nothing
 BLOCKS = 15  # of Marlin's BLOCK_BUFFER_SIZE 16 one place stays empty
@@ -65,11 +64,12 @@ def _waited(now, places, state, span, entry2, cruise, acceleration, length):  # 
 
 
 @kernel
-def played(direction, length, speed, acceleration, measure, halts, own, ahead, byte_s, jerk, slowed, stopped):  # type: ignore[no-untyped-def]
+def played(direction, length, speed, acceleration, measure, halts, own, ahead, ring, byte_s, jerk, slowed, stopped):  # type: ignore[no-untyped-def]
     """Seconds until the last block is over; slowed and stopped (n,) are filled in.
 
     direction (n, 6), length (n,), speed (n,), acceleration (n,) and measure (n,) of the blocks; halts (n,): all before it must
-    be over; own (n,): bytes of its line, ahead (n,): bytes of other lines before that; byte_s: seconds of a byte.
+    be over; own (n,): bytes of its line, ahead (n,): bytes of other lines before that; ring: bytes in flight at most; byte_s:
+    seconds of a byte.
     """
     n = len(length)
     cruise, entry2, corner2, taken = floats(n, 0.0), floats(n + 1, 0.0), floats(n, 0.0), floats(n, 0.0)
@@ -80,7 +80,7 @@ def played(direction, length, speed, acceleration, measure, halts, own, ahead, b
     for i in range(n):
         cruise[i] = speed[i]
         flight += own[i]
-        while oldest < i and (flight > RING_BYTES or i - oldest >= LINES):
+        while oldest < i and (flight > ring or i - oldest >= LINES):
             flight -= own[oldest]
             oldest += 1
         begin = max(sent, taken[oldest - 1] + OK_BYTES * byte_s) if oldest > 0 else sent

@@ -85,8 +85,8 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
     own, ahead = _bytes(lines, program.line[blocks])
     flags = np.zeros((2, len(blocks)), dtype=np.bool_)
     time_s = played(
-        moved / length[:, None], length, speed, acceleration, measure, halts, own, ahead, BITS / baud,
-        machine.junction_speed_mm_s, flags[0], flags[1],
+        moved / length[:, None], length, speed, acceleration, measure, halts, own, ahead,
+        machine.receive_bytes - 1.0, BITS / baud, machine.junction_speed_mm_s, flags[0], flags[1],
     )  # fmt: skip
     whole = np.zeros((2, len(program.line)), dtype=np.bool_)
     whole[:, blocks] = flags

@@ -83,7 +83,9 @@ def print_lines(
     feed = Feed(job, control, journal, on_progress, stop, medium.now_s())
     name = lasting_name(port)
     wire = medium.open(port, baud)
-    talk = Talk(wire, medium, timing or Timing(), feed.heard, feed.turned, _Finder(feed, name, baud, medium), limit, traffic)
+    rx_bytes = None if profile is None else profile.machine.receive_bytes - 1  # a ring holds one byte less than its size
+    finder = _Finder(feed, name, baud, medium)
+    talk = Talk(wire, medium, timing or Timing(), feed.heard, feed.turned, finder, limit, traffic, rx_bytes, baud)
     feed.talk = talk
     try:
         return _Print(feed, talk, medium, journal).run(lines, begin)

@@ -30,9 +30,11 @@ class Talk:
         lost: Callable[[PortError], Wire],
         limit: int = LINE_LIMIT,
         traffic: Traffic | None = None,
+        rx_bytes: int | None = None,
+        baud: int | None = None,
     ) -> None:
         self.wire, self.medium = wire, medium
-        self.protocol = Protocol(timing, medium.now_s(), limit)
+        self.protocol = Protocol(timing, medium.now_s(), limit, rx_bytes=rx_bytes, baud=baud)
         self.greeted = False
         self._heard, self._turned, self._lost, self._traffic = heard, turned, lost, traffic
         self._position: Position | None = None
