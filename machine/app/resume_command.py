@@ -8,14 +8,14 @@ from pathlib import Path
 from machine.app.interrupts import interrupting
 from machine.app.journals import continued
 from machine.app.pipeline import Program
-from machine.app.printing import check_dialect, ended, streamed
+from machine.app.printing import SIMULATED, check_dialect, ended, streamed
 from machine.app.progress import say
 from machine.app.traffic import TrafficLog, new_log
 from machine.dialects import DIALECTS
 from machine.dryrun.dryrun import dry_run
 from machine.link.feed import Begin
 from machine.link.inquiry import Found
-from machine.link.journal import Heading, Story, mark_resumed, read_journal
+from machine.link.journal import Heading, Moment, Story, mark_resumed, read_journal
 from machine.link.program import GcodeFile
 from machine.link.resume import Point, Way, heights_mm, point_of, way_on
 from machine.link.wishes import CancelledError
@@ -38,6 +38,8 @@ def resume(
 
     given: the profile whose machine the user has named; file: of the new journal; log: of the traffic.
     """
+    if port == SIMULATED:
+        raise JournalError("--port sim: a simulated printer ends with its print, so it cannot be resumed; give the port of a printer")
     story = read_journal(journal)
     profile = _profile(journal, story.heading, given)
     check_dialect(profile.machine)
@@ -59,13 +61,14 @@ def resume(
 
     title = f"the rest of {story.heading.name} to {port}"
     program = Program(lines, dry_run(lines, profile), None)
-    with (
-        new_log("print", title) if log is None else TrafficLog(log, title) as kept,
-        continued(text, profile, story.heading.name, file) as further,
-    ):
-        outcome = streamed(program, profile, port, baud, title, kept, journal=further, begin=begin)
+    further = continued(text, profile, story.heading.name, file)
+    try:
+        with new_log("print", title) if log is None else TrafficLog(log, title) as kept, further:
+            outcome = streamed(program, profile, port, baud, title, kept, journal=further, begin=begin)
+    finally:
+        if further.last == Moment():  # a journal that tells nothing would let the whole program begin anew
+            further.path.unlink(missing_ok=True)
     if outcome.cancelled and outcome.heaters_off is None:
-        further.path.unlink(missing_ok=True)
         say("nothing was moved or heated")
         return 1
     return ended(outcome)

@@ -71,7 +71,7 @@ class Feed:
         self.talk: Talk
         self.begin: Begin | None = None  # of a resumed print
         self.state, self._trouble, self.begun, self.finished = "printing", "", False, False
-        self.sent = 0
+        self.sent = self._absorbed = 0
         self._layer_ended = self._verify = self._away = False
         self._began_s = self._shown_s = self._asked_s = self._checked_s = began_s
 
@@ -111,6 +111,7 @@ class Feed:
     def _absorb(self, command: str) -> None:
         """A command that was done by an earlier run."""
         self._follow(command)
+        self._absorbed += 1
 
     def _follow(self, command: str) -> bool:
         """Keep modal state and the print's outline in step; True when the command moves something."""
@@ -167,8 +168,8 @@ class Feed:
         self._checked_s = now_s
         told = self.talk.ask_position()
         self.trail.barrier()
-        if told is not None and (wrong := unlike(self.modal, told.axes, NEAR)):
-            self._trouble = f"the printer stands at {', '.join(wrong)}"
+        wrong = unlike(self.modal, told.axes, NEAR) if told is not None else []
+        self._trouble = f"the printer stands at {', '.join(wrong)}" if wrong else ""
         self._mark()
 
     def _prove(self, when: str) -> None:
@@ -291,7 +292,7 @@ class Feed:
         self._shown_s = now_s
         if self._on_progress is None:
             return
-        elapsed_s, place, done = now_s - self._began_s, self._place, self.trail.commands
+        elapsed_s, place, done = now_s - self._began_s, self._place, self._absorbed + self.trail.commands
         self._on_progress(
             Progress(
                 sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,

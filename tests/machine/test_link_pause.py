@@ -20,7 +20,7 @@ from machine.link.stream import Outcome, print_lines
 from machine.link.virtual import PATH, VirtualPrinter
 from mdp.head import bodies, directions
 from mdp.pose import UP, Pose, rotation
-from profiles.errors import FirmwareError, PortError
+from profiles.errors import FirmwareError, PortError, PrinterError
 from profiles.profile import load
 
 PROFILE = load()
@@ -151,6 +151,22 @@ def test_cancelling_lifts_the_tip_and_neither_homes_nor_turns() -> None:
     assert record.end[-1, 2] == pytest.approx(60.0 + MACHINE.lift_mm)
     assert (record.end[-1, 3], record.end[-1, 4]) == (30.0, 725.0)
     assert [text for _, text in record.events if text.startswith("homed")] == ["homed XYZ"]
+
+
+def test_an_error_that_leaves_the_printer_alive_lifts_the_tip_too() -> None:
+    watcher = watched()
+    watcher.when = {150: lambda: watcher.printer.firmware._said.append("//action:disconnect")}
+    with pytest.raises(PrinterError, match=r"asked to be disconnected.*; the printer reports its heaters off"):
+        watcher.run(PROGRAM)
+    assert watcher.printer.record.end[-1, 2] == pytest.approx(60.0 + MACHINE.lift_mm)
+    assert [text for _, text in watcher.printer.record.events if text.startswith("homed")] == ["homed XYZ"]
+
+
+def test_a_printer_that_has_stopped_by_itself_is_not_moved() -> None:
+    watcher = watched((Fault("error", at=150, unit="line", text="Error:Thermal Runaway, system stopped! Heater_ID: 0"),))
+    with pytest.raises(FirmwareError, match="Thermal Runaway, system stopped"):
+        watcher.run(PROGRAM)
+    assert "G91" not in watcher.lines()
 
 
 def test_a_cancel_while_the_tip_is_parked_leaves_it_there() -> None:

@@ -206,7 +206,7 @@ def test_a_second_death_is_resumed_from_the_second_journal(text: GcodeFile, whol
 
 @pytest.mark.parametrize("advanced", [True, False])
 def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: GcodeFile, advanced: bool) -> None:
-    for line in range(20, len(PROGRAM), 17):
+    for line in range(20, len(PROGRAM), 31):
         fault = FaultScript((Fault("reset", at=line, unit="line"),))
         printer = VirtualPrinter(PROFILE.machine, None if advanced else Habits(advanced_ok=False), fault)
         with journal_of(text, f"at {line}") as journal, pytest.raises(FirmwareError):
@@ -387,10 +387,12 @@ def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that
     with journal_of(text, "done") as journal:
         journal.mark(Moment(120, 120, 100, 20, state="finished"))
     assert main(["resume", str(journal.path), "--port", "x"]) == 1
+    assert main(["resume", str(journal.path), "--port", "sim"]) == 1
     told = capsys.readouterr().err
     assert "--machine gives another machine" in told
     assert "give --yes where there is no terminal" in told
     assert "ran to its end" in told
+    assert "a simulated printer ends with its print" in told
 
 
 def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
