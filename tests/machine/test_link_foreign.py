@@ -56,7 +56,8 @@ def print_with_printcore(printer: SimulatedPrinter, heard: list[str] | None = No
     try:
         soon(lambda: core.online)
         assert core.startprint(core_of.gcoder.LightGCode(list(lines())))
-        soon(lambda: not core.printing)
+        # It says that it has printed before the thread that it goes on with has begun.
+        soon(lambda: not core.printing and core.print_thread is None and core.send_thread is not None and core.send_thread.is_alive())
         soon(lambda: printer.record.events[-1][1] == "motors off")
     finally:
         core.disconnect()
