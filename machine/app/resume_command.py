@@ -39,7 +39,7 @@ def resume(
     given: the profile whose machine the user has named; file: of the new journal; log: of the traffic.
     """
     if port == SIMULATED:
-        raise JournalError("--port sim: a simulated printer ends with its print, so it cannot be resumed; give the port of a printer")
+        raise JournalError("--port sim: a simulated printer ends with its print and cannot go on; the port of a printer is expected")
     story = read_journal(journal)
     profile = _profile(journal, story.heading, given)
     check_dialect(profile.machine)

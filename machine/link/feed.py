@@ -234,12 +234,17 @@ class Feed:
         """Once a turn of the talk."""
         self.trail.acknowledge(self.talk.protocol.window.acknowledged)
         self.heed()
-        self.reports.wait(now_s)
+        self.reports.wait(now_s, self._mute())
         if self._journal is not None:
             self._journal.note(self._moment(), now_s)
         if now_s - max(self.reports.heard_s, self._asked_s) >= ASK_S and self.talk.protocol.room("M105"):
             self._asked_s = now_s
             self.talk.protocol.send("M105", now_s)
+
+    def _mute(self) -> bool:
+        """Whether the printer tells no temperatures now: it is at a slow command, and does not report by itself."""
+        protocol = self.talk.protocol
+        return not protocol.capabilities.get("AUTOREPORT_TEMP") and any(line.budget_s for line in protocol.window.flight)
 
     def heed(self) -> None:
         """See what a person wants, and show where the print stands now and then. Raises CancelledError, EmergencyError."""

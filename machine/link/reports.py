@@ -34,9 +34,9 @@ class Reports:
             return self._asked(event)
         return None
 
-    def wait(self, now_s: float) -> None:
-        """Judge a silence; raises PrinterError."""
-        self._watchdog.wait(now_s)
+    def wait(self, now_s: float, mute: bool) -> None:
+        """Judge a silence; raises PrinterError. mute: nothing can be heard now."""
+        self._watchdog.wait(now_s, mute)
 
     def _words(self, text: str) -> None:
         if COLD in text:

@@ -74,8 +74,12 @@ class Watchdog:
             if not heater.over:
                 heater.saw(now_c, target_c, now_s)
 
-    def wait(self, now_s: float) -> None:
-        """Judge silence while a heater is on; raises PrinterError. A printer that never told anything is not judged."""
+    def wait(self, now_s: float, mute: bool = False) -> None:
+        """Judge silence while a heater is on; raises PrinterError. A printer that never told anything is not judged, nor one that
+        cannot tell anything now (mute).
+        """
+        if mute and self.heard_s is not None:
+            self.heard_s = now_s
         heated = any(heater.target_c for heater in self._heaters)
         if self.heard_s is not None and heated and now_s - self.heard_s > UNHEARD_S:
             raise PrinterError(f"the printer has told no temperature for {now_s - self.heard_s:.0f} s although a heater is on")

@@ -6,6 +6,7 @@ import pytest
 
 from machine.link.events import Temperature
 from machine.link.faults import Fault, FaultScript
+from machine.link.habits import Habits
 from machine.link.stream import print_lines
 from machine.link.virtual import PATH, VirtualPrinter
 from machine.link.watchdog import Watchdog
@@ -71,6 +72,13 @@ def test_silence_of_a_printer_that_is_cold_or_never_told_anything_is_not_judged(
     cold.saw(Temperature(20.0, 0.0), 0.0)
     cold.wait(1e6)
     Watchdog().wait(1e6)
+
+
+def test_a_printer_without_reports_may_be_at_a_slow_command_for_long() -> None:
+    lines = ["M104 S200", "M109 S200", "G4 S900", "G1 X5 F600"]
+    printer = VirtualPrinter(PROFILE.machine, Habits(autoreport=False))
+    assert not print_lines(lines, PATH, medium=printer.medium, profile=PROFILE).cancelled
+    assert printer.now_s > 900.0
 
 
 def test_a_heater_that_fails_in_mid_print_ends_it_with_heaters_off() -> None:
