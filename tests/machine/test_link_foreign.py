@@ -39,7 +39,7 @@ def assert_printed(record: Record) -> None:
     assert (record.unknown, record.clamped, record.nozzle_target_c, record.bed_target_c) == (0, 0, 0.0, 0.0)
 
 
-def soon(what: Callable[[], bool], seconds: float = 60.0) -> None:
+def soon(what: Callable[[], object], seconds: float = 60.0) -> None:
     """Wait until something is so."""
     end_s = time.monotonic() + seconds
     while not what():
@@ -57,7 +57,7 @@ def print_with_printcore(printer: SimulatedPrinter, heard: list[str] | None = No
         soon(lambda: core.online)
         assert core.startprint(core_of.gcoder.LightGCode(list(lines())))
         # It says that it has printed before the thread that it goes on with has begun.
-        soon(lambda: not core.printing and core.print_thread is None and core.send_thread is not None and core.send_thread.is_alive())
+        soon(lambda: not (core.printing or core.print_thread) and core.send_thread and core.send_thread.is_alive())
         soon(lambda: printer.record.events[-1][1] == "motors off")
     finally:
         core.disconnect()
