@@ -139,7 +139,7 @@ REACH = re.compile(r"([a-z]):(-?\d+\.?\d*)")
 ACTION = re.compile(r"//\s*action:\s*(\w+)\s*(.*)")
 # A boot loader at another rate, and the jerk of a reset line, put rubbish in front of the word.
 START = re.compile(r"(?:.*[^ -~])?start")
-GREETS = re.compile(r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*")
+GREETS = re.compile(r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: .*")
 # Words by which transmission errors are known even when a byte of them is damaged.
 OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
 OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")

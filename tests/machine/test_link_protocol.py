@@ -717,7 +717,8 @@ def test_a_device_that_is_no_printer_is_told_by_its_own_words() -> None:
     assert "no printer that this program knows: to 6 greetings it said '$GPGGA,123519,4807.038,N'" in str(table.protocol.fault)
 
 
-@pytest.mark.parametrize("said", [b"\x00\xf8start\n", b"echo: Last Updated: 2024-09-29 | Author: (none)\n", b"Grbl 1.1h\n"])
+@pytest.mark.parametrize("said", [b"\x00\xf8start\n", b"echo: Last Updated: 2024-09-29 | Author: (none)\n", b"Grbl 1.1h\n",
+                                  b"RepRapFirmware for Duet 3 is up and running.\n", b"// Klipper state: Ready\n"])  # fmt: skip
 def test_a_restart_is_heard_behind_rubbish_and_by_its_other_words(said: bytes) -> None:
     table = opened()
     table.send("G1 X1")
