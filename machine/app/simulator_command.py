@@ -10,10 +10,10 @@ from machine.app.progress import say
 from machine.app.report import duration, show
 from machine.dialects import DIALECTS
 from machine.link.faults import FaultScript, read_script
-from machine.link.firmware import Habits
+from machine.link.habits import Habits, habits_at
 from machine.link.port import BAUDS
 from machine.link.record import Record
-from machine.link.simulator import RING, SimulatedPrinter
+from machine.link.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.machine import Machine
 
@@ -27,7 +27,7 @@ def serve(
     """Run until Ctrl-C or a termination request, which is its end: 0. The path to open stands on stdout, then what was done."""
     script = read_script(faults) if faults is not None else FaultScript()
     _check(machine, link, tcp, speed, baud)
-    chosen = habits_of(habits or "", Habits(rx_ring=RING if baud else None))
+    chosen = habits_of(habits or "", habits_at(machine, baud))
     stop = threading.Event()
     with (
         stopping(stop),

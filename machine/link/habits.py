@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from machine.link.planner import BLOCKS, MIN_SEGMENT_S
+from profiles.machine import Machine
 
 BANNER = ("start", "Marlin bugfix-2.1.x (simulated)", "echo: Last Updated: 2024-09-29 | Author: (none, default config)")
 
@@ -117,6 +118,11 @@ MANNERS: dict[str, Manner] = {
     "klipper": KLIPPER,
     "klipper_steppers": KLIPPER,
 }
+
+
+def habits_at(machine: Machine, baud: int | None) -> Habits:
+    """The usual build: USB without a baud rate, with one a UART whose ring is machine.receive_bytes."""
+    return Habits(rx_ring=machine.receive_bytes if baud else None)
 
 
 def manner_of(dialect: str) -> Manner:

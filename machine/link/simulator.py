@@ -13,13 +13,12 @@ from typing import Self
 from machine.link.cable import Cable
 from machine.link.faults import Fault, FaultScript
 from machine.link.firmware import BUSY_S, Firmware
-from machine.link.habits import Habits
+from machine.link.habits import Habits, habits_at
 from machine.link.record import Record
 from machine.link.terminal import Server, Terminal
 from machine.link.uart import Uart
 from profiles.machine import Machine
 
-RING = 128  # bytes of an AVR's receive ring
 UNREAD_BYTES = 1 << 20  # answers kept for a host that does not read; older ones are dropped beyond
 
 
@@ -29,8 +28,8 @@ class SimulatedPrinter:
     speed: virtual seconds in a real one; inf never sleeps, the clock jumps over every wait. faults: what goes wrong; after a
     disconnection the terminal is gone (reading fails) and comes back at a new printer.path, or behind the same `link` (a symbolic
     link to keep). tcp: a port number of this computer (0: a free one) instead of a terminal; path is then a socket:// address.
-    baud: every byte takes the time of 10 bits, both ways, and what a 128-byte receive ring cannot hold is lost (without
-    habits of your own); None: USB, as fast as the system, and the host waits. The rate a host opens the path with means nothing.
+    baud: every byte takes the time of 10 bits, both ways, and what a ring of machine.receive_bytes cannot hold is lost (habits
+    of your own say it themselves); None: USB, as fast as the system, and the host waits. The rate a host opens the path with means nothing.
     kept: how many moves the record holds at least, None: all (120 bytes a move).
     Raises PortError on a system without pseudo-terminals, or for a link or port that is taken.
     """
@@ -49,7 +48,7 @@ class SimulatedPrinter:
         if not speed > 0:
             raise ValueError(f"speed is {speed:g}: it must be above 0")
         # `busy:` must come in real time, or a slow simulation would look dead to the sender.
-        self._firmware = Firmware(machine, habits or (Habits(rx_ring=RING) if baud else None), BUSY_S * min(1.0, speed), kept)
+        self._firmware = Firmware(machine, habits or habits_at(machine, baud), BUSY_S * min(1.0, speed), kept)
         self._cable = Cable(self._firmware, faults if isinstance(faults, FaultScript) else FaultScript(tuple(faults)), speed)
         self._line = self._cable if baud is None else Uart(self._cable, baud)
         self._lock = threading.Lock()

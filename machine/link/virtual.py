@@ -4,11 +4,11 @@ from math import inf
 
 from machine.link.cable import Cable
 from machine.link.faults import FaultScript
-from machine.link.firmware import Firmware, Habits
+from machine.link.firmware import Firmware
+from machine.link.habits import Habits, habits_at
 from machine.link.medium import Medium
 from machine.link.port import READ_S, WRITE_S
 from machine.link.record import Record
-from machine.link.simulator import RING
 from machine.link.uart import Uart
 from profiles.errors import PortError
 from profiles.machine import Machine
@@ -35,7 +35,7 @@ class VirtualPrinter:
         baud: int | None = None,
         most_s: float = inf,
     ) -> None:
-        self.firmware = Firmware(machine, habits or (Habits(rx_ring=RING) if baud else None))
+        self.firmware = Firmware(machine, habits or habits_at(machine, baud))
         self.now_s = 0.0
         self._most_s = most_s
         self._cable = Cable(self.firmware, faults, speed=1.0)
