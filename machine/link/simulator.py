@@ -29,8 +29,8 @@ class SimulatedPrinter:
     disconnection the terminal is gone (reading fails) and comes back at a new printer.path, or behind the same `link` (a symbolic
     link to keep). tcp: a port number of this computer (0: a free one) instead of a terminal; path is then a socket:// address.
     baud: every byte takes the time of 10 bits, both ways, and what a ring of machine.receive_bytes cannot hold is lost (habits
-    of your own say it themselves); None: USB, as fast as the system, and the host waits. The rate a host opens the path with means nothing.
-    kept: how many moves the record holds at least, None: all (120 bytes a move).
+    of your own say it themselves); None: USB, as fast as the system, and the host waits. The rate a host opens the path
+    with means nothing. kept: how many moves the record holds at least, None: all (120 bytes a move).
     Raises PortError on a system without pseudo-terminals, or for a link or port that is taken.
     """
 
