@@ -35,6 +35,7 @@ class Body:
         self.unknown = 0
         self.turning: dict[str, tuple[float, float]] = {}
         self.busy_every_s = 0.0
+        self.must_home = False
         self.number: int | None = None  # told by M110, for the firmware to take over
         self.fan = 0.0
         self.forget()

@@ -43,6 +43,7 @@ class Firmware:
         self._habits = habits or Habits()
         self._said: list[str] = []
         self.body = Body(machine, self._said.append, kept)
+        self.body.must_home = self._habits.must_home
         self._manner = self.body.manner
         self._commands, self._macros = commands_of(machine.dialect), DIALECTS[machine.dialect].macros
         self.body.busy_every_s = self._busy_default_s = busy_s if self._habits.busy and self._manner.options else 0.0

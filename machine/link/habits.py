@@ -17,7 +17,8 @@ class Habits:
     """Build options. rx_ring: bytes of a UART's receive ring that overflows; None: USB, which waits.
 
     realtime: Marlin's REALTIME_REPORTING_COMMANDS; geometry: its M115_GEOMETRY_REPORT; waits: its NO_TIMEOUTS, `wait` every
-    second when idle; resend_ok: an `ok` follows each Resend (Smoothieware has none).
+    second when idle; resend_ok: an `ok` follows each Resend (Smoothieware has none); must_home: X Y Z are not moved before they
+    are homed (Klipper, RepRapFirmware, Marlin's NO_MOTION_BEFORE_HOMING).
     """
 
     advanced_ok: bool = True
@@ -29,6 +30,7 @@ class Habits:
     geometry: bool = True
     waits: bool = False
     resend_ok: bool = True
+    must_home: bool = False
 
 
 @dataclass(frozen=True)
@@ -38,9 +40,9 @@ class Manner:
     numbers: "resend": lines are checked and asked for again; "drop": a bad checksum is dropped in silence, any number is
     taken; "ignore": number and checksum are cut off unread. pending: lines kept before the one at work is done; more wait.
     urgent: where an M112 is seen before its turn ("bytes": an emergency parser, "lines": when its line has been read).
-    unknown, cold, beyond: what is said of such commands; {}: the command or the coordinates. cold_moves: a cold move is made
-    without filament. beyond "": a target outside the limits is clamped without a word. tells_place: G28 and G92 print it.
-    answers_dead: what is said, with ok, to every line after a kill. options: knows Habits' options of build.
+    unknown, cold, unhomed, beyond: what is said of such commands; {}: the command or the coordinates. cold_moves: a cold
+    move is made without filament. beyond "": a target outside the limits is clamped without a word. tells_place: G28 and
+    G92 print it. answers_dead: what is said, with ok, to every line after a kill. options: knows Habits' options of build.
     talks_in_ok: answers of one line stand behind the ok. min_segment_s: shorter moves are stretched while few wait. lacks:
     commands it does not know.
     """
@@ -53,6 +55,7 @@ class Manner:
     urgent: Literal["bytes", "lines", ""]
     unknown: str
     cold: tuple[str, ...]
+    unhomed: str
     kill: tuple[str, ...]
     cold_moves: bool = True
     beyond: str = ""
@@ -74,6 +77,7 @@ MARLIN = Manner(
     urgent="bytes",
     unknown='echo:Unknown command: "{}"',
     cold=("echo: cold extrusion prevented",),
+    unhomed="echo:Home XYZ First",
     kill=("Error:Printer halted. kill() called!", "//action:poweroff"),
     tells_place=True,
     options=True,
@@ -89,6 +93,7 @@ REPRAPFIRMWARE = Manner(
     urgent="",
     unknown="Warning: {}: Command is not supported",
     cold=("Warning: Tool 0 was not driven because its heater temperatures were not high enough or it has a heater fault",),
+    unhomed="Error: G0/G1: insufficient axes homed",
     kill=("Error: Emergency Stop! Reset the controller to continue.",),
     lacks=frozenset({"M154", "M155", "M113", "M876"}),
 )
@@ -105,6 +110,7 @@ KLIPPER = Manner(
         "// See the 'min_extrude_temp' config option for details",
         "!! Extrude below minimum temp",
     ),
+    unhomed="!! Must home axis first: {}",
     kill=("!! Shutdown due to M112 command", "// Klipper state: Shutdown"),
     cold_moves=False,
     beyond="!! Move out of range: {}",

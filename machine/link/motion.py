@@ -57,6 +57,7 @@ class Motion:
         self._offset = self._real[:5]
         self.follows = self.relative = self.filament_relative = self.inches = False
         self.soft_limits = True
+        self.homed: set[int] = set()
         self.feed = FIRST_FEED
         self.feed_share = self.flow_share = 1.0
         axes = (machine.x, machine.y, machine.z)
@@ -80,6 +81,11 @@ class Motion:
             self.shift[5] += place[5] - self.place[5]
             place[5] = self.place[5]
         return place
+
+    def unhomed(self, words: Words) -> list[float] | None:
+        """The program's coordinates of a target that moves X, Y or Z before they are homed; None for any other."""
+        wanted = [axis for axis, letter in enumerate(self.letters[:3]) if letter in words and axis not in self.homed]
+        return [p + s for p, s in zip(self._wanted(words), self.shift, strict=True)] if wanted else None
 
     def beyond(self, words: Words) -> list[float] | None:
         """The program's coordinates of a target outside the soft limits; None for one inside."""
@@ -156,6 +162,7 @@ class Motion:
 
     def home(self, axes: Sequence[int]) -> float:
         """Put axes at their home positions (X Y least, Z greatest, table level); returns how long it takes, s."""
+        self.homed.update(axes)
         travel_s = max((abs(self._home[a] - self._real[a]) / self.speeds[a] for a in axes), default=0.0)
         real = self._real[:]
         for axis in axes:

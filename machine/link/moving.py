@@ -11,6 +11,9 @@ COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP
 def move(body: Body, words: Words, text: str) -> Work:
     """G0, G1; the caller has made sure of a free block."""
     motion, pushes = body.motion, True
+    if body.must_home and (unhomed := motion.unhomed(words)) is not None:
+        body.say(body.manner.unhomed.format(_told(unhomed)))
+        return None
     if "E" in words and not body.cold_allowed and body.nozzle.at(body.now_s) < COLD_C:
         pushes = _is_idle(motion, words)
         if not pushes:
@@ -19,14 +22,19 @@ def move(body: Body, words: Words, text: str) -> Work:
             if not body.manner.cold_moves:
                 return None
     if body.manner.beyond and (beyond := motion.beyond(words)) is not None:
-        x, y, z, *_, filament = beyond
-        body.say(body.manner.beyond.format(f"{x:.3f} {y:.3f} {z:.3f} [{filament:.3f}]"))
+        body.say(body.manner.beyond.format(_told(beyond)))
         return None
     pieces = motion.pieces(motion.target(words, pushes))
     if len(pieces) > 1:
         return _run(body, pieces)
     motion.reach(pieces[0], body.now_s)
     return None
+
+
+def _told(place: Sequence[float]) -> str:
+    """Coordinates as Klipper tells them."""
+    x, y, z, *_, filament = place
+    return f"{x:.3f} {y:.3f} {z:.3f} [{filament:.3f}]"
 
 
 def _is_idle(motion: Motion, words: Words) -> bool:
@@ -172,6 +180,7 @@ def _call_it(body: Body, words: Words, text: str) -> Work:
 
 def _rest(body: Body, words: Words, text: str) -> Iterator[float]:
     yield from drained(body)
+    body.motion.homed.clear()
     body.note("motors off")
 
 

@@ -7,6 +7,7 @@ import pytest
 from machine.link.cable import Cable
 from machine.link.firmware import Firmware
 from machine.link.framing import frame
+from machine.link.habits import Habits
 from machine.link.simulator import SimulatedPrinter
 from tests.machine.test_dialects import profile
 
@@ -120,3 +121,12 @@ def test_only_marlin_stretches_short_moves_while_few_wait(machine, slowed: int) 
     firmware = Firmware(machine)
     answer(firmware, "".join(f"G1 X0.{k} F6000\n" for k in range(1, 6)), until_s=0.0)
     assert firmware.record().slowed == slowed
+
+
+@pytest.mark.parametrize(("machine", "said"), [
+    (MARLIN, "echo:Home XYZ First"), (RRF, "Error: G0/G1: insufficient axes homed"),
+    (KLIPPER, "!! Must home axis first: 5.000 0.000 0.000 [0.000]")])  # fmt: skip
+def test_a_printer_may_refuse_to_move_before_it_is_homed(machine, said: str) -> None:  # type: ignore[no-untyped-def]
+    firmware = Firmware(machine, Habits(advanced_ok=False, must_home=True))
+    assert answer(firmware, "G1 X5\nG1 A5\nG28\nG1 X5\nM84\nG1 X6\n").count(said) >= 1
+    assert [move[0] for move in firmware.record().end.tolist()] == [0.0, 5.0]
