@@ -59,6 +59,12 @@ def test_a_sender_that_repeats_something_else_is_caught(monkeypatch: pytest.Monk
     assert trial(4, 80).wrong == (words,)
 
 
+def test_a_host_that_only_says_that_it_switched_the_heaters_off_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.link.stream.heaters_off", lambda *given: True)
+    monkeypatch.setattr(fault_campaign, "script", lambda seed, lines: FaultScript((Fault("error", 40),)))
+    assert trial(4, 80).wrong == ("a heater is on",)
+
+
 def test_a_host_that_waits_for_ever_is_stopped() -> None:
     printer = VirtualPrinter(PROFILE.machine, most_s=30.0)
     with pytest.raises(EndlessError):
