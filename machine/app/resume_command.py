@@ -17,7 +17,7 @@ from machine.link.feed import Begin
 from machine.link.inquiry import Found
 from machine.link.journal import Heading, Moment, Story, mark_resumed, read_journal
 from machine.link.program import GcodeFile
-from machine.link.resume import Point, Way, heights_mm, point_of, way_on
+from machine.link.resume import AWAY, Point, Way, heights_mm, point_of, stood, way_on
 from machine.link.wishes import CancelledError
 from profiles.errors import JournalError
 from profiles.profile import Profile, section
@@ -39,7 +39,7 @@ def resume(
     given: the profile whose machine the user has named; file: of the new journal; log: of the traffic.
     """
     if port == SIMULATED:
-        raise JournalError("--port sim: a simulated printer ends with its print and cannot go on; the port of a printer is expected")
+        raise JournalError("--port sim: a simulated printer ends with its print; the port of a printer is expected")
     story = read_journal(journal)
     profile = _profile(journal, story.heading, given)
     check_dialect(profile.machine)
@@ -117,10 +117,10 @@ def _sentence(way: Way, point: Point, profile: Profile) -> str:
     if not way.homes:
         return told
     low, high = heights_mm(point)
-    tilt, turn = (point.modal.at[axis] or 0.0 for axis in (3, 4))
-    machine = profile.machine
-    told += f"; nothing may have been moved by hand: tip on the print at Z {low:.2f}"
-    if high - low > UNSURE_MM:
+    (x, y, z), pose = stood(point, profile)
+    tilt, turn, machine = pose.tilt_deg, pose.turn_deg, profile.machine
+    told += f"; nothing may have been moved by hand: tip at X {x:.1f} Y {y:.1f} Z {z:.2f}"
+    if point.moment.state not in AWAY and high - low > UNSURE_MM:
         told += f" (it may have stood up to {high - low:.2f} mm higher: look at the first lines)"
     if hypot(tilt, turn) > 0:
         turns = f", {int(turn // 360)} whole turns and {turn % 360:.3f}" if abs(turn) >= 360 else ""

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Event as Flag
 
 from machine.link.control import Control
-from machine.link.events import Event, Ok
+from machine.link.events import Event, Ok, Position
 from machine.link.framing import LINE_LIMIT, command_of
-from machine.link.journal import FINISHED, Journal, Moment
+from machine.link.journal import FINISHED, LEFT, Journal, Moment
 from machine.link.modal import Modal, axes_of
 from machine.link.park import Laid, lift_words, standing_mm
 from machine.link.progress import Place, Progress
@@ -182,6 +182,7 @@ class Feed:
     def _pause(self) -> None:
         """Leave the print, wait for the wish to go on, and come back to the same place."""
         self.turn_to("pausing")
+        self._mark()
         told = self.talk.ask_position()
         self.trail.barrier()
         agreed = told is None or not unlike(self.modal, told.axes, NEAR)
@@ -190,6 +191,8 @@ class Feed:
         for command in way.away:
             self.talk.send(command)
         self.talk.drain()
+        if way.park is not None:
+            self.trail.pose = (*way.park.stand_mm, *self.modal.at[3:])
         self.turn_to("paused")
         self._mark()
         wishes = self._wishes
@@ -197,6 +200,7 @@ class Feed:
             self.talk.rest(until=lambda: wishes.resume or bool(wishes.lines))
             self._send_own()
         self.turn_to("resuming")
+        self._mark()
         for command in way.back:
             self.talk.send(command)
         wishes.resumed()
@@ -280,6 +284,13 @@ class Feed:
         at, pose = standing
         far = min(machine.lift_mm, machine.z.limits_mm[1] - float(at[2]))
         return (lift_words(machine, pose, far, following), 60.0 * machine.z.speed_mm_s) if far > 0 else None
+
+    def left(self, told: Position | None) -> None:
+        """The tip was lifted off the print for good; told: where the printer says it stands now."""
+        places = dict(told.axes) if told is not None else {}
+        if self._journal is not None:
+            pose = tuple(places.get(letter) for letter in self.modal.axes.letters)
+            self._journal.mark(replace(self._moment(), state=LEFT, pose=pose))
 
     def _moment(self) -> Moment:
         trail = self.trail

@@ -17,7 +17,7 @@ from zlib import crc32
 from profiles.errors import JournalError, OutputError
 
 FORMAT = 1
-FINISHED, RESUMED = "finished", "resumed in "
+FINISHED, LEFT, RESUMED = "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
 EVERY_LINES = 16  # the sender never gets so many lines ahead of the newest record,
 EVERY_S = 0.1  # which is not older than this when something has happened since
 SYNC_S = 1.0  # so old may the disk be after a power cut of the computer
@@ -37,7 +37,8 @@ class Heading:
 @dataclass(frozen=True)
 class Moment:
     """Lines of the program, from 1: sent, acknowledged, surely executed; the newest acknowledged wire number; the pose X Y Z tilt
-    turn E after the acknowledged line, unwrapped, None where it is not known; what the print was doing.
+    turn E after the acknowledged line (of a tip that was taken away from the print, where it stands), unwrapped, None where it is
+    not known; what the print was doing.
     """
 
     sent: int = 0

@@ -15,7 +15,7 @@ from machine.collide import Printed
 from machine.link.feed import Begin
 from machine.link.framing import command_of
 from machine.link.inquiry import Found
-from machine.link.journal import EVERY_LINES, Moment
+from machine.link.journal import EVERY_LINES, LEFT, Moment
 from machine.link.modal import E_AXIS, Modal, axes_of
 from machine.link.park import Laid
 from machine.link.progress import Place
@@ -27,6 +27,9 @@ from profiles.errors import JournalError
 from profiles.profile import Profile
 
 ANEW = "hardly anything was printed: the program begins anew"
+AWAY = ("paused", LEFT)  # states in which the journal's pose is where the tip has been taken
+ON_THE_WAY = ("pausing", "resuming")
+HOME_IT = "machine.gcode.resume must tell how it is homed with a print on it"
 SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
 SAME = 0.02  # mm or deg: M114 tells hundredths
 NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: questions have numbers too
@@ -187,24 +190,25 @@ def _before(point: Point, profile: Profile, at: Floats, pose: Pose) -> tuple[str
 
 def _before_homed(point: Point, profile: Profile) -> tuple[str, ...]:
     """The same after a restart: the axes are called what they stand at, the tip rises, X and Y are homed."""
-    stood = _stood(point, profile)
     goal, wanted = _goal(point, profile)
     pull, push = pushing(point.modal, profile)
-    homed = home_way(profile, point.printed, *stood, goal, wanted, (*heated(point.modal, profile), *pull, "G90"))
+    homed = home_way(profile, point.printed, *stood(point, profile), goal, wanted, (*heated(point.modal, profile), *pull, "G90"))
     return (*homed, *push, *point.modal.lines())
 
 
-def _stood(point: Point, profile: Profile) -> tuple[Floats, Pose]:
-    """Where the axes stood when the power went; raises JournalError when the table may have been turning."""
+def stood(point: Point, profile: Profile) -> tuple[Floats, Pose]:
+    """Where the axes stood when the power went; raises JournalError when tip or table may have been on a way."""
+    state, known = point.moment.state, [value for value in point.moment.pose[:E_AXIS] if value is not None]
+    if state in AWAY and len(known) == E_AXIS:
+        return np.array(known[:3]), Pose(*known[3:])
+    if state in ON_THE_WAY and not profile.machine.gcode.resume:
+        raise JournalError(f"the tip was on its way between print and parking place, so nobody knows where it stands; {HOME_IT}")
     states = [point.modal, *(reached.modal for reached in point.ahead)]
     for axis in (3, 4):
-        values = {modal.at[axis] for modal in states}
-        if len(values) > 1 and not profile.machine.gcode.resume:
+        if len({modal.at[axis] for modal in states}) > 1 and not profile.machine.gcode.resume:
             letter = point.modal.axes.letters[axis]
-            raise JournalError(
-                f"lines {point.line} to {point.last}: the table was turning about {letter}, so nobody knows where it stands; "
-                "machine.gcode.resume must tell how it is homed with a print on it"
-            )
+            where = f"lines {point.line} to {point.last}"
+            raise JournalError(f"{where}: the table was turning about {letter}, so nobody knows where it stands; {HOME_IT}")
     at, pose = _goal(point, profile)
     low, _ = heights_mm(point)
     return np.array([at[0], at[1], low]), pose

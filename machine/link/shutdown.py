@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from machine.link.events import FirmwareFault, Ok, Temperature, read_event
+from machine.link.events import FirmwareFault, Ok, Position, Temperature, read_event
 from machine.link.medium import Medium, Wire
 from profiles.errors import PortError
 
@@ -55,10 +55,19 @@ def heaters_off(wire: Wire, medium: Medium, patience_s: float = SETTLE_S) -> boo
     return False
 
 
-def lift(wire: Wire, medium: Medium, words: str, feed_mm_min: float) -> None:
-    """A step away from the print; words: of G1, relative. Raises PortError."""
-    wire.write(f"\nM83\nG91\nG1 {words} F{feed_mm_min:.0f}\nG90\nM400\nM105\n".encode("ascii"))
-    Listener(wire, medium).until(medium.now_s() + LIFT_S, lambda line: b"T:" in line and line.startswith(b"ok"))
+def lift(wire: Wire, medium: Medium, words: str, feed_mm_min: float) -> Position | None:
+    """A step away from the print; words: of G1, relative. Where the printer says it stands then. Raises PortError."""
+    places: list[Position] = []
+
+    def done(line: bytes) -> bool:
+        event = read_event(line)
+        place = event if isinstance(event, Position) else event.position if isinstance(event, Ok) else None
+        places.extend([place] if place is not None else [])
+        return isinstance(event, Ok) and event.temperature is not None
+
+    wire.write(f"\nM83\nG91\nG1 {words} F{feed_mm_min:.0f}\nG90\nM400\nM114\nM105\n".encode("ascii"))
+    arrived = Listener(wire, medium).until(medium.now_s() + LIFT_S, done)
+    return places[-1] if arrived and places else None
 
 
 def emergency_stop(wire: Wire, medium: Medium) -> bool:

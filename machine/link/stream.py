@@ -164,7 +164,7 @@ class _Print:
             off = heaters_off(self.talk.wire, self.medium, patience_s)
             away = self.feed.lift() if off and known else None
             if away is not None:
-                lift(self.talk.wire, self.medium, *away)
+                self.feed.left(lift(self.talk.wire, self.medium, *away))
             return off
         except PortError:
             return False

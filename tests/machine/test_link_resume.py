@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from threading import Event as Flag
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from machine.link.journal import Heading, Journal, Moment, Story, read_journal
 from machine.link.medium import Medium, Wire
 from machine.link.modal import Modal, axes_of
 from machine.link.program import GcodeFile
+from machine.link.progress import Progress
 from machine.link.resume import Point, Way, point_of, way_on
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import print_lines
@@ -250,6 +252,34 @@ def test_a_table_that_was_turning_when_the_power_went_is_refused() -> None:
         way_on(point(line, line + 5), found(), PROFILE)
 
 
+@pytest.mark.parametrize("state", ["paused", "left"])
+def test_a_tip_that_was_taken_away_is_told_where_it_was_taken(state: str) -> None:
+    moment = Moment(LINE + 3, LINE, LINE, 100, (159.0, -159.0, 120.0, 30.0, 725.0, 5.0), state)
+    before = way_on(point_of(PROGRAM, moment, PROFILE, LIMIT), found(), PROFILE).begin.before
+    assert "G92 X159 Y-159 Z120 A30 C725" in before
+
+
+@pytest.mark.parametrize("state", ["pausing", "resuming"])
+def test_a_tip_that_was_on_its_way_when_the_power_went_is_refused(state: str) -> None:
+    moment = Moment(LINE + 3, LINE, LINE, 100, (10.0, 10.0, 62.0, 30.0, 725.0, 5.0), state)
+    with pytest.raises(JournalError, match=r"was on its way between print and parking place"):
+        way_on(point_of(PROGRAM, moment, PROFILE, LIMIT), found(), PROFILE)
+
+
+def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text: GcodeFile) -> None:
+    printer, stop = VirtualPrinter(PROFILE.machine), Flag()
+
+    def see(progress: Progress) -> None:
+        if progress.file_line > LINE:
+            stop.set()
+
+    with journal_of(text, "first") as journal:
+        print_lines(text, PATH, on_progress=see, stop=stop, medium=printer.medium, profile=PROFILE, journal=journal)
+    last = read_journal(journal.path).last
+    assert last.state == "left"
+    assert last.pose[:5] == pytest.approx(tuple(printer.record.end[-1, :5]), abs=0.005)
+
+
 def test_a_profiles_own_block_homes_instead() -> None:
     block = "G28 Z\nG28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
     profile = load(settings=[f"machine.gcode.resume={block!r}"])
@@ -334,9 +364,7 @@ def test_every_firmware_is_told_where_its_axes_stand(dialect: str) -> None:
 
 def cancelled(text: GcodeFile, port: str) -> Path:
     """A print on a pseudo-terminal that was stopped in its second part."""
-    from threading import Event
-
-    stop = Event()
+    stop = Flag()
     with journal_of(text, "first") as journal:
         outcome = print_lines(
             text, port, 250000, lambda told: stop.set() if told.file_line > 190 else None, stop, profile=PROFILE, journal=journal
