@@ -15,7 +15,8 @@ from tests.machine.browser import Browser
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs"
 SIZE = (1060, 660)
-STILL = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+PAUSE = "new Promise((done) => setTimeout(done, 400))"  # until the page thinks that nothing moves any more
+STILL = "document.documentElement.dataset.picture === 'idle'"
 # What is chosen for each demo: a share of the rows, values of lists and sliders, boxes clicked, keys pressed.
 SHOTS = {
     "figure": (0.52, {"colour-by": "part"}, ("show-travels",), ("+",)),
@@ -43,7 +44,7 @@ def choose(browser: Browser, name: str, value: object) -> None:
 def shoot(browser: Browser, demo: str, folder: Path, page: Path) -> Path:
     """Open a page, choose what is told for this demo, and keep what is seen."""
     share, choices, boxes, keys = SHOTS[demo]
-    browser.open(page.as_uri())
+    browser.open(page.as_uri() + "#all")
     choose(browser, "position", round(share * int(browser.value("document.getElementById('position').max"))))
     for name, value in choices.items():
         choose(browser, name, value)
@@ -51,7 +52,8 @@ def shoot(browser: Browser, demo: str, folder: Path, page: Path) -> Path:
         browser.click(f"#{box}")
     for key in ("f", *keys):
         browser.key(key)
-    browser.value(STILL)
+    browser.value(PAUSE)
+    browser.wait(STILL)
     path = folder / f"view-{demo}.png"
     browser.screenshot(path)
     return path

@@ -35,23 +35,25 @@ G1 X30 Y30 E9
 """
 # What the canvas holds right after the page has drawn it: in the same frame, for it is empty afterwards.
 PICTURE = """new Promise((done) => {
-  document.getElementById('position').dispatchEvent(new Event('input'));
-  requestAnimationFrame(() => done(document.getElementById('canvas').toDataURL()));
+  const look = () => {
+    if (document.documentElement.dataset.picture !== 'idle') return setTimeout(look, 5);
+    document.getElementById('position').dispatchEvent(new Event('input'));
+    requestAnimationFrame(() => done(document.getElementById('canvas').toDataURL()));
+  };
+  look();
 })"""
-# Pixels of the canvas in the red of risky faces.
-REDS = """new Promise((done) => {
-  document.getElementById('model').dispatchEvent(new Event('change'));
-  requestAnimationFrame(() => {
-    const canvas = document.getElementById('canvas'), copy = document.createElement('canvas');
-    [copy.width, copy.height] = [canvas.width, canvas.height];
-    const pen = copy.getContext('2d');
-    pen.drawImage(canvas, 0, 0);
-    const seen = pen.getImageData(0, 0, copy.width, copy.height).data;
-    let count = 0;
-    for (let k = 0; k < seen.length; k += 4) if (seen[k] > 40 && seen[k] > 3 * seen[k + 1] && seen[k] > 3 * seen[k + 2]) count++;
-    done(count);
-  });
-})"""
+# Pixels of such a picture in the red of risky faces.
+REDS = f"""{PICTURE}.then(async (address) => {{
+  const picture = new Image(), copy = document.createElement('canvas'), pen = copy.getContext('2d');
+  picture.src = address;
+  await picture.decode();
+  [copy.width, copy.height] = [picture.width, picture.height];
+  pen.drawImage(picture, 0, 0);
+  const seen = pen.getImageData(0, 0, copy.width, copy.height).data;
+  let count = 0;
+  for (let k = 0; k < seen.length; k += 4) if (seen[k] > 40 && seen[k] > 3 * seen[k + 1] && seen[k] > 3 * seen[k + 2]) count++;
+  return count;
+}})"""
 
 
 @pytest.fixture(scope="module")

@@ -42,7 +42,7 @@ bool laid() {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return false;
   }
-  paint = vec4(mix(colour.rgb, tint.rgb, tint.a), 1.0);
+  paint = vec4(mix(colour.rgb, tint.rgb, tint.a), tint.a > 0.0 ? 0.0 : 1.0);
   stop = slot == last ? mix(start, end, share) : end;
   up = unfolded(vec2(texelFetch(verticals, texel(slot), 0).xy) / 32767.0);
   along = normalize(end - start);
@@ -90,13 +90,14 @@ void main() {
 }`;
 
 const BEAD_PAINT = `
-flat in vec4 paint;
+flat in vec4 paint; // a: 0 for what is drawn faint, with gaps to look through
 flat in int slot;
 in vec3 normal;
 uniform bool picking;
 out vec4 colour;
 ${LIGHT}
 void main() {
+  if (paint.a == 0.0 && (int(gl_FragCoord.x) + int(gl_FragCoord.y)) % 3 != 0) discard;
   if (picking) colour = vec4(slot & 255, (slot >> 8) & 255, (slot >> 16) & 255, (slot >> 24) & 255) / 255.0;
   else colour = vec4(lit(paint.rgb, normalize(normal)), 1.0);
 }`;

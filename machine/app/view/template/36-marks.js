@@ -24,7 +24,7 @@ void main() {
   if (shape != 0) p.y = -p.y;
   float d = inside(p);
   if (d < 0.0) discard;
-  colour = vec4(size > 7.0 && d < 0.2 ? vec3(1.0) : fill, 1.0);
+  colour = vec4(size > 10.0 && d < 0.2 ? vec3(1.0) : fill, 1.0);
 }`;
 
 const MARKS = {

@@ -58,7 +58,7 @@ function paintStage(gl, stage, print, scene, camera) {
   if (on.beads && stage.beads) stage.beads.draw(beads, ranges, { slot: print.path.slot(scene.row), share: scene.share }, scene.stride);
   if (on.machine && !below) paintTable(stage.bodies, work, cradle, {});
   if (on.machine) stage.bodies.nozzle.draw(head);
-  paintPath(stage, ranges, on, work.toClip, lift, clamp(pixels * 2.5, 4, 13) * (width / clientWidth || 1));
+  paintPath(stage, ranges, on, work.toClip, lift, clamp(pixels * 1.8, 3.5, 13) * (width / clientWidth || 1));
   paintModel(stage, print, scene, (shift) => seenAs(multiply(stand.work, moved(shift))), lift);
   if (on.machine && below) paintTable(stage.bodies, work, cradle, { strength: 0.18 }); // or it would hide everything
   if (on.machine) paintHead(stage.bodies, head);
@@ -73,7 +73,8 @@ function paintTable(bodies, work, cradle, look) {
 }
 
 function paintPath({ ways, wayRow, marks }, ranges, on, toClip, lift, size) {
-  for (const { firstRow, endRow } of ranges) {
+  for (const { firstRow, endRow, tint } of ranges) {
+    if (tint !== PLAIN_TINT) continue;
     const first = 2 * countUpTo(wayRow, firstRow - 1), end = 2 * countUpTo(wayRow, endRow - 1);
     if (on.travels) ways.draw(toClip, { first, end });
     if (on.seams) marks.seams.draw(toClip, firstRow, endRow, size, lift);

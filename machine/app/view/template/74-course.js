@@ -56,15 +56,10 @@ function playerOf(scene, bells, total) {
 }
 
 /** Each part's rows as a piece of its colour. */
-function paintStrip(canvas, parts, count) {
-  canvas.width = 1200;
-  canvas.height = 8;
-  const pen = canvas.getContext("2d");
-  pen.fillStyle = PLAIN;
-  pen.fillRect(0, 0, 1200, 8);
-  for (const part of parts) {
-    if (!part.rows) continue;
-    pen.fillStyle = part.colour;
-    pen.fillRect((part.first_row / count) * 1200, 0, Math.max((part.rows / count) * 1200, 1), 8);
-  }
+function paintStrip(strip, parts, count) {
+  const share = (row) => `${((100 * row) / Math.max(count, 1)).toFixed(3)}%`;
+  const pieces = parts.filter((part) => part.rows).flatMap(({ colour, first_row: first, rows }) => [
+    `transparent ${share(first)}`, `${colour} ${share(first)}`, `${colour} ${share(first + rows)}`, `transparent ${share(first + rows)}`,
+  ]);
+  if (pieces.length) strip.style.backgroundImage = `linear-gradient(to right, ${pieces.join(", ")})`;
 }

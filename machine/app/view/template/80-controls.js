@@ -54,9 +54,8 @@ function showLegend({ rows, header }, mode, legend) {
   const box = $("legend");
   box.replaceChildren(made("b", { text: (TITLES[mode] || mode) + (legend ? `, ${legend.unit}` : "") }));
   if (legend) {
-    const scale = made("canvas", { width: 256, height: 1 });
-    const pen = scale.getContext("2d");
-    STEPS.forEach((_, k) => { pen.fillStyle = hex(ramp(k / 255)); pen.fillRect(k, 0, 1, 1); });
+    const scale = made("div", { className: "scale" });
+    scale.style.backgroundImage = `linear-gradient(to right, ${RAMP.map(hex).join(", ")})`;
     box.append(scale, made("div", { className: "marks" }, ...legend.marks.map((text) => made("span", { text }))));
     return;
   }

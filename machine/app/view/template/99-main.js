@@ -20,7 +20,6 @@ async function main() {
   keysOf({ scene, camera, player, look: picture.moved, fit, toggleTheme });
   handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => goTo(picture.rowAt(event), scene, player) });
   if (header.live && location.protocol.startsWith("http")) follow(print, scene, player);
-  if (header.thinned) notice(thinnedTold(header.thinned));
   document.documentElement.dataset.openedMs = performance.now().toFixed(0);
   document.documentElement.dataset.state = "ready";
 }
@@ -31,10 +30,11 @@ function goTo(row, scene, player) {
   scene.go(row);
 }
 
-function summaryOf({ time_s: seconds, filament_mm: filament, parts }, { count, layers }) {
+function summaryOf({ time_s: seconds, filament_mm: filament, parts, thinned }, { count, layers }) {
   const many = (number, thing) => `${number.toLocaleString("en")} ${thing}${number === 1 ? "" : "s"}`;
   const told = [many(parts.length, "part")];
   if (count) told.push(many(layers.length, "layer"), duration(seconds), `${(filament / 1000).toFixed(2)} m of filament`);
+  if (thinned) told.push(`thinned: ${thinned.kept.toLocaleString("en")} of ${many(thinned.rows, "move")}`);
   return told.join(" · ");
 }
 
