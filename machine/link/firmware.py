@@ -121,7 +121,7 @@ class Firmware:
         due_s = min(body.report_s, body.place_s, body.nozzle.trip_s, body.bed.trip_s)
         if self._wake_s is None:
             return body.now_s if self._queue or len(self._reception) else min(due_s, self._wait_s)
-        return min(self._wake_s, due_s, self._busy_s)
+        return min(self._wake_s, due_s, inf if body.waits_for_heat else self._busy_s)  # no busy while it tells temperatures
 
     def reset(self, banner: bool = True) -> None:
         """The board restarts: counter, queues, position and temperatures are lost."""

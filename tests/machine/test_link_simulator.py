@@ -300,3 +300,13 @@ def test_ten_times_real_time_is_ten_times_real_time() -> None:
         os.close(host)
     assert time.monotonic() - began > 0.45
     assert said.count(b"busy") == 2
+
+
+def test_while_it_heats_the_printer_always_has_a_next_moment_ahead() -> None:
+    firmware = Firmware(MACHINE)
+    firmware.receive(b"M155 S2\nM140 S60\nM190 S60\n")
+    now_s, reports = 0.0, 0
+    while reports < 20:
+        reports += firmware.advance(now_s).count(b"W:?")
+        assert firmware.next_s() > now_s
+        now_s = firmware.next_s()
