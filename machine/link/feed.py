@@ -155,7 +155,10 @@ class Feed:
     def _send_own(self) -> None:
         """Commands of the person's own."""
         while self._wishes.lines:
-            self.talk.send(self._wishes.lines.popleft())
+            command = self._wishes.lines.popleft()
+            self.talk.send(command)
+            if command[0] in "Mm":  # a person's temperature or fan holds beyond a pause
+                self.modal.take(command)
 
     def _due(self, command: str, now_s: float) -> bool:
         """Whether the position is to be looked at now: at a layer's end, or in a travel where the printer tells little."""

@@ -31,7 +31,7 @@ class Trail:
         self.pose: tuple[float | None, ...] = ()  # after the newest acknowledged command
         self._flight: deque[Step] = deque()
         self._planned: deque[Step] = deque()
-        self._blocks = PLANNER_BLOCKS
+        self._blocks, self._free = PLANNER_BLOCKS, 0
 
     def send(self, step: Step) -> None:
         """A command has gone out."""
@@ -51,7 +51,9 @@ class Trail:
         if free is None:
             return
         self._blocks = max(self._blocks, free + 1)
-        waiting = self._blocks - free
+        # The less of two answers counts: a damaged digit in one of them must not make a waiting move an executed one.
+        least, self._free = min(free, self._free), free
+        waiting = self._blocks - least
         while len(planned) > waiting:
             planned.popleft()
         self.executed = max(self.executed, planned[0].line - 1 if planned else self.acknowledged)

@@ -171,7 +171,8 @@ def test_acknowledged_moves_are_executed_as_far_as_the_planner_has_room() -> Non
     trail = Trail()
     for step in moves(40):
         trail.send(step)
-    trail.acknowledge(33, PLANNER_BLOCKS - 1)
+    for _ in range(2):
+        trail.acknowledge(33, PLANNER_BLOCKS - 1)
     assert (trail.sent, trail.acknowledged, trail.executed) == (40, 30, 29)
     trail.acknowledge(33, 5)
     assert trail.executed == 29
@@ -187,6 +188,14 @@ def test_what_counts_as_executed_never_holds_a_move_that_waits(free: list[int]) 
         del waiting[: max(0, len(waiting) - (15 - places))]
         trail.acknowledge(step.number, 15 - len(waiting))
         assert trail.executed < min(waiting, default=len(free) + 1)
+
+
+def test_a_damaged_number_of_free_places_moves_nothing_on() -> None:
+    trail = Trail()
+    for step in moves(40):
+        trail.send(step)
+        trail.acknowledge(step.number, 95 if step.line == 30 else 5)
+    assert trail.executed < 40 - 10
 
 
 def test_without_word_of_the_planner_only_a_barrier_tells() -> None:

@@ -269,6 +269,17 @@ def test_filament_may_be_changed_in_a_pause_and_the_count_is_restored() -> None:
     assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
 
 
+def test_a_temperature_of_ones_own_holds_beyond_a_pause() -> None:
+    watcher = watched()
+    watcher.when = {
+        100: watcher.ask(Wish.LINE, text="M104 S215"),
+        150: watcher.ask(Wish.PAUSE),
+        "paused": watcher.ask(Wish.RESUME),
+    }
+    watcher.run(PROGRAM)
+    assert "M109 S215" in watcher.lines()
+
+
 @pytest.mark.parametrize("length_s", [0.5, 30.0])
 def test_a_port_that_comes_back_to_a_printer_that_went_on_loses_and_doubles_nothing(length_s: float) -> None:
     watcher = watched((Fault("disconnect", at=120, unit="line", seconds=length_s),))
