@@ -101,7 +101,7 @@ def misfit(answer: Answer, machine: Machine) -> str:
     dialects = next((row for word, row in UNDERSTOOD.items() if word in folded), (machine.dialect,))
     if machine.dialect not in dialects:
         return (
-            f"the printer's firmware is {answer.firmware[:60]}, but {machine.name} writes for {machine.dialect}: "
+            f"the printer's firmware is {answer.firmware}, but {machine.name} writes for {machine.dialect}: "
             f"machine.dialect must be {' or '.join(dialects)}"
         )
     wanted = "XYZ" + (machine.tilt.letter + machine.turn.letter if machine.tilts else "")

@@ -16,6 +16,8 @@ ASK_S = 1.0  # between questions; those asked during the start are lost
 POSITION_S = 1.0  # a printer that names itself but not its place
 RATES = (115200, 250000, 1000000, 230400)  # what firmwares are built with, the likeliest first
 NAME = "FIRMWARE_NAME:"
+KEY = re.compile(r"\s+[A-Z_]+:")  # Marlin writes SOURCE_CODE_URL, RepRapFirmware ELECTRONICS behind the name
+VERSION = re.compile(r" FIRMWARE_VERSION: ?(\S+)")
 GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of printers have words
 
 
@@ -45,8 +47,10 @@ class Answer:
 
     @property
     def firmware(self) -> str:
-        """The firmware's name without the rest of its line."""
-        return self.words.removeprefix(NAME).strip().partition(" SOURCE_CODE_URL")[0].partition(" PROTOCOL_VERSION")[0]
+        """The firmware's name and version without the rest of its line."""
+        name = KEY.split(self.words.removeprefix(NAME).strip())[0]
+        version = VERSION.search(self.words)
+        return f"{name} {version[1]}" if version else name
 
 
 def ask(port: Port, patience_s: float = PATIENCE_S) -> Answer:

@@ -188,6 +188,16 @@ def test_limits_carry_the_firmware_s_own_letters() -> None:
         assert ask(port).limits["A"] == (-90.0, 90.0)
 
 
+@pytest.mark.parametrize(("words", "name"), [
+    ("FIRMWARE_NAME:Marlin 2.1.2 (Sep 29) SOURCE_CODE_URL:x.org AXIS_COUNT:5", "Marlin 2.1.2 (Sep 29)"),
+    ("FIRMWARE_NAME: RepRapFirmware for Duet 3 FIRMWARE_VERSION: 3.5.1 ELECTRONICS: Duet 3", "RepRapFirmware for Duet 3 3.5.1"),
+    ("FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.12-85", "Klipper v0.12-85"),
+    ("", ""),
+])  # fmt: skip
+def test_a_firmware_is_called_by_name_and_version(words: str, name: str) -> None:
+    assert Answer(Kind.PRINTER, words).firmware == name
+
+
 @pytest.mark.parametrize("letters", ["", "XYZAC", "XYZABC"])
 def test_a_firmware_that_tells_enough_or_nothing_is_not_refused(letters: str) -> None:
     assert misfit(Answer(Kind.PRINTER, "FIRMWARE_NAME:Marlin 2", letters), MACHINE) == ""
