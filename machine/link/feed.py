@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import inf
 from threading import Event as Flag
 
 from machine.link.control import Control
@@ -66,7 +67,8 @@ class Feed:
         self.modal, self.trail, self._place = Modal(axes_of(machine)), Trail(), Place()
         self._laid = Laid(machine) if machine is not None else None
         self._wishes = Wishes(self.modal.axes, job.limit, control, stop)
-        watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c)) if machine is not None else Watchdog()
+        # A bed that cannot be heated is as warm as its room.
+        watchdog = Watchdog((machine.nozzle_limit_c, machine.bed_limit_c or inf)) if machine is not None else Watchdog()
         self.reports = Reports(watchdog, began_s)
         self.talk: Talk
         self.begin: Begin | None = None  # of a resumed print

@@ -87,3 +87,10 @@ def test_a_heater_that_fails_in_mid_print_ends_it_with_heaters_off() -> None:
     with pytest.raises(PrinterError, match=r"nozzle|cold|Heating|Thermal"):
         print_lines(lines, PATH, medium=printer.medium, profile=PROFILE)
     assert printer.record.nozzle_target_c == 0.0
+
+
+def test_a_bed_that_cannot_be_heated_may_be_as_warm_as_its_room() -> None:
+    profile = load(settings=["machine.bed_limit_c=0"])
+    lines = ["M104 S200", "M109 S200", *(f"G1 X{k % 50} F600" for k in range(100))]
+    printer = VirtualPrinter(profile.machine)
+    assert not print_lines(lines, PATH, medium=printer.medium, profile=profile).cancelled
