@@ -25,7 +25,7 @@ profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check pro
 app.add_typer(profiles_app, name="profiles")
 
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF or GLB file, or demo:NAME")]
-ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model as above, or a G-code file")]
+ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model file, demo:NAME, or a G-code file")]
 MachineName = Annotated[str, typer.Option("--machine", metavar="NAME|FILE", help="machine profile")]
 MaterialName = Annotated[str, typer.Option("--material", metavar="NAME|FILE", help="material profile")]
 ProcessName = Annotated[str, typer.Option("--process", metavar="NAME|FILE", help="process profile")]
@@ -195,7 +195,11 @@ def print_(
     process: ProcessGiven = None,
     settings: Settings = None,
 ) -> int:
-    """Print a model or a G-code file over a serial port, or on the simulated printer."""
+    """Print a model or a G-code file over a serial port, or on the simulated printer.
+
+    PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT. The printer is asked who it is before anything moves.
+    Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
+    """
     from machine.app import commands
 
     profile = _profile(
@@ -256,7 +260,10 @@ def console(
     machine: MachineName = "generic_ac",
     settings: Settings = None,
 ) -> int:
-    """Talk to a printer: lines typed, or piped in, are sent; its answers are shown."""
+    """Talk to a printer: lines typed, or piped in, are sent; its answers are shown.
+
+    /help tells what else can be typed; Ctrl-D leaves. Heaters that are on are then switched off, after a question at a terminal.
+    """
     from machine.app import console_command
 
     profile = _profile(machine, "pla", "standard", settings, None, None, None)
