@@ -14,7 +14,7 @@ from profiles.profile import load
 from tests.machine.browser import Browser
 
 FOLDER = Path(__file__).resolve().parents[1] / "docs"
-SIZE = (1060, 660)
+SIZE = (1040, 640)
 PAUSE = "new Promise((done) => setTimeout(done, 400))"  # until the page thinks that nothing moves any more
 STILL = "document.documentElement.dataset.picture === 'idle'"
 # What is chosen for each demo: a share of the rows, values of lists and sliders, boxes clicked, keys pressed.
@@ -22,7 +22,7 @@ SHOTS = {
     "figure": (0.52, {"colour-by": "part"}, ("show-travels",), ("+",)),
     "tree": (0.71, {"colour-by": "kind", "model": "hide", "frame": "workpiece"}, (), ("ArrowUp",)),
     "bracket": (0.86, {"colour-by": "speed"}, (), ("d",)),
-    "lattice": (1.0, {"colour-by": "layer", "model": "hide"}, ("show-machine",), ("d",)),
+    "lattice": (1.0, {"colour-by": "layer", "model": "hide"}, ("show-machine",), ("d", "-")),
 }
 
 

@@ -210,6 +210,16 @@ def test_residual_faces_are_red_and_may_be_left_plain(browser: Browser, tmp_path
     assert page.value(REDS) > plain + 100
 
 
+def test_parts_are_drawn_apart_and_the_table_stands_as_for_one(browser: Browser, tmp_path: Path) -> None:
+    profile, decomposition, _, _ = hand.printed()
+    page = opened(browser, tmp_path, parts_page(decomposition, profile))
+    together = page.value(PICTURE)
+    put(page, "apart", 0.3)
+    apart = page.value(PICTURE)
+    put(page, "stand", 2)
+    assert len({together, apart, page.value(PICTURE)}) == 3
+
+
 def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:
     finding = program()[1].run.findings[0]
     put(page, "position", 0)

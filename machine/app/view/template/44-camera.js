@@ -1,6 +1,7 @@
 // Camera: an eye that circles a target, z up, moved by mouse, fingers and keys.
 
 const FARTHEST_MM = 1000; // behind the work: room for the machine
+const MARGIN = 1.12;
 const HALF_HEIGHT = Math.tan(15 * RAD); // of the picture at distance 1
 
 function cameraOf() {
@@ -35,11 +36,17 @@ function cameraOf() {
     camera.target = add(camera.target, add(scaled(camera.right(), x * span), scaled(camera.up(), y * span)));
     camera.distance = next;
   };
-  /** Brings a box [least, most] into view; the room that panels leave is of the given aspect. */
-  camera.fit = ([least, most], aspect) => {
+  /** Brings places into view about their middle. */
+  camera.fit = (places, aspect) => {
+    const [least, most] = bounds(places.flat());
     camera.target = scaled(add(least, most), 0.5);
     camera.radius = Math.max(length(sub(most, least)) / 2, 1);
-    camera.distance = (1.1 * camera.radius) / (HALF_HEIGHT * Math.min(1, aspect));
+    const axes = [camera.right(), camera.up(), outward()];
+    const needed = places.map((place) => {
+      const [x, y, near] = axes.map((axis) => dot(axis, sub(place, camera.target)));
+      return near + Math.max(Math.abs(x) / aspect, Math.abs(y)) / HALF_HEIGHT;
+    });
+    camera.distance = MARGIN * Math.max(...needed, 1);
   };
   return camera;
 }

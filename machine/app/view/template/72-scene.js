@@ -3,7 +3,7 @@
 function sceneOf(print, bells) {
   const { rows, header } = print, last = Math.max(rows.count - 1, 0);
   const scene = {
-    row: last, share: 1, place: [0, 0, 0, 0, 0],
+    row: last, share: 1, place: restingPlace(header),
     part: null, others: "faint", low: 0, high: Math.max(rows.layers.length - 1, 0),
     riding: false, dark: false, stride: 1, mode: "part", hidden: new Set(),
     model: rows.count ? "ghost" : "solid", risky: "printed", apart: 0,
@@ -17,7 +17,7 @@ function sceneOf(print, bells) {
   scene.go = (row, share = 1) => {
     scene.row = clamp(Math.round(row), 0, last);
     scene.share = share;
-    scene.place = rows.count ? placeAt(rows, scene.row, share) : restingPlace(header);
+    if (rows.count) scene.place = placeAt(rows, scene.row, share);
     bells.ring("row");
   };
   /** The end of a layer some layers away. */

@@ -23,7 +23,7 @@ function readoutsOf(print, scene, bells) {
   for (const [id, label] of told) {
     const className = [id === "type" ? "wide" : "", less.has(id) ? "less" : ""].join(" ");
     const term = made("dt", { text: label, className: less.has(id) ? "less" : "" });
-    $("readouts").append(term, made("dd", { className }, made("output", { id: `readout-${id}` })));
+    $("readouts").append(term, made("dd", { className }, made("output", { id: `readout-${id}`, ariaLive: "off" })));
   }
   bells.on("row", () => { for (const [id, , of] of told) $(`readout-${id}`).textContent = rows.count ? of(scene.row) : "–"; });
 }

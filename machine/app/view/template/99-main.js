@@ -43,8 +43,8 @@ function fitting(print, scene, camera, picture, ring) {
   const [least, most] = print.box, middle = scaled(add(least, most), 0.5);
   const work = () => standing(print.chain, scene.place, scene.riding).work;
   const fit = () => {
-    camera.fit(print.box, picture.canvas.clientWidth / Math.max(picture.canvas.clientHeight, 1));
-    camera.target = carried(work(), middle);
+    const corners = Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => print.box[(i >> axis) & 1][axis]));
+    camera.fit(corners.map((corner) => carried(work(), corner)), picture.canvas.clientWidth / Math.max(picture.canvas.clientHeight, 1));
     picture.ask();
   };
   let before = work();
