@@ -20,6 +20,7 @@ from machine.link.events import Action, Echo, FirmwareFault, LineError, Start, U
 from machine.link.progress import Progress
 
 WORDS_KEPT = 4  # last words of the printer
+WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell
 HALF_BYTES = 4096
 COLOURS = {"printing": "green", "finishing": "green", "paused": "yellow", "pausing": "yellow", "resuming": "yellow"}
 KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? more"
@@ -160,7 +161,7 @@ def _times(progress: Progress, now: datetime) -> Text:
 
 
 def _words(words: tuple[str, ...]) -> list[Text]:
-    return [Text(f"  {word}", style="cyan", no_wrap=True, overflow="ellipsis") for word in words]
+    return [Text(f"  {word if len(word) <= WORD_LENGTH else word[:WORD_LENGTH] + '...'}", style="cyan") for word in words]
 
 
 def _joined(told: list[str]) -> Text:

@@ -78,9 +78,15 @@ def test_without_a_keyboard_no_keys_are_offered() -> None:
 
 @pytest.mark.parametrize("width", [20, 40, 80])
 def test_a_narrow_terminal_gets_one_line_each(width: int) -> None:
-    got = lines(replace(MOMENT, state="reconnecting"), ("word " * 50,), width=width)
+    got = lines(replace(MOMENT, state="reconnecting"), ("a word",), width=width)
     assert all(len(line) <= width for line in got)
     assert len(got) <= 7 + len(KEYS) // width
+
+
+def test_a_long_word_of_the_printer_is_wrapped_and_cut() -> None:
+    got = lines(MOMENT, ("x" * 300,), width=80)
+    assert sum(line.count("x") for line in got[5:-1]) == 200
+    assert len(got) == 9
 
 
 def test_the_explanation_of_q_fits_on_two_lines() -> None:
