@@ -96,7 +96,7 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """Words for people, `echo:` or `//`."""
+    """Words for people: `echo:`, `//`, `Warning:`."""
 
     text: str
 
@@ -180,7 +180,7 @@ def _told(text: str) -> Event:
         return Action(found[1].lower(), found[2])
     if GREETS.fullmatch(text):
         return Banner(text)
-    if text.startswith(("echo:", "//")):
+    if text.startswith(("echo:", "//", "Warning:")):  # the last is RepRapFirmware's
         return Echo(text.removeprefix("echo:").removeprefix("//").strip())
     if text.startswith("FIRMWARE_NAME:"):
         return Identity(text)

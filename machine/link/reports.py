@@ -7,7 +7,7 @@ from profiles.errors import PrinterError
 
 WARNINGS = 20  # kept of the printer's own words that show a program it does not understand
 WARNS = ("nknown command", "too long extrusion")
-COLD = "cold extrusion prevented"
+COLD = ("cold extrusion prevented", "not driven because its heater")  # Marlin, RepRapFirmware; Klipper's is an error
 ASKS = {"pause": Wish.PAUSE, "resume": Wish.RESUME, "cancel": Wish.CANCEL}
 SILENT = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prompt_button", "prompt_show", "prompt_end"}
 
@@ -39,7 +39,7 @@ class Reports:
         self._watchdog.wait(now_s, mute)
 
     def _words(self, text: str) -> None:
-        if COLD in text:
+        if any(words in text for words in COLD):
             raise PrinterError(
                 f"the printer said {text!r}: the nozzle is too cold, the filament of a move is missing from the print"
             )

@@ -63,6 +63,7 @@ LINES: list[tuple[bytes, Event]] = [
     (b"fatal: heater", FirmwareFault("fatal: heater")),
     (b'echo:Unknown command: "5 G92"', Echo('Unknown command: "5 G92"')),
     (b"//action:pause\r", Action("pause")),
+    (b"Warning: Tool 0 was not driven", Echo("Warning: Tool 0 was not driven")),
     (b"Cap:EMERGENCY_PARSER:1", Capability("EMERGENCY_PARSER", True)),
     (b"start", Start()),
     (b"wait", Wait()),

@@ -423,6 +423,15 @@ def test_scenario_28_thermal_runaway(habits: Habits) -> None:
     assert_cold(done)
 
 
+@pytest.mark.parametrize("dialect", ["marlin", "reprapfirmware", "klipper"])
+def test_a_nozzle_too_cold_to_print_ends_the_print(dialect: str) -> None:
+    profile = load(settings=[f"machine.dialect={dialect}"])
+    printer = VirtualPrinter(profile.machine)
+    with pytest.raises(PrinterError, match=r"nozzle is too cold|below minimum temp"):
+        print_lines(["M104 S190", "M109 S190", "G92 E0", "M83", "M104 S0", "G4 S300", *STROKES], PATH, medium=printer.medium)
+    assert printer.record.strokes <= 1
+
+
 @BOTH
 def test_scenario_29_klipper_s_two_exclamation_marks_stop_although_an_ok_follows(habits: Habits) -> None:
     done = printed([Fault("error", LINE, text="!! Lost communication with MCU\nok")], habits)
