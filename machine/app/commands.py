@@ -11,7 +11,7 @@ from machine.app.output import check_folder, check_writable, write_bytes, write_
 from machine.app.picture import contact_sheet, parts_picture
 from machine.app.pipeline import Program, build, decompose_model, model_name
 from machine.app.png import write_png
-from machine.app.printing import check_dialect, check_port, print_program
+from machine.app.printing import check_dialect, check_port, paced, print_program
 from machine.app.progress import say
 from machine.app.report import agreement_line, parts_table, run_table, show
 from machine.app.view.live import served
@@ -178,6 +178,8 @@ def print_model(
         check_printer(answer, profile.machine, force)
     check_program(answer, program, profile, model_name(model), force)
     _refuse_errors(program, force)
+    if paced(port):
+        program = replace(program, run=starved(program.run, program.lines, profile.machine, baud))
     show(run_table(program.run))
     name, source = model_name(model), None if is_model else Path(model)
     if watch_port is None:

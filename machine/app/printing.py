@@ -44,6 +44,14 @@ def check_port(port: str, baud: int, sim_speed: float) -> Answer | None:
     return None if port == SIMULATED else printer_at(port, baud)
 
 
+def paced(port: str) -> bool:
+    """Whether bytes take the time that the baud rate says: not over native USB, a network or a pseudo-terminal."""
+    if port == SIMULATED or "://" in port:
+        return False
+    device = Path(port).resolve()  # of a stable name under /dev/serial/by-id
+    return device.parent.name != "pts" and not device.name.startswith(("ttyACM", "cu.usbmodem"))
+
+
 def check_dialect(machine: Machine) -> None:
     """Refuse a machine whose firmware takes no lines over a serial port."""
     if not DIALECTS[machine.dialect].serial:

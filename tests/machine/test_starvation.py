@@ -5,6 +5,7 @@ from math import cos, sin
 import pytest
 
 from machine.app.cli import main
+from machine.app.printing import paced
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.starvation import feeding, starved
 from machine.link.habits import Habits
@@ -73,6 +74,13 @@ def test_lines_of_other_commands_take_their_time_on_the_line_too() -> None:
 @pytest.mark.parametrize("lines", [("G21",), ("M104 S0", "G28"), (";nothing", "G4 P1")])
 def test_a_program_without_moves_starves_nothing(lines: tuple[str, ...]) -> None:
     assert starved(dry_run(lines, PROFILE), lines, MACHINE, 9600).findings == dry_run(lines, PROFILE).findings
+
+
+@pytest.mark.parametrize(("port", "slow"), [
+    ("/dev/ttyUSB0", True), ("/dev/ttyS3", True), ("COM4", True), ("/dev/ttyACM0", False), ("/dev/pts/7", False), ("sim", False),
+    ("socket://printer:5000", False)])  # fmt: skip
+def test_print_looks_at_the_line_s_speed_where_the_baud_rate_means_something(port: str, slow: bool) -> None:
+    assert paced(port) == slow
 
 
 def test_simulate_takes_a_baud_rate(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:  # type: ignore[no-untyped-def]
