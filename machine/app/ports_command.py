@@ -1,8 +1,10 @@
 """Ports: the serial ports of this computer and what answers at each."""
 
 import json
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from threading import Event
 from typing import Any
 
 from machine.app.match import ECHO
@@ -33,17 +35,26 @@ def ports(baud: int, as_json: bool, ask: bool) -> int:
         say("no serial port was found: plug the printer in and switch it on")
     elif ask:
         say(f"asking {len(devices)} {'ports' if len(devices) > 1 else 'port'}: this takes up to {_longest_s():.0f} s")
-    with ThreadPoolExecutor(AT_A_TIME) as pool:
-        found = list(pool.map(lambda device: asked(device, baud) if ask else Found(device), devices))
+    found = _all_asked(devices, baud) if ask else [Found(device) for device in devices]
     show(json.dumps([plain(each) for each in found], indent=2) + "\n" if as_json else "".join(told(each) for each in found))
     return 0
 
 
-def asked(device: SerialDevice, baud: int) -> Found:
-    """Open a port for this program alone and see what answers."""
+def _all_asked(devices: Sequence[SerialDevice], baud: int) -> list[Found]:
+    over = Event()
+    with ThreadPoolExecutor(AT_A_TIME) as pool:
+        try:
+            return list(pool.map(lambda device: asked(device, baud, over), devices))
+        except KeyboardInterrupt:
+            over.set()
+            raise
+
+
+def asked(device: SerialDevice, baud: int, over: Event | None = None) -> Found:
+    """Open a port for this program alone and see what answers; a set `over` ends the asking."""
     try:
         with open_port(device.name, baud) as port:
-            return Found(device, *ask_at_any_rate(port, baud, PATIENCE_S))
+            return Found(device, *ask_at_any_rate(port, baud, PATIENCE_S, over))
     except PortError as error:
         return Found(device, trouble=str(error))
 

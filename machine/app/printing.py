@@ -85,7 +85,7 @@ def print_program(
     keeping = new_journal(program.lines, profile, name or "print", source, journal) if wanted else nullcontext()
     with new_log("print", title) if log is None else TrafficLog(log, title) as kept, _pointing_to(kept), keeping as story:
         if port != SIMULATED:
-            return ended(streamed(program, profile, port, baud, title, kept, follow, story))
+            return ended(streamed(program, profile, port, baud, title, kept, follow, story), kept)
         return _print_simulated(program, profile, baud, sim_speed or inf, title, kept, follow, story)
 
 
@@ -104,7 +104,7 @@ def _print_simulated(
         outcome = streamed(program, profile, printer.path, baud, title, log, follow, journal)
         record = printer.record
     if outcome.cancelled:
-        return ended(outcome)
+        return ended(outcome, log)
     segments, volumes = record.deposited(profile.material.diameter_mm)
     planned = float(program.run.segment_mm3.sum())
     laid = f"{len(segments)} strokes laid {volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f})"
@@ -221,9 +221,13 @@ def _pointing_to(log: TrafficLog) -> Iterator[None]:
     try:
         yield
     except PrinterError:
-        if not log.trouble:
-            say(f"all that was sent and received is in {log.file}")
+        _point_to(log)
         raise
+
+
+def _point_to(log: TrafficLog) -> None:
+    if not log.trouble:
+        say(f"all that was sent and received is in {log.file}")
 
 
 def status(progress: Progress) -> str:
@@ -241,10 +245,12 @@ def status(progress: Progress) -> str:
     return f"{progress.state}: " + ", ".join(told) + (f"; {progress.message}" if progress.message else "")
 
 
-def ended(outcome: Outcome) -> int:
-    """Tell how the print ended; 130 when a person stopped it."""
+def ended(outcome: Outcome, log: TrafficLog | None = None) -> int:
+    """Tell how the print ended, and where its log is when the printer had something to say; 130 when a person stopped it."""
     for warning in outcome.warnings:
         say(f"the printer said: {warning}")
+    if outcome.warnings and log is not None:
+        _point_to(log)
     if outcome.cancelled:
         say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {HEATERS[outcome.heaters_off]}")
         return 130

@@ -4,9 +4,11 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
+from threading import Event
 from time import monotonic
 
-from machine.link.events import Area, Busy, Event, FirmwareFault, Identity, Ok, Position
+from machine.link.events import Area, Busy, FirmwareFault, Identity, Ok, Position
+from machine.link.events import Event as Said
 from machine.link.hearing import Hearing
 from machine.link.port import Port
 
@@ -53,27 +55,27 @@ class Answer:
         return f"{name} {version[1]}" if version else name
 
 
-def ask(port: Port, patience_s: float = PATIENCE_S) -> Answer:
-    """Ask until a printer has named itself, s at most; raises PortError when the port is lost."""
-    heard = _Heard(port)
+def ask(port: Port, patience_s: float = PATIENCE_S, over: Event | None = None) -> Answer:
+    """Ask until a printer has named itself, s at most, or until `over` is set; raises PortError when the port is lost."""
+    heard = _Heard(port, over or Event())
     heard.listen("M115", patience_s, lambda: heard.named)
     if heard.named:
         heard.listen("M114", POSITION_S, lambda: heard.placed)
     return heard.answer()
 
 
-def ask_at_any_rate(port: Port, baud: int, patience_s: float = PATIENCE_S) -> tuple[Answer, int]:
+def ask_at_any_rate(port: Port, baud: int, patience_s: float = PATIENCE_S, over: Event | None = None) -> tuple[Answer, int]:
     """What answers and at which rate: the given one, and where nothing sensible comes the usual others.
 
     Where none makes a printer answer, the answer is that at the given rate, at which the port is left.
     """
-    first = ask(port, patience_s)
+    first = ask(port, patience_s, over)
     if first.kind not in (Kind.RUBBISH, Kind.SILENT) or port.name.startswith("socket://"):
         return first, baud
     for rate in RATES:
         if rate != baud:
             port.set_baud(rate)
-            found = ask(port, QUICK_S)
+            found = ask(port, QUICK_S, over)
             if found.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED):
                 return found, rate
     port.set_baud(baud)
@@ -83,8 +85,8 @@ def ask_at_any_rate(port: Port, baud: int, patience_s: float = PATIENCE_S) -> tu
 class _Heard:
     """What one asking has brought so far."""
 
-    def __init__(self, port: Port) -> None:
-        self._port = port
+    def __init__(self, port: Port, over: Event) -> None:
+        self._port, self._over = port, over
         self._hearing = Hearing()
         self._words = self._fault = self._letters = ""
         self._area: Area | None = None
@@ -95,7 +97,7 @@ class _Heard:
         end_s = next_s = monotonic()
         end_s += patience_s
         self._ok = False
-        while not until() and not self._fault and (now_s := monotonic()) < end_s:
+        while not until() and not self._fault and not self._over.is_set() and (now_s := monotonic()) < end_s:
             if now_s >= next_s:
                 self._port.write(f"\n{question}\n".encode("ascii"))  # the newline ends what stood on the line before
                 next_s = now_s + ASK_S
@@ -116,7 +118,7 @@ class _Heard:
         words = self._hearing.foreign
         return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
 
-    def _take(self, event: Event) -> None:
+    def _take(self, event: Said) -> None:
         if isinstance(event, FirmwareFault):
             self._fault = event.text
         elif isinstance(event, Busy):

@@ -122,6 +122,17 @@ def test_the_log_goes_where_it_is_asked_for(tmp_path: Path) -> None:
     assert re.search(r"> N\d+ M109 S210\*\d+\n", text)
 
 
+def test_what_the_printer_did_not_understand_is_told_with_the_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, log = tmp_path / "odd.gcode", tmp_path / "traffic.log"
+    file.write_text("\n".join([*HEAT, "M9876", *OFF]) + "\n")
+    with SimulatedPrinter(MACHINE) as printer:
+        assert main(["print", str(file), "--port", printer.path, "--log", str(log), "--force"]) == 0
+    assert capsys.readouterr().err.splitlines()[-2:] == [
+        'the printer said: Unknown command: "M9876"',
+        f"all that was sent and received is in {log}",
+    ]
+
+
 def test_a_log_that_cannot_be_written_is_refused_before_the_print(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["print", "demo:tree", "--port", "sim", "--log", str(tmp_path / "nowhere" / "a.log")]) == 1
     assert "the folder" in capsys.readouterr().err

@@ -1,6 +1,7 @@
 """`tiltprint ports`: every port once, with what answers there, for people and for programs."""
 
 import json
+from threading import Event
 
 import pytest
 
@@ -78,6 +79,14 @@ def test_a_port_in_use_is_told_without_its_name_twice() -> None:
         with serial.Serial(printer.path, exclusive=True):
             found = asked(device(printer.path), 115200)
     assert told(found) == f"{printer.path}\n    is busy: another program holds it open\n"
+
+
+def test_asking_ends_when_it_is_called_off() -> None:
+    over = Event()
+    over.set()
+    with SimulatedPrinter(MACHINE) as printer:
+        found = asked(device(printer.path), 115200, over)
+    assert found.answer == Answer(Kind.SILENT)
 
 
 @pytest.mark.parametrize(("kind", "words", "line"), [
