@@ -14,7 +14,9 @@ from pathlib import Path
 
 from machine.app.interrupts import interrupting
 from machine.app.match import printer_on
+from machine.app.output import check_writable
 from machine.app.ports_command import in_words
+from machine.app.printing import SIMULATED, check_speed
 from machine.app.progress import say
 from machine.app.session import LeftError, Session, StopError
 from machine.app.state_folder import state_folder
@@ -39,7 +41,6 @@ from machine.link.simulator import SimulatedPrinter
 from profiles.errors import LocalProtocolError, PrinterError
 from profiles.machine import Machine
 
-SIMULATED = "sim"
 PROMPT = "> "
 HISTORY = 1000  # lines
 AT_ONCE_S = 0.5
@@ -68,11 +69,16 @@ def console(
     machine: Machine, port: str, baud: int, sim_speed: float, reports: bool, leave_heaters: bool, log: Path | None
 ) -> int:
     """Talk to a printer until the person leaves (0; 130 after Ctrl-C) or the pipe ends (1 when a command was not known)."""
+    check_speed(sim_speed)
+    if log is not None:
+        check_writable(log)
     title = f"console at {port}"
     with ExitStack() as stack:
         path = stack.enter_context(SimulatedPrinter(machine, sim_speed or inf)).path if port == SIMULATED else port
         kept = stack.enter_context(new_log("console", title) if log is None else TrafficLog(log, title))
         wire = stack.enter_context(open_port(path, baud))
+        if kept.trouble:
+            say(f"the traffic is not logged: {kept.file}: {kept.trouble}")
         stack.enter_context(interrupting())
         shown = Shown(reports)
 

@@ -11,7 +11,7 @@ from machine.app.match import ECHO
 from machine.app.progress import say
 from machine.app.report import show
 from machine.link.answer import QUICK_S, RATES, Answer, Kind, ask_at_any_rate
-from machine.link.port import SerialDevice, open_port, serial_devices
+from machine.link.port import SerialDevice, check_baud, open_port, serial_devices
 from profiles.errors import PortError
 
 PATIENCE_S = 4.0
@@ -30,6 +30,7 @@ class Found:
 
 def ports(baud: int, as_json: bool, ask: bool) -> int:
     """List ports on stdout; those found in /dev/serial/by-id first. ask=False: none is opened. 0 also when there is none."""
+    check_baud(baud)
     devices = serial_devices()
     if not devices:
         say("no serial port was found: plug the printer in and switch it on")

@@ -39,8 +39,7 @@ Follow = Callable[[Progress], None]
 
 def check_port(port: str, baud: int, sim_speed: float) -> Answer | None:
     """What answers at a port, refused at once when it is no printer; None for the simulated one. Raises PrinterError."""
-    if not (isfinite(sim_speed) and sim_speed >= 0):
-        raise PrinterError(f"--sim-speed is {sim_speed:g}: it must be 0 (as fast as possible) or a number above")
+    check_speed(sim_speed)
     return None if port == SIMULATED else printer_at(port, baud)
 
 
@@ -50,6 +49,12 @@ def paced(port: str) -> bool:
         return False
     device = Path(port).resolve()  # of a stable name under /dev/serial/by-id
     return device.parent.name != "pts" and not device.name.startswith(("ttyACM", "cu.usbmodem"))
+
+
+def check_speed(sim_speed: float) -> None:
+    """Refuse a speed at which no simulated printer can run."""
+    if not (isfinite(sim_speed) and sim_speed >= 0):
+        raise PrinterError(f"--sim-speed is {sim_speed:g}: it must be 0 (as fast as possible) or a number above")
 
 
 def check_dialect(machine: Machine) -> None:

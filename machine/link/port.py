@@ -133,8 +133,7 @@ def open_port(name: str, baud: int) -> Port:
     The modem lines are left as the system sets them on opening: a board with native USB sends only while DTR is up, one
     with a reset circuit restarts, which the greeting copes with. Raises PortError.
     """
-    if not BAUDS[0] <= baud <= BAUDS[1]:
-        raise PortError(f"baud rate {baud} is not possible: {BAUDS[0]} to {BAUDS[1]} is allowed, printers use 115200 or 250000")
+    check_baud(baud)
     if "://" in name:
         _check_address(name)
     else:
@@ -146,6 +145,12 @@ def open_port(name: str, baud: int) -> Port:
     except _TROUBLE as error:
         raise PortError(refusal(name, baud, error)) from None
     return Port(device, name)
+
+
+def check_baud(baud: int) -> None:
+    """Refuse a rate that no adapter takes; raises PortError."""
+    if not BAUDS[0] <= baud <= BAUDS[1]:
+        raise PortError(f"baud rate {baud} is not possible: {BAUDS[0]} to {BAUDS[1]} is allowed, printers use 115200 or 250000")
 
 
 def _descriptor(device: Any) -> int | None:

@@ -122,6 +122,20 @@ def test_a_port_where_no_printer_is_gets_the_sentence_of_print(
     assert f"what answers at {path} is no printer: it sends back what it is told" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("options", "words"), [
+    (("--sim-speed", "-1"), "--sim-speed is -1: it must be 0 (as fast as possible) or a number above"),
+    (("--log", "/nowhere/a.log"), "the folder /nowhere does not exist"),
+    (("--baud", "7"), "baud rate 7 is not possible"),
+])  # fmt: skip
+def test_an_option_that_makes_no_sense_is_one_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], words: str
+) -> None:
+    assert piped("", "sim", *options, monkeypatch=monkeypatch) == 1
+    message = capsys.readouterr().err
+    assert words in message
+    assert message.count("\n") == 1
+
+
 def test_a_person_types_gets_help_and_leaves_with_ctrl_d() -> None:
     with Person("console", "--port", "sim") as person:
         person.see("> ")

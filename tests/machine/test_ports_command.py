@@ -65,6 +65,11 @@ def test_several_ports_are_asked_at_a_time_and_told_in_order(
     assert found[3]["trouble"].startswith("port /dev/no-such-port does not exist")
 
 
+def test_an_impossible_rate_is_refused_before_any_port_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ports", "--baud", "0"]) == 1
+    assert capsys.readouterr().err.startswith("tiltprint: baud rate 0 is not possible")
+
+
 def test_without_asking_no_port_is_opened(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
     here.append(MEGA)
     assert main(["ports", "--no-ask"]) == 0
