@@ -99,6 +99,13 @@ class Browser:
         for kind, (x, y) in places:
             self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
+    def touch(self, *moments: tuple[tuple[float, float], ...]) -> None:
+        """Fingers put down at the places of the first moment, moved to those of the others, and lifted."""
+        for k, places in enumerate(moments):
+            points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(places)]
+            self._send("Input.dispatchTouchEvent", type="touchMove" if k else "touchStart", touchPoints=points)
+        self._send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
     def key(self, key: str) -> None:
         """One key pressed and released."""
         text = {"text": key} if len(key) == 1 else {}

@@ -283,6 +283,14 @@ def test_dragging_turns_and_the_wheel_zooms(page: Browser) -> None:
     assert len({before, turned, page.value(PICTURE)}) == 3
 
 
+def test_one_finger_turns_and_two_fingers_zoom(page: Browser) -> None:
+    before = page.value(PICTURE)
+    page.touch(((300, 300),), ((360, 320),))
+    turned = page.value(PICTURE)
+    page.touch(((300, 300), (340, 340)), ((260, 260), (380, 380)))
+    assert len({before, turned, page.value(PICTURE)}) == 3
+
+
 def test_a_click_on_a_bead_goes_to_its_row(page: Browser) -> None:
     put(page, "part", 2)
     put(page, "model", "hide")

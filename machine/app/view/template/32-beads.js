@@ -16,7 +16,7 @@ uniform lowp sampler2D colours;
 uniform mat4 toClip, toEye;
 uniform vec3 eye;
 uniform vec4 tint;
-uniform int first, stride, corners, last;
+uniform int first, behind, stride, corners, last; // behind: the first slot that is not drawn
 uniform float share;
 flat out vec4 paint;
 flat out int slot;
@@ -31,13 +31,18 @@ vec3 unfolded(vec2 f) {
   if (v.z < 0.0) v.xy = (1.0 - abs(v.yx)) * vec2(v.x < 0.0 ? -1.0 : 1.0, v.y < 0.0 ? -1.0 : 1.0);
   return normalize(v);
 }
-/** Takes the bead's values; false where nothing is to be drawn. */
+int next; // the slot after the bead
+/** Takes the bead's values; false where nothing is to be drawn. With a stride, the first beads of so many rows as one. */
 bool laid() {
-  slot = first + (gl_VertexID / corners) * stride;
+  int begin = first + (gl_VertexID / corners) * stride, most = min(begin + stride, behind);
+  slot = begin;
+  while (slot < most - 1 && sizeOf(slot).x == 0.0) slot++;
+  next = slot + 1;
+  while (next < most && sizeOf(next).x > 0.0) next++;
   size = sizeOf(slot);
   vec4 colour = texelFetch(colours, texel(slot), 0);
   start = point(slot);
-  end = point(slot + 1);
+  end = point(next);
   if (colour.a == 0.0 || size.x == 0.0 || start == end) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return false;
@@ -62,7 +67,7 @@ void main() {
   vec3 mine = sideways(along, up), across = mine;
   bool ending = mod(corner.x, 2.0) > 0.5, tip = corner.x > 1.5;
   vec3 here = ending ? stop : start, other = vec3(0.0);
-  int beside = ending ? slot + 1 : slot - 1;
+  int beside = ending ? next : slot - 1;
   if (sizeOf(beside).x > 0.0 && !(ending && slot == last)) other = point(beside + 1) - point(beside);
   bool joined = dot(other, other) > 0.0 && dot(normalize(other), along) > -0.3;
   if (joined) across = mitred(mine, sideways(normalize(other), up));
@@ -155,6 +160,7 @@ function beadsOf(gl, path) {
     gl.uniform1i(to("corners"), body.corners);
     for (const { first, end, tint } of ranges) {
       gl.uniform4fv(to("tint"), tint);
+      gl.uniform1i(to("behind"), end);
       for (let from = first; from < end; from += AT_ONCE * stride) {
         gl.uniform1i(to("first"), from);
         const beads = Math.min(Math.ceil((end - from) / stride), AT_ONCE);

@@ -1,4 +1,4 @@
-// Picture: the canvas and when it is drawn: only after a change, and with fewer beads while the eye moves on a slow computer.
+// Picture: the canvas and when it is drawn: only after a change, and with fewer beads on a slow computer.
 
 const SLOW_MS = 50;
 const STILL_MS = 180;
@@ -111,14 +111,14 @@ function outlive(canvas, drop, build) {
 }
 
 /**
- * moved() is called whenever eye or slider move, painted() after each picture. Where pictures come slowly only every second,
- * fourth ... bead is drawn until all rests, and on a computer without a graphics card so few that rest does not take long.
+ * moved() is called whenever eye or slider move, painted() after each picture. Where pictures come slowly, two, four ... moves are
+ * drawn as one until all rests; without a graphics card at rest too, so many that a picture takes a moment only.
  */
 function easing(scene, ask, count) {
   let timer = 0, coarse = doublings(count / AT_FIRST), whole = 0; // whole: ms that all beads would take
   const settle = () => {
     scene.stride = count > AT_FIRST && location.hash !== ALL ? doublings(whole / REST_MS) : 1;
-    notice(scene.stride > 1 ? `Without a fast graphics card: one bead of ${scene.stride} is drawn.` : "");
+    notice(scene.stride > 1 ? `Without a fast graphics card: up to ${scene.stride} moves are drawn as one.` : "");
     ask();
   };
   const rest = () => {

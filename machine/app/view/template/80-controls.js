@@ -19,6 +19,7 @@ function controlsOf(print, scene, bells) {
   $("stand").append(...posed.map((part) => made("option", { value: part.index, text: `part ${part.index}` })));
   $("stand").addEventListener("change", () => scene.standFor(posed.find((part) => String(part.index) === $("stand").value)));
   $("apart").addEventListener("input", () => { scene.apart = Number($("apart").value); bells.ring("look"); });
+  if (print.header.parts.length < 2) document.body.classList.add("one-part");
   typeBoxes(print, scene, bells);
   tabs();
 }
@@ -72,11 +73,14 @@ function kindEntries(rows) {
 
 function tabs() {
   const all = [...document.querySelectorAll("[role=tab]")];
-  const choose = (chosen) => all.forEach((tab) => {
-    tab.setAttribute("aria-selected", tab === chosen);
-    tab.tabIndex = tab === chosen ? 0 : -1;
-    $(tab.getAttribute("aria-controls")).hidden = tab !== chosen;
-  });
+  const choose = (chosen) => {
+    document.body.classList.toggle("reporting", chosen.id === "tab-report");
+    all.forEach((tab) => {
+      tab.setAttribute("aria-selected", tab === chosen);
+      tab.tabIndex = tab === chosen ? 0 : -1;
+      $(tab.getAttribute("aria-controls")).hidden = tab !== chosen;
+    });
+  };
   all.forEach((tab, k) => {
     tab.addEventListener("click", () => choose(tab));
     tab.addEventListener("keydown", (event) => {
