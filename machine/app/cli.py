@@ -13,6 +13,28 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
+from machine.app.options import (
+    BeamWidth,
+    Force,
+    HtmlFile,
+    JsonFile,
+    MachineGiven,
+    MachineName,
+    MaterialGiven,
+    MaterialName,
+    Model,
+    ModelOrGcode,
+    Orient,
+    ProcessGiven,
+    ProcessName,
+    RankerName,
+    SearchName,
+    Settings,
+    TimeLimit,
+    profile_of,
+    sections_named,
+)
+from machine.app.printer_cli import COMMANDS
 from profiles.errors import UserError
 
 app = typer.Typer(
@@ -23,28 +45,6 @@ app = typer.Typer(
 )
 profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check profiles of machines, materials and processes.")
 app.add_typer(profiles_app, name="profiles")
-
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF or GLB file, or demo:NAME")]
-ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model file, demo:NAME, or a G-code file")]
-MachineName = Annotated[str, typer.Option("--machine", metavar="NAME|FILE", help="machine profile")]
-MaterialName = Annotated[str, typer.Option("--material", metavar="NAME|FILE", help="material profile")]
-ProcessName = Annotated[str, typer.Option("--process", metavar="NAME|FILE", help="process profile")]
-MachineGiven = Annotated[
-    str | None, typer.Option("--machine", metavar="NAME|FILE", help="machine profile; else the G-code file's own")
-]
-MaterialGiven = Annotated[str | None, typer.Option("--material", metavar="NAME|FILE", help="material profile; else the file's")]
-ProcessGiven = Annotated[str | None, typer.Option("--process", metavar="NAME|FILE", help="process profile; else the file's")]
-Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
-JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
-HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]
-BeamWidth = Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")]
-SearchName = Annotated[
-    str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
-]
-TimeLimit = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")]
-RankerName = Annotated[str, typer.Option("--ranker", metavar="classic", help="which candidates the beam follows")]
-Orient = Annotated[bool, typer.Option("--orient", help="first lay the model down the way that needs least support")]
-Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
 
 
 @app.command()
@@ -73,7 +73,7 @@ def decompose(
     """Cut a model into parts, each with its own printing direction."""
     from machine.app import commands
 
-    profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
+    profile = profile_of(machine, material, process, settings, beam_width, search, time_limit)
     return commands.decompose(model, profile, ranker, orient, out, json, png, sheet, record, html)
 
 
@@ -102,7 +102,7 @@ def export(
     """Write the G-code of a model, dry-run first."""
     from machine.app import commands
 
-    profile = _profile(machine, material, process, settings, beam_width, search, time_limit)
+    profile = profile_of(machine, material, process, settings, beam_width, search, time_limit)
     return commands.export(model, profile, ranker, orient, out, json, svg, layer, force, compare, html)
 
 
@@ -130,10 +130,10 @@ def simulate(
     """Dry-run a model or a G-code file, held against the model; exit 1 when a finding is an error."""
     from machine.app import commands
 
-    profile = _profile(
+    profile = profile_of(
         machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
     )
-    named = _named(machine=machine, material=material, process=process, settings=settings)
+    named = sections_named(machine=machine, material=material, process=process, settings=settings)
     return commands.simulate(model, profile, ranker, orient, json, named, beside, html, baud)
 
 
@@ -158,136 +158,15 @@ def view(
     """Write one HTML page that shows a model or a G-code file: parts, layers, the moving machine, a report."""
     from machine.app import view_command
 
-    profile = _profile(
+    profile = profile_of(
         machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
     )
-    named = _named(machine=machine, material=material, process=process, settings=settings)
+    named = sections_named(machine=machine, material=material, process=process, settings=settings)
     return view_command.view(model, profile, ranker, orient, out, open_, compare, named)
 
 
-@app.command("print")
-def print_(
-    model: ModelOrGcode,
-    port: Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")],
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
-    beam_width: BeamWidth = None,
-    search: SearchName = None,
-    time_limit: TimeLimit = None,
-    ranker: RankerName = "classic",
-    orient: Orient = False,
-    speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
-    watch: Annotated[bool, typer.Option("--watch", help="serve a page on this computer that follows the print")] = False,
-    watch_port: Annotated[
-        int | None,
-        typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one"),
-    ] = None,
-    log: Annotated[
-        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
-    ] = None,
-    journal: Annotated[
-        Path | None, typer.Option("--journal", metavar="FILE", help="for resume; else a new file in the state folder")
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")
-    ] = False,
-    machine: MachineGiven = None,
-    material: MaterialGiven = None,
-    process: ProcessGiven = None,
-    settings: Settings = None,
-) -> int:
-    """Print a model or a G-code file over a serial port, or on the simulated printer.
-
-    PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT. The printer is asked who it is before anything moves.
-    Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
-    """
-    from machine.app import commands
-
-    profile = _profile(
-        machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
-    )
-    named = _named(machine=machine, material=material, process=process, settings=settings)
-    watched = (watch_port or 0) if watch or watch_port is not None else None
-    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named, watched, log, journal)
-
-
-@app.command()
-def resume(
-    journal: Annotated[Path, typer.Argument(metavar="JOURNAL", help="journal of the print that was cut off")],
-    port: Annotated[str, typer.Option("--port", metavar="PORT", help="serial port")],
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
-    yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
-    further: Annotated[
-        Path | None, typer.Option("--journal", metavar="FILE", help="journal of the rest; else a new file in the state folder")
-    ] = None,
-    log: Annotated[
-        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
-    ] = None,
-    machine: MachineGiven = None,
-) -> int:
-    """Go on with a print that was cut off: by a power cut, a crash, a pulled plug."""
-    from machine.app import resume_command
-
-    given = None if machine is None else _profile(machine, "pla", "standard", None, None, None, None)
-    return resume_command.resume(journal, port, baud, yes, given, further, log)
-
-
-@app.command()
-def ports(
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="rate tried first, bits a second")] = 115200,
-    json: Annotated[bool, typer.Option("--json", help="the list as JSON")] = False,
-    ask: Annotated[
-        bool, typer.Option("--ask/--no-ask", help="open each port and ask what is there; many boards restart when opened")
-    ] = True,
-) -> int:
-    """Serial ports and what answers at each: firmware, axes, rate, or why nothing does."""
-    from machine.app import ports_command
-
-    return ports_command.ports(baud, json, ask)
-
-
-@app.command()
-def console(
-    port: Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")],
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
-    speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
-    reports: Annotated[bool, typer.Option("--reports/--no-reports", help="show temperatures that the printer reports")] = True,
-    leave_heaters: Annotated[
-        bool, typer.Option("--leave-heaters", help="heaters stay as they are on leaving; else they are switched off")
-    ] = False,
-    log: Annotated[
-        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
-    ] = None,
-    machine: MachineName = "generic_ac",
-    settings: Settings = None,
-) -> int:
-    """Talk to a printer: lines typed, or piped in, are sent; its answers are shown.
-
-    /help tells what else can be typed; Ctrl-D leaves. Heaters that are on are then switched off, after a question at a terminal.
-    """
-    from machine.app import console_command
-
-    profile = _profile(machine, "pla", "standard", settings, None, None, None)
-    return console_command.console(profile.machine, port, baud, speed, reports, leave_heaters, log)
-
-
-@app.command()
-def simulator(
-    pty: Annotated[Path | None, typer.Option("--pty", metavar="PATH", help="a link to keep on the terminal's path")] = None,
-    tcp: Annotated[int | None, typer.Option("--tcp", metavar="PORT", help="for socket://localhost:PORT; 0: a free one")] = None,
-    faults: Annotated[Path | None, typer.Option("--faults", metavar="FILE", help="fault script: what goes wrong")] = None,
-    speed: Annotated[float, typer.Option("--speed", metavar="X", help="X times real time; 0: as fast as possible")] = 1.0,
-    baud: Annotated[int | None, typer.Option("--baud", metavar="N", help="bytes are as slow as on such a line")] = None,
-    habits: Annotated[
-        str | None, typer.Option("--habits", metavar="LIST", help="how the firmware was built: no-advanced-ok,no-busy,...")
-    ] = None,
-    machine: MachineName = "generic_ac",
-    settings: Settings = None,
-) -> int:
-    """A simulated printer for any host to print on; Ctrl-C ends it."""
-    from machine.app import simulator_command
-
-    profile = _profile(machine, "pla", "standard", settings, None, None, None)
-    return simulator_command.serve(profile.machine, pty, tcp, faults, speed, baud, habits)
+for word, command in COMMANDS.items():
+    app.command(word)(command)
 
 
 @app.command()
@@ -316,7 +195,7 @@ def calibrate(
     if (out is None) == (measured is None):
         raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected")
     if out is not None:
-        profile = _profile(machine, "pla", "standard", settings, None, None, None)
+        profile = profile_of(machine, "pla", "standard", settings, None, None, None)
         return calibrate_command.write_program(machine, profile, out, mark_height, mark_radius, replace)
     if measured is None:
         return 1
@@ -364,28 +243,6 @@ def _options(
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version")] = False,
 ) -> None:
     del version
-
-
-def _named(settings: list[str] | None, **given: str | None) -> frozenset[str]:
-    """The sections of the profile that the user has said something about."""
-    sections = {kind for kind, name in given.items() if name is not None}
-    return frozenset(sections | {setting.partition(".")[0] for setting in settings or []})
-
-
-def _profile(  # type: ignore[no-untyped-def]
-    machine: str,
-    material: str,
-    process: str,
-    settings: list[str] | None,
-    beam_width: int | None,
-    search: str | None,
-    time_limit_s: float | None,
-):
-    from profiles.profile import load
-
-    options = {"search.beam_width": beam_width, "search.method": search, "search.time_limit_s": time_limit_s}
-    given = [f"{key}={value}" for key, value in options.items() if value is not None]
-    return load(machine, material, process, [*(settings or []), *given])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
