@@ -10,7 +10,7 @@ const CLOSE_PIXELS = 3; // a bead this wide on the screen is drawn as a prism
 const BEAD_HEAD = `
 in vec4 corner;
 uniform highp sampler2D points;
-uniform highp usampler2D sizes; // width and height, thousandths of mm
+uniform highp usampler2D sizes; // width and height, thousandths of mm; beads in a row from here on; slots until the next bead
 uniform highp isampler2D verticals;
 uniform lowp sampler2D colours;
 uniform mat4 toClip, toEye;
@@ -35,10 +35,8 @@ int next; // the slot after the bead
 /** Takes the bead's values; false where nothing is to be drawn. With a stride, the first beads of so many rows as one. */
 bool laid() {
   int begin = first + (gl_VertexID / corners) * stride, most = min(begin + stride, behind);
-  slot = begin;
-  while (slot < most - 1 && sizeOf(slot).x == 0.0) slot++;
-  next = slot + 1;
-  while (next < most && sizeOf(next).x > 0.0) next++;
+  slot = min(begin + int(texelFetch(sizes, texel(begin), 0).w), most - 1);
+  next = min(slot + max(int(texelFetch(sizes, texel(slot), 0).z), 1), most);
   size = sizeOf(slot);
   vec4 colour = texelFetch(colours, texel(slot), 0);
   start = point(slot);
@@ -127,7 +125,7 @@ function twoFaces() {
 function beadsOf(gl, path) {
   const textures = {
     points: texture(gl, gl.RGB32F, gl.RGB, gl.FLOAT, path.points, 3),
-    sizes: texture(gl, gl.RG16UI, gl.RG_INTEGER, gl.UNSIGNED_SHORT, path.sizes, 2),
+    sizes: texture(gl, gl.RGBA16UI, gl.RGBA_INTEGER, gl.UNSIGNED_SHORT, path.sizes, 4),
     verticals: texture(gl, gl.RG16I, gl.RG_INTEGER, gl.SHORT, path.verticals, 2),
     colours: texture(gl, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4 * path.texels), 4),
   };
