@@ -7,6 +7,7 @@ the printer, the protocol is asked alone.
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -140,9 +141,15 @@ def times(done: Print, number: int) -> int:
     return done.sent.count(b"\nN%d " % number)
 
 
+@cache
+def clean(habits: Habits | None = None) -> Print:
+    """The print when nothing goes wrong."""
+    return printed(habits=habits)
+
+
 def wire(habits: Habits | None = None) -> bytes:
     """What the host sends when nothing goes wrong."""
-    return printed(habits=habits).sent
+    return clean(habits).sent
 
 
 def byte(line: int, offset: int = 0, habits: Habits | None = None) -> int:
@@ -154,7 +161,7 @@ def byte(line: int, offset: int = 0, habits: Habits | None = None) -> int:
 
 def answer(line: int, habits: Habits | None = None) -> int:
     """Which of the printer's words, counted from 1, acknowledges a wire line that moves something."""
-    done = printed(habits=habits)
+    done = clean(habits)
     before = done.heard[: done.heard.index(b"ok T:")].count(b"\n")
     oks = [k for k, text in enumerate(done.heard.split(b"\n"), 1) if text.startswith(b"ok") and k > before]
     return oks[line - 2]
@@ -211,7 +218,7 @@ def test_scenario_06_a_repeat_of_an_accepted_line_is_never_used_as_a_question(ha
 def test_scenario_07_an_ok_lost_with_a_window_of_one() -> None:
     done = printed([Fault("swallow ok", answer(LINE, PLAIN))], PLAIN)
     assert_exact(done)
-    assert done.printer.now_s - printed(habits=PLAIN).printer.now_s < STALL_S + 1.0
+    assert done.printer.now_s - clean(PLAIN).printer.now_s < STALL_S + 1.0
 
 
 def test_scenario_08_an_ok_lost_with_a_window_of_four_and_plain_oks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -226,7 +233,7 @@ def test_scenario_08_an_ok_lost_with_a_window_of_four_and_plain_oks(monkeypatch:
 def test_scenario_09_an_ok_truncated_to_o() -> None:
     done = printed([Fault("truncate ok", answer(LINE, PLAIN))], PLAIN)
     assert_exact(done)
-    assert done.printer.now_s - printed(habits=PLAIN).printer.now_s < STALL_S + 1.0
+    assert done.printer.now_s - clean(PLAIN).printer.now_s < STALL_S + 1.0
 
 
 @BOTH
@@ -262,7 +269,7 @@ def test_scenario_12_a_resend_without_its_ok() -> None:
     faults, habits = [Fault("drop", byte(LINE, 9, PLAIN))], replace(PLAIN, resend_ok=False)
     done = printed(faults, habits)
     assert_exact(done)
-    assert done.printer.now_s - printed(habits=habits).printer.now_s < 0.5
+    assert done.printer.now_s - clean(habits).printer.now_s < 0.5
 
 
 def test_scenario_13_a_resend_for_each_line_in_flight_is_one_repetition() -> None:
@@ -305,7 +312,7 @@ def test_scenario_17_an_error_of_the_line_without_a_resend_is_asked_about_at_onc
     words = "Error:No Line Number with checksum, Last Line: 59\n"
     done = printed([Fault("garbage", byte(LINE, 0, PLAIN), unit="byte", text=words), *lost(LINE, PLAIN)], PLAIN)
     assert_exact(done)
-    assert done.printer.now_s - printed(habits=PLAIN).printer.now_s < 1.0
+    assert done.printer.now_s - clean(PLAIN).printer.now_s < 1.0
 
 
 def test_scenario_18_a_line_longer_than_ninety_five_characters_is_never_sent() -> None:
@@ -536,7 +543,7 @@ def test_scenario_36_two_waits_with_a_line_in_flight_find_the_lost_one() -> None
     done = printed(lost(LINE, habits), habits)
     assert_exact(done)
     assert done.heard.count(b"wait\n") == 2
-    assert done.printer.now_s - printed(habits=habits).printer.now_s < 3.0
+    assert done.printer.now_s - clean(habits).printer.now_s < 3.0
 
 
 def test_scenario_37_the_c_axis_and_the_chamber_are_not_confused() -> None:
