@@ -6,6 +6,7 @@ import select
 import sys
 import threading
 from collections.abc import Callable
+from time import monotonic
 from types import TracebackType
 from typing import Self
 
@@ -14,6 +15,7 @@ from machine.link.progress import Progress
 from machine.link.requests import FEED_PERCENT, FLOW_PERCENT
 
 STEP_PERCENT = 10.0
+HINT_S = 10.0  # a question that was not answered by then is void
 STANDING = ("pausing", "paused")
 SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
 MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e stops the machine at once (M112)"
@@ -22,13 +24,19 @@ SAME = {"=": "+", "_": "-", "?": "q"}
 
 
 class Keyboard:
-    """press() one key after the other; `hint` is what the screen shows in place of the list of keys."""
+    """press() one key after the other; `hint` is what the screen shows in place of the list of keys, for a while."""
 
-    def __init__(self, control: Control) -> None:
-        self.hint = ""
+    def __init__(self, control: Control, now_s: Callable[[], float] = monotonic) -> None:
+        self._now_s = now_s
+        self._hint, self._hint_until_s = "", 0.0
         self._control = control
         self._sure = False
         self._state, self._feed, self._flow = "printing", 100.0, 100.0
+
+    @property
+    def hint(self) -> str:
+        """A question, an explanation, or what was just asked for; "" when there is none or it is old."""
+        return self._hint if self._now_s() < self._hint_until_s else ""
 
     def follow(self, progress: Progress) -> None:
         """Know what the print does, so that one key can mean pause and resume."""
@@ -37,9 +45,10 @@ class Keyboard:
     def press(self, key: str) -> None:
         """Ask for what a key means; unknown keys mean nothing."""
         key = SAME.get(key, key).lower()
-        sure, self._sure, self.hint = self._sure, False, ""
+        sure, self._sure = self._sure and bool(self.hint), False
+        self._tell("")
         if key == "e":
-            self.hint = "emergency stop"
+            self._tell("emergency stop")
             self._control.ask(Wish.EMERGENCY_STOP)
         elif sure:
             self._answer(key)
@@ -48,7 +57,7 @@ class Keyboard:
 
     def _answer(self, key: str) -> None:
         if key in ("c", "y"):
-            self.hint = "cancelling"
+            self._tell("cancelling")
             self._control.ask(Wish.CANCEL)
 
     def _pause(self) -> None:
@@ -61,10 +70,14 @@ class Keyboard:
         self._control.ask(Wish.RESUME if self._state in STANDING else Wish.PAUSE)
 
     def _cancel(self) -> None:
-        self._sure, self.hint = True, SURE
+        self._sure = True
+        self._tell(SURE)
 
     def _explain(self) -> None:
-        self.hint = MORE
+        self._tell(MORE)
+
+    def _tell(self, hint: str) -> None:
+        self._hint, self._hint_until_s = hint, self._now_s() + HINT_S
 
     def _faster(self, step: float) -> None:
         self._feed = min(max(self._feed + step, FEED_PERCENT[0]), FEED_PERCENT[1])

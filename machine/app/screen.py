@@ -18,6 +18,7 @@ from machine.app.report import duration
 from machine.dryrun.dryrun import DryRun
 from machine.link.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event
 from machine.link.progress import Progress
+from machine.parsed import MoveKind
 
 WORDS_KEPT = 4  # last words of the printer
 WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell
@@ -33,7 +34,8 @@ class Course:
         program = run.program
         self.letters = run.letters
         self._line, self._angles = program.line, program.end[:, 3:5]
-        self._layers = {part: len(np.unique(program.layer[program.part == part])) for part in program.parts}
+        laying = program.kind == MoveKind.EXTRUDE  # the way to a part still counts to the layer before it
+        self._layers = {part: len(np.unique(program.layer[laying & (program.part == part)])) for part in program.parts}
 
     def pose_deg(self, file_line: int) -> tuple[float, float] | None:
         """Tilt and turn after a line of the program; None before the first move."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from machine.app.keys import MORE, SURE, Keyboard, Typing, can_type
+from machine.app.keys import HINT_S, MORE, SURE, Keyboard, Typing, can_type
 from machine.link.control import Control, Request, Wish
 from machine.link.events import Temperature
 from machine.link.progress import Progress
@@ -55,6 +55,16 @@ def test_other_keys_and_an_unsure_cancel_ask_for_nothing(keys: str) -> None:
 def test_cancelling_is_asked_once_more(keys: str) -> None:
     assert hint_after(keys[0]) == SURE
     assert asked(*keys) == [Request(Wish.CANCEL)]
+
+
+def test_a_question_that_nobody_answers_is_void_after_a_while() -> None:
+    control, clock = Control(), [0.0]
+    board = Keyboard(control, lambda: clock[0])
+    board.press("c")
+    clock[0] = HINT_S
+    assert board.hint == ""
+    board.press("c")
+    assert (board.hint, control.take()) == (SURE, None)
 
 
 def test_the_question_goes_away_with_the_answer() -> None:

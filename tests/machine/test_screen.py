@@ -51,6 +51,10 @@ def test_the_pose_is_that_of_the_acknowledged_line() -> None:
     assert lines(turned)[1] == "part 2 of 2   tilt A 30.0 deg   turn C 120.0 deg"
 
 
+def test_the_way_to_a_part_is_no_layer_of_it() -> None:
+    assert [COURSE.layers(part) for part in (1, 2, 3, None)] == [2, 1, None, None]
+
+
 @pytest.mark.parametrize(("line", "pose"), [(0, None), (10, None), (11, (0.0, 0.0)), (15, (0.0, 0.0)), (99, (30.0, 120.0))])
 def test_the_table_stands_where_the_last_move_before_a_line_has_left_it(line: int, pose: tuple[float, float] | None) -> None:
     assert COURSE.pose_deg(line) == pose
