@@ -143,15 +143,15 @@ class Feed:
 
     def _between(self, command: str) -> None:
         """What is due before the next command of the program."""
-        self._send_own()
+        if self._wishes.lines:
+            self._send_own()
         if self._verify:
             self._verify = False
             self._prove("after the port came back")
-        now_s = self.talk.medium.now_s()
-        if self._journal is not None and self._due(command, now_s):
-            self._check(now_s)
+        if self._journal is not None and (self._layer_ended or not self.talk.protocol.advanced) and self._due(command):
+            self._check()
         since_s = self._wishes.pause_s
-        if since_s is not None and (not _pushes(command) or now_s - since_s > BOUNDARY_S):
+        if since_s is not None and (not _pushes(command) or self.talk.medium.now_s() - since_s > BOUNDARY_S):
             self._pause()
 
     def _send_own(self) -> None:
@@ -162,15 +162,16 @@ class Feed:
             if command[0] in "Mm":  # a person's temperature or fan holds beyond a pause
                 self.modal.take(command)
 
-    def _due(self, command: str, now_s: float) -> bool:
+    def _due(self, command: str) -> bool:
         """Whether the position is to be looked at now: at a layer's end, or in a travel where the printer tells little."""
         ended, self._layer_ended = self._layer_ended, False
+        since_s = self.talk.medium.now_s() - self._checked_s
         if self.talk.protocol.advanced:
-            return ended and now_s - self._checked_s >= CHECK_S
-        return (ended or command.startswith("G0")) and now_s - self._checked_s >= CHECK_MUTE_S
+            return ended and since_s >= CHECK_S
+        return (ended or command.startswith("G0")) and since_s >= CHECK_MUTE_S
 
-    def _check(self, now_s: float) -> None:
-        self._checked_s = now_s
+    def _check(self) -> None:
+        self._checked_s = self.talk.medium.now_s()
         told = self.talk.ask_position()
         self.trail.barrier()
         wrong = unlike(self.modal, told.axes, NEAR) if told is not None else []

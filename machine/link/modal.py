@@ -15,7 +15,7 @@ WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
 VALUE = re.compile(r"([A-Z_]+)=(\S+)")
 INCH_MM = 25.4
 E_AXIS = 5
-MOVES = ("G0", "G1", "G2", "G3")
+MOVES = frozenset({"G0", "G1", "G2", "G3"})
 KEPT = ("M200", "M201", "M203", "M204", "M205", "M207", "M220", "M221", "SET_VELOCITY_LIMIT", "M900")
 FOLLOWING_ON = ("G43.4",)
 FOLLOWING = (*FOLLOWING_ON, "G49")
@@ -55,6 +55,10 @@ class Modal:
     fans: dict[str, str] = field(default_factory=dict)
     kept: dict[str, str] = field(default_factory=dict)
     pulled_mm: float = 0.0  # filament that stands further back than it has stood
+    _index: dict[str, int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._index = {letter: axis for axis, letter in enumerate(self.axes.letters)}
 
     def place(self) -> Place:
         """Where the axes stand."""
@@ -95,24 +99,25 @@ class Modal:
         return [*said, *self.kept.values(), *self.fans.values()]
 
     def _move(self, rest: str) -> bool:
-        at, moved = self.at, False
+        at, index, moved = self.at, self._index, False
         for letter, value in _words(rest):
-            if letter == "F":
-                self.feed = value
-                continue
-            axis = self.axes.letters.index(letter) if letter in self.axes.letters else -1
-            if axis < 0:
+            axis = index.get(letter)
+            if axis is None:
+                if letter == "F":
+                    self.feed = value
                 continue
             moved = True
             if self.inches and not 3 <= axis <= 4:
                 value *= INCH_MM
             before = at[axis]
-            stepped = self._steps() if axis == E_AXIS else self.relative
-            after = value if not stepped else None if before is None else before + value
             if axis == E_AXIS:
+                stepped = self._steps()
                 pushed = value if stepped else 0.0 if before is None else value - before
-                self.pulled_mm = max(0.0, self.pulled_mm - pushed)
-            at[axis] = after
+                if self.pulled_mm or pushed < 0.0:
+                    self.pulled_mm = max(0.0, self.pulled_mm - pushed)
+            else:
+                stepped = self.relative
+            at[axis] = value if not stepped else None if before is None else before + value
         return moved
 
     def _steps(self) -> bool:

@@ -1,14 +1,13 @@
 """Trail: how far a program has come; its lines sent, acknowledged and surely executed."""
 
 from collections import deque
-from dataclasses import dataclass
+from typing import NamedTuple
 
 MOST_WAITING = 4096  # moves whose end is awaited; of further ones, without any word from the planner, nothing can be known
 PLANNER_BLOCKS = 16  # Marlin's BLOCK_BUFFER_SIZE; a printer that tells of more free places has more
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(NamedTuple):
     """A command on its way: number on the wire, line of the program, whether it moves something, and the pose after it."""
 
     number: int
