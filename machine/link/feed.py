@@ -15,6 +15,7 @@ from machine.link.park import Laid, lift_words, standing_mm
 from machine.link.progress import Place, Progress
 from machine.link.reports import Reports
 from machine.link.retreat import retreat, unlike
+from machine.link.states import State
 from machine.link.talk import Talk
 from machine.link.trail import Step, Trail
 from machine.link.watchdog import Watchdog
@@ -321,9 +322,15 @@ class Feed:
                 left_s=place.left_s(elapsed_s, self._job.total_s), share=place.share(done, self._job.total),
                 temperature=self.reports.temperature, part=place.part, parts=place.parts, layer=place.layer, state=self.state,
                 file_line=self.trail.acknowledged, feed_percent=self._wishes.feed_percent, flow_percent=self._wishes.flow_percent,
-                message=self._wishes.message or self._trouble,
+                message=self._wishes.message or self._trouble or self._silence(),
             )
         )  # fmt: skip
+
+    def _silence(self) -> str:
+        """Said while an answer is overdue; a slow command may take its time."""
+        protocol = self.talk.protocol
+        slow = any(line.budget_s for line in protocol.window.flight)
+        return "no answer from the printer, it is asked again" if protocol.state is State.PROBING and not slow else ""
 
 
 def _pushes(command: str) -> bool:
