@@ -9,6 +9,7 @@ from machine.app.output import write_lines
 from machine.app.state_folder import state_folder
 from machine.link.journal import Heading, Journal
 from machine.link.program import GcodeFile
+from profiles.errors import OutputError
 from profiles.profile import Profile
 
 KEPT = 20
@@ -38,8 +39,11 @@ def continued(program: GcodeFile, profile: Profile, name: str, file: Path | None
 def _place(name: str) -> Path:
     """A new file's path, named after the time and the model."""
     folder = state_folder() / "journals"
-    folder.mkdir(exist_ok=True)
-    _thin(folder)
+    try:
+        folder.mkdir(exist_ok=True)
+        _thin(folder)
+    except OSError as error:
+        raise OutputError(f"folder {folder} cannot be written: {(error.strerror or str(error)).lower()}") from None
     plain = "".join(c if c.isalnum() and c.isascii() else "-" for c in name)[:40].strip("-") or "print"
     return folder / f"{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}-{plain}.journal"
 

@@ -24,7 +24,7 @@ from machine.link.journal import Journal
 from machine.link.progress import Progress
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import Outcome, print_lines
-from profiles.errors import PrinterError
+from profiles.errors import OutputError, PrinterError
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -87,11 +87,24 @@ def print_program(
     """
     title = f"{name or 'print'} to {'the simulated printer' if port == SIMULATED else port}"
     wanted = port != SIMULATED or journal is not None
-    keeping = new_journal(program.lines, profile, name or "print", source, journal) if wanted else nullcontext()
+    keeping = _journal(program, profile, name or "print", source, journal) if wanted else nullcontext()
     with new_log("print", title) if log is None else TrafficLog(log, title) as kept, _pointing_to(kept), keeping as story:
         if port != SIMULATED:
             return ended(streamed(program, profile, port, baud, title, kept, follow, story), kept)
         return _print_simulated(program, profile, baud, sim_speed or inf, title, kept, follow, story)
+
+
+def _journal(
+    program: Program, profile: Profile, name: str, source: Path | None, file: Path | None
+) -> AbstractContextManager[Journal | None]:
+    """The print's journal; a print that was not told where to keep it goes on without one where none can be written."""
+    try:
+        return new_journal(program.lines, profile, name, source, file)
+    except OutputError as error:
+        if file is not None:
+            raise
+        say(f"this print cannot be resumed when it is cut off: {error}")
+        return nullcontext()
 
 
 def _print_simulated(

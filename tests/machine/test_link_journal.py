@@ -138,6 +138,14 @@ def test_the_program_of_a_model_is_kept_beside_its_journal(tmp_path: Path) -> No
     assert heading.sha256 == GcodeFile(tmp_path / "j.gcode").sha256()
 
 
+def test_a_journal_that_cannot_be_kept_is_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "tiltprint").mkdir()
+    (tmp_path / "tiltprint" / "journals").write_text("a file", encoding="utf-8")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    with pytest.raises(OutputError, match=r"folder .*journals cannot be written: file exists"):
+        new_journal(["G28"], load(), "a")
+
+
 def test_only_the_newest_journals_and_their_programs_are_kept() -> None:
     for number in range(KEPT + 3):
         with new_journal([f"G1 X{number}"], load(), f"model {number}") as journal:
