@@ -217,8 +217,8 @@ class Blocks(Frozen):
     resume: str = Field(
         "",
         description="after a power cut, a print on the table: makes the axes know where they stand, and leaves the tip at "
-        "{clear_z_mm} or above, the table at {tilt_deg} {turn_deg}; {x_mm} {y_mm} {z_mm} is where the tip was. Empty: all are taken "
-        "to stand there still, the tip rises, X and Y are homed",
+        "{clear_z_mm} or above, the table at {tilt_deg} {turn_deg}; {x_mm} {y_mm} {z_mm} is where the tip was. Empty: all are "
+        "taken to stand there still, the tip rises, X and Y are homed",
     )
 
 
