@@ -77,9 +77,9 @@ class Browser:
         return answer["result"].get("value")
 
     def wait(self, condition: str) -> None:
-        """Until a JavaScript condition holds. Raises TimeoutError with the console's complaints."""
+        """Until a JavaScript condition, or what it promises, holds. Raises TimeoutError with the console's complaints."""
         end = time.monotonic() + PATIENCE_S
-        while not self.value(f"!!({condition})"):
+        while not self.value(f"Promise.resolve({condition}).then(Boolean)"):
             if time.monotonic() > end:
                 raise TimeoutError(f"{condition}; the console says {self.complaints}")
             time.sleep(0.02)

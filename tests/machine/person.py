@@ -14,7 +14,7 @@ from typing import Self
 
 ROOT = Path(__file__).parents[2]
 ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 class Person:
@@ -48,8 +48,10 @@ class Person:
 
     def end(self) -> int:
         """Wait for the command to end; its exit code."""
+        end_s = time.monotonic() + PATIENCE_S
         while self._read():
-            pass
+            if time.monotonic() > end_s:
+                raise AssertionError(f"it did not end, it showed {self.seen[-2000:]!r}")
         code = os.waitstatus_to_exitcode(os.waitpid(self._child, 0)[1])
         self._child = 0
         return code

@@ -146,6 +146,7 @@ def test_a_person_types_gets_help_and_leaves_with_ctrl_d() -> None:
         person.see("/stop     emergency stop (M112) at once")
         person.press("/fly\n")
         person.see("/fly is not known: /help, /reports, /stop and /quit are")
+        person.see("> ")  # without a reader at the terminal an end of input is nobody's
         person.press("\x04")
         assert person.end() == 0
     assert "\x1b[2mok" in person.raw
