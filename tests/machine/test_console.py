@@ -168,7 +168,8 @@ def test_ctrl_c_while_the_printer_heats_leaves_with_the_heaters_off() -> None:
     with Person("console", "--port", "sim", "--sim-speed", "2") as person:
         person.see("> ")
         person.press("M109 S200\n")
-        person.see("> ")
+        person.see("W:?")  # readline waits for keys by now
+        person.see("W:?")
         person.press("\x03")
         person.see("switched off: heaters, for a command was under way")
         assert person.end() == 130
