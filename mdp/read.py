@@ -74,18 +74,22 @@ def floating(mesh: Mesh) -> tuple[str, ...]:
     return (f"{pieces} {heights.min():.3g} mm above the platform on nothing: no cut changes that, only support can hold such",)
 
 
-def _surfaces(path: Path) -> list[Surface]:
-    reader = READERS.get(path.suffix.lower())
+def check_file(path: Path) -> None:
+    """Refuse what is no model file at all before any work is done. Raises MeshError."""
     if path.is_dir():
         raise MeshError(f"{path}: is a folder, not a model file.")
     if not path.exists():
         raise MeshError(f"{path}: there is no such file.")
-    if reader is None:
+    if path.suffix.lower() not in READERS:
         raise MeshError(f"{path}: the kind of file {path.suffix!r} is not read; allowed are {', '.join(READERS)}.")
+
+
+def _surfaces(path: Path) -> list[Surface]:
+    check_file(path)
     try:
         if path.stat().st_size == 0:
             raise MeshError(f"{path}: is empty.")
-        return reader(path)
+        return READERS[path.suffix.lower()](path)
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror or error}.") from None
 

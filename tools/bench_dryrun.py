@@ -106,7 +106,7 @@ def whole(file: Path, profile: Profile) -> None:
     cpu, wall = process_time(), perf_counter()
     run = dry_run(file.read_text().splitlines(), profile)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    errors = sum(finding.severity == "error" for finding in run.findings)
+    errors = len(run.errors)
     told = f"{len(run.program.line)} moves, {run.time_s / 3600:.1f} h, {errors} errors"
     print(f"\nwhole: {process_time() - cpu:.1f} s processor, {perf_counter() - wall:.1f} s wall, peak {peak:.2f} GB ({told})")
 

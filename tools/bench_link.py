@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
+from machine.app.traffic import tapped
 from machine.link.firmware import Firmware, Habits
 from machine.link.framing import frame
 from machine.link.medium import Medium
@@ -60,14 +61,14 @@ def used(lines: list[str], baud: int, habits: Habits, terminal: bool) -> tuple[f
         clock, (here, there) = perf_counter, Pipe()
         printer = Process(target=serve, args=(there, habits, baud))
         printer.start()
-        outcome = print_lines(lines, here.recv(), baud, traffic=traffic)
+        outcome = print_lines(lines, here.recv(), baud, medium=tapped(traffic))
         here.send("end")
         lost = here.recv()
         printer.join()
     else:
         virtual = VirtualPrinter(load().machine, habits, baud=baud)
         clock = virtual.medium.now_s
-        outcome = print_lines(lines, PATH, baud, traffic=traffic, medium=virtual.medium)
+        outcome = print_lines(lines, PATH, baud, medium=tapped(traffic, virtual.medium))
         lost = virtual.record.lost_bytes
     seconds = times[-1] - times[0]
     return len(lines) / seconds, sent[0] * 10 / baud / seconds, outcome.repeated, lost

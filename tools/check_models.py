@@ -75,7 +75,7 @@ def figures(found: Decomposition, program: Program, profile: Profile) -> list[ob
     """The columns between the machine and the seconds."""
     told, run = agreement(program.run, found.mesh, profile)
     mesh = found.mesh
-    codes = sorted({finding.code for finding in run.findings if finding.severity == "error"})
+    codes = sorted({finding.code for finding in run.errors})
     error = abs(found.volume_mm3 / mesh.volume_mm3 - 1.0)
     plastic = run.segment_mm3.sum() / mesh.volume_mm3
     return [

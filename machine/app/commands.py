@@ -20,7 +20,7 @@ from machine.app.warmup import warm_dry_run, warm_picture
 from machine.dryrun.agreement import Agreement, agreement
 from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.starvation import check_baud, starved
-from mdp.read import locate, read_mesh
+from mdp.read import check_file, locate, read_mesh
 from mdp.save import part_file, stl, threemf, values
 from profiles.errors import GcodeError, MoveError, ProfileError
 from profiles.profile import Profile
@@ -91,7 +91,8 @@ def export(
     if svg is not None:
         check_writable(svg)
     wanted = asked(layer, svg is not None)
-    program = build(decompose_model(model, profile, ranker, orient, to_build=True).decomposition, profile)
+    found = decompose_model(model, profile, ranker, orient, to_build=True).decomposition
+    program = build(found, profile, pictures=True)
     _refuse_errors(program, force)
     picture = b"" if svg is None else drawn(program.sliced, *wanted)
     write_lines(out, program.lines)
@@ -127,7 +128,7 @@ def simulate(
     if beside is not None:
         if Path(model).suffix.lower() not in GCODE_SUFFIXES:
             raise ProfileError(f"--model {beside}: {model} is a model itself; --model goes with a G-code file")
-        locate(beside)
+        check_file(locate(beside))
     given = profile
     program, profile = program_of(model, profile, ranker, orient, named)
     mesh = None if program.decomposition is None else program.decomposition.mesh
@@ -143,7 +144,7 @@ def simulate(
         known = machine_known(program, profile, given, named)
         write_bytes(html, print_page(model_name(model), program, profile, known))
     _tell(program, json, found=found)
-    return 1 if _errors(program) else 0
+    return 1 if program.run.errors else 0
 
 
 def print_model(
@@ -222,18 +223,16 @@ def _gcode_lines(path: Path) -> tuple[str, ...]:
     return lines
 
 
-def _errors(program: Program) -> list[str]:
-    return [finding.message for finding in program.run.findings if finding.severity == "error"]
-
-
 def _refuse_errors(program: Program, force: bool) -> None:
-    errors = _errors(program)
+    errors = program.run.errors
     if not errors:
         return
     if force:
         say(f"the dry run found {len(errors)} errors; going on because of --force")
         return
-    raise MoveError(f"the dry run found {len(errors)} errors, the first: {errors[0]} (simulate lists all, --force goes on)")
+    raise MoveError(
+        f"the dry run found {len(errors)} errors, the first: {errors[0].message} (simulate lists all, --force goes on)"
+    )
 
 
 def _check(file: Path | None) -> None:

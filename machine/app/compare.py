@@ -78,8 +78,7 @@ def _figures(name: str, orientation: str, parts: int, program: Program, risky_mm
     held = [place for place, kind in enumerate(run.program.types) if kind in SUPPORT]
     support = float(run.segment_mm3[np.isin(run.program.type[run.segment_row], held)].sum())
     grams = filament_mm * pi * material.diameter_mm**2 / 4.0 * material.density_g_cm3 / 1000.0
-    errors = [finding.message for finding in run.findings if finding.severity == "error"]
-    message = errors[0] if errors else ""
+    message = run.errors[0].message if run.errors else ""
     return Rival(name, orientation, parts, run.time_s, filament_mm, grams, support, max(risky_mm2, 0.0), message)
 
 

@@ -116,8 +116,11 @@ def _hints(found: Decomposition, profile: Profile, orient: bool) -> tuple[str, .
     return (f"{in_words(single)} it would leave {single.risky_mm2:.0f} mm2 risky even in one part: try --orient",)
 
 
-def build(decomposition: Decomposition, profile: Profile) -> Program:
-    """Slice, plan, write and dry-run a decomposition. Raises MoveError, before slicing, for a part outside the axes' ranges."""
+def build(decomposition: Decomposition, profile: Profile, pictures: bool = False) -> Program:
+    """Slice, plan, write and dry-run a decomposition. Raises MoveError, before slicing, for a part outside the axes' ranges.
+
+    pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show.
+    """
     ticker = Ticker()
     parts = decomposition.parts
 
@@ -128,7 +131,9 @@ def build(decomposition: Decomposition, profile: Profile) -> Program:
     warm_program(profile)
     sliced = slice_parts(parts, profile, show)
     ticker.tick("planning moves", at_once=ticker.live)
-    lines = with_thumbnails(tuple(write_gcode(plan(decomposition, sliced, profile), profile)), decomposition, profile)
+    lines = tuple(write_gcode(plan(decomposition, sliced, profile), profile))
+    if pictures:
+        lines = with_thumbnails(lines, decomposition, profile)
     ticker.tick("dry run", at_once=ticker.live)
     run = dry_run(lines, profile)
     ticker.close()

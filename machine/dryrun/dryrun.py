@@ -52,9 +52,9 @@ class DryRun:
         return [self.program.types[k] for k in self.program.type[self.segment_row]]
 
     @property
-    def failed(self) -> bool:
-        """True when a finding is an error."""
-        return any(finding.severity == "error" for finding in self.findings)
+    def errors(self) -> tuple[Finding, ...]:
+        """The findings that a print is refused for."""
+        return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
 def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:

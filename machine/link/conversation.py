@@ -37,7 +37,6 @@ class Conversation:
         self.family = family
         self.window = Window(limit, rx_bytes or family.rx_bytes)
         self.repeated = 0
-        self.strays = 0
         self.capabilities: dict[str, bool] = {}
         self.identity = ""
         self.area: told.Area | None = None

@@ -48,7 +48,6 @@ class Job:
     total_s: float | None = None
     limit: int = LINE_LIMIT
     profile: Profile | None = None
-    standby_c: float | None = None
 
 
 class Feed:
@@ -193,7 +192,7 @@ class Feed:
         told = self.talk.ask_position()
         self.trail.barrier()
         agreed = told is None or not unlike(self.modal, told.axes, NEAR)
-        way = retreat(self.modal, self._job.profile, self._laid, self._job.standby_c)
+        way = retreat(self.modal, self._job.profile, self._laid)
         self._away = way.park is not None
         for command in way.away:
             self.talk.send(command)

@@ -101,7 +101,6 @@ class Protocol(Conversation):
         oldest = flight[0] if flight else None
         count = self.window.acknowledge(number)
         if number is None or oldest is None or not count:
-            self.strays += 1
             return
         self._pace.passed(count)
         self._resends.passed(number)

@@ -28,11 +28,12 @@ class Retreat:
     park: Park | None
 
 
-def retreat(modal: Modal, profile: Profile | None, laid: Laid | None, standby_c: float | None = None) -> Retreat:
-    """How to leave a print that stands at modal's place, all moves over. standby_c: the nozzle's temperature meanwhile."""
+def retreat(modal: Modal, profile: Profile | None, laid: Laid | None) -> Retreat:
+    """How to leave a print that stands at modal's place, all moves over, and how to come back."""
     pull, push = pushing(modal, profile)
     up, down, park = _ways(modal, profile, laid)
     away = ["G21", *pull, "G90", *up]
+    standby_c = profile.material.standby_c if profile is not None else None
     if standby_c is not None and profile is not None and pull and standby_c < modal.nozzle_c:
         away.append(DIALECTS[profile.machine.dialect].nozzle.format(number(standby_c)))
     back = [*heated(modal, profile), "G21", "G90", *down, *push, *modal.lines()]

@@ -9,7 +9,7 @@ from machine.link.feed import Begin, Feed, Job
 from machine.link.framing import LINE_LIMIT, command_of
 from machine.link.inquiry import Found, inquire
 from machine.link.journal import Journal
-from machine.link.medium import SERIAL, Medium, Traffic, Wire
+from machine.link.medium import SERIAL, Medium, Wire
 from machine.link.progress import Progress
 from machine.link.protocol import Timing
 from machine.link.reconnect import found_again, lasting_name
@@ -55,9 +55,7 @@ def print_lines(
     *,
     control: Control | None = None,
     journal: Journal | None = None,
-    traffic: Traffic | None = None,
     profile: Profile | None = None,
-    standby_c: float | None = None,
     begin: Callable[[Found], Begin] | None = None,
     medium: Medium = SERIAL,
 ) -> Outcome:
@@ -66,9 +64,8 @@ def print_lines(
     What can be read twice (a sequence, a GcodeFile) is checked wholly before the port is opened, an iterator line by line as it
     is reached; lines are consumed lazily. A plain string is taken as its lines. total_s is the expected duration, total the
     number of commands where `lines` does not tell; limit: characters of a line, number and checksum included, that the firmware
-    keeps. control: wishes of a person; journal: kept for a later resume; traffic: gets every chunk of bytes; profile: lets a
-    pause lift and park, and the watchdog know what is too hot; standby_c: the nozzle's temperature in a pause; begin: for a
-    resumed print, decides where it goes on.
+    keeps. control: wishes of a person; journal: kept for a later resume; profile: lets a pause
+    lift, park and cool the nozzle, and the watchdog know what is too hot; begin: for a resumed print, decides where it goes on.
 
     A set `stop` flag ends the print: feeding stops, moves are stopped, heaters and fan go off, the tip is lifted, nothing homes
     or turns; the Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises LocalProtocolError for a
@@ -79,13 +76,13 @@ def print_lines(
         lines = lines.splitlines()
     if not isinstance(lines, Iterator):
         total = sum(1 for place, line in enumerate(lines, 1) if command_of(line, place, limit))
-    job = Job(total, total_s, limit, profile, standby_c)
+    job = Job(total, total_s, limit, profile)
     feed = Feed(job, control, journal, on_progress, stop, medium.now_s())
     name = lasting_name(port)
     wire = medium.open(port, baud)
     rx_bytes = None if profile is None else profile.machine.receive_bytes - 1  # a ring holds one byte less than its size
     finder = _Finder(feed, name, baud, medium)
-    talk = Talk(wire, medium, timing or Timing(), feed.heard, feed.turned, finder, limit, traffic, rx_bytes, baud)
+    talk = Talk(wire, medium, timing or Timing(), feed.heard, feed.turned, finder, limit, rx_bytes, baud)
     feed.talk = talk
     try:
         return _Print(feed, talk, medium, journal).run(lines, begin)

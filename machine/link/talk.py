@@ -5,7 +5,7 @@ from math import inf
 
 from machine.link.events import Event, Ok, Position
 from machine.link.framing import LINE_LIMIT
-from machine.link.medium import Medium, Traffic, Wire
+from machine.link.medium import Medium, Wire
 from machine.link.protocol import Protocol, Timing
 from machine.link.states import State
 from profiles.errors import PortError
@@ -29,14 +29,13 @@ class Talk:
         turned: Callable[[float], None],
         lost: Callable[[PortError], Wire],
         limit: int = LINE_LIMIT,
-        traffic: Traffic | None = None,
         rx_bytes: int | None = None,
         baud: int | None = None,
     ) -> None:
         self.wire, self.medium = wire, medium
         self.protocol = Protocol(timing, medium.now_s(), limit, rx_bytes=rx_bytes, baud=baud)
         self.greeted = False
-        self._heard, self._turned, self._lost, self._traffic = heard, turned, lost, traffic
+        self._heard, self._turned, self._lost = heard, turned, lost
         self._position: Position | None = None
 
     def greet(self) -> None:
@@ -85,8 +84,8 @@ class Talk:
         protocol = self.protocol
         try:
             if out := protocol.take():
-                self._put(out)
-            data = self._take()
+                self.wire.write(out)
+            data = self.wire.read()
         except PortError as error:
             self._mend(error)
             return
@@ -108,16 +107,5 @@ class Talk:
         if not self.greeted or not self.protocol.family.resends:
             raise error
         self.wire = self._lost(error)
-        self._put(b"\n")  # ends a half line
+        self.wire.write(b"\n")  # ends a half line
         self.protocol.interrupted(self.medium.now_s())
-
-    def _put(self, data: bytes) -> None:
-        self.wire.write(data)
-        if self._traffic is not None:
-            self._traffic(">", data)
-
-    def _take(self) -> bytes:
-        data = self.wire.read()
-        if data and self._traffic is not None:
-            self._traffic("<", data)
-        return data

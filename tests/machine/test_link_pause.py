@@ -7,6 +7,7 @@ from threading import Event as Flag
 import numpy as np
 import pytest
 
+from machine.app.traffic import tapped
 from machine.collide import solids
 from machine.kinematics.table import machine_points
 from machine.link.control import Control, Wish
@@ -64,9 +65,8 @@ class Watcher:
             on_progress=self.see,
             stop=stop,
             control=self.control,
-            traffic=self.traffic,
             profile=PROFILE,
-            medium=medium or self.printer.medium,
+            medium=tapped(self.traffic, medium or self.printer.medium),
         )
 
     def ask(self, wish: Wish, value: float = 100.0, text: str = "") -> Callable[[], None]:
@@ -385,3 +385,13 @@ def test_the_place_of_a_program_without_rotary_words_is_that_of_a_level_table() 
     assert found is not None
     assert (found[0].tolist(), found[1]) == ([1.0, 2.0, 3.0], Pose(0.0, 0.0))
     assert standing_mm(MACHINE, (1.0, 2.0, None, 0.0, 0.0, 0.0), False) is None
+
+
+def test_a_material_may_want_the_nozzle_cooler_while_a_print_rests() -> None:
+    modal = Modal(axes_of(MACHINE))
+    for command in ("M109 S200", "M83", "G1 X1 Y1 Z1 A0 C0 E1"):
+        modal.take(command)
+    cool, hot = (load(settings=[f"material.standby_c={c}"]) for c in (150, 250))
+    ways = [retreat(modal, profile, Laid(MACHINE)) for profile in (PROFILE, cool, hot)]
+    assert ["M104 S150" in way.away for way in ways] == [False, True, False]
+    assert all("M109 S200" in way.back for way in ways)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from machine.app.cli import main
+from machine.app.traffic import tapped
 from machine.link.events import Position, Temperature
 from machine.link.faults import Fault, FaultScript
 from machine.link.feed import Begin
@@ -97,11 +98,10 @@ def resumed(text: GcodeFile, printer: VirtualPrinter, story: Story) -> tuple[Way
         print_lines(
             text,
             PATH,
-            medium=printer.medium,
+            medium=tapped(lambda way, data: sent.append(data) if way == ">" else None, printer.medium),
             profile=PROFILE,
             journal=journal,
             begin=begin,
-            traffic=lambda way, data: sent.append(data) if way == ">" else None,
         )
     assert read_journal(journal.path).finished
     return found[0], [re.sub(r"^N\d+ |\*\d+$", "", line) for line in b"".join(sent).decode().splitlines()]

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from machine.app.traffic import tapped
 from machine.dryrun.dryrun import dry_run
 from machine.link.control import Control, Wish
 from machine.link.events import Position, Temperature, read_event
@@ -49,23 +50,6 @@ PROGRAM = [*HEAT, *STROKES, "M104 S0"]
 LINE = 60  # the wire line that most faults hit
 STALL_S = 4.0
 BOTH = pytest.mark.parametrize("habits", [Habits(), PLAIN], ids=["advanced", "plain"])
-
-
-class Recorded:
-    """A wire whose bytes are kept with their times."""
-
-    def __init__(self, line: Wire, note: Callable[[str, bytes], None]) -> None:
-        self._line, self._note, self.name = line, note, line.name
-        self.discard, self.close = line.discard, line.close
-
-    def write(self, data: bytes) -> None:
-        self._note(">", data)
-        self._line.write(data)
-
-    def read(self) -> bytes:
-        if data := self._line.read():
-            self._note("<", data)
-        return data
 
 
 @dataclass
@@ -112,7 +96,7 @@ def printed(
         done.traffic.append((printer.now_s, way, data))
         listen(printer.now_s, way, data)
 
-    medium = replace(printer.medium, open=lambda name, rate: Recorded(wrap(printer.medium.open(name, rate)), note))
+    medium = tapped(note, replace(printer.medium, open=lambda name, rate: wrap(printer.medium.open(name, rate))))
     try:
         done.outcome = print_lines(lines, PATH, medium=medium, profile=PROFILE, **more)  # type: ignore[arg-type]
     except PrinterError as error:

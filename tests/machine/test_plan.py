@@ -96,7 +96,7 @@ def test_with_a_short_z_axis_the_head_stands_aside() -> None:
     x, y, z = program.moves[turn - 1].points_mm[-1]
     assert z == 60.5
     assert np.hypot(x, y) > 60.0
-    assert not dry_run(write_gcode(program, profile), profile).failed
+    assert dry_run(write_gcode(program, profile), profile).errors == ()
 
 
 def test_no_safe_place_is_refused_with_part_and_heights() -> None:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mdp.clearance import allowed_poses
-from mdp.head import Block, bodies, corners
+from mdp.head import Block, Body, bodies, corners
 from mdp.pose import Pose, rotation, shift, unit
 from profiles.machine import CradleBox, Machine
 from profiles.profile import load
@@ -23,17 +23,22 @@ def with_post(machine: Machine, y_mm: float, height_mm: float) -> Machine:
     return machine.model_copy(update={"cradle": [post]})
 
 
+def outline(body: Body) -> np.ndarray:
+    """Corners of a body of the head; of a ring those of 24-gons inside its discs, and 300 mm above them."""
+    if isinstance(body, Block):
+        return corners(body.min_mm, body.max_mm)
+    turns = np.arange(24) * np.pi / 12
+    discs = [np.column_stack([r * np.cos(turns), r * np.sin(turns), np.full(24, h)]) for r, h in body.discs_mm]
+    return np.vstack([*discs, *(disc + np.array([0.0, 0.0, 300.0]) for disc in discs)])
+
+
 def meet(machine: Machine, pose: Pose) -> bool:
-    """Whether the head's boxes, over all places of the tip, share room with the post; by exact solids."""
+    """Whether a body of the head, over all places of the tip, shares room with the post; by exact solids."""
     tips = PART @ rotation(machine, pose).T + shift(machine, pose)
     tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
     box = machine.cradle[0]
     post = corners(box.min_mm, box.max_mm) @ rotation(machine, tilted).T + shift(machine, tilted)
-    swept = [
-        (tips[:, None] + corners(body.min_mm, body.max_mm)[None]).reshape(-1, 3)
-        for body in bodies(machine)
-        if isinstance(body, Block)
-    ]
+    swept = [(tips[:, None] + outline(body)[None]).reshape(-1, 3) for body in bodies(machine)]
     return any((m3.Manifold.hull_points(each) ^ m3.Manifold.hull_points(post)).volume() > 1e-6 for each in swept)
 
 
@@ -41,6 +46,12 @@ def meet(machine: Machine, pose: Pose) -> bool:
 def test_no_pose_is_allowed_at_which_the_head_meets_a_post_of_the_cradle(y_mm: float, height_mm: float) -> None:
     machine = with_post(MACHINE, y_mm, height_mm)
     assert not any(meet(machine, pose) for pose in allowed_poses(machine, LEANING, PART))
+
+
+def test_the_post_beside_the_part_would_be_met_at_every_pose() -> None:
+    beside = with_post(MACHINE, 10.0, 200.0)
+    free = allowed_poses(MACHINE.model_copy(update={"cradle": []}), LEANING, PART)
+    assert [meet(beside, pose) for pose in free] == [True, True]
 
 
 @pytest.mark.parametrize(("height", "count"), [(5.0, 2), (200.0, 0)])
