@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from math import inf
 from pathlib import Path
+from types import FrameType
 
 from machine.app.interrupts import interrupting
 from machine.app.match import printer_on
@@ -44,6 +45,7 @@ from profiles.machine import Machine
 PROMPT = "> "
 HISTORY = 1000  # lines
 AT_ONCE_S = 0.5
+WAKE_S = 0.1
 HELP = """What you type is sent, one line after the other is answered. Besides:
   /help     this
   /reports  show or hide temperature reports
@@ -92,6 +94,10 @@ def console(
         return _Console(session, shown, leave_heaters).run()
 
 
+class _WokenError(Exception):
+    """The other thread has an error to tell."""
+
+
 class _Console:
     """One console from the greeting to a safe end."""
 
@@ -99,6 +105,8 @@ class _Console:
         self._session, self._shown, self._leave_heaters = session, shown, leave_heaters
         self._waiting: deque[str] = deque()
         self._done = threading.Event()
+        self._left = threading.Event()
+        self._reader = threading.get_ident()
         self._error: Exception | None = None
 
     def run(self) -> int:
@@ -130,13 +138,16 @@ class _Console:
     def _typed(self) -> None:
         """What a person types; a thread of its own keeps listening meanwhile."""
         worker = threading.Thread(target=self._serve, name="console", daemon=True)
+        before = signal.signal(signal.SIGUSR1, self._wake)
         worker.start()
         try:
             with _history():
                 self._read_on()
         finally:
+            self._left.set()
             self._session.order(LeftError)
             worker.join()
+            signal.signal(signal.SIGUSR1, before)
             if self._waiting:
                 say(f"not sent any more: {', '.join(self._waiting)}")
         if self._error is not None:
@@ -144,33 +155,36 @@ class _Console:
 
     def _read_on(self) -> None:
         while self._error is None:
-            self._shown.typing = True
             try:
-                line = input(PROMPT).strip()
+                line = self._asked()
             except EOFError:
-                self._shown.typing = False
                 self._shown.write("")
                 return
-            except KeyboardInterrupt:
-                self._shown.typing = False
-                if self._error is None:
-                    raise
+            except _WokenError:
                 return
-            self._shown.typing = False
             if self._meant_for_us(line):
                 return
             if line and not line.startswith("/"):
                 self._hand_over(line)
 
+    def _asked(self) -> str:
+        try:
+            self._shown.typing = True
+            return input(PROMPT).strip()
+        finally:
+            self._shown.typing = False
+
+    def _wake(self, _number: int, _frame: FrameType | None) -> None:
+        """Leave input() for an error of the other thread; between two lines that error is seen without it."""
+        if self._shown.typing:
+            self._shown.typing = False
+            raise _WokenError
+
     def _hand_over(self, line: str) -> None:
         """Let the thread send a line; what is answered at once comes before the next prompt, what takes longer above it."""
         self._done.clear()
         self._waiting.append(line)
-        try:
-            self._done.wait(AT_ONCE_S)
-        except KeyboardInterrupt:
-            if self._error is None:
-                raise
+        self._done.wait(AT_ONCE_S)
 
     def _serve(self) -> None:
         try:
@@ -188,8 +202,8 @@ class _Console:
         except (PrinterError, StopError) as error:
             self._error = error
             self._done.set()
-            if self._shown.typing:  # input() waits for a key
-                os.kill(os.getpid(), signal.SIGINT)
+            while not self._left.wait(WAKE_S):  # input() waits for a key; a signal just before it begins to is lost
+                signal.pthread_kill(self._reader, signal.SIGUSR1)
 
     def _meant_for_us(self, line: str) -> bool:
         """Do what a line with a slash means; True when it means to leave."""

@@ -1,7 +1,9 @@
 """`tiltprint console`: through a pipe and at a terminal, with a safe end whatever happens."""
 
 import io
+import signal
 import sys
+import time
 from contextlib import ExitStack
 
 import pytest
@@ -18,6 +20,14 @@ from tests.machine.person import Person
 MACHINE = load().machine
 NAMED = {"M115": "FIRMWARE_NAME:Marlin 2.1.2\nok", "M114": "X:0.00 Y:0.00 Z:0.00 A:0.00 C:0.00 E:0.00\nok", "M110": "ok"}
 COLD = "ok T:20.00 /0.00 B:20.00 /0.00"
+
+
+class Keys(io.StringIO):
+    """A keyboard: what is asked there is answered by input()."""
+
+    def isatty(self) -> bool:
+        """A terminal."""
+        return True
 
 
 def piped(text: str, path: str, *options: str, monkeypatch: pytest.MonkeyPatch) -> int:
@@ -193,3 +203,21 @@ def test_a_printer_that_goes_away_ends_the_console_without_a_key() -> None:
             stack.close()
             person.see(f"the connection at {path} was lost")
             assert person.end() == 1
+
+
+def test_a_wake_up_that_comes_before_input_waits_comes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    woken = {signal.SIGUSR1}
+    with ExitStack() as stack:
+
+        def late(_prompt: str) -> str:
+            signal.pthread_sigmask(signal.SIG_BLOCK, woken)
+            stack.close()
+            signal.sigwait(woken)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, woken)
+            time.sleep(60)
+            return "/quit"
+
+        path = stack.enter_context(on_terminal(scripted(NAMED | {"M105": COLD})))
+        monkeypatch.setattr("builtins.input", late)
+        monkeypatch.setattr(sys, "stdin", Keys())
+        assert main(["console", "--port", path]) == 1
