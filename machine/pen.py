@@ -13,6 +13,7 @@ from profiles.machine import Machine
 from slicer.paths import Kind
 
 UNKNOWN = -(10**12)
+SAME = 1.001  # less than the firmware and the dry run care for
 
 
 @dataclass
@@ -77,13 +78,15 @@ class Pen:
 
 def pushed(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) -> Iterator[str]:
     """One line a point, as the file calls them; a point that rounds to where the tip is gives its filament to the next line."""
-    points = thousandths(points_mm[1:])
-    filament = pen.filament_mm + np.cumsum(filament_mm)
+    rounded = np.rint(points_mm * 1000.0)
+    told_mm, slower = as_rounded(points_mm, rounded, filament_mm)
+    filament = pen.filament_mm + np.cumsum(told_mm)
     pen.filament_mm = float(filament[-1])
     start, letter = f"{pen.dialect.stroke}", pen.filament_letter
     relative, before = pen.dialect.filament_relative, pen.pushed
-    ending = pen.speed(speed_mm_s)
-    for (x, y, z), e in zip(points, np.rint(filament * 1e5).astype(np.int64).tolist(), strict=True):
+    ending = pen.speed(speed_mm_s / slower)
+    points, pushed_to = rounded[1:].astype(np.int64).tolist(), np.rint(filament * 1e5).astype(np.int64).tolist()
+    for (x, y, z), e in zip(points, pushed_to, strict=True):
         place = pen.place(x, y, z)
         if place:
             told, before = e - before if relative else e, e
@@ -92,6 +95,21 @@ def pushed(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) 
     pen.pushed = before
     if ending:
         pen.feed = 0
+
+
+def as_rounded(points_mm: Floats, rounded: Floats, filament_mm: Floats) -> tuple[Floats, float]:
+    """(n - 1,) filament of each step in proportion to its length as written, the sum kept; how much slower it must go for that.
+
+    Else a step of a few thousandths, which rounding makes shorter by half, would ask the extruder for double its speed.
+    """
+    steps = np.array([points_mm[1:] - points_mm[:-1], (rounded[1:] - rounded[:-1]) / 1000.0])
+    exact, written = np.sqrt(np.einsum("ijk,ijk->ij", steps, steps))
+    told = filament_mm * written / np.maximum(exact, 1e-12)
+    whole, told_whole = float(filament_mm.sum()), float(told.sum())
+    if told_whole == 0.0:
+        return filament_mm, 1.0
+    more = whole / told_whole
+    return told * more, more if more > SAME else 1.0
 
 
 def thousandths(points_mm: Floats) -> list[list[int]]:

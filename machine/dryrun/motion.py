@@ -10,6 +10,7 @@ from mdp.mesh import Floats
 from profiles.machine import Machine
 
 SLACK = 1.001
+WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # how much a step may differ by its ends' rounding
 LEVEL_DEG = 0.01
 HOMED_BEFORE = ("linuxcnc",)  # runs no program before its axes are homed by hand; G28 means another thing there
 
@@ -45,7 +46,8 @@ def deltas(program: ParsedProgram) -> Floats:
 def _too_fast(program: ParsedProgram, machine: Machine) -> list[Finding]:
     change = deltas(program)
     length, _ = lengths(change)
-    speed = np.abs(change) / np.maximum(length, 1e-9)[:, None] * (program.feed / 60.0)[:, None]
+    surely = np.maximum(np.abs(change) - WRITTEN, 0.0)
+    speed = surely / np.maximum(length, 1e-9)[:, None] * (program.feed / 60.0)[:, None]
     names = [*axis_limits(machine), "E"]
     found = []
     for axis, (letter, most) in enumerate(zip(names, axis_speeds(machine), strict=True)):

@@ -63,6 +63,18 @@ def test_rounding_of_filament_never_drifts(filament: list[float]) -> None:
     assert parsed.filament_mm == pytest.approx(np.cumsum(filament), abs=5.1e-6)
 
 
+@settings(deadline=None)
+@given(st.lists(st.floats(1e-4, 0.3), min_size=1, max_size=20), st.floats(0.0, 360.0))
+def test_no_step_is_written_denser_than_its_stroke(steps: list[float], heading_deg: float) -> None:
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    x, y = 7.0 + along * np.cos(np.radians(heading_deg)), 3.0 + along * np.sin(np.radians(heading_deg))
+    stroke = Stroke(Kind.SKIN, np.column_stack([x, y, np.full(len(x), 0.2)]), 0.4 * np.array(steps), 100.0, 0.4)
+    parsed = parse_gcode(write_gcode(MachineProgram("p", (stroke,)), load()), load().machine)
+    length = np.linalg.norm(parsed.end - parsed.start, axis=1)
+    filament_mm_s = (parsed.e_mm - 1e-5)[1:] / length[1:] * parsed.feed[1:] / 60.0  # the first comes from where the text begins
+    assert filament_mm_s.max(initial=0.0) <= 40.0 * 1.001 + 0.01
+
+
 @BOTH
 def test_no_command_outgrows_the_firmware_s_line(machine: str) -> None:
     assert all(len(f"N1234567 {command}*123") <= 95 for command in _commands(text(machine)))
