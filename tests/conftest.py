@@ -1,16 +1,39 @@
-"""Property tests draw the same examples on every run, so that a commit is judged by itself and not by luck;
-no example has a deadline, for a busy machine is no fault of a law.
+"""What every test stands on: laws that draw the same examples on every run, and an environment that is always the same.
 
-`pytest --hypothesis-profile=explore` draws new ones: run it a few times when a law's code was changed.
+A commit is judged by itself and not by luck: no example has a deadline and no drawing of examples a time limit, for a busy
+machine is no fault of a law; what the person or the service that runs the tests has set for colours, widths, settings or
+interrupts does not count.
+
+`pytest --hypothesis-profile=explore` draws new examples: run it a few times when a law's code was changed.
 """
 
+import os
 import signal
 
-from hypothesis import settings
+import pytest
+from hypothesis import HealthCheck, settings
 
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell leaves it for what it starts in the background
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+# What shapes messages, and what turns on or off what a program shows; a terminal's own words are the test's to say.
+SHAPING = ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE", "PYTHONWARNINGS")
 
-settings.register_profile("repeatable", derandomize=True, deadline=None)
-settings.register_profile("explore", print_blob=True, deadline=None)
+for name in SHAPING:
+    os.environ.pop(name, None)
+
+# A shell ignores SIGINT for what it starts in the background, nohup SIGHUP: commands that tests start would inherit it.
+for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, signal.default_int_handler if number == signal.SIGINT else lambda *_: None)
+signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid_signals())
+
+SLOW_IS_NO_FAULT = (HealthCheck.too_slow,)
+settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=SLOW_IS_NO_FAULT)
+settings.register_profile("explore", print_blob=True, deadline=None, suppress_health_check=SLOW_IS_NO_FAULT)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _folders_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Logs, journals and settings are not those of the person who runs the tests."""
+    monkeypatch = pytest.MonkeyPatch()
+    for kind in ("STATE", "CONFIG"):
+        monkeypatch.setenv(f"XDG_{kind}_HOME", str(tmp_path_factory.mktemp(kind.lower())))

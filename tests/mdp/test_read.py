@@ -45,7 +45,7 @@ def outcome(path: Path) -> Mesh | None:
         return None
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(suffix=st.sampled_from(FORMATS), x=SIZES, y=SIZES, z=SIZES)
 def test_a_box_in_any_format_comes_back_with_its_volume_standing_on_the_platform(tmp_path, suffix, x, y, z):
     mesh, notes = read_mesh(files.written(tmp_path / f"box{suffix}", files.placed(x, y, z, (3.0, -4.0, 5.0))))
@@ -189,7 +189,7 @@ def test_a_file_cut_anywhere_ends_in_a_sentence_or_in_the_whole_solid(tmp_path, 
         assert mesh is None or mesh.volume_mm3 == pytest.approx(tee().volume_mm3, rel=1e-4)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(suffix=st.sampled_from(FORMATS), place=st.floats(0, 0.999), value=st.integers(0, 255))
 def test_a_file_with_one_wrong_byte_never_ends_in_a_traceback(tmp_path, suffix, place, value):
     content = bytearray(files.written(tmp_path / f"a{suffix}", tee()).read_bytes())
