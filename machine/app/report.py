@@ -1,6 +1,7 @@
 """Report: the tables that the commands print on stdout."""
 
 import sys
+from textwrap import wrap
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from machine.dryrun.dryrun import DryRun, summary
 from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, Part
 from mdp.orientation import best_orientation, in_words
 from mdp.overhang import risky_upright
+
+WIDEST = 100  # characters of a line
+KEPT = "\u00a0"  # a space at which no line ends
 
 
 def duration(seconds: float) -> str:
@@ -95,9 +99,16 @@ def run_table(run: DryRun) -> str:
     moved = [f"{axis} {reach[0]:.1f}..{reach[1]:.1f}" for axis, reach in values["axes"].items() if reach]
     lines.append("axes " + ", ".join(moved) if moved else "nothing moves")
     for finding in values["findings"]:
-        where = f" (line {finding['line']})" if finding["line"] else ""
-        lines.append(f"{finding['severity']}: {finding['message']}{where}")
+        where = f" (line{KEPT}{finding['line']})" if finding["line"] else ""
+        lines += _wrapped(finding["severity"], finding["message"] + where)
     return "\n".join(lines) + "\n"
+
+
+def _wrapped(severity: str, message: str) -> list[str]:
+    """A finding in lines that can be read, the words after the severity below each other; keys of a profile stay whole."""
+    indent = " " * len(f"{severity}: ")
+    lines = wrap(message, WIDEST, initial_indent=f"{severity}: ", subsequent_indent=indent, break_long_words=False)
+    return [line.replace(KEPT, " ") for line in lines]
 
 
 def agreement_line(found: Agreement) -> str:

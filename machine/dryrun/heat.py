@@ -55,9 +55,12 @@ def _flow(program: ParsedProgram, profile: Profile) -> list[Finding]:
 
 def _profile(program: ParsedProgram, profile: Profile) -> list[Finding]:
     found = []
-    if profile.machine.uncalibrated:
-        keys = ", ".join(profile.machine.uncalibrated)
-        found.append(Finding("warning", "uncalibrated", 0, 0, 0, f"no source gives these numbers, measure them: {keys}"))
+    machine = profile.machine
+    if machine.uncalibrated:
+        count = len(machine.uncalibrated)
+        told = f"{count} numbers of {machine.name} are" if count > 1 else f"one number of {machine.name} is"
+        message = f"{told} in no source, measure them (docs/calibration.md): {', '.join(machine.uncalibrated)}"
+        found.append(Finding("warning", "uncalibrated", 0, 0, 0, message))
     for line, part, area, layer in program.unsupported:
         where = f", most of them in layer {layer}" if layer else ""
         message = f"{area:g} mm2 of risky faces of part {part} could be given no support{where}"
@@ -67,6 +70,10 @@ def _profile(program: ParsedProgram, profile: Profile) -> list[Finding]:
 
 def _ignored(program: ParsedProgram) -> list[Finding]:
     return [
-        Finding("warning", "ignored", line, 0, 0, f"{code} is not known to the dry run and was ignored ({count} times)")
+        Finding("warning", "ignored", line, 0, 0, f"{code} is not known to the dry run and was ignored{_times(count)}")
         for code, (line, count) in program.ignored.items()
     ]
+
+
+def _times(count: int) -> str:
+    return f", {count} times" if count > 1 else ""

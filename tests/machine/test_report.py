@@ -10,7 +10,7 @@ from mdp.mesh import Mesh
 from mdp.orientation import best_orientation
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, about
-from profiles.profile import load
+from profiles.profile import load, load_one
 from tests.shapes import box, hollow, tee
 
 
@@ -102,8 +102,16 @@ def test_a_run_is_told_in_four_lines_and_its_findings() -> None:
         "plastic from 0.0, 0.0, 10.0 to 30.0, 0.0, 10.0 mm (workpiece)",
         "axes X 0.0..30.0, Y 0.0..0.0, Z 10.0..10.0, A 0.0..0.0, C 0.0..0.0",
         "error: the part begins in air: 30.0 mm of its first layer have nothing under them (line 8)",
-        "warning: M777 is not known to the dry run and was ignored (1 times) (line 10)",
+        "warning: M777 is not known to the dry run and was ignored (line 10)",
     ]
+
+
+def test_a_long_finding_is_told_in_lines_with_every_key_whole() -> None:
+    machine = load_one("trident_5axis")["machine"]
+    told = run_table(dry_run(["M105"], load(machine="trident_5axis"))).splitlines()
+    first = next(k for k, line in enumerate(told) if line.startswith("warning: 8 numbers of "))
+    assert max(len(line) for line in told) <= 100
+    assert set(machine.uncalibrated) <= set(" ".join(told[first:]).replace(",", "").split())
 
 
 def test_a_program_without_a_move_says_so() -> None:
