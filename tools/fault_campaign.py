@@ -41,7 +41,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "error": ("Heating failed",),
     "reset": ("restarted", "stands at"),
     "silent reset": ("restarted", "stands at"),
-    "disconnect": ("was lost", "did not come back"),
+    "disconnect": ("was lost", "did not come back", "was not answered", "stands at"),
     "stall": ("has been silent", "no temperature"),
     "block": ("has been silent", "has stopped reading", "no temperature"),
     "heater failure": (

@@ -5,7 +5,7 @@ from machine.link.framing import LINE_LIMIT, command_of
 from machine.link.medium import SERIAL, Wire
 from machine.link.protocol import Timing
 from machine.link.shutdown import emergency_stop, heaters_off
-from machine.link.talk import Talk
+from machine.link.talk import Mended, Talk
 from profiles.errors import FirmwareError, LocalProtocolError, PortError
 
 FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
@@ -104,5 +104,5 @@ class Session:
         if ordered is not None:
             raise ordered
 
-    def _lost(self, error: PortError) -> Wire:
+    def _lost(self, error: PortError) -> Mended:
         raise error

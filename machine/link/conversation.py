@@ -74,11 +74,21 @@ class Conversation:
         self._out.clear()
         return out
 
-    def interrupted(self, now_s: float) -> None:
-        """The port was lost and is there again: the printer is asked what has arrived; one that restarted betrays itself."""
-        self._out.clear()
+    def interrupted(self, now_s: float, done: bool | None = None) -> None:
+        """The port was lost and is there again: the printer is asked what has arrived; one that restarted betrays itself.
+
+        done: what is known otherwise of the lines on their way: they have been done, or are to be sent once more.
+        """
+        self._out[:] = b"\n"  # ends a half line
         self._hearing.cut()
         self._probes = 0
+        if done:
+            self.window.acknowledge(self.window.sent)
+        elif done is False:
+            unanswered = [line.number for line in self.window.flight if not line.asks_temperature]
+            self.window.ground()
+            for number in unanswered:
+                self._out += self.window.repeat(number, now_s)
         self._turn(Signal.BROKEN, now_s)
 
     def _pass(self, now_s: float) -> None:

@@ -7,8 +7,10 @@ from math import inf
 from threading import Event as Flag
 
 from machine.link.control import Control
+from machine.link.doubt import was_done
 from machine.link.events import Event, Ok, Position
 from machine.link.framing import LINE_LIMIT, command_of
+from machine.link.inquiry import Found
 from machine.link.journal import FINISHED, LEFT, Journal, Moment
 from machine.link.modal import Modal, axes_of
 from machine.link.park import Laid, lift_words, standing_mm
@@ -278,6 +280,14 @@ class Feed:
         finally:
             self._trouble = ""
             self.turn_to(before)
+
+    def was_done(self, found: Found) -> bool | None:
+        """Whether the one line of the program on its way has been done, by where the printer stands; None: nobody can say."""
+        window, step = self.talk.protocol.window, self.trail.unanswered
+        waiting = [line.number for line in window.flight if not line.asks_temperature]
+        if step is None or waiting != [step.number]:
+            return None
+        return was_done(window.command(step.number), self.trail.pose, self.modal, found)
 
     def lift(self) -> tuple[str, float] | None:
         """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or it is away already."""

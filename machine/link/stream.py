@@ -9,12 +9,12 @@ from machine.link.feed import Begin, Feed, Job
 from machine.link.framing import LINE_LIMIT, command_of
 from machine.link.inquiry import Found, inquire
 from machine.link.journal import Journal
-from machine.link.medium import SERIAL, Medium, Wire
+from machine.link.medium import SERIAL, Medium
 from machine.link.progress import Progress
 from machine.link.protocol import Timing
 from machine.link.reconnect import found_again, lasting_name
 from machine.link.shutdown import SETTLE_S, emergency_stop, heaters_off, lift
-from machine.link.talk import Talk
+from machine.link.talk import Mended, Talk
 from machine.link.wishes import CancelledError, EmergencyError
 from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
 from profiles.profile import Profile
@@ -91,18 +91,23 @@ def print_lines(
 
 
 class _Finder:
-    """Waits for a lost port."""
+    """Waits for a lost port. A firmware that cannot be asked by line number is asked for its place instead."""
 
     def __init__(self, feed: Feed, name: str, baud: int, medium: Medium) -> None:
         self._feed, self._name, self._baud, self._medium = feed, name, baud, medium
 
-    def __call__(self, error: PortError) -> Wire:
-        self._feed.talk.wire.close()
-        with self._feed.apart("reconnecting", f"{error}; waiting {self._medium.lost_s:.0f} s for it to come back"):
-            wire = found_again(self._name, self._baud, self._medium, self._feed.heed)
-        if wire is None:
-            raise PortError(f"{error}; it did not come back within {self._medium.lost_s:.0f} s")
-        return wire
+    def __call__(self, error: PortError) -> Mended:
+        feed, medium = self._feed, self._medium
+        feed.talk.wire.close()
+        with feed.apart("reconnecting", f"{error}; waiting {medium.lost_s:.0f} s for it to come back"):
+            while (wire := found_again(self._name, self._baud, medium, feed.heed)) is not None:
+                if feed.talk.protocol.family.resends:
+                    return Mended(wire, None)
+                try:
+                    return Mended(wire, feed.was_done(inquire(wire, medium)))
+                except PortError:  # a plug that is still loose
+                    wire.close()
+        raise PortError(f"{error}; it did not come back within {medium.lost_s:.0f} s")
 
 
 @dataclass

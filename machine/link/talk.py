@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import inf
+from typing import NamedTuple
 
 from machine.link.events import Event, Ok, Position
 from machine.link.framing import LINE_LIMIT
@@ -13,10 +14,17 @@ from profiles.errors import PortError
 GREETING = (State.DRAIN, State.SYNC, State.HELLO)
 
 
+class Mended(NamedTuple):
+    """A new wire to a printer whose port was lost, and whether what was on its way has been done; None: it is to be asked."""
+
+    wire: Wire
+    done: bool | None
+
+
 class Talk:
     """`heard` gets every event after the protocol has seen it, `turned` is called once a turn with the time, s.
 
-    `lost` is asked what to do when the port is gone after the greeting: it returns a new wire to the same printer or raises. The
+    `lost` is asked what to do when the port is gone after the greeting: it finds the same printer again or raises. The
     printer's own faults are raised as the protocol tells them.
     """
 
@@ -27,7 +35,7 @@ class Talk:
         timing: Timing,
         heard: Callable[[Event], None],
         turned: Callable[[float], None],
-        lost: Callable[[PortError], Wire],
+        lost: Callable[[PortError], Mended],
         limit: int = LINE_LIMIT,
         rx_bytes: int | None = None,
         baud: int | None = None,
@@ -104,8 +112,7 @@ class Talk:
 
     def _mend(self, error: PortError) -> None:
         """Go on over a new wire: the printer is asked what has arrived; one that has restarted answers with its first number."""
-        if not self.greeted or not self.protocol.family.resends:
+        if not self.greeted:
             raise error
-        self.wire = self._lost(error)
-        self.wire.write(b"\n")  # ends a half line
-        self.protocol.interrupted(self.medium.now_s())
+        self.wire, done = self._lost(error)
+        self.protocol.interrupted(self.medium.now_s(), done)

@@ -32,6 +32,11 @@ class Trail:
         self._planned: deque[Step] = deque()
         self._blocks, self._free = PLANNER_BLOCKS, 0
 
+    @property
+    def unanswered(self) -> Step | None:
+        """The only command of the program that is not acknowledged; None when there is none, or more than one."""
+        return self._flight[0] if len(self._flight) == 1 else None
+
     def send(self, step: Step) -> None:
         """A command has gone out."""
         self._flight.append(step)

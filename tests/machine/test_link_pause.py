@@ -21,11 +21,12 @@ from machine.link.stream import Outcome, print_lines
 from machine.link.virtual import PATH, VirtualPrinter
 from mdp.head import bodies, directions
 from mdp.pose import UP, Pose, rotation
-from profiles.errors import FirmwareError, PortError, PrinterError
-from profiles.profile import load
+from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError
+from profiles.profile import Profile, load
 
 PROFILE = load()
 MACHINE = PROFILE.machine
+UNASKING = {dialect: load(settings=[f"machine.dialect={dialect}"]) for dialect in ("klipper", "reprapfirmware")}
 START = ["G21", "G90", "M83", "M140 S60", "M104 S200", "G28 X Y Z", "G92 A0 C0", "M190 S60", "M109 S200", "G92 E0", "M106 S128"]
 POSED = ["G0 Z120 F900", "G0 A30 C725 F6000", "G0 X10 Y10 F6000", "G0 Z60 F900", "M204 P800 T1200", "G1 F1500"]
 # strokes with a travel after every tenth, where a pause can begin
@@ -38,8 +39,8 @@ PROGRAM = [*START, *POSED, *BODY, "M104 S0", "M140 S0"]
 class Watcher:
     """Asks for things when the print has come to a line or a state, and remembers what was shown and sent."""
 
-    def __init__(self, printer: VirtualPrinter) -> None:
-        self.printer, self.control = printer, Control()
+    def __init__(self, printer: VirtualPrinter, profile: Profile = PROFILE) -> None:
+        self.printer, self.control, self.profile = printer, Control(), profile
         self.shown: list[Progress] = []
         self.sent = b""
         self.when: dict[str | int, Callable[[], None]] = {}
@@ -65,7 +66,7 @@ class Watcher:
             on_progress=self.see,
             stop=stop,
             control=self.control,
-            profile=PROFILE,
+            profile=self.profile,
             medium=tapped(self.traffic, medium or self.printer.medium),
         )
 
@@ -73,9 +74,9 @@ class Watcher:
         return lambda: self.control.ask(wish, value, text)
 
 
-def watched(faults: tuple[Fault, ...] = (), seed: int = 1) -> Watcher:
+def watched(faults: tuple[Fault, ...] = (), seed: int = 1, profile: Profile = PROFILE) -> Watcher:
     script = FaultScript(faults, seed) if faults else None
-    return Watcher(VirtualPrinter(MACHINE, faults=script, most_s=20000.0))
+    return Watcher(VirtualPrinter(profile.machine, faults=script, most_s=20000.0), profile)
 
 
 def strokes(printer: VirtualPrinter) -> np.ndarray:
@@ -286,6 +287,37 @@ def test_a_port_that_comes_back_to_a_printer_that_went_on_loses_and_doubles_noth
     assert not watcher.run(PROGRAM).cancelled
     assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
     assert "reconnecting" in {progress.state for progress in watcher.shown}
+
+
+@pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
+@pytest.mark.parametrize("line", [14, 30, 61])
+def test_a_firmware_that_never_asks_for_a_line_again_goes_on_by_its_place(dialect: str, line: int) -> None:
+    watcher = watched((Fault("disconnect", at=line, unit="line", seconds=2.0),), profile=UNASKING[dialect])
+    assert not watcher.run(PROGRAM).cancelled
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+
+
+@pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
+@pytest.mark.parametrize("byte", range(2000, 2040, 9))
+def test_a_line_that_was_torn_with_the_port_is_never_done_twice_or_left_out(dialect: str, byte: int) -> None:
+    watcher, error = watched((Fault("disconnect", at=byte, seconds=2.0),), profile=UNASKING[dialect]), ""
+    try:
+        watcher.run(PROGRAM)
+    except RemoteProtocolError as stopped:
+        error = str(stopped)
+    done, program = strokes(watcher.printer), planned(PROGRAM)
+    assert np.abs(done - program[: len(done)]).max() < 1e-6
+    assert len(done) == len(program) or "whether it was done is not known" in error or "can no longer be trusted" in error
+
+
+@pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
+def test_a_firmware_that_restarted_behind_the_lost_port_is_seen_by_its_place(dialect: str) -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=2.0),), profile=UNASKING[dialect])
+    reset = watcher.printer.firmware.reset
+    watcher.when = {"reconnecting": lambda: reset(False)}
+    with pytest.raises(RemoteProtocolError, match=r"was not answered|can no longer be trusted"):
+        watcher.run(PROGRAM)
+    assert len(strokes(watcher.printer)) < len(planned(PROGRAM))
 
 
 def test_a_port_that_comes_back_to_a_restarted_printer_ends_the_print() -> None:

@@ -732,7 +732,7 @@ def test_a_mended_cable_is_followed_by_a_question_and_what_was_lost_is_repeated(
     line = table.send("G1 X1")
     table.say(b"ok N1")
     table.protocol.interrupted(table.now_s)
-    assert table.wire() == frame(12, "M105")
+    assert table.wire() == b"\n" + frame(12, "M105")
     table.say(b"Error:Line Number is not Last Line Number+1, Last Line: 10\nResend: 11\nok\n")
     table.wait(0.2)
     assert table.wire() == line
