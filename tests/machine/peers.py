@@ -1,4 +1,4 @@
-"""Peers for tests of the link: what answers at a pseudo-terminal, at a socket, behind RFC 2217."""
+"""Peers for tests of the link: what answers at a pseudo-terminal, at a socket, behind RFC 2217; and an ear that never hurries."""
 
 import os
 import pty
@@ -9,14 +9,20 @@ import threading
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
+from types import ModuleType
 
+import pytest
 import serial
 import serial.rfc2217
 
+from machine.link import answer
 from machine.link.firmware import Firmware
+from machine.link.port import Port
 
 RATES = {getattr(termios, f"B{rate}"): rate for rate in (9600, 57600, 115200, 230400, 1000000)}
 Answer = Callable[[bytes, int], bytes]  # what is received, baud rate that the host has set -> what is answered
+PATIENCE_S = 60.0  # for what is to come: a busy machine may take its time
 
 
 @contextmanager
@@ -39,7 +45,7 @@ def on_terminal(answer: Answer, greeting: bytes = b"") -> Iterator[str]:
         yield os.ttyname(slave)
     finally:
         os.write(end, b"x")
-        thread.join(5)
+        thread.join(PATIENCE_S)
         for descriptor in (master, slave, over, end):
             os.close(descriptor)
 
@@ -142,3 +148,52 @@ def _serve_rfc2217(host: socket.socket, device: serial.Serial) -> None:
             device.write(b"".join(manager.filter(data)))
         if device in ready:
             host.sendall(b"".join(manager.escape(device.read(4096))))
+
+
+class Ear:
+    """A port, and a clock for who asks at it: once the other end has spoken and is silent again, all patience is over.
+
+    So nobody who speaks late, on a busy machine, is taken for silent, and nobody who has spoken is waited for.
+    """
+
+    _ahead = threading.local()  # ports are asked at the same time, each in a thread of its own
+
+    def __init__(self, port: Port) -> None:
+        self._port, self.name, self.set_baud = port, port.name, port.set_baud
+        self._spoke = False
+
+    def write(self, data: bytes) -> None:
+        """Ask."""
+        self._spoke = False
+        self._port.write(data)
+
+    def read(self) -> bytes:
+        """Listen."""
+        data = self._port.read()
+        if self._spoke and not data:
+            self._ahead.s = self._ahead_s() + 10 * PATIENCE_S
+        self._spoke = bool(data)
+        return data
+
+    @classmethod
+    def now_s(cls) -> float:
+        """The clock."""
+        return monotonic() + cls._ahead_s()
+
+    @classmethod
+    def _ahead_s(cls) -> float:
+        return float(getattr(cls._ahead, "s", 0.0))
+
+
+def hear_out(monkeypatch: pytest.MonkeyPatch, asker: ModuleType, *mute: str) -> None:
+    """Let a module ask its ports once, with an ear; mute: ports at which nothing will be said, which are given up soon."""
+    monkeypatch.setattr(answer, "monotonic", Ear.now_s)
+    monkeypatch.setattr(answer, "ASK_S", 10 * PATIENCE_S)
+    monkeypatch.setattr(answer, "POSITION_S", PATIENCE_S)
+    monkeypatch.setattr(answer, "QUICK_S", 0.1 if mute else PATIENCE_S)
+    asked = answer.ask_at_any_rate
+
+    def patiently(port: Port, baud: int, _patience_s: float = 0.0, over: threading.Event | None = None) -> object:
+        return asked(Ear(port), baud, 0.1 if port.name in mute else PATIENCE_S, over)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(asker, "ask_at_any_rate", patiently)

@@ -10,11 +10,10 @@ import pytest
 
 from machine.app import match
 from machine.app.cli import main
-from machine.link.answer import ask_at_any_rate
 from machine.link.record import Record
 from machine.link.simulator import SimulatedPrinter
 from profiles.profile import load
-from tests.machine.peers import on_terminal, scripted
+from tests.machine.peers import hear_out, on_terminal, scripted
 from tests.machine.person import Person
 
 MACHINE = load().machine
@@ -126,7 +125,7 @@ def test_the_error_of_a_printer_is_told_in_its_own_words(
 def test_a_port_where_no_printer_is_gets_the_sentence_of_print(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(match, "ask_at_any_rate", lambda port, baud: ask_at_any_rate(port, baud, 0.3))
+    hear_out(monkeypatch, match)
     with on_terminal(lambda data, baud: data) as path:
         assert piped("G28\n", path, monkeypatch=monkeypatch) == 1
     assert f"what answers at {path} is no printer: it sends back what it is told" in capsys.readouterr().err

@@ -11,14 +11,13 @@ import serial
 from machine.app import match
 from machine.app.cli import main
 from machine.app.match import beyond, made_for_another, misfit
-from machine.link import answer as answer_module
-from machine.link.answer import Answer, Kind, ask, ask_at_any_rate
+from machine.link.answer import Answer, Kind, ask
 from machine.link.port import open_port
 from machine.link.simulator import SimulatedPrinter
 from machine.settings import foot
 from profiles.profile import load
+from tests.machine.peers import PATIENCE_S, behind_rfc2217, hear_out, on_terminal, scripted
 from tests.machine.peers import Answer as Words
-from tests.machine.peers import behind_rfc2217, on_terminal, scripted
 
 MACHINE = load().machine
 NAMED = "FIRMWARE_NAME:Marlin 2.1.2 SOURCE_CODE_URL:x AXIS_COUNT:5\n"
@@ -35,14 +34,6 @@ def file_of(folder: Path, *lines: str) -> str:
 
 def printed(port: str, file: str, *options: str) -> int:
     return main(["print", file, "--port", port, *options])
-
-
-@pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Silence is recognised sooner than a real board would allow."""
-    monkeypatch.setattr(answer_module, "PATIENCE_S", 0.3)
-    monkeypatch.setattr(match, "ask_at_any_rate", lambda port, baud: ask_at_any_rate(port, baud, 0.3))
-    monkeypatch.setattr(answer_module, "QUICK_S", 0.3)
 
 
 def talking_at(rate: int) -> Words:
@@ -75,10 +66,11 @@ STRANGERS: dict[str, tuple[Words, str]] = {
 
 @pytest.mark.parametrize("name", STRANGERS)
 def test_what_is_no_fitting_printer_is_refused_with_one_sentence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], quick: None, name: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     peer, sentence = STRANGERS[name]
     with on_terminal(peer) as path:
+        hear_out(monkeypatch, match, *([path] if name == "silence" else []))
         assert printed(path, file_of(tmp_path, "G1 X1 F600")) == 1
     message = capsys.readouterr().err
     assert sentence.replace("PORT", path) in message
@@ -87,16 +79,18 @@ def test_what_is_no_fitting_printer_is_refused_with_one_sentence(
 
 @pytest.mark.parametrize("rate", [230400, 1000000])
 def test_the_rate_at_which_the_printer_speaks_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], quick: None, rate: int
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, rate: int
 ) -> None:
+    hear_out(monkeypatch, match)
     with on_terminal(talking_at(rate)) as path:
         assert printed(path, file_of(tmp_path, "G1 X1 F600")) == 1
     assert f"does not speak at 115200 baud but at {rate}: use --baud {rate}" in capsys.readouterr().err
 
 
-def test_the_rate_is_found_behind_rfc_2217_too(quick: None) -> None:
+def test_the_rate_is_found_behind_rfc_2217_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    hear_out(monkeypatch, match)
     with on_terminal(talking_at(230400)) as path, behind_rfc2217(path) as address, open_port(address, 115200) as port:
-        answer, rate = ask_at_any_rate(port, 115200, 0.3)
+        answer, rate = match.ask_at_any_rate(port, 115200)
     assert (answer.kind, answer.letters, rate) == (Kind.PRINTER, "XYZAC", 230400)
 
 
@@ -129,7 +123,10 @@ def test_the_limits_that_the_firmware_tells_bind_the_program(tmp_path: Path, cap
     assert words in capsys.readouterr().err
 
 
-def test_a_program_for_another_machine_is_refused_unless_forced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_program_for_another_machine_is_refused_unless_forced(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hear_out(monkeypatch, match)
     made = load("open5x") if "open5x" in _machines() else load(_machines()[0])
     file = file_of(tmp_path, "G1 X1 F600", *foot(made, 1.0, 1.0))
     with SimulatedPrinter(MACHINE) as printer:
@@ -161,7 +158,7 @@ def test_speeds_do_not_make_another_machine() -> None:
 
 def test_the_simulated_printer_answers_with_its_axes() -> None:
     with SimulatedPrinter(MACHINE) as printer, open_port(printer.path, 115200) as port:
-        answer = ask(port)
+        answer = ask(port, PATIENCE_S)
     assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZAC")
     assert answer.firmware.startswith("Marlin")
     assert misfit(answer, MACHINE) == ""
@@ -176,12 +173,12 @@ def test_a_board_that_starts_when_its_port_is_opened_is_waited_for() -> None:
         return b"" if deaf[0] > 0 else b"start\necho:Marlin 2.1.2\n" if deaf[0] == 0 else right(data, baud)
 
     with on_terminal(starting) as path, open_port(path, 115200) as port:
-        assert ask(port).letters == "XYZAC"
+        assert ask(port, PATIENCE_S).letters == "XYZAC"
 
 
 def test_limits_carry_the_firmware_s_own_letters() -> None:
     with on_terminal(scripted(FIVE_AXES)) as path, open_port(path, 115200) as port:
-        assert ask(port).limits["A"] == (-90.0, 90.0)
+        assert ask(port, PATIENCE_S).limits["A"] == (-90.0, 90.0)
 
 
 @pytest.mark.parametrize(("words", "name"), [

@@ -12,7 +12,7 @@ from machine.link.answer import Answer, Kind
 from machine.link.port import SerialDevice
 from machine.link.simulator import SimulatedPrinter
 from profiles.profile import load
-from tests.machine.peers import on_terminal, scripted
+from tests.machine.peers import hear_out, on_terminal, scripted
 
 MACHINE = load().machine
 MEGA = SerialDevice("/dev/serial/by-id/usb-Mega", "/dev/ttyACM0", "Mega 2560 (2341:0042)", "7533")
@@ -24,11 +24,10 @@ def device(path: str) -> SerialDevice:
 
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> list[SerialDevice]:
-    """The ports of this computer, as the test fills them in; silence is recognised soon."""
+    """The ports of this computer, as the test fills them in."""
     devices: list[SerialDevice] = []
     monkeypatch.setattr(ports_command, "serial_devices", lambda: tuple(devices))
-    monkeypatch.setattr(ports_command, "PATIENCE_S", 0.3)
-    monkeypatch.setattr("machine.link.answer.QUICK_S", 0.2)
+    hear_out(monkeypatch, ports_command)
     return devices
 
 
@@ -49,13 +48,14 @@ def test_a_printer_is_told_with_firmware_axes_and_rate(here: list[SerialDevice],
 
 
 def test_several_ports_are_asked_at_a_time_and_told_in_order(
-    here: list[SerialDevice], capsys: pytest.CaptureFixture[str]
+    here: list[SerialDevice], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with (
         SimulatedPrinter(MACHINE) as printer,
         on_terminal(scripted({}, "hello?")) as stranger,
         on_terminal(lambda *_: b"") as mute,
     ):
+        hear_out(monkeypatch, ports_command, mute)
         here += [device(printer.path), device(stranger), device(mute), device("/dev/no-such-port")]
         assert main(["ports", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
