@@ -18,10 +18,10 @@ from machine.app.traffic import TrafficLog, new_log, tapped
 from machine.dialects import DIALECTS
 from machine.link.answer import Answer
 from machine.link.control import Control
-from machine.link.feed import Begin
 from machine.link.inquiry import Found
+from machine.link.job import Begin
 from machine.link.journal import Journal
-from machine.link.progress import Progress
+from machine.link.progress import Progress, Schedule
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import Outcome, print_lines
 from profiles.errors import OutputError, PrinterError
@@ -119,7 +119,8 @@ def _print_simulated(
 ) -> int:
     """Stream to the simulated printer and tell what it has done."""
     with SimulatedPrinter(profile.machine, speed) as printer:
-        outcome = streamed(program, profile, printer.path, baud, title, log, follow, journal)
+        pace = speed if isfinite(speed) else None
+        outcome = streamed(program, profile, printer.path, baud, title, log, follow, journal, pace=pace)
         record = printer.record
     if outcome.cancelled:
         return ended(outcome, log)
@@ -145,16 +146,20 @@ def streamed(
     follow: Follow | None = None,
     journal: Journal | None = None,
     begin: Callable[[Found], Begin] | None = None,
+    pace: float | None = 1.0,
 ) -> Outcome:
-    """Stream a program while a person watches: screen or lines, keys, Ctrl-C, log, journal. begin: of a resumed print."""
-    stop, control, words = threading.Event(), Control(), Words()
+    """Stream a program while a person watches: screen or lines, keys, Ctrl-C, log, journal.
+
+    begin: of a resumed print. pace: seconds of the print that pass in one of the clock; None: as fast as it goes.
+    """
+    stop, control, words, course = threading.Event(), Control(), Words(), Course(program.run)
 
     def traffic(direction: str, data: bytes) -> None:
         log.note(direction, data)
         words.hear(direction, data)
 
     with stopping(stop), ExitStack() as stack:
-        tell = _Late(stack, _shown(title, program, control, words))
+        tell = _Late(stack, _shown(title, course, control, words))
 
         def begun(found: Found) -> Begin:
             decided = Begin(1, ()) if begin is None else begin(found)
@@ -175,7 +180,7 @@ def streamed(
             baud,
             on_progress,
             stop,
-            program.run.time_s,
+            Schedule(course.remaining_s, pace),
             limit=DIALECTS[profile.machine.dialect].longest_line,
             control=control,
             profile=profile,
@@ -201,7 +206,7 @@ class _Late:
 
 
 @contextmanager
-def _shown(title: str, program: Program, control: Control, words: Words) -> Iterator[Follow]:
+def _shown(title: str, course: Course, control: Control, words: Words) -> Iterator[Follow]:
     """What shows the progress: a screen with keys on a terminal, plain lines elsewhere. Ends with the terminal as before."""
     if not is_terminal():
         yield _Lines()
@@ -211,7 +216,7 @@ def _shown(title: str, program: Program, control: Control, words: Words) -> Iter
         keys = can_type()
         if keys:
             stack.enter_context(Typing(board.press))
-        screen = stack.enter_context(Screen(title, Course(program.run), words, lambda: board.hint, keys))
+        screen = stack.enter_context(Screen(title, course, words, lambda: board.hint, keys))
 
         def tell(progress: Progress) -> None:
             board.follow(progress)

@@ -13,8 +13,8 @@ from machine.app.progress import say
 from machine.app.traffic import TrafficLog, new_log
 from machine.dialects import DIALECTS
 from machine.dryrun.dryrun import dry_run
-from machine.link.feed import Begin
 from machine.link.inquiry import Found
+from machine.link.job import Begin
 from machine.link.journal import Heading, Moment, Story, mark_resumed, read_journal
 from machine.link.program import GcodeFile
 from machine.link.resume import AWAY, Point, Way, heights_mm, point_of, stood, way_on

@@ -28,19 +28,30 @@ KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? mor
 
 
 class Course:
-    """What a dry run knows about the way of a print: where the table stands at a line, how many layers a part has."""
+    """What a dry run knows about the way of a print: where the table stands at a line, what is left to do, layers of a part."""
 
     def __init__(self, run: DryRun) -> None:
         program = run.program
         self.letters = run.letters
         self._line, self._angles = program.line, program.end[:, 3:5]
+        self._done_s = np.concatenate([[0.0], np.cumsum(run.times_s)])
+        self._waits = [(event.line, event.value) for event in program.events if event.code == "G4"]
         laying = program.kind == MoveKind.EXTRUDE  # the way to a part still counts to the layer before it
         self._layers = {part: len(np.unique(program.layer[laying & (program.part == part)])) for part in program.parts}
 
     def pose_deg(self, file_line: int) -> tuple[float, float] | None:
         """Tilt and turn after a line of the program; None before the first move."""
-        row = int(np.searchsorted(self._line, file_line, side="right")) - 1
+        row = self._rows(file_line) - 1
         return None if row < 0 else (float(self._angles[row, 0]), float(self._angles[row, 1]))
+
+    def remaining_s(self, file_line: int) -> float:
+        """How long moves and dwells after a line of the program take; heating and homing are not counted."""
+        waits_s = sum(wait_s for line, wait_s in self._waits if line > file_line)
+        return float(self._done_s[-1] - self._done_s[self._rows(file_line)]) + waits_s
+
+    def _rows(self, file_line: int) -> int:
+        """How many moves are told up to a line."""
+        return int(np.searchsorted(self._line, file_line, side="right"))
 
     def layers(self, part: int | None) -> int | None:
         """Layers of a part."""

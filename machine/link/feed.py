@@ -2,15 +2,16 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from threading import Event as Flag
 
 from machine.link.control import Control
 from machine.link.doubt import was_done
 from machine.link.events import Event, Ok, Position
-from machine.link.framing import LINE_LIMIT, command_of
+from machine.link.framing import command_of
 from machine.link.inquiry import Found
+from machine.link.job import Begin, Job
 from machine.link.journal import FINISHED, LEFT, Journal, Moment
 from machine.link.modal import Modal, axes_of
 from machine.link.park import Laid, lift_words, standing_mm
@@ -23,7 +24,6 @@ from machine.link.trail import Step, Trail
 from machine.link.watchdog import Watchdog
 from machine.link.wishes import Wishes
 from profiles.errors import RemoteProtocolError
-from profiles.profile import Profile
 
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
@@ -32,24 +32,6 @@ BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
 CHECK_S = 30.0  # between looks at the position where a layer ends
 CHECK_MUTE_S = 10.0  # the same for a printer that does not tell what it has executed
 NEAR = 0.1  # mm or deg: M114 tells hundredths, motor steps are smaller
-
-
-@dataclass(frozen=True)
-class Begin:
-    """Where a resumed print goes on: the first line of the program to be sent, and commands before it."""
-
-    line: int
-    before: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Job:
-    """What is fixed for a print. total: commands."""
-
-    total: int | None = None
-    total_s: float | None = None
-    limit: int = LINE_LIMIT
-    profile: Profile | None = None
 
 
 class Feed:
@@ -328,12 +310,18 @@ class Feed:
         self._on_progress(
             Progress(
                 sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
-                left_s=place.left_s(elapsed_s, self._job.total_s), share=place.share(done, self._job.total),
+                left_s=self._left_s(elapsed_s), share=place.share(done, self._job.total),
                 temperature=self.reports.temperature, part=place.part, parts=place.parts, layer=place.layer, state=self.state,
                 file_line=self.trail.acknowledged, feed_percent=self._wishes.feed_percent, flow_percent=self._wishes.flow_percent,
                 message=self._wishes.message or self._trouble or self._silence(),
             )
         )  # fmt: skip
+
+    def _left_s(self, elapsed_s: float) -> float | None:
+        schedule, trail, feed = self._job.schedule, self.trail, self._wishes.feed_percent
+        if schedule is None:
+            return self._place.left_s(elapsed_s, feed)
+        return schedule.left_s(trail.before, trail.acknowledged, elapsed_s, feed)
 
     def _silence(self) -> str:
         """Said while an answer is overdue; a slow command may take its time."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from machine.link.events import Temperature
@@ -36,6 +37,25 @@ class Progress:
     message: str = ""
 
 
+@dataclass(frozen=True)
+class Schedule:
+    """How long a program takes. remaining_s: what is left of it after a line of its file, s, at the feed rates that it tells.
+
+    pace: how many of those seconds pass in one of the clock; None: as many as have so far, whatever the feed.
+    """
+
+    remaining_s: Callable[[int], float]
+    pace: float | None = 1.0
+
+    def left_s(self, begin: int, file_line: int, elapsed_s: float, feed_percent: float) -> float | None:
+        """Time left, s, for a print that began after line `begin`; None where nothing is known yet."""
+        left_s = self.remaining_s(file_line)
+        if self.pace is not None:
+            return left_s / self.pace * 100.0 / feed_percent
+        done_s = self.remaining_s(begin) - left_s
+        return left_s * elapsed_s / done_s if done_s > 0 else None
+
+
 @dataclass
 class Place:
     """Where in the program the sender stands, gathered line by line."""
@@ -62,11 +82,11 @@ class Place:
         if "R" in words:
             self.minutes_left, self.told_at_s = words["R"], now_s
 
-    def left_s(self, elapsed_s: float, total_s: float | None) -> float | None:
-        """Time left: M73's last word less what has passed since, else the total less what has passed."""
-        if self.minutes_left is not None:
-            return max(0.0, 60.0 * self.minutes_left - (elapsed_s - self.told_at_s))
-        return None if total_s is None else max(0.0, total_s - elapsed_s)
+    def left_s(self, elapsed_s: float, feed_percent: float) -> float | None:
+        """Time left by M73's last word, less what has passed since; None when it has said nothing."""
+        if self.minutes_left is None:
+            return None
+        return max(0.0, 60.0 * self.minutes_left * 100.0 / feed_percent - (elapsed_s - self.told_at_s))
 
     def share(self, acknowledged: int, total: int | None) -> float | None:
         """Done so far, 0 to 1: by M73, else by lines."""

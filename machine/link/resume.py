@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from machine.collide import Printed
-from machine.link.feed import Begin
 from machine.link.framing import command_of
 from machine.link.inquiry import Found
+from machine.link.job import Begin
 from machine.link.journal import EVERY_LINES, LEFT, Moment
 from machine.link.modal import E_AXIS, Modal, axes_of
 from machine.link.park import Laid

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from threading import Event as Flag
 
 from machine.link.control import Control
-from machine.link.feed import Begin, Feed, Job
+from machine.link.feed import Feed
 from machine.link.framing import LINE_LIMIT, command_of
 from machine.link.inquiry import Found, inquire
+from machine.link.job import Begin, Job
 from machine.link.journal import Journal
 from machine.link.medium import SERIAL, Medium
-from machine.link.progress import Progress
+from machine.link.progress import Progress, Schedule
 from machine.link.protocol import Timing
 from machine.link.reconnect import found_again, lasting_name
 from machine.link.shutdown import SETTLE_S, emergency_stop, heaters_off, lift
@@ -48,7 +49,7 @@ def print_lines(
     baud: int = 115200,
     on_progress: Callable[[Progress], None] | None = None,
     stop: Flag | None = None,
-    total_s: float | None = None,
+    schedule: Schedule | None = None,
     total: int | None = None,
     timing: Timing | None = None,
     limit: int = LINE_LIMIT,
@@ -62,7 +63,7 @@ def print_lines(
     """Print a program: send every line's command, wait until the last one is done.
 
     What can be read twice (a sequence, a GcodeFile) is checked wholly before the port is opened, an iterator line by line as it
-    is reached; lines are consumed lazily. A plain string is taken as its lines. total_s is the expected duration, total the
+    is reached; lines are consumed lazily. A plain string is taken as its lines. schedule: for the time left, total: the
     number of commands where `lines` does not tell; limit: characters of a line, number and checksum included, that the firmware
     keeps. control: wishes of a person; journal: kept for a later resume; profile: lets a pause
     lift, park and cool the nozzle, and the watchdog know what is too hot; begin: for a resumed print, decides where it goes on.
@@ -76,7 +77,7 @@ def print_lines(
         lines = lines.splitlines()
     if not isinstance(lines, Iterator):
         total = sum(1 for place, line in enumerate(lines, 1) if command_of(line, place, limit))
-    job = Job(total, total_s, limit, profile)
+    job = Job(total, schedule, limit, profile)
     feed = Feed(job, control, journal, on_progress, stop, medium.now_s())
     name = lasting_name(port)
     wire = medium.open(port, baud)

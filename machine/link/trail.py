@@ -24,7 +24,7 @@ class Trail:
     """
 
     def __init__(self, before: int = 0) -> None:
-        self.sent = self.acknowledged = self.executed = before
+        self.before = self.sent = self.acknowledged = self.executed = before
         self.number = 0  # the newest wire number that is acknowledged
         self.commands = 0  # acknowledged commands of the program
         self.pose: tuple[float | None, ...] = ()  # after the newest acknowledged command

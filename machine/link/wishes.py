@@ -71,11 +71,11 @@ class Wishes:
         self.pause_s, self.resume = None, False
 
     def told(self, command: str) -> None:
-        """Take note of an M220 or M221 of the program itself."""
-        value = dict(requests.words(command)).get("S")
-        if value is not None and command.startswith("M220"):
+        """Take note of an M220 or M221 of the program itself; no firmware goes down to 0."""
+        value = dict(requests.words(command)).get("S", 0.0)
+        if value > 0 and command.startswith("M220"):
             self.feed_percent = value
-        elif value is not None:
+        elif value > 0:
             self.flow_percent = value
 
     def undone(self) -> list[str]:

@@ -13,9 +13,9 @@ from machine.app.cli import main
 from machine.app.traffic import tapped
 from machine.link.events import Position, Temperature
 from machine.link.faults import Fault, FaultScript
-from machine.link.feed import Begin
 from machine.link.habits import Habits
 from machine.link.inquiry import Found
+from machine.link.job import Begin
 from machine.link.journal import Heading, Journal, Moment, Story, read_journal
 from machine.link.medium import Medium, Wire
 from machine.link.modal import Modal, axes_of

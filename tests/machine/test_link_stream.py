@@ -18,7 +18,7 @@ from machine.link.firmware import Firmware, Habits
 from machine.link.framing import frame
 from machine.link.medium import Medium
 from machine.link.port import open_port, refusal
-from machine.link.progress import Progress
+from machine.link.progress import Place, Progress, Schedule
 from machine.link.protocol import Timing
 from machine.link.record import Record
 from machine.link.simulator import SimulatedPrinter
@@ -87,7 +87,7 @@ def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
     told: list[Progress] = []
     body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + body, printer.path, 250000, told.append, total_s=1000.0, timing=QUICK)
+        print_lines(HEAT + body, printer.path, 250000, told.append, timing=QUICK)
     last = told[-1]
     assert (last.sent, last.acknowledged, last.total) == (6, 6, 6)
     assert (last.part, last.parts, last.layer, last.share) == (2, 2, 2, 0.5)
@@ -96,12 +96,24 @@ def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
     assert last.temperature.bed_target_c == 60.0
 
 
-def test_the_time_left_without_m73_is_the_total_less_what_passed() -> None:
+def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:
     told: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(iter(["G21"]), printer.path, 250000, told.append, total_s=1000.0, timing=QUICK)
-    assert told[-1].left_s == pytest.approx(1000.0 - told[-1].elapsed_s)
+        schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=2.0)
+        print_lines(iter(["G21", "M220 S50", "G90"]), printer.path, 250000, told.append, schedule=schedule, timing=QUICK)
+    assert told[-1].left_s == pytest.approx((1000.0 - 300.0) / 2.0 / 0.5)
     assert told[-1].total is None
+
+
+def test_where_the_pace_is_not_known_the_one_so_far_holds() -> None:
+    schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=None)
+    assert schedule.left_s(2, 4, 10.0, 50.0) == pytest.approx(600.0 * 10.0 / 200.0)
+    assert schedule.left_s(2, 2, 10.0, 50.0) is None
+
+
+def test_m73_s_minutes_follow_the_feed_override() -> None:
+    place = Place(minutes_left=3.0, told_at_s=10.0)
+    assert place.left_s(20.0, 200.0) == pytest.approx(80.0)
 
 
 @pytest.mark.parametrize("bad", ["M117 schön", "M117 " + "x" * 90, "G1 X1*5", "M112", "M0 wait"])

@@ -51,6 +51,14 @@ def test_the_pose_is_that_of_the_acknowledged_line() -> None:
     assert lines(turned)[1] == "part 2 of 2   tilt A 30.0 deg   turn C 120.0 deg"
 
 
+def test_what_is_left_after_a_line_are_the_moves_and_dwells_behind_it() -> None:
+    run = dry_run(["G21", "G90", "M83", "G28", "G1 X60 F600", "G4 S5", "G1 X0 F600", "G4 S7"], PROFILE)
+    course, ends_s = Course(run), run.times_s
+    assert course.remaining_s(0) == pytest.approx(run.time_s)
+    assert course.remaining_s(5) == pytest.approx(ends_s[1] + 12.0)
+    assert course.remaining_s(7) == pytest.approx(7.0)
+
+
 def test_the_way_to_a_part_is_no_layer_of_it() -> None:
     assert [COURSE.layers(part) for part in (1, 2, 3, None)] == [2, 1, None, None]
 
