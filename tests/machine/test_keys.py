@@ -6,6 +6,7 @@ import sys
 import termios
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -13,13 +14,16 @@ from machine.app.keys import HINT_S, MORE, SURE, Keyboard, Typing, can_type
 from machine.link.control import Control, Request, Wish
 from machine.link.events import Temperature
 from machine.link.progress import Progress
+from tests.machine.peers import PATIENCE_S
+
+MOMENT = Progress(0, 0, None, 0.0, None, None, Temperature(), None, None, None)
 
 
 def asked(*keys: str, state: str = "printing") -> list[Request]:
     """What a run of keys asks for."""
     control = Control()
     board = Keyboard(control)
-    board.follow(Progress(0, 0, None, 0.0, None, None, Temperature(), None, None, None, state=state))
+    board.follow(replace(MOMENT, state=state))
     for key in keys:
         board.press(key)
     return list(iter(control.take, None))
@@ -86,6 +90,15 @@ def test_the_feed_goes_in_steps(keys: str, percent: list[float]) -> None:
     assert asked(*keys) == [Request(Wish.FEED, value) for value in percent]
 
 
+def test_steps_begin_at_what_the_program_has_set() -> None:
+    control = Control()
+    board = Keyboard(control)
+    board.follow(replace(MOMENT, feed_percent=50.0, flow_percent=95.0))
+    board.press("+")
+    board.press("]")
+    assert [control.take(), control.take()] == [Request(Wish.FEED, 60.0), Request(Wish.FLOW, 105.0)]
+
+
 def test_overrides_stay_inside_what_the_stream_takes() -> None:
     assert asked(*"-" * 50)[-1] == Request(Wish.FEED, 10.0)
     assert asked(*"+" * 50)[-1] == Request(Wish.FEED, 300.0)
@@ -107,7 +120,7 @@ class Pressed:
 
     def wait_for(self, count: int) -> str:
         with self._more:
-            self._more.wait_for(lambda: len(self.keys) >= count, 5.0)
+            self._more.wait_for(lambda: len(self.keys) >= count, PATIENCE_S)
         return self.keys
 
 
@@ -127,6 +140,16 @@ def test_keys_come_as_they_are_pressed_and_arrows_are_none(keyboard: int) -> Non
         os.write(keyboard, b"p")
         assert pressed.wait_for(1) == "p"
         os.write(keyboard, b"\x1b[C\x1bOP\x1b[15~r")
+        assert pressed.wait_for(2) == "pr"
+
+
+@pytest.mark.parametrize(("one", "other"), [(b"p\x1b", b"[Cr"), (b"p\x1b[", b"Cr"), (b"p\x1bO", b"Pr"), (b"p\x1b[15", b"~r")])
+def test_an_arrow_that_comes_in_pieces_is_no_key_either(keyboard: int, one: bytes, other: bytes) -> None:
+    pressed = Pressed()
+    with Typing(pressed):
+        os.write(keyboard, one)
+        assert pressed.wait_for(1) == "p"
+        os.write(keyboard, other)
         assert pressed.wait_for(2) == "pr"
 
 
@@ -151,10 +174,10 @@ def test_the_terminal_is_as_before_on_every_way_out(keyboard: int) -> None:
 
 
 def test_no_thread_is_left(keyboard: int) -> None:
-    threads = threading.active_count()
+    before = set(threading.enumerate())
     with Typing(Pressed()):
         pass
-    assert threading.active_count() == threads
+    assert set(threading.enumerate()) <= before
 
 
 def test_a_terminal_that_goes_away_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:

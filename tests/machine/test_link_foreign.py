@@ -17,6 +17,7 @@ from machine.link.simulator import SimulatedPrinter
 from machine.parse import parse_gcode
 from machine.parsed import MoveKind
 from tests.machine.hand import printed
+from tests.machine.peers import PATIENCE_S
 from tests.machine.test_dialects import profile
 
 CHOSEN = profile("marlin")
@@ -39,7 +40,7 @@ def assert_printed(record: Record) -> None:
     assert (record.unknown, record.clamped, record.nozzle_target_c, record.bed_target_c) == (0, 0, 0.0, 0.0)
 
 
-def soon(what: Callable[[], object], seconds: float = 60.0) -> None:
+def soon(what: Callable[[], object], seconds: float = PATIENCE_S) -> None:
     """Wait until something is so."""
     end_s = time.monotonic() + seconds
     while not what():
@@ -103,7 +104,7 @@ def ask(host: serial.Serial, line: bytes) -> list[bytes]:
 @pytest.mark.parametrize(("first", "number"), [
     (b"N-1 M110 N-1*125\n", 0), (b"M110 N0\n", 1), (b"N0 M110 N0*125\n", 1), (b"\nM110\n", None)])  # fmt: skip
 def test_a_host_that_sends_line_by_line_prints_a_whole_file(first: bytes, number: int | None) -> None:
-    with SimulatedPrinter(CHOSEN.machine) as printer, serial.Serial(printer.path, 250000, timeout=10) as host:
+    with SimulatedPrinter(CHOSEN.machine) as printer, serial.Serial(printer.path, 250000, timeout=PATIENCE_S) as host:
         assert ask(host, first)[-1].startswith(b"ok")
         assert any(b"FIRMWARE_NAME:Marlin" in line for line in ask(host, b"M115\n"))
         for line in lines():

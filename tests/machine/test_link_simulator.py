@@ -15,6 +15,7 @@ from machine.link.heater import Heater
 from machine.link.simulator import SimulatedPrinter
 from mdp.pose import Pose, rotation
 from profiles.profile import load
+from tests.machine.peers import PATIENCE_S
 
 MACHINE = load().machine
 HOT = "M104 S200\nM109 S200\n"
@@ -282,7 +283,7 @@ def test_a_machine_with_other_letters_is_spoken_to_in_them() -> None:
 
 
 def test_the_terminal_answers_a_plain_serial_program() -> None:
-    with SimulatedPrinter(MACHINE) as simulated, serial.Serial(simulated.path, 250000, timeout=2) as host:
+    with SimulatedPrinter(MACHINE) as simulated, serial.Serial(simulated.path, 250000, timeout=PATIENCE_S) as host:
         host.write(b"M105\nG1 X5\n")
         assert host.readline().startswith(b"ok T:20.00")
         assert host.readline() == b"ok P14 B3\n"
@@ -295,7 +296,7 @@ def test_ten_times_real_time_is_ten_times_real_time() -> None:
         began = time.monotonic()
         os.write(host, b"G4 S5\n")
         said = b""
-        while b"ok" not in said and select.select([host], [], [], 3)[0]:
+        while b"ok" not in said and select.select([host], [], [], PATIENCE_S)[0]:
             said += os.read(host, 100)
         os.close(host)
     assert time.monotonic() - began > 0.45

@@ -13,6 +13,7 @@ from machine.link.framing import frame
 from machine.link.simulator import SimulatedPrinter
 from machine.link.uart import Uart
 from profiles.profile import load
+from tests.machine.peers import PATIENCE_S
 
 MACHINE = load().machine
 LINE = b"M117 " + b"x" * 57 + b"\n"  # 63 bytes, as a usual stroke with number and checksum
@@ -86,7 +87,7 @@ def test_a_blocked_firmware_lets_its_ring_overflow_but_a_small_window_lives() ->
 
 
 def test_the_terminal_paces_bytes_in_real_time() -> None:
-    with SimulatedPrinter(MACHINE, baud=115200) as printer, serial.Serial(printer.path, timeout=5) as host:
+    with SimulatedPrinter(MACHINE, baud=115200) as printer, serial.Serial(printer.path, timeout=PATIENCE_S) as host:
         began_s = time.monotonic()
         for first, _ in pairwise(range(51)):
             host.write(LINE)

@@ -26,6 +26,11 @@ PLACE = "X:0.00 Y:0.00 Z:0.00 A:0.00 C:0.00 E:0.00 Count X:0 Y:0 Z:0 A:0 C:0\n"
 FIVE_AXES = {"M115": f"{NAMED}Cap:EEPROM:1\n{AREA}ok", "M114": f"{PLACE}ok"}
 
 
+@pytest.fixture(autouse=True)
+def _no_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.link.answer.POSITION_S", PATIENCE_S)
+
+
 def file_of(folder: Path, *lines: str) -> str:
     file = folder / "part.gcode"
     file.write_text("\n".join(["G21", "G90", "M83", "G28", "G92 A0 C0", *lines, "M104 S0", "M140 S0"]) + "\n")

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from time import monotonic
 
 import pytest
 
@@ -19,19 +20,18 @@ from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import print_lines
 from profiles.errors import PortError
 from profiles.profile import load
-from tests.machine.peers import RATES, behind_rfc2217, on_socket, on_terminal
+from tests.machine.peers import PATIENCE_S, RATES, behind_rfc2217, on_socket, on_terminal
 
 MACHINE = load().machine
-QUICK = Timing(stall_s=0.5, stall_mute_s=0.5, sync_s=1.0, drain_s=0.05, quiet_s=0.03)
+PATIENT = Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
 PROGRAM = ["M83", *(f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 F3000" for i in range(300))]
 
 
 def heard(port: Port, length: int) -> bytes:
-    """The next bytes of a port; gives up after five seconds of silence."""
-    data, turns = b"", 0
-    while len(data) < length and turns < 100:
+    """The next bytes of a port; gives up after a minute of silence."""
+    data, end_s = b"", monotonic() + PATIENCE_S
+    while len(data) < length and monotonic() < end_s:
         data += port.read()
-        turns += 1
     return data
 
 
@@ -49,14 +49,14 @@ def accepted() -> Iterator[tuple[Port, socket.socket]]:
 def test_a_printer_behind_a_socket_prints_every_line_once(habits: Habits) -> None:
     firmware = Firmware(MACHINE, habits)
     with on_socket(firmware) as address:
-        outcome = print_lines(PROGRAM, address, 115200, timing=QUICK)
+        outcome = print_lines(PROGRAM, address, 115200, timing=PATIENT)
     assert (outcome.acknowledged, outcome.repeated) == (301, 0)
     assert [round(x, 5) for x in firmware.record().end[:, 0]] == [float(f"{1 + i % 90}.{i:05d}") for i in range(300)]
 
 
 def test_a_printer_behind_rfc_2217_prints_every_line_once() -> None:
     with SimulatedPrinter(MACHINE) as printer, behind_rfc2217(printer.path) as address:
-        outcome = print_lines(PROGRAM, address, 115200, timing=QUICK)
+        outcome = print_lines(PROGRAM, address, 115200, timing=PATIENT)
         record = printer.record
     assert (outcome.acknowledged, outcome.repeated) == (301, 0)
     assert [round(x, 5) for x in record.end[:, 0]] == [float(f"{1 + i % 90}.{i:05d}") for i in range(300)]
@@ -65,7 +65,9 @@ def test_a_printer_behind_rfc_2217_prints_every_line_once() -> None:
 def test_a_read_over_a_socket_takes_all_that_is_there() -> None:
     with accepted() as (port, host):
         host.sendall(b"ok N1 P15 B3\n" * 50)
-        assert port.read() == b"ok N1 P15 B3\n" * 50
+        while not (data := port.read()):
+            continue
+        assert data == b"ok N1 P15 B3\n" * 50
 
 
 def test_bytes_of_every_value_pass_through_rfc_2217() -> None:
@@ -145,7 +147,7 @@ def test_a_network_printer_that_stops_reading_is_given_up(monkeypatch: pytest.Mo
 
 
 def test_a_network_printer_lost_in_mid_print_ends_it_and_leaves_no_thread() -> None:
-    threads = threading.active_count()
+    before = set(threading.enumerate())
     firmware = Firmware(MACHINE)
     with socket.create_server(("localhost", 0)) as server:
 
@@ -160,9 +162,9 @@ def test_a_network_printer_lost_in_mid_print_ends_it_and_leaves_no_thread() -> N
         thread, address = threading.Thread(target=serve), f"socket://localhost:{server.getsockname()[1]}"
         thread.start()
         with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
-            print_lines(PROGRAM, address, 115200, timing=QUICK, medium=replace(SERIAL, lost_s=0.2))
-        thread.join(5)
-    assert threading.active_count() == threads
+            print_lines(PROGRAM, address, 115200, timing=PATIENT, medium=replace(SERIAL, lost_s=0.2))
+        thread.join(PATIENCE_S)
+    assert set(threading.enumerate()) <= before
 
 
 def test_a_closed_port_stays_closed() -> None:

@@ -14,6 +14,7 @@ from machine.app.cli import main
 from machine.app.simulator_command import habits_of
 from machine.link.firmware import Habits
 from profiles.errors import PrinterError
+from tests.machine.peers import PATIENCE_S
 
 
 @contextmanager
@@ -31,12 +32,12 @@ def running(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 def ended(process: subprocess.Popen[str], number: signal.Signals = signal.SIGINT) -> tuple[int, str]:
     """Exit code and the rest of what it prints."""
     process.send_signal(number)
-    told, _ = process.communicate(timeout=20)
+    told, _ = process.communicate(timeout=PATIENCE_S)
     return process.returncode, told
 
 
 def talk(path: str, text: bytes, until: bytes) -> bytes:
-    with serial.serial_for_url(path, 115200, timeout=5) as host:
+    with serial.serial_for_url(path, 115200, timeout=PATIENCE_S) as host:
         host.write(text)
         return host.read_until(until)
 
@@ -64,7 +65,7 @@ def test_faults_of_a_file_happen(tmp_path: Path) -> None:
     (tmp_path / "faults.toml").write_text('[[fault]]\nkind = "thermal runaway"\nline = 2\n')
     with (
         running("--faults", str(tmp_path / "faults.toml")) as (path, process),
-        serial.Serial(path, timeout=5) as host,
+        serial.Serial(path, timeout=PATIENCE_S) as host,
     ):
         host.write(b"G21\nG21\n")
         assert b"Error:Thermal Runaway" in host.read_until(b"//action:poweroff")

@@ -17,6 +17,7 @@ from machine.link.events import Temperature
 from machine.link.progress import Progress
 from profiles.errors import OutputError
 from tests.machine.pages import opened
+from tests.machine.peers import PATIENCE_S
 
 HALF = Progress(
     sent=60, acknowledged=50, total=100, elapsed_s=10.0, left_s=9.5, share=0.5,
@@ -33,7 +34,7 @@ def watched(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
 
 def asked(watched: Watched, path: str, method: str = "GET", **headers: str) -> tuple[HTTPResponse, bytes]:
     """What the server answers."""
-    connection = http.client.HTTPConnection("127.0.0.1", int(watched.address.split(":")[2].strip("/")), timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", int(watched.address.split(":")[2].strip("/")), timeout=PATIENCE_S)
     connection.request(method, path, headers=headers)
     answer = connection.getresponse()
     content = answer.read()
@@ -85,7 +86,7 @@ def test_who_hangs_up_leaves_the_terminal_alone(capfd: pytest.CaptureFixture[str
     with served(b"x" * 20_000_000) as running:
         port = int(running.address.split(":")[2].strip("/"))
         for _ in range(3):
-            with socket.create_connection(("127.0.0.1", port), timeout=5) as rude:
+            with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as rude:
                 rude.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
                 rude.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
                 rude.recv(10)
@@ -96,7 +97,7 @@ def test_who_hangs_up_leaves_the_terminal_alone(capfd: pytest.CaptureFixture[str
 def test_it_listens_on_this_computer_only(watched: Watched) -> None:
     assert watched.address.startswith("http://127.0.0.1:")
     port = int(watched.address.split(":")[2].strip("/"))
-    with pytest.raises(OSError, match=r"refused|unreachable"), socket.create_connection(("127.0.0.2", port), timeout=5):
+    with pytest.raises(OSError, match=r"refused|unreachable"), socket.create_connection(("127.0.0.2", port), timeout=PATIENCE_S):
         pass
 
 
@@ -109,7 +110,7 @@ def test_a_port_in_use_is_refused_with_a_sentence(watched: Watched) -> None:
 def test_the_server_ends_with_the_print() -> None:
     with served(b"page") as running:
         port = int(running.address.split(":")[2].strip("/"))
-    with pytest.raises(ConnectionRefusedError), socket.create_connection(("127.0.0.1", port), timeout=5):
+    with pytest.raises(ConnectionRefusedError), socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S):
         pass
 
 

@@ -18,6 +18,7 @@ PART_FILE = "from mdp.kernel import part\n\nPART = 1.0\n\n\n@part\ndef far(x):\n
 def program(tmp_path, monkeypatch):
     """A folder with the packages' kernel page and two files of a program, and a cache of its own."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")  # Python knows an edited file by its size and the second of its date
     packages = tmp_path / "program" / "mdp"
     packages.mkdir(parents=True)
     for name in ("__init__.py", "kernel.py", "store.py"):
