@@ -122,7 +122,11 @@ class _Console:
             raise self._session.stop() from None
         except PrinterError as error:
             raise type(error)(f"{error}{self._given_up()}") from None
-        self._leave(ask=typed and not code)
+        try:
+            self._leave(ask=typed and not code)
+        except KeyboardInterrupt:
+            say("left at once: heaters may still be on, look at the printer")
+            raise
         if self._session.unknown and not typed:
             raise PrinterError(f"the printer did not know {', '.join(repr(line) for line in self._session.unknown[:5])}")
         return code
@@ -144,14 +148,20 @@ class _Console:
             with _history():
                 self._read_on()
         finally:
-            self._left.set()
-            self._session.order(LeftError)
-            worker.join()
+            self._part_from(worker)
             signal.signal(signal.SIGUSR1, before)
             if self._waiting:
                 say(f"not sent any more: {', '.join(self._waiting)}")
         if self._error is not None:
             raise self._error
+
+    def _part_from(self, worker: threading.Thread) -> None:
+        """Let the other thread end whatever interrupts: two must not talk at the same time."""
+        while worker.is_alive():
+            with suppress(KeyboardInterrupt):
+                self._left.set()
+                self._session.order(LeftError)
+                worker.join()
 
     def _read_on(self) -> None:
         while self._error is None:

@@ -1,6 +1,7 @@
 """Interrupts: Ctrl-C, a termination request and a closed terminal, turned into a safe end."""
 
 import os
+import select
 import signal
 import stat
 import threading
@@ -10,6 +11,7 @@ from types import FrameType
 
 HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
 ALL: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM, *HANGUP)
+AGAIN_S = 0.1
 
 
 @contextmanager
@@ -27,13 +29,56 @@ def stopping(stop: threading.Event) -> Iterator[None]:
 
 @contextmanager
 def interrupting() -> Iterator[None]:
-    """Every interrupt raises KeyboardInterrupt in the main thread."""
+    """Every interrupt raises KeyboardInterrupt in the main thread, also one that comes just before that begins to wait."""
+    with _woken() as hear:
 
-    def act() -> None:
-        raise KeyboardInterrupt
+        def act() -> None:
+            hear()
+            raise KeyboardInterrupt
 
-    with _handled(act):
-        yield
+        with _handled(act):
+            yield
+
+
+@contextmanager
+def _woken() -> Iterator[Callable[[], None]]:
+    """Wake the main thread until it has heard an interrupt, which it tells by the function given.
+
+    Python's own handlers run between two of its instructions: a signal that comes after the last one before select() or read()
+    is noted, but ends no waiting.
+    """
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGUSR2"):
+        yield lambda: None
+        return
+    main, over = threading.get_ident(), threading.Event()
+    noted, write = os.pipe()  # what is in it has not been heard yet
+    for descriptor in (noted, write):
+        os.set_blocking(descriptor, False)
+
+    def hear() -> None:
+        with suppress(BlockingIOError):
+            os.read(noted, 4096)
+
+    def serve() -> None:
+        while not over.is_set():
+            select.select([noted], [], [])
+            if not over.wait(AGAIN_S) and select.select([noted], [], [], 0.0)[0]:
+                signal.pthread_kill(main, signal.SIGUSR2)
+
+    before = signal.signal(signal.SIGUSR2, lambda number, frame: hear())
+    wakeup = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+    thread = threading.Thread(target=serve, name="interrupts", daemon=True)
+    thread.start()
+    try:
+        yield hear
+    finally:
+        over.set()
+        signal.set_wakeup_fd(wakeup)
+        os.write(write, b"x")
+        thread.join()
+        signal.signal(signal.SIGUSR2, before)
+        os.close(noted)
+        os.close(write)
 
 
 @contextmanager

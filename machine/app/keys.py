@@ -20,6 +20,7 @@ STANDING = ("pausing", "paused")
 SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
 MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e stops the machine at once (M112)"
 SEQUENCE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O[A-Z])")  # arrow and function keys: the letters in them are no keys
+BEGUN = re.compile(rb"\x1b(\[[0-9;]*|O)?$")  # over a slow line a sequence comes in pieces
 SAME = {"=": "+", "_": "-", "?": "q"}
 
 
@@ -32,6 +33,7 @@ class Keyboard:
         self._control = control
         self._sure = False
         self._state, self._feed, self._flow = "printing", 100.0, 100.0
+        self._told = (100.0, 100.0)
 
     @property
     def hint(self) -> str:
@@ -41,6 +43,9 @@ class Keyboard:
     def follow(self, progress: Progress) -> None:
         """Know what the print does, so that one key can mean pause and resume."""
         self._state = progress.state
+        told = (progress.feed_percent, progress.flow_percent)
+        if told != self._told:  # the program may set them too
+            self._told, (self._feed, self._flow) = told, told
 
     def press(self, key: str) -> None:
         """Ask for what a key means; unknown keys mean nothing."""
@@ -140,6 +145,7 @@ class Typing:
             return
 
     def _serve(self) -> None:
+        begun = b""
         while True:
             ready = select.select([self._descriptor, self._end], [], [])[0]
             if self._end in ready:
@@ -150,7 +156,10 @@ class Typing:
                 return
             if not typed:
                 return
-            for key in SEQUENCE.sub(b"", typed).decode("ascii", "ignore"):
+            typed = SEQUENCE.sub(b"", begun + typed)
+            half = BEGUN.search(typed)
+            begun = half[0] if half else b""
+            for key in typed.removesuffix(begun).decode("ascii", "ignore"):
                 self._press(key)
 
 

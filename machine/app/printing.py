@@ -246,6 +246,9 @@ def _pointing_to(log: TrafficLog) -> Iterator[None]:
     except PrinterError:
         _point_to(log)
         raise
+    except KeyboardInterrupt:  # the second one: nobody waited for the printer's word
+        say("ended at once: whether the heaters are off is not known, look at the printer")
+        raise
 
 
 def _point_to(log: TrafficLog) -> None:

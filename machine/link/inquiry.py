@@ -5,6 +5,7 @@ refuses with the last one it has taken.
 """
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from machine.link.events import Ok, Position, Temperature, read_event
@@ -54,9 +55,11 @@ class _Answers:
         return False
 
 
-def inquire(wire: Wire, medium: Medium) -> Found:
-    """Ask; a printer that answers nothing is found without anything known. Raises PortError."""
-    answers, listener = _Answers(), Listener(wire, medium)
+def inquire(wire: Wire, medium: Medium, heed: Callable[[], None]) -> Found:
+    """Ask; a printer that answers nothing is found without anything known. Raises PortError, and what heed(), called meanwhile,
+    raises to end the asking.
+    """
+    answers, listener = _Answers(), Listener(wire, medium, heed)
     for _ in range(TRIES):
         wire.write(b"\n" + frame(FAR_NUMBER, "M105"))
         if listener.until(medium.now_s() + ANSWER_S, answers.numbered):

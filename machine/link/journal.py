@@ -114,6 +114,7 @@ class Journal:
             self._end.set()
             self._dirty.set()
             self._syncing.join()
+            self._to_disk()
             os.close(self._file)
 
     def __enter__(self) -> Self:
@@ -138,11 +139,14 @@ class Journal:
         while not self._end.is_set():
             self._dirty.wait()
             self._dirty.clear()
-            try:
-                os.fsync(self._file)
-            except OSError as error:
-                self.trouble = self.trouble or (error.strerror or str(error)).lower()
+            self._to_disk()
             self._end.wait(SYNC_S)
+
+    def _to_disk(self) -> None:
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            self.trouble = self.trouble or (error.strerror or str(error)).lower()
 
 
 def mark_resumed(path: Path, story: Story, rest: Path) -> None:

@@ -26,11 +26,13 @@ class Listener:
 
     wire: Wire
     medium: Medium
+    heed: Callable[[], None] = lambda: None  # once a turn; may raise to end the listening
     _half: bytes = b""
 
     def until(self, end_s: float, wanted: Callable[[bytes], bool]) -> bool:
         """Listen until a line is wanted (True) or the time has come (False)."""
         while self.medium.now_s() < end_s:
+            self.heed()
             *lines, self._half = (self._half + self.wire.read()).split(b"\n")
             self._half = self._half[-HELD_BYTES:]
             if any(wanted(line) for line in lines):

@@ -104,8 +104,9 @@ class _Finder:
             while (wire := found_again(self._name, self._baud, medium, feed.heed)) is not None:
                 if feed.talk.protocol.family.resends:
                     return Mended(wire, None)
+                feed.talk.wire = wire  # whoever cancels meanwhile wants the heaters off
                 try:
-                    return Mended(wire, feed.was_done(inquire(wire, medium)))
+                    return Mended(wire, feed.was_done(inquire(wire, medium, feed.heed)))
                 except PortError:  # a plug that is still loose
                     wire.close()
         raise PortError(f"{error}; it did not come back within {medium.lost_s:.0f} s")
@@ -124,7 +125,7 @@ class _Print:
         began_s = self.medium.now_s()
         try:
             if begin is not None:
-                self.feed.begin = begin(inquire(self.talk.wire, self.medium))
+                self.feed.begin = begin(inquire(self.talk.wire, self.medium, self.feed.heed))
             self.talk.greet()
             self.feed.run(lines)
         except CancelledError:

@@ -31,10 +31,10 @@ class Terminal:
         # Raw: no echo, no change of newlines. The own slave end stays open, so that the terminal outlives each host.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
-        self._device = self.path = os.ttyname(self._slave)
+        self._device = os.ttyname(self._slave)
         if self._link is not None:
             self._make_link(self._link)
-            self.path = str(self._link)
+        self.path = str(self._link or self._device)  # at once: another thread may look
 
     def close(self) -> None:
         """The cable is out: a host's next reading or writing fails."""

@@ -423,6 +423,15 @@ def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that
     assert "a simulated printer ends with its print" in told
 
 
+def test_a_cancel_is_heeded_while_the_printer_is_asked_where_it_stands(text: GcodeFile) -> None:
+    printer, stop = VirtualPrinter(PROFILE.machine), Flag()
+    deaf = Medium(lambda name, baud: _Deaf(printer.medium.open(name, baud)), printer.medium.now_s, printer.medium.wait)
+    stop.set()
+    outcome = print_lines(text, PATH, stop=stop, medium=deaf, profile=PROFILE, begin=lambda found: Begin(1, ()))
+    assert (outcome.cancelled, outcome.sent, outcome.heaters_off) == (True, 0, None)
+    assert printer.now_s < 1.0
+
+
 def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
     printer = VirtualPrinter(PROFILE.machine)
     story = killed(text, printer, 233)

@@ -22,8 +22,9 @@ OFF = ["M104 S0", "M140 S0"]
 
 @pytest.fixture
 def hours(tmp_path: Path) -> str:
-    """A file of an hour of careful strokes, each in a place of its own."""
-    strokes = [f"G0 X0 Y{0.4 * k:.1f}\nG1 X20 E1.0 F60" for k in range(1, 200)]
+    """A file of ten hours of careful strokes, each in a place of its own: at sixty times real time nobody sees its end."""
+    places = [(25 * (k // 250), 0.4 * (k % 250)) for k in range(2000)]
+    strokes = [f"G0 X{x} Y{y:.1f}\nG1 X{x + 20} E1.0 F60" for x, y in places]
     file = tmp_path / "hours.gcode"
     file.write_text("\n".join([*HEAT, ";PART:1 of 1", ";LAYER_CHANGE", *strokes, *OFF]) + "\n")
     return str(file)

@@ -1,0 +1,62 @@
+"""Interrupts: none is lost, whenever it comes."""
+
+import os
+import select
+import signal
+import threading
+
+import pytest
+
+from machine.app.interrupts import interrupting, stopping
+
+
+def wait_for_nothing() -> None:
+    """As input() does: nothing comes."""
+    never, end = os.pipe()
+    try:
+        select.select([never], [], [], 30.0)
+    finally:
+        os.close(never)
+        os.close(end)
+
+
+def test_an_interrupt_that_ends_no_waiting_is_heard_all_the_same() -> None:
+    # Noted in another thread it does not end select() in this one, as a signal just before select() would not.
+    elsewhere = threading.Timer(0.2, lambda: signal.pthread_kill(threading.get_ident(), signal.SIGINT))
+    late: list[str] = []
+    alarm = threading.Timer(20.0, lambda: late.append("nobody heard it"))
+    elsewhere.start()
+    alarm.start()
+    with pytest.raises(KeyboardInterrupt), interrupting():
+        wait_for_nothing()
+    alarm.cancel()
+    assert not late
+
+
+def test_waiting_goes_on_after_signals_that_are_none_of_its_own() -> None:
+    noted: list[int] = []
+    before = signal.signal(signal.SIGUSR1, lambda number, frame: noted.append(number))
+    with interrupting():
+        for _ in range(3):
+            signal.raise_signal(signal.SIGUSR1)
+        assert select.select([], [], [], 0.3) == ([], [], [])
+    signal.signal(signal.SIGUSR1, before)
+    assert noted == [signal.SIGUSR1] * 3
+
+
+def test_everything_is_as_before_afterwards() -> None:
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR2)
+    before, threads = [signal.getsignal(number) for number in numbers], threading.active_count()
+    with interrupting():
+        pass
+    assert [signal.getsignal(number) for number in numbers] == before
+    assert threading.active_count() == threads
+
+
+def test_the_first_interrupt_sets_the_flag_and_the_second_raises() -> None:
+    stop = threading.Event()
+    with stopping(stop):
+        signal.raise_signal(signal.SIGTERM)
+        assert stop.is_set()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
