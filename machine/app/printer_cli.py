@@ -22,6 +22,11 @@ from machine.app.options import (
     sections_named,
 )
 
+Watch = Annotated[bool, typer.Option("--watch", help="serve a page on this computer that follows the print")]
+WatchPort = Annotated[
+    int | None, typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one")
+]
+
 
 def print_(
     model: ModelOrGcode,
@@ -33,11 +38,8 @@ def print_(
     ranker: RankerName = "classic",
     orient: Orient = False,
     speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
-    watch: Annotated[bool, typer.Option("--watch", help="serve a page on this computer that follows the print")] = False,
-    watch_port: Annotated[
-        int | None,
-        typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one"),
-    ] = None,
+    watch: Watch = False,
+    watch_port: WatchPort = None,
     log: Annotated[
         Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
     ] = None,
@@ -52,7 +54,7 @@ def print_(
     process: ProcessGiven = None,
     settings: Settings = None,
 ) -> int:
-    """Print a model or a G-code file over a serial port, or on the simulated printer.
+    """Print a model or a G-code file on a printer or a simulated one.
 
     PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT. The printer is asked who it is before anything moves.
     Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
@@ -63,8 +65,13 @@ def print_(
         machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
     )
     named = sections_named(machine=machine, material=material, process=process, settings=settings)
-    watched = (watch_port or 0) if watch or watch_port is not None else None
-    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named, watched, log, journal)
+    page = _page_port(watch, watch_port)
+    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named, page, log, journal)
+
+
+def _page_port(watch: bool, watch_port: int | None) -> int | None:
+    """Where the page of a print is served, 0: at any free port; None: nowhere."""
+    return (watch_port or 0) if watch or watch_port is not None else None
 
 
 def resume(
@@ -72,6 +79,8 @@ def resume(
     port: Annotated[str, typer.Option("--port", metavar="PORT", help="serial port")],
     baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
     yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
+    watch: Watch = False,
+    watch_port: WatchPort = None,
     further: Annotated[
         Path | None, typer.Option("--journal", metavar="FILE", help="journal of the rest; else a new file in the state folder")
     ] = None,
@@ -80,11 +89,11 @@ def resume(
     ] = None,
     machine: MachineGiven = None,
 ) -> int:
-    """Go on with a print that was cut off: by a power cut, a crash, a pulled plug."""
+    """Go on with a print after a power cut, a crash or a pulled plug."""
     from machine.app import resume_command
 
     given = None if machine is None else profile_of(machine, "pla", "standard", None, None, None, None)
-    return resume_command.resume(journal, port, baud, yes, given, further, log)
+    return resume_command.resume(journal, port, baud, yes, given, further, log, _page_port(watch, watch_port))
 
 
 def ports(
@@ -94,7 +103,7 @@ def ports(
         bool, typer.Option("--ask/--no-ask", help="open each port and ask what is there; many boards restart when opened")
     ] = True,
 ) -> int:
-    """Serial ports and what answers at each: firmware, axes, rate, or why nothing does."""
+    """List serial ports and what answers at each. It tells firmware, axes and rate, or why nothing answers."""
     from machine.app import ports_command
 
     return ports_command.ports(baud, json, ask)
@@ -114,7 +123,7 @@ def console(
     machine: MachineName = "generic_ac",
     settings: Settings = None,
 ) -> int:
-    """Talk to a printer: lines typed, or piped in, are sent; its answers are shown.
+    """Talk to a printer. Lines typed, or piped in, are sent; its answers are shown.
 
     /help tells what else can be typed; Ctrl-D leaves. Heaters that are on are then switched off, after a question at a terminal.
     """

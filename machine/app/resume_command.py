@@ -1,6 +1,8 @@
 """Resume: go on with a print that was cut off by a power cut, a crash or a pulled plug, as its journal tells."""
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from math import hypot
 from pathlib import Path
@@ -8,9 +10,11 @@ from pathlib import Path
 from machine.app.interrupts import interrupting
 from machine.app.journals import continued
 from machine.app.pipeline import Program
-from machine.app.printing import SIMULATED, check_dialect, ended, streamed
+from machine.app.printing import SIMULATED, Follow, check_dialect, ended, streamed
 from machine.app.progress import say
 from machine.app.traffic import TrafficLog, new_log
+from machine.app.view.live import served
+from machine.app.view.page import print_page
 from machine.dialects import DIALECTS
 from machine.dryrun.dryrun import dry_run
 from machine.link.inquiry import Found
@@ -33,10 +37,12 @@ def resume(
     given: Profile | None = None,
     file: Path | None = None,
     log: Path | None = None,
+    watch_port: int | None = None,
 ) -> int:
     """Tell where a print goes on, ask, and print the rest; 0 when it was printed, 1 when the answer was no.
 
-    given: the profile whose machine the user has named; file: of the new journal; log: of the traffic.
+    given: the profile whose machine the user has named; file: of the new journal; log: of the traffic. watch_port: serve the
+    print's page on this port of this computer, 0: on any free one; None: serve nothing.
     """
     if port == SIMULATED:
         raise JournalError("--port sim: a simulated printer ends with its print; the port of a printer is expected")
@@ -63,8 +69,13 @@ def resume(
     program = Program(lines, dry_run(lines, profile), None)
     further = continued(text, profile, story.heading.name, file)
     try:
-        with new_log("print", title) if log is None else TrafficLog(log, title) as kept, further:
-            outcome = streamed(program, profile, port, baud, title, kept, journal=further, begin=begin)
+        with (
+            new_log("print", title) if log is None else TrafficLog(log, title) as kept,
+            further,
+            _followed(story.heading.name, program, profile, watch_port) as (follow, end),
+        ):
+            outcome = streamed(program, profile, port, baud, title, kept, follow, further, begin)
+            end("stopped" if outcome.cancelled else "done")
     finally:
         if further.last == Moment():  # a journal that tells nothing would let the whole program begin anew
             further.path.unlink(missing_ok=True)
@@ -72,6 +83,19 @@ def resume(
         say("nothing was moved or heated")
         return 1
     return ended(outcome)
+
+
+@contextmanager
+def _followed(
+    name: str, program: Program, profile: Profile, watch_port: int | None
+) -> Iterator[tuple[Follow | None, Callable[[str], None]]]:
+    """What tells the page of a print its progress, and its end; nothing where no page is wanted."""
+    if watch_port is None:
+        yield None, lambda state: None
+        return
+    with served(print_page(name, program, profile, live=True), watch_port) as watched:
+        say(f"watch the print at {watched.address}")
+        yield watched.follow, watched.end
 
 
 def _profile(journal: Path, heading: Heading, given: Profile | None) -> Profile:

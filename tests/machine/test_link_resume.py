@@ -379,12 +379,14 @@ def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
 ) -> None:
     with SimulatedPrinter(PROFILE.machine, speed=100.0) as printer:
         journal = cancelled(text, printer.path)
-        assert main(["resume", str(journal), "--port", printer.path, "--yes", "--journal", str(journal.with_name("rest"))]) == 0
+        further = str(journal.with_name("rest"))
+        assert main(["resume", str(journal), "--port", printer.path, "--yes", "--journal", further, "--watch"]) == 0
         record = printer.record
         assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
     told = capsys.readouterr().err
     assert re.search(r"p, part [23] of 3, (layer 1, )?line \d+ of 310", told)
     assert "has not restarted and knows its place" in told
+    assert "watch the print at http://" in told
     assert "was resumed already, what became of it is in" in told
     assert record.end[-1, 3:5].tolist() == [-20.0, 360.0]
 
