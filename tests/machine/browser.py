@@ -20,7 +20,7 @@ FLAGS = [
     *("--disable-extensions", "--disable-dev-shm-usage", "--remote-debugging-pipe"),
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),  # WebGL2 without a graphics card
 ]
-PATIENCE_S = 60.0
+PATIENCE_S = 150.0  # on a busy machine its start alone has taken 50 s
 
 
 class Browser:
@@ -41,11 +41,25 @@ class Browser:
             [*command, "about:blank"],
             preexec_fn=lambda: _become(to_child, from_child),
             pass_fds=(3, 4),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
         os.close(to_child)
         os.close(from_child)
-        pages = [t for t in self._send("Target.getTargets")["targetInfos"] if t["type"] == "page"]
+        try:
+            self._begin(size)
+        except BaseException:
+            self._end()
+            raise
+
+    def _begin(self, size: tuple[int, int]) -> None:
+        """Take hold of the first page, which may come later than the first answer."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not (pages := [t for t in self._send("Target.getTargets")["targetInfos"] if t["type"] == "page"]):
+            if time.monotonic() > end_s:
+                raise TimeoutError("the browser opens no page")
+            time.sleep(0.02)
         self._session = self._send("Target.attachToTarget", targetId=pages[0]["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self._send(f"{domain}.enable")
@@ -56,7 +70,15 @@ class Browser:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._session = ""
-        self._send("Browser.close")
+        try:
+            self._send("Browser.close")
+            self._process.wait(PATIENCE_S)
+        finally:
+            self._end()
+
+    def _end(self) -> None:
+        """No process, pipe or folder stays, whatever has happened."""
+        self._process.kill()
         self._process.wait(PATIENCE_S)
         os.close(self._in)
         os.close(self._out)

@@ -1,5 +1,6 @@
 """A person at a terminal: a command in a pseudo-terminal of its own, what is typed, and what is seen."""
 
+import codecs
 import os
 import pty
 import re
@@ -52,17 +53,23 @@ class Person:
         while self._read():
             if time.monotonic() > end_s:
                 raise AssertionError(f"it did not end, it showed {self.seen[-2000:]!r}")
-        code = os.waitstatus_to_exitcode(os.waitpid(self._child, 0)[1])
-        self._child = 0
-        return code
+        return self._code()
 
     def hang_up(self) -> int:
         """Close the terminal's window and wait for the command to end; its exit code."""
         os.close(self._terminal)
         self._terminal = -1
-        code = os.waitstatus_to_exitcode(os.waitpid(self._child, 0)[1])
+        return self._code()
+
+    def _code(self) -> int:
+        """The exit code of a command that is about to end."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not (ended := os.waitpid(self._child, os.WNOHANG))[0]:
+            if time.monotonic() > end_s:
+                raise AssertionError(f"it left its terminal but did not end, it had shown {self.seen[-2000:]!r}")
+            time.sleep(0.02)
         self._child = 0
-        return code
+        return os.waitstatus_to_exitcode(ended[1])
 
     def _read(self) -> bool:
         """Take what there is; False when the command has ended."""
@@ -72,11 +79,12 @@ class Person:
             data = os.read(self._terminal, 65536)
         except OSError:
             return False
-        self.raw += data.decode("utf-8", "replace")
+        self.raw += self._decoder.decode(data)
         return bool(data)
 
     def __enter__(self) -> Self:
         self._looked = 0
+        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")  # a letter may come in two pieces
         self._child, self._terminal = pty.fork()
         if self._child == 0:
             os.chdir(ROOT)

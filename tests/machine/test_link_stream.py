@@ -25,9 +25,12 @@ from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import Outcome, print_lines
 from profiles.errors import FirmwareError, LocalProtocolError, PortError, PrinterError, SilenceError
 from profiles.profile import load
+from tests.machine.peers import PATIENCE_S
 
 MACHINE = load().machine
-QUICK = Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=0.5, drain_s=0.05, quiet_s=0.03)
+QUICK = Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=1.0, drain_s=0.05, quiet_s=0.03)
+# Where nothing goes wrong nobody has to be asked again, however long a busy machine takes.
+PATIENT = Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
 PLAIN = Habits(advanced_ok=False)
 HEAT = ["M140 S60", "M104 S200", "M109 S200"]
 OFF = ["M104 S0", "M140 S0"]
@@ -57,7 +60,7 @@ def assert_executed(record: Record, lines: list[str], whole: bool = True) -> Non
 
 def run(lines: list[str], faults: tuple[Fault, ...] = (), habits: Habits | None = None) -> tuple[Outcome, Record]:
     with SimulatedPrinter(MACHINE, habits=habits, faults=faults) as printer:
-        return print_lines(lines, printer.path, 250000, timing=QUICK), printer.record
+        return print_lines(lines, printer.path, 250000, timing=QUICK if faults else PATIENT), printer.record
 
 
 @pytest.mark.parametrize("habits", [Habits(), PLAIN, Habits(emergency_parser=False, autoreport=False, busy=False)])
@@ -78,7 +81,7 @@ def test_comments_and_blank_lines_are_never_sent() -> None:
 
 def test_the_end_of_a_print_is_the_end_of_its_moves() -> None:
     with SimulatedPrinter(MACHINE, speed=50.0) as printer:
-        print_lines(["G1 X60 F600"], printer.path, 250000, timing=QUICK)
+        print_lines(["G1 X60 F600"], printer.path, 250000, timing=PATIENT)
         record = printer.record
         assert record.begin_s[-1] + record.duration_s[-1] <= printer._firmware.body.now_s
 
@@ -87,11 +90,11 @@ def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
     told: list[Progress] = []
     body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + body, printer.path, 250000, told.append, timing=QUICK)
+        print_lines(HEAT + body, printer.path, 250000, told.append, timing=PATIENT)
     last = told[-1]
     assert (last.sent, last.acknowledged, last.total) == (6, 6, 6)
     assert (last.part, last.parts, last.layer, last.share) == (2, 2, 2, 0.5)
-    assert last.left_s == pytest.approx(180.0, abs=5.0)
+    assert last.left_s == pytest.approx(180.0, abs=60.0)
     assert last.temperature.nozzle_c == pytest.approx(200.0, abs=1.5)
     assert last.temperature.bed_target_c == 60.0
 
@@ -100,7 +103,7 @@ def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:
     told: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
         schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=2.0)
-        print_lines(iter(["G21", "M220 S50", "G90"]), printer.path, 250000, told.append, schedule=schedule, timing=QUICK)
+        print_lines(iter(["G21", "M220 S50", "G90"]), printer.path, 250000, told.append, schedule=schedule, timing=PATIENT)
     assert told[-1].left_s == pytest.approx((1000.0 - 300.0) / 2.0 / 0.5)
     assert told[-1].total is None
 
@@ -120,14 +123,14 @@ def test_m73_s_minutes_follow_the_feed_override() -> None:
 def test_a_line_that_cannot_be_sent_is_refused_before_anything_is_sent(bad: str) -> None:
     with SimulatedPrinter(MACHINE) as printer:
         with pytest.raises(LocalProtocolError, match="line 3"):
-            print_lines(["G28", "G1 X1", bad], printer.path, 250000, timing=QUICK)
+            print_lines(["G28", "G1 X1", bad], printer.path, 250000, timing=PATIENT)
         assert printer.record.lines == 0
 
 
 def test_a_bad_line_of_a_stream_stops_the_print_with_heaters_off() -> None:
     with SimulatedPrinter(MACHINE) as printer:
         with pytest.raises(LocalProtocolError, match=r"line 4 .*; the printer reports its heaters off"):
-            print_lines(iter([*HEAT, "M117 ö"]), printer.path, 250000, timing=QUICK)
+            print_lines(iter([*HEAT, "M117 ö"]), printer.path, 250000, timing=PATIENT)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
 
 
@@ -142,24 +145,28 @@ def test_a_stream_is_consumed_only_as_fast_as_it_is_printed() -> None:
                 stop.set()
 
     with SimulatedPrinter(MACHINE) as printer:
-        outcome = print_lines(lines(), printer.path, 250000, stop=stop, timing=QUICK)
+        outcome = print_lines(lines(), printer.path, 250000, stop=stop, timing=PATIENT)
     assert outcome.cancelled
     assert ahead[0] < 20
     assert outcome.sent < 520
 
 
-def _soon(seconds: float, act: Callable[[], object]) -> None:
-    timer = threading.Timer(seconds, act)
-    timer.daemon = True
-    timer.start()
+def _once_sent(count: int, act: Callable[[], object]) -> Callable[[Progress], None]:
+    """Told of the progress of a print, does something as soon as so many commands are sent."""
+    waiting = [act]
+
+    def told(progress: Progress) -> None:
+        if progress.sent >= count and waiting:
+            waiting.pop()()
+
+    return told
 
 
 @pytest.mark.parametrize("lines", [HEAT + strokes(3000), ["M109 S250"]])
 def test_stopping_leaves_heaters_off_and_moves_nothing_home(lines: list[str]) -> None:
     stop = threading.Event()
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
-        _soon(0.7, stop.set)
-        outcome = print_lines(["M106 S255", *lines], printer.path, 250000, stop=stop, timing=QUICK)
+        outcome = print_lines(["M106 S255", *lines], printer.path, 250000, _once_sent(2, stop.set), stop=stop, timing=PATIENT)
         record = printer.record
     assert outcome.cancelled
     assert outcome.heaters_off
@@ -171,17 +178,17 @@ def test_stopping_leaves_heaters_off_and_moves_nothing_home(lines: list[str]) ->
 def test_without_an_emergency_parser_stopping_still_switches_the_heaters_off() -> None:
     stop = threading.Event()
     with SimulatedPrinter(MACHINE, speed=5.0, habits=Habits(emergency_parser=False)) as printer:
-        _soon(0.7, stop.set)
-        outcome = print_lines(["M104 S200", *(["G1 X5 F3000", "G1 X0"] * 999)], printer.path, 250000, stop=stop, timing=QUICK)
+        lines = ["M104 S200", *(["G1 X5 F3000", "G1 X0"] * 999)]
+        outcome = print_lines(lines, printer.path, 250000, _once_sent(9, stop.set), stop=stop, timing=PATIENT)
         assert outcome.heaters_off
         assert printer.record.nozzle_target_c == 0.0
 
 
 def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
-        _soon(0.7, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT))
+        press = _once_sent(9, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT))
         with pytest.raises(KeyboardInterrupt):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, timing=QUICK)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, press, timing=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
         assert printer.record.happened("nozzle 200")
 
@@ -193,7 +200,7 @@ def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
 
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         with pytest.raises(ZeroDivisionError):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, burst, timing=QUICK)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, burst, timing=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
 
 
@@ -272,9 +279,9 @@ def test_random_faults_end_in_the_exact_moves_or_in_an_error(seed: int) -> None:
 def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         other = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
-        _soon(0.5, lambda: printer._firmware.receive(b"\nM112\n"))
+        kill = _once_sent(9, lambda: os.write(other, b"\nM112\n"))
         with pytest.raises(FirmwareError, match="Printer halted"):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, timing=QUICK)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, kill, timing=PATIENT)
         os.close(other)
         assert printer.record.nozzle_target_c == 0.0
 
@@ -347,13 +354,13 @@ def test_a_cable_pulled_in_mid_print_ends_it_and_leaves_no_thread() -> None:
             os.write(master, firmware.advance())
         os.close(master)
 
-    threads, server = threading.active_count(), threading.Thread(target=serve, daemon=True)
+    before, server = set(threading.enumerate()), threading.Thread(target=serve, daemon=True)
     server.start()
     with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
         print_lines(PROGRAM, os.ttyname(slave), 250000, timing=QUICK, medium=Medium(lost_s=0.3))
-    server.join(5)
+    server.join(PATIENCE_S)
     os.close(slave)
-    assert threading.active_count() <= threads
+    assert set(threading.enumerate()) <= before
 
 
 def test_a_printer_behind_a_socket_is_printed_on_too() -> None:
@@ -368,6 +375,6 @@ def test_a_printer_behind_a_socket_is_printed_on_too() -> None:
 
     threading.Thread(target=serve, daemon=True).start()
     with server:
-        outcome = print_lines(PROGRAM, f"socket://localhost:{server.getsockname()[1]}", 115200, timing=QUICK)
+        outcome = print_lines(PROGRAM, f"socket://localhost:{server.getsockname()[1]}", 115200, timing=PATIENT)
     assert outcome.acknowledged == len(PROGRAM)
     assert_executed(firmware.record(), PROGRAM)
