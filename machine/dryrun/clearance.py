@@ -18,6 +18,7 @@ from machine.collide import (
 )
 from machine.dryrun.findings import MOST, Finding, cut_short
 from machine.dryrun.stretches import stretches
+from machine.limits import axis_limits
 from machine.parsed import MoveKind, ParsedProgram
 from mdp.head import Body, bodies, directions
 from mdp.mesh import Floats
@@ -26,7 +27,7 @@ from profiles.machine import Machine
 
 FIRST_MM = 20.0  # of way between the poses tried first
 MOST_LEFT_MM = 0.05
-MOST_POSES = 4000
+MOST_POSES = 2000
 AT_ONCE = 20_000  # moves times directions fill memory
 CONFIRMED = 200
 ROUNDING_MM = 2e-3  # three coordinates rounded to a thousandth
@@ -111,9 +112,9 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
     """One turn of the table, swept: no pose is farther from a tried one than what its gaps leave room for.
 
     Between two poses every point of what turns moves, against the tip, by at most `_way_mm`; where the gaps at both ends do not
-    leave half of that, the pose between them is tried too, until the way is MOST_LEFT_MM.
+    leave half of that, the pose between them is tried too, until the way is MOST_LEFT_MM. What MOST_POSES leave open is said.
     """
-    start, end = program.start[row], program.end[row]
+    start, end = _turned_at_most(program.start[row], program.end[row], machine)
     way = _way_mm(start, end, printed, machine)
     least: dict[tuple[str, str], tuple[float, Pose]] = {}
 
@@ -130,11 +131,11 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
                 least[meeting] = (gap, pose)
         return left
 
-    steps = max(1, ceil(way / FIRST_MM))
+    steps = min(max(1, ceil(way / FIRST_MM)), MOST_POSES)
     shares = [k / steps for k in range(steps + 1)]
     rooms = [room(share, way / steps) for share in shares]
     open_intervals = list(zip(shares, shares[1:], rooms, rooms[1:], strict=False))
-    for _ in range(MOST_POSES):
+    for _ in range(max(MOST_POSES - steps, 0)):
         if not open_intervals:
             break
         low, high, left, right = open_intervals.pop()
@@ -144,14 +145,28 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
         middle = 0.5 * (low + high)
         between = room(middle, 0.5 * distance)
         open_intervals += [(low, middle, left, between), (middle, high, between, right)]
-    return [
+    place = int(program.line[row]), int(program.part[row]), int(program.layer[row])
+    cut = [Finding("warning", "not-tested", *place, "the table turns so far that not all of the turn was tested for collisions")]
+    return (cut if open_intervals else []) + [
         Finding(
-            "error", "collision", int(program.line[row]), int(program.part[row]), int(program.layer[row]),
+            "error", "collision", *place,
             f"{body} {'comes to ' + format(gap, '.2f') + ' mm from' if gap > 0 else 'runs into'} {name} while the table turns, "
             f"at {machine.tilt.letter}{pose.tilt_deg:.1f} {machine.turn.letter}{pose.turn_deg:.1f}",
         )
         for (body, name), (gap, pose) in least.items()
     ]  # fmt: skip
+
+
+def _turned_at_most(start: Floats, end: Floats, machine: Machine) -> tuple[Floats, Floats]:
+    """Where a turn begins and ends: beyond its limits no axis goes (another finding says so), and a second turn about the turn
+    axis alone meets nothing new.
+    """
+    least, most = np.transpose(list(axis_limits(machine).values())[3:])
+    start, end = (np.concatenate([side[:3], np.clip(side[3:], least, most)]) for side in (start, end))
+    turned = end[4] - start[4]
+    if abs(turned) > 360.0 and np.all(end[:4] == start[:4]):
+        end[4] = start[4] + np.copysign(360.0, turned)
+    return start, end
 
 
 def _way_mm(start: Floats, end: Floats, printed: Printed, machine: Machine) -> float:

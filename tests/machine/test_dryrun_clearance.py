@@ -92,6 +92,13 @@ def test_a_turn_under_a_low_head_meets_the_rim_and_what_is_printed() -> None:
     assert not [f for f in dry_run(text.format(z=60, a=30).splitlines(), profile).findings if f.code == "collision"]
 
 
+@pytest.mark.parametrize("turn", ["C10000000", "A30 C10000000"])
+def test_a_turn_of_ten_million_degrees_is_tried_as_far_as_the_axis_goes(turn: str) -> None:
+    found = dry_run(["G28", "G92 A0 C0", "G1 Z5 F600", f"G1 {turn} F600"], GENERIC).findings
+    assert {(f.code, f.line) for f in found} >= {("axis-limit", 4)}
+    assert ("A30" in turn) == any(f.code == "collision" and "while the table turns" in f.message for f in found)
+
+
 @settings(deadline=None)  # the first call compiles
 @given(st.floats(0, 80), st.floats(5, 30), st.floats(0, 40))
 def test_refining_never_loses_to_the_tried_directions(tilt: float, radius: float, height: float) -> None:
