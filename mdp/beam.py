@@ -6,6 +6,7 @@ beam holds the narrower ones and never ends worse, and the places do not fill wi
 """
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from itertools import islice
 from math import isqrt
@@ -16,6 +17,7 @@ from mdp.pool import Entry, Table, entries, round_of, same, traded
 from mdp.ranker import Ranker
 from mdp.record import Child, Offer, Trace
 from mdp.rules import Rules
+from mdp.threads import ahead
 
 # Area left for ever counts as so many times the area made safe; None: the classic ranking. Many models, one greedy search
 # each: 4 is best on average, no value is best on most models.
@@ -25,10 +27,15 @@ RECORDED = 50  # candidates of a pool that are put on record, the B of the 2020 
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A node that is followed, and the candidates for its next cut."""
+    """A node that is followed, and the candidates for its next cut, worked out while other places are still picking."""
 
     node: Node
-    table: Table
+    coming: Future[Table]
+
+    @property
+    def table(self) -> Table:
+        """The candidates, waited for."""
+        return self.coming.result()
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +54,7 @@ class Beam:
         width = rules.settings.beam_width
         self.nodes: list[Node | None] = [rules.root] + [None] * (width - 1)
         self.bests = [rules.root] * width
+        self._branches: list[Branch | None] = [self._branch(rules.root)]
         self._seen = {rules.root.signature: 0}  # solids and the lowest place that had them
         self._children: dict[tuple[int, int], Node | None] = {}
         self._taken: dict[int, list[Plane]] = {}
@@ -60,19 +68,29 @@ class Beam:
         """One more cut at every place; places that find none stay empty."""
         if self.trace is not None:
             self.trace.stage([node.signature for node in self.nodes if node is not None])
-        branches = [None if node is None else Branch(node, self.rules.table(node)) for node in self.nodes]
+        branches, self._branches = self._branches, []
         self._children.clear()
         self._taken.clear()
-        picks = [
-            self._pick([branch for branch in branches[: place + 1] if branch is not None], place)
-            for place in range(len(self.nodes))
-        ]
+        picks: list[Pick | None] = []
+        for place in range(len(self.nodes)):
+            pick = self._pick([branch for branch in branches[: place + 1] if branch is not None], place)
+            picks.append(pick)
+            self._branches.append(None if pick is None or self.rules.full(pick.node) else self._branch(pick.node))
         if self.trace is not None:
             self._record(self.trace, [branch for branch in branches if branch is not None], picks)
         self.nodes = [None if pick is None else pick.node for pick in picks]
         for place, node in enumerate(self.nodes):
             if node is not None and node.cost_mm2 < self.bests[place].cost_mm2:
                 self.bests[place] = node
+
+    def close(self) -> None:
+        """Leave off what was begun for a next cut."""
+        for branch in self._branches:
+            if branch is not None:
+                branch.coming.cancel()
+
+    def _branch(self, node: Node) -> Branch:
+        return Branch(node, ahead(self.rules.table, node))
 
     def finalists(self) -> list[Node]:
         """The nodes worth polishing: at the second place and at every place with a square number the best one that it or a

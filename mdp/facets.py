@@ -51,8 +51,14 @@ class Facets:
     @cached_property
     def links(self) -> tuple[Ints, Ints]:
         """(n + 1,) starts and (3 m,) neighbours in cyclic order: those of vertex v are neighbours[starts[v] : starts[v + 1]]."""
-        starts, neighbours, _ = _links(self.mesh.faces, len(self.mesh.vertices))
+        starts, neighbours, _ = self._rings
         return starts, neighbours
+
+    @cached_property
+    def _rings(self) -> tuple[Ints, Ints, Mask]:
+        """links, and whether a vertex' neighbours form a single ring."""
+        starts, neighbours, single = _links(self.mesh.faces, len(self.mesh.vertices))
+        return starts, neighbours, single
 
     @cached_property
     def flatness(self) -> Floats:
@@ -61,7 +67,7 @@ class Facets:
         A vertex with |d . m| below it is regular for the direction d: around it the surface is a graph over the plane across m
         whose slope cannot outweigh d's part in that plane.
         """
-        _, _, single = _links(self.mesh.faces, len(self.mesh.vertices))
+        _, _, single = self._rings
         least_mm = LEAST_ALTITUDE * float(np.abs(self.mesh.bounds_mm).max())
         flat: Floats = _flatness(self.mesh.vertices, self.mesh.faces, self.mesh.normals, self.vertex_normals, least_mm)
         return np.where(single, flat, -1.0)

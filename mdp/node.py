@@ -5,7 +5,7 @@ from functools import cached_property
 
 import manifold3d as m3
 
-from mdp.cut import mesh_of
+from mdp.cut import above, mesh_of
 from mdp.overhang import risky_upright
 from mdp.plane import Plane
 from mdp.sweep import Remainder
@@ -13,11 +13,16 @@ from mdp.sweep import Remainder
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """A part cut off: the solid above its base plane, and the area that stays risky on it."""
+    """A part cut off: its base plane, the solid it is cut off, and the area that stays risky on it."""
 
     base: Plane
-    solid: m3.Manifold
+    whole: m3.Manifold
     residual_mm2: float
+
+    @cached_property
+    def solid(self) -> m3.Manifold:
+        """The part. Most of what a search cuts off is never looked at, so it is made when it is asked for."""
+        return above(self.whole, self.base)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from mdp.cut import mesh_of
 from mdp.forecast import Surface
 from mdp.mesh import Floats
 from mdp.node import Node
@@ -153,8 +152,7 @@ def _around(plane: Plane, pivot: Floats, step_mm: float, turn_deg: float) -> Ite
 
 def _middle(node: Node) -> Floats:
     """(3,) middle of the corners of a node's last cut face."""
-    last = node.cuts[-1]
-    points = mesh_of(last.solid).vertices
-    resting = points[np.abs(last.base.heights_mm(points)) <= BASE_TOLERANCE_MM]
-    middle: Floats = (resting if len(resting) else points).mean(axis=0)
+    base, points = node.cuts[-1].base, node.remainder.mesh.vertices
+    heights = base.heights_mm(points)
+    middle: Floats = points[heights >= heights.max() - BASE_TOLERANCE_MM].mean(axis=0)
     return middle

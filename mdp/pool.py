@@ -8,6 +8,8 @@ reduce at least as much as the best so far are taken. Near-equal planes of one p
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from heapq import merge
+from itertools import accumulate, repeat
+from operator import mul
 
 import numpy as np
 
@@ -16,7 +18,8 @@ from mdp.features import Plan
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
 
-FIRST_DELTA, DELTA_FACTOR, LAST_DELTA = 1e-4, 5.0, 1e3
+FIRST_DELTA, DELTA_FACTOR, ROUNDS = 1e-4, 5.0, 11  # the last delta is above 1e3
+DELTAS = np.array(list(accumulate(repeat(DELTA_FACTOR, ROUNDS - 1), mul, initial=FIRST_DELTA)))
 SAME_COSINE = 0.95
 LOOK_AHEAD = 128
 EQUAL = 1e-9  # shares of the risky area that differ less are equal but for rounding
@@ -37,6 +40,15 @@ class Table:
         self.reason = np.full(len(worth.gain_mm2), UNKNOWN, np.int32)
         self.volume_mm3, self._fragile_mm = np.zeros(len(worth.gain_mm2)), np.zeros(len(worth.gain_mm2))
         self._rankings: dict[float, _Ranking] = {}
+        self._rounds: list[Ints] = []
+
+    def let_in(self, number: int, risky_mm2: float) -> Ints:
+        """The rows that a round of the relaxation lets in; risky_mm2: what delta is a share of."""
+        if not self._rounds:
+            rounds = np.searchsorted(DELTAS, self.worth.residual_mm2 / risky_mm2, side="right")
+            order = np.argsort(rounds, kind="stable")
+            self._rounds = np.split(order, np.searchsorted(rounds[order], np.arange(1, ROUNDS + 1)))
+        return self._rounds[number]
 
     def ranked(self, trade_off: float) -> Iterator[int]:
         """Feasible rows by gain less trade_off times residual, best first; near-equal planes take one place."""
@@ -148,74 +160,75 @@ def entries(
     risky_mm2: the model's risky area, which delta and the reductions are shares of. least_reduction: accumulated reduction
     that a candidate must exceed. preferred_mm3: parts of at least this volume come before all smaller ones.
     """
-    side = _side_by_side(tables, risky_mm2, bound_mm2, least_reduction)
-    waiting = np.arange(len(side.row), dtype=np.int32)
-    yield from _relaxed(tables, side, waiting, preferred_mm3, np.inf)
+    pool = _Pool(tables, risky_mm2, bound_mm2, least_reduction)
+    yield from pool.relaxed(preferred_mm3, np.inf)
     if preferred_mm3 > 0.0:
-        yield from _relaxed(tables, side, waiting, 0.0, preferred_mm3)
-
-
-def _relaxed(tables: Sequence[Table], side: "_Side", waiting: Ints, least_mm3: float, most_mm3: float) -> Iterator[Entry]:
-    """The feasible ones of the waiting candidates whose parts have a volume from least_mm3 to below most_mm3."""
-    near: list[list[Plane]] = [[] for _ in tables]
-    best, delta, number = -np.inf, FIRST_DELTA, 0
-    while len(waiting) and delta <= LAST_DELTA:
-        admitted = side.residual[waiting] < delta
-        turn = waiting[admitted & (side.reduction[waiting] >= best)]
-        for place, index in enumerate(turn):
-            table, row = tables[int(side.table[index])], int(side.row[index])
-            if table.reason[row] == UNKNOWN:
-                _look_ahead(tables, side, turn[place : place + LOOK_AHEAD])
-            if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
-                continue
-            plane, others = table.plane(row), near[int(side.table[index])]
-            if not any(same(plane, other) for other in others):
-                others.append(plane)
-                best = max(best, float(side.reduction[index]))
-                yield Entry(int(side.table[index]), row, number)
-        waiting = waiting[~admitted]
-        delta, number = delta * DELTA_FACTOR, number + 1
+        yield from pool.relaxed(0.0, preferred_mm3)
 
 
 @dataclass(frozen=True, eq=False)
-class _Side:
+class _Turn:
     """Candidates of all tables side by side, by reduction, larger parts first among equals."""
 
     table: Ints
     row: Ints
     reduction: Floats
-    residual: Floats
 
 
-def _side_by_side(tables: Sequence[Table], risky_mm2: float, bound_mm2: float, least_reduction: float) -> _Side:
-    """Those that would leave less than bound_mm2 for ever and reduce more than least_reduction: few of all, so they are
-    chosen before anything is sorted."""
-    found: list[tuple[Ints, Ints, Ints]] = []
-    sums: list[Floats] = []
-    for index, table in enumerate(tables):
-        worth = table.worth
-        reduction = np.round((worth.gain_mm2 + table.saved_mm2) / risky_mm2 / EQUAL) * EQUAL
-        kept = np.flatnonzero((worth.residual_mm2 + table.residual_mm2 < bound_mm2) & (reduction > least_reduction))
-        found.append((np.full(len(kept), index, np.int32), kept.astype(np.int32), worth.direction[kept]))
-        sums.append(np.stack([worth.offset_mm[kept], reduction[kept], worth.residual_mm2[kept] / risky_mm2]))
-    number, row, direction = (np.concatenate(column, dtype=np.int32) for column in zip(*found, strict=True))
-    offset, reduction, residual = np.concatenate(sums, axis=1)
-    order = np.lexsort((direction, number, offset, -reduction))
-    return _Side(number[order], row[order], reduction[order], residual[order])
+@dataclass(frozen=True, eq=False)
+class _Pool:
+    """The candidates of some tables that would leave less than bound_mm2 for ever and reduce more than least_reduction."""
 
+    tables: Sequence[Table]
+    risky_mm2: float
+    bound_mm2: float
+    least_reduction: float
 
-def _look_ahead(tables: Sequence[Table], side: _Side, ahead: Ints) -> None:
-    """Check the next candidates of every table in one go, all their directions in parallel."""
-    for table in np.unique(side.table[ahead]):
-        tables[table].look(side.row[ahead[side.table[ahead] == table]])
+    def relaxed(self, least_mm3: float, most_mm3: float) -> Iterator[Entry]:
+        """The feasible ones whose parts have a volume from least_mm3 to below most_mm3."""
+        near: list[list[Plane]] = [[] for _ in self.tables]
+        best = -np.inf
+        for number in range(ROUNDS):
+            turn = self._turn(number, best)
+            for place, (index, row) in enumerate(zip(turn.table.tolist(), turn.row.tolist(), strict=True)):
+                table = self.tables[index]
+                if table.reason[row] == UNKNOWN:
+                    self._look_ahead(turn.table[place : place + LOOK_AHEAD], turn.row[place : place + LOOK_AHEAD])
+                if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
+                    continue
+                plane = table.plane(row)
+                if not any(same(plane, other) for other in near[index]):
+                    near[index].append(plane)
+                    best = max(best, float(turn.reduction[place]))
+                    yield Entry(index, row, number)
+
+    def _turn(self, number: int, best: float) -> _Turn:
+        """What a round lets in that reduces at least as much as the best so far; few of all, so they are chosen before anything
+        is sorted."""
+        found: list[tuple[Ints, Ints, Ints]] = []
+        sums: list[Floats] = []
+        for index, table in enumerate(self.tables):
+            worth, rows = table.worth, table.let_in(number, self.risky_mm2)
+            reduction = np.round((worth.gain_mm2[rows] + table.saved_mm2) / self.risky_mm2 / EQUAL) * EQUAL
+            kept = (reduction >= best) & (reduction > self.least_reduction)
+            kept &= worth.residual_mm2[rows] + table.residual_mm2 < self.bound_mm2
+            rows = rows[kept]
+            found.append((np.full(len(rows), index, np.int32), rows.astype(np.int32), worth.direction[rows]))
+            sums.append(np.stack([worth.offset_mm[rows], reduction[kept]]))
+        number_of, row, direction = (np.concatenate(column, dtype=np.int32) for column in zip(*found, strict=True))
+        offset, reduction = np.concatenate(sums, axis=1)
+        order = np.lexsort((direction, number_of, offset, -reduction))
+        return _Turn(number_of[order], row[order], reduction[order])
+
+    def _look_ahead(self, table: Ints, row: Ints) -> None:
+        """Check these candidates of every table in one go, all their directions in parallel."""
+        for index in np.unique(table):
+            self.tables[index].look(row[table == index])
 
 
 def round_of(residual: float) -> int:
     """The round of relaxation that lets in a candidate with this share of the risky area left on its part."""
-    delta, number = FIRST_DELTA, 0
-    while residual >= delta and delta <= LAST_DELTA:
-        delta, number = delta * DELTA_FACTOR, number + 1
-    return number
+    return int(np.searchsorted(DELTAS, residual, side="right"))
 
 
 def same(plane: Plane, other: Plane) -> bool:

@@ -7,13 +7,14 @@ import numpy as np
 
 from mdp.candidates import Bounds, Checked, Reason, bounds, bounds_of, check, ground, refusals, worth
 from mdp.clearance import allowed_poses
-from mdp.cut import cut, mesh_of, solid_of
+from mdp.cut import below, solid_of
 from mdp.features import Model
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.node import Cut, Node
-from mdp.overhang import risky_above
+from mdp.overhang import BASE_TOLERANCE_MM, threshold
 from mdp.plane import Plane
 from mdp.pool import Table
+from mdp.sweep import gains
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -39,13 +40,23 @@ class Rules:
         self.limits: Bounds = bounds(mesh, self.machine, settings)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         self.least_gain_mm2 = settings.least_gain * self.root.risky_mm2
-        self.evaluated = 0
+        self._evaluated: list[int] = []  # appended to by several threads
         self._began = perf_counter()
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Have everything that asks whether it is late leave off."""
+        self._stopped = True
+
+    @property
+    def evaluated(self) -> int:
+        """How many candidates were looked at."""
+        return sum(self._evaluated)
 
     def late(self) -> bool:
         """Whether the time limit is reached."""
         limit = self.settings.time_limit_s
-        return limit is not None and perf_counter() - self._began >= limit
+        return self._stopped or (limit is not None and perf_counter() - self._began >= limit)
 
     def full(self, node: Node) -> bool:
         """Whether a node has as many parts as are allowed."""
@@ -54,7 +65,7 @@ class Rules:
     def table(self, node: Node) -> Table:
         """The candidates of a node that are worth a cut."""
         found = worth(node.remainder, self.limits, self.settings, node.angle_deg, self.least_gain_mm2)
-        self.evaluated += found.evaluated
+        self._evaluated.append(found.evaluated)
 
         def look(direction: Ints, offset_mm: Floats) -> Checked:
             return check(node.remainder, self.limits, self.settings, direction, offset_mm)
@@ -67,13 +78,10 @@ class Rules:
 
     def allowed(self, node: Node, plane: Plane) -> bool:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""
-        direction = plane.normal[None]
-        limits = bounds_of(direction, self.ground, self.model.volume_mm3, self.machine, self.settings)
-        step_mm, offset_mm = self.settings.offset_step_mm, abs(plane.offset_mm)
-        if 0.0 < offset_mm < FINEST * step_mm:
+        if 0.0 < abs(plane.offset_mm) < FINEST * self.settings.offset_step_mm:
             return False
-        step_mm = offset_mm / max(1, round(offset_mm / step_mm)) or step_mm  # a grid that the plane lies on
-        own = self.settings.model_copy(update={"offset_step_mm": step_mm})
+        direction, own = plane.normal[None], self.settings.model_copy(update={"offset_step_mm": self._step_mm(plane)})
+        limits = bounds_of(direction, self.ground, self.model.volume_mm3, self.machine, self.settings)
         found = check(node.remainder, limits, own, np.zeros(1, np.int32), np.array([plane.offset_mm]))
         return bool(found.reason[0] == Reason.FEASIBLE)
 
@@ -82,16 +90,31 @@ class Rules:
 
         residual_mm2: what stays risky on the part, where that is known.
         """
-        above, below = cut(node.solid, plane)
-        if above.is_empty() or below.is_empty():
-            return None
-        if self.settings.clearance and not allowed_poses(self.machine, plane.normal, mesh_of(above).vertices):
+        vertices = node.remainder.mesh.vertices
+        upper, rest = vertices[plane.heights_mm(vertices) > 0.0], below(node.solid, plane)
+        if len(upper) == 0 or rest.is_empty():
             return None
         if residual_mm2 is None:
-            part = mesh_of(above)
-            residual_mm2 = float(part.areas_mm2[risky_above(part, plane, node.angle_deg)].sum())
-        cuts = (*node.cuts, Cut(plane, above, residual_mm2))
-        return Node(below, cuts, node.angle_deg, node.count_platform_faces, node)
+            residual_mm2 = self._residual_mm2(node, plane)
+        cuts = (*node.cuts, Cut(plane, node.solid, residual_mm2))
+        following = Node(rest, cuts, node.angle_deg, node.count_platform_faces, node)
+        if self.settings.clearance:
+            lower = following.remainder.mesh.vertices
+            corners = np.vstack([upper, lower[plane.heights_mm(lower) >= -BASE_TOLERANCE_MM]])
+            if not allowed_poses(self.machine, plane.normal, corners):
+                return None
+        return following
+
+    def _residual_mm2(self, node: Node, plane: Plane) -> float:
+        """What stays risky on the part that a plane cuts off."""
+        step_mm = self._step_mm(plane)
+        found = gains(node.remainder, plane.normal[None], step_mm, threshold(node.angle_deg))
+        return float(found.residual_mm2[0, round(plane.offset_mm / step_mm) - int(found.first[0])])
+
+    def _step_mm(self, plane: Plane) -> float:
+        """Step of a grid of offsets that a plane lies on, near that of the candidates' grid."""
+        step_mm, offset_mm = self.settings.offset_step_mm, abs(plane.offset_mm)
+        return offset_mm / max(1, round(offset_mm / step_mm)) or step_mm
 
     def replay(self, node: Node, planes: Sequence[Plane]) -> list[Node] | None:
         """The nodes after cutting with the planes in turn, the given one first; None when one of them may not or cannot be

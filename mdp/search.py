@@ -29,6 +29,7 @@ from mdp.ranker import RANKERS
 from mdp.record import Trace
 from mdp.rules import Rules
 from mdp.sequence import least_rotation
+from mdp.threads import ahead
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -105,16 +106,28 @@ def _followed(rules: Rules, ranker: str, trace: Trace | None, tell: Callable[[Pr
     """The best node of a beam, the finalists polished, and after how many stages."""
     beam = Beam(rules, RANKERS[ranker], trace)
     stage = 0
-    while any(beam.nodes) and _goes_on(rules, stage):
-        stage += 1
-        beam.advance()
-        held = sum(node is not None for node in beam.nodes)
-        tell(Progress(stage, held, beam.best.cost_mm2 / rules.model.risky_mm2))
+    try:
+        while any(beam.nodes) and _goes_on(rules, stage):
+            stage += 1
+            beam.advance()
+            held = sum(node is not None for node in beam.nodes)
+            tell(Progress(stage, held, beam.best.cost_mm2 / rules.model.risky_mm2))
+        return _polished(rules, beam, stage, tell), stage
+    except KeyboardInterrupt:
+        rules.stop()
+        raise
+    finally:
+        beam.close()
+
+
+def _polished(rules: Rules, beam: Beam, stage: int, tell: Callable[[Progress], None]) -> Node:
+    """The best of a beam and of its polished finalists."""
     best = beam.best
-    for node in beam.finalists() if rules.settings.polish else []:
-        best = min(best, polished(rules, node), key=lambda found: (found.cost_mm2, len(found.cuts)))
+    finalists = beam.finalists() if rules.settings.polish else []
+    for coming in [ahead(polished, rules, node) for node in finalists]:
+        best = min(best, coming.result(), key=lambda found: (found.cost_mm2, len(found.cuts)))
         tell(Progress(stage, 1, best.cost_mm2 / rules.model.risky_mm2))
-    return best, stage
+    return best
 
 
 def _published(rules: Rules, tell: Callable[[Progress], None]) -> tuple[Node, int]:

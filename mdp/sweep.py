@@ -9,12 +9,8 @@ There are two passes: `gains` touches only the faces that are risky one way or t
 `sweep` tells whether it can be made, and is asked only for the directions that are worth it.
 """
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 
@@ -28,11 +24,7 @@ from mdp.pieces import UNKNOWN, count_pieces, find_critical
 from mdp.plane import Plane
 from mdp.rays import Tree
 from mdp.sums import dot, find_heights, find_lowest, sum_risks, sum_volumes
-
-# Threads of our own: they wait for each other without spinning, Ctrl-C reaches the one that asks, and kernels that are not
-# parallel themselves compile in half the time.
-THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-LEAST_ROWS, SHARES = 4, 8  # rows a call, and calls for every core: handing a call over costs as much as a row
+from mdp.threads import in_threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +113,7 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     k, columns = len(directions), remainder.columns(step_mm)
     found = Gains(np.zeros(k, np.int32), np.zeros(k, np.int32), np.zeros((k, columns)), np.zeros((k, columns)))
     out = (found.first, found.count, found.up_mm2, found.residual_mm2)
-    _in_threads(_gains, k, surface, np.ascontiguousarray(directions), step_mm, risky_below, out)
+    in_threads(_gains, k, surface, np.ascontiguousarray(directions), step_mm, risky_below, out)
     return found
 
 
@@ -157,27 +149,10 @@ def sweep(
     )
     sums = (found.section_mm2, found.volume_mm3, found.footing_mm2)
     out = (found.first, found.count, found.pieces, *sums, found.lowest_mm, found.fragile_mm)
-    _in_threads(
+    in_threads(
         sweep_kernel, shape[0], rows, solid, np.ascontiguousarray(directions), watched, needed, crumb_mm / step_mm, step_mm, out
     )
     return found
-
-
-@cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads, thread_name_prefix="sweep")
-
-
-def _in_threads(kernel: Callable[..., None], count: int, *arguments: Any) -> None:
-    """Run a kernel over `count` rows, some at a time on every core; each row is written by one call alone."""
-    rows = max(LEAST_ROWS, count // (SHARES * THREADS))
-    spans = [(row, min(row + rows, count)) for row in range(0, count, rows)]
-    threads = min(THREADS, len(spans))
-    if threads < 2:
-        kernel(0, count, *arguments)
-        return
-    for done in [_pool(THREADS).submit(kernel, begin, end, *arguments) for begin, end in spans]:
-        done.result()
 
 
 @kernel

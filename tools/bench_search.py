@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-import mdp.sweep
+import mdp.threads
 from mdp.candidates import Bounds, bounds
 from mdp.cut import mesh_of, solid_of
 from mdp.mesh import Mesh
@@ -112,11 +112,11 @@ def all_candidates(mesh: Mesh, profile: Profile) -> tuple[Callable[[], object], 
 
 def on_cores(cores: int, work: Callable[[], object]) -> tuple[float, float]:
     """Processor time and wall time on so many threads, each the least of several runs."""
-    usual, mdp.sweep.THREADS = mdp.sweep.THREADS, cores
+    usual, mdp.threads.THREADS = mdp.threads.THREADS, cores
     try:
         return _least(work, time.process_time), _least(work, time.perf_counter)
     finally:
-        mdp.sweep.THREADS = usual
+        mdp.threads.THREADS = usual
 
 
 def _least(work: Callable[[], object], clock: Callable[[], float]) -> float:

@@ -1,5 +1,7 @@
 import io
+from concurrent.futures import Future, wait
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,8 @@ from mdp.mesh import Mesh
 from mdp.overhang import facing_down
 from mdp.plane import Plane
 from mdp.pose import Pose, rotation
-from mdp.search import decompose, folded_mm3
+from mdp.search import Progress, decompose, folded_mm3
+from mdp.threads import ahead
 from profiles.errors import DecompositionError
 from profiles.profile import load
 from tests import shapes
@@ -140,6 +143,23 @@ def test_a_time_limit_of_nothing_leaves_one_part_and_says_so() -> None:
     found = _decomposed(shapes.tee(), "search.time_limit_s=0")
     assert len(found.parts) == 1
     assert found.notes == ("search.time_limit_s = 0 ended the search; the best so far is used",)
+
+
+def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[Future[object]] = []
+
+    def noted(*work: Any) -> Future[object]:
+        begun.append(ahead(*work))
+        return begun[-1]
+
+    def interrupted(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mdp.beam.ahead", noted)
+    with pytest.raises(KeyboardInterrupt):
+        decompose(shapes.branch(), "branch", load(settings=["search.beam_width=8"]), on_stage=interrupted)
+    assert len(begun) > 2
+    assert wait(begun, timeout=60).not_done == set()
 
 
 def test_space_that_a_fold_winds_around_twice_is_told_and_no_other_difference_is_allowed() -> None:

@@ -104,7 +104,7 @@ def test_one_core_and_two_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch)
     remainder = Remainder(shapes.branch(), risky_upright(shapes.branch(), 45.0))
     found = []
     for threads in (1, 2):
-        monkeypatch.setattr("mdp.sweep.THREADS", threads)
+        monkeypatch.setattr("mdp.threads.THREADS", threads)
         found.append([gains(remainder, directions, 1.0, threshold(45.0)), sweep(remainder, directions, 1.0)])
     for one, two in zip(*found, strict=True):
         assert all(np.array_equal(vars(one)[key], vars(two)[key]) for key in vars(one))

@@ -1,0 +1,46 @@
+"""Cut: both halves of a solid, each made alone."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mdp.cut import above, below, cut, mesh_of, solid_of
+from mdp.overhang import risky_above
+from mdp.plane import Plane
+from mdp.rules import Rules
+from profiles.profile import load
+from tests import shapes
+from tests.mdp.solids import random_direction, random_solid
+
+THOUSANDTHS = st.integers(1, 999)
+
+
+@given(st.integers(0, 9), THOUSANDTHS, THOUSANDTHS, THOUSANDTHS)
+def test_the_halves_are_those_that_one_split_makes(seed: int, height: int, around: int, share: int) -> None:
+    mesh, normal = random_solid(seed), random_direction(height, around)
+    heights = mesh.vertices @ normal
+    plane = Plane(normal, float(heights.min() + share / 1000.0 * np.ptp(heights)))
+    whole = solid_of(mesh)
+    expected = whole.split_by_plane(tuple(float(x) for x in normal), plane.offset_mm)
+    for mine, other in zip(cut(whole, plane), expected, strict=True):
+        assert mine.volume() == pytest.approx(other.volume(), rel=1e-9, abs=1e-6)
+        assert mine.surface_area() == pytest.approx(other.surface_area(), rel=1e-9, abs=1e-6)
+
+
+def test_a_plane_beside_the_solid_leaves_one_half_empty() -> None:
+    whole, over = solid_of(shapes.box()), Plane(np.array([0.0, 0.0, 1.0]), 1000.0)
+    assert above(whole, over).is_empty()
+    assert below(whole, over).volume() == pytest.approx(whole.volume())
+
+
+@pytest.mark.parametrize("offset_mm", [8.0, 6.3, 11.71])
+def test_what_a_cut_leaves_risky_is_what_is_risky_on_the_part(offset_mm: float) -> None:
+    rules = Rules(shapes.tee(), load(settings=("process.self_supporting_angle_deg=20", "search.clearance=false")))
+    node = rules.cut(rules.root, Plane(np.array([0.8, 0.0, 0.6]), 18.0 + offset_mm))
+    assert node is not None
+    made = node.cuts[-1]
+    part = mesh_of(made.solid)
+    risky_mm2 = part.areas_mm2[risky_above(part, made.base, node.angle_deg)].sum()
+    assert made.residual_mm2 == pytest.approx(risky_mm2, rel=1e-9)
+    assert risky_mm2 > 1.0
