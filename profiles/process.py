@@ -33,6 +33,13 @@ class Process(Frozen):
         0.28, ge=0.02, le=2, description="adaptive layers are not thicker: seven tenths of the nozzle still bond well, mm"
     )
     line_width_mm: float = Field(0.45, ge=0.1, le=4, description="width of a bead, mm")
+    slit_closing_mm: float = Field(
+        0.018,
+        ge=0,
+        le=1,
+        description="slits of a layer narrower than twice this are closed; the default keeps plastic within 4 % of a line of the "
+        "model, 0.049 heals coarser meshes, mm",
+    )
     walls: int = Field(3, ge=0, le=50, description="number of walls")
     wall_order: Literal["inner-first", "outer-first"] = Field(
         "inner-first",

@@ -26,6 +26,7 @@ from slicer.seam import Surroundings, rear_of, seamed
 from slicer.skin import angle_of_layer_deg, skin
 from slicer.speed import layer_time_s, speeds_mm_s
 from slicer.stack import Stack, stack_of
+from slicer.thin import thin_walls
 from slicer.walls import wall_beads
 
 
@@ -70,7 +71,7 @@ def _own(stack: Stack, layer: int) -> list[Bead]:
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
     angle = angle_of_layer_deg(process.infill_angle_deg, layer)
     beads = wall_beads(around, process, height_mm)
-    beads += gaps(around.free, width, height_mm, outline, process.outer_bulge) + gaps(around.narrow, width, height_mm)
+    beads += thin_walls(around.free, outline, width, height_mm, process.outer_bulge) + gaps(around.narrow, width, height_mm)
     for span in stack.contacts[layer].bridges:
         area = bridged(span, around.inside, width)
         if not area.is_empty():

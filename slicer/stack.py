@@ -57,7 +57,8 @@ def stack_of(part: Part, profile: Profile, earlier: Sequence[Part], later: Seque
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     at = heights_of(mesh, process, on_platform, pedestal_mm)
     low = pedestal_layers(at.tip_mm, pedestal_mm)
-    outlines = grooved([cleaned(loops) for loops in sections(mesh, at.cut_mm)], part, later, at.cut_mm, process)
+    outlines = [cleaned(loops, process.slit_closing_mm) for loops in sections(mesh, at.cut_mm)]
+    outlines = grooved(outlines, part, later, at.cut_mm, process)
     if on_platform:
         outlines[0] = compensated(outlines[0], process.elephant_foot_mm, process.line_width_mm)
     own = without_pedestal(outlines, mesh, at.cut_mm, pedestal_mm, low) if low else outlines

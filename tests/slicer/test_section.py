@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Mesh
 from profiles.errors import SliceError
-from slicer.polygons import area_mm2, cleaned
+from slicer.polygons import CLOSING_MM, area_mm2, cleaned, contours
 from slicer.section import sections
 from tests.shapes import ball, bowl, box, from_manifold, hollow
-from tests.slicer.hand import shared
+from tests.slicer.hand import profile, shared
 
 
 def area(loops):
@@ -114,3 +114,11 @@ def test_every_layer_has_the_area_that_manifold_slices(name):
     exact, clean = ([f(loops) for loops in sections(mesh, cuts)] for f in (area, lambda loops: cleaned(loops).area()))
     assert np.abs(exact - expected).max() < 1e-3
     assert (np.abs(clean - expected) < 0.05 + 2e-4 * expected).all()
+
+
+@pytest.mark.parametrize("slit_mm", [0.03, 0.05, 0.09])
+def test_cleaning_reaches_over_the_section_by_no_more_than_a_twentieth_of_a_line(slit_mm):
+    block = m3.CrossSection.square((10.0, 10.0)) - m3.CrossSection.square((slit_mm, 8.0)).translate((5.0, 4.0))
+    closed = m3.CrossSection(cleaned(contours(block)).to_polygons()).area() == pytest.approx(100.0, abs=0.01)
+    assert closed == (slit_mm < 2.0 * CLOSING_MM)
+    assert 0.05 * profile().process.line_width_mm >= CLOSING_MM

@@ -13,6 +13,7 @@ from slicer.gap import gaps
 from slicer.paths import Kind, bead_area_mm2
 from slicer.polygons import Polygons, closed, contours
 from slicer.section import sections
+from slicer.thin import thin_walls
 from slicer.walls import wall_beads, walls
 from tests.slicer.hand import as_shapely, distances_mm, profile, section_at, shared
 
@@ -62,7 +63,7 @@ def test_outer_walls_of_a_real_model_keep_half_a_width_from_its_exact_outline():
 def test_a_thin_plate_gets_one_line_in_its_middle(thickness):
     plate = rectangle(20, thickness)
     found = walls(plate, 3, WIDTH, HEIGHT)
-    bead = max(gaps(found.free, WIDTH, HEIGHT, plate), key=lambda bead: bead.length_mm)
+    bead = max(thin_walls(found.free, plate, WIDTH, HEIGHT, 0.0), key=lambda bead: bead.length_mm)
     assert found.loops[0] == ()
     assert bead.points[4:-4, 1] == pytest.approx(thickness / 2, abs=1e-3)
     assert bead.width_mm == pytest.approx(thickness, abs=0.02)
@@ -82,7 +83,8 @@ def test_what_is_narrower_than_a_third_of_a_line_stays_empty():
 
 def test_a_small_round_pin_gets_a_ring_of_its_area():
     pin = Polygons.circle(0.4, 32)
-    assert plastic_mm2(gaps(walls(pin, 3, WIDTH, HEIGHT).free, WIDTH, HEIGHT, pin)) == pytest.approx(pin.area(), rel=0.15)
+    beads = thin_walls(walls(pin, 3, WIDTH, HEIGHT).free, pin, WIDTH, HEIGHT, 0.0)
+    assert plastic_mm2(beads) == pytest.approx(pin.area(), rel=0.15)
 
 
 @settings(max_examples=25, deadline=None)
@@ -117,7 +119,7 @@ def test_walls_stay_inside_any_polygon(points):
 
 def uncovered(section, found):
     """What of a section the walls, the gaps and what they enclose leave, but for slits of 0.03 mm, by shapely."""
-    narrow = gaps(found.free, WIDTH, HEIGHT, section) + gaps(found.narrow, WIDTH, HEIGHT)
+    narrow = thin_walls(found.free, section, WIDTH, HEIGHT, 0.0) + gaps(found.narrow, WIDTH, HEIGHT)
     lines = [shapely.LineString(b.points).buffer(b.width_mm / 2) for b in narrow]
     lines += [shapely.LineString(closed(loop)).buffer(WIDTH / 2) for loops in found.loops for loop in loops]
     rest = as_shapely(section).difference(shapely.union_all([*lines, as_shapely(found.inside)]))
@@ -135,7 +137,7 @@ def test_no_place_of_a_tapering_plate_wider_than_half_a_line_stays_empty(start, 
 @pytest.mark.parametrize("radius", [0.13, 0.16, 0.2, 0.3])
 def test_the_bead_of_a_thin_pin_stays_inside_it(radius):
     pin = Polygons.circle(radius, 48)
-    beads = gaps(walls(pin, 3, WIDTH, HEIGHT).free, WIDTH, HEIGHT, pin)
+    beads = thin_walls(walls(pin, 3, WIDTH, HEIGHT).free, pin, WIDTH, HEIGHT, 0.0)
     plastic = shapely.union_all([shapely.LineString(b.points).buffer(b.width_mm / 2) for b in beads])
     assert plastic.difference(as_shapely(pin).buffer(0.01)).area == pytest.approx(0.0, abs=1e-6)
     assert plastic.area > 0.5 * pin.area()
@@ -181,3 +183,27 @@ def test_five_thousand_holes_are_walled():
     plate = Polygons.square((220, 220)).translate((-4, -4)) - Polygons.compose(holes)
     found = walls(plate, 3, WIDTH, HEIGHT)
     assert len(found.loops[0]) == 71**2 + 1
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2)), min_size=4, max_size=8), st.floats(0.2, 1.5))
+def test_thin_walls_reach_over_no_section_by_more_than_a_twentieth_of_a_line(points, radius):
+    section = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(radius, 12)
+    beads = thin_walls(walls(section, 3, WIDTH, HEIGHT).free, section, WIDTH, HEIGHT, 0.0)
+    plastic = shapely.union_all([shapely.LineString(b.points).buffer(b.width_mm / 2) for b in beads])
+    assert plastic.difference(as_shapely(section).buffer(0.05 * WIDTH)).area < 1e-6
+
+
+@pytest.mark.parametrize("tip_deg", [15, 25, 32, 38])
+def test_the_tip_of_a_sharp_corner_is_filled(tip_deg):
+    half = 5.0 * np.tan(np.radians(0.5 * tip_deg))
+    corner = Polygons([np.array([[0.0, 0.0], [5.0, -half], [5.0, half]])])
+    rest = uncovered(corner, walls(corner, 3, WIDTH, HEIGHT))
+    assert max((part.area for part in shapely.get_parts(rest)), default=0.0) < WIDTH**2
+
+
+def test_a_waist_between_two_bodies_gets_one_bead_along_it():
+    half = [(-3, 2), (-0.4, 0.27), (0.0, 0.21), (0.4, 0.27), (3, 2)]
+    shape = Polygons([np.array([(x, -y) for x, y in half] + half[::-1])])
+    (bead,) = thin_walls(walls(shape, 3, WIDTH, HEIGHT).free, shape, WIDTH, HEIGHT, 0.0)
+    assert abs(bead.points[-1, 1] - bead.points[0, 1]) < 0.1 * abs(bead.points[-1, 0] - bead.points[0, 0])
