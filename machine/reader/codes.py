@@ -1,6 +1,7 @@
 """Codes: what each G and M code does to the reader."""
 
 from collections.abc import Callable
+from math import pi
 
 from machine.reader.motion import arc, flush, follow, push, straight
 from machine.reader.state import E_AXIS, Reader, Words
@@ -163,6 +164,23 @@ def _accelerate(reader: Reader, name: str, words: Words) -> None:
             reader.travelling = value * reader.scale
 
 
+def _override(reader: Reader, name: str, words: Words) -> None:
+    """M220, M221: S percent of every feed, of all filament; what is not above 0 tells nothing."""
+    percent = dict(words).get("S", 0.0)
+    if percent > 0 and name == "M220":
+        reader.pace = percent / 100.0
+    elif percent > 0:
+        reader.flow = percent / 100.0
+
+
+def _volumetric(reader: Reader, name: str, words: Words) -> None:
+    """M200: with D, the filament's diameter, E words are mm3 from here on; D0 or S0: millimetres again."""
+    values = dict(words)
+    diameter = values.get("D", 0.0) * reader.scale
+    if diameter > 0 or "D" in values or values.get("S") == 0.0:
+        reader.filament_mm2 = pi * max(diameter, 0.0) ** 2 / 4.0 if values.get("S") != 0.0 else 0.0
+
+
 def _nothing(reader: Reader, name: str, words: Words) -> None:
     """Codes without a bearing on motion or heat."""
 
@@ -179,8 +197,10 @@ ACTIONS: tuple[tuple[Action, str], ...] = (
     (_mode, "G20 G21 G90 G91 G93 G94 M82 M83"),
     (_note, "G4 M0 M1 M18 M84 M104 M106 M107 M109 M140 M190 M400"),
     (_nothing, "G17 G40 G43 G49 G53 G54 G61 G64 G80 G91.1 G92.1 G92.2 M6"),
-    (_nothing, "M17 M73 M105 M110 M115 M117 M118 M155 M201 M203 M205 M208 M220 M221 M486 M502"),
+    (_nothing, "M17 M73 M105 M110 M115 M117 M118 M155 M201 M203 M205 M126 M127 M208 M486 M502"),
     (_accelerate, "M204"),
+    (_override, "M220 M221"),
+    (_volumetric, "M200"),
     (_home, "G28"),
     (_set, "G92"),
     (_offset, "G10"),

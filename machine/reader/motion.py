@@ -35,8 +35,7 @@ def straight(reader: Reader, words: Words, rapid: bool = False) -> None:
         else:
             moved = True
             if axis == E_AXIS:
-                value *= reader.scale
-                at[5] = at[5] + value if _steps(reader) else value + reader.e_shift
+                _push(reader, value * reader.scale)
             else:
                 if axis < 3:
                     value *= reader.scale
@@ -45,7 +44,17 @@ def straight(reader: Reader, words: Words, rapid: bool = False) -> None:
         rapid = rapid and reader.dialect.rapid
         if not told and not rapid:
             raise GcodeError(f"line {reader.number}: after G93 every move needs its own F")
-        reader.row(before, inf if rapid else -reader.feed if reader.inverse else reader.feed)
+        feed = reader.feed * reader.pace
+        reader.row(before, inf if rapid else -feed if reader.inverse else feed)
+
+
+def _push(reader: Reader, value: float) -> None:
+    """A filament word, a step or a sum; the extruder turns by more or less where M221 or M200 says so, the sum stays as told."""
+    at = reader.at
+    told = value if _steps(reader) else value + reader.e_shift - at[E_AXIS]
+    pushed = told * reader.flow / (reader.filament_mm2 or 1.0)
+    at[E_AXIS] += pushed
+    reader.e_shift += pushed - told
 
 
 def _steps(reader: Reader) -> bool:
@@ -74,7 +83,7 @@ def arc(reader: Reader, name: str, words: Words) -> None:
     sweep = sweep_rad(start, end, centre, clockwise)
     points = chords(start, end, centre, sweep, chord_count(max(radii), sweep, CHORD_MM))
     reader.at[:] = before
-    feed = -reader.feed * len(points) if reader.inverse else reader.feed
+    feed = reader.feed * reader.pace * (-len(points) if reader.inverse else 1)
     for k, point in enumerate(points, start=1):
         row_before, share = reader.at.copy(), k / len(points)
         others = [a + share * (b - a) for a, b in zip(before[2:], after[2:], strict=True)]

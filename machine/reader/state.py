@@ -31,6 +31,9 @@ class Reader:
     relative_e: bool = False
     scale: float = 1.0
     feed: float = DEFAULT_FEED
+    pace: float = 1.0  # of M220, by which every F is multiplied
+    flow: float = 1.0  # of M221, by which all filament that moves push is
+    filament_mm2: float = 0.0  # of M200: E words are then mm3
     inverse: bool = False
     followed: bool = False
     printing: float = inf

@@ -69,6 +69,14 @@ class TestFirmwares:
     def test_firmware_retraction_does_not_shift_absolute_filament(self) -> None:
         assert [row[5] for row in ends("M82\nG1 X1 E2\nG10\nG11\nG1 X2 E3")] == [2.0, -1.0, 2.0, 3.0]
 
+    def test_flow_and_speed_overrides_count_as_the_firmware_counts_them(self) -> None:
+        parsed = read("M82\nG1 X1 E2 F600\nM221 S50\nM220 S200\nG1 X2 E4\nG2 X4 I1 J0 E6\nM221 S100\nG1 X5 E7")
+        assert (parsed.filament_mm[[0, 1, -2, -1]].tolist(), parsed.feed[1]) == ([2.0, 3.0, pytest.approx(4.0), 5.0], 1200.0)
+
+    def test_volumetric_filament_is_read_in_cubic_millimetres(self) -> None:
+        parsed = read("M200 D2\nM83\nG1 X1 E3.14159265\nM200 D0\nG1 X2 E1")
+        assert parsed.e_mm.tolist() == pytest.approx([1.0, 1.0], abs=1e-8)
+
     def test_reprapfirmware_s_g10_with_p_heats_a_tool(self) -> None:
         events = read("G10 P0 S205\nM116\nM568 P0 S200 A0", "reprapfirmware").events
         assert [(e.code, e.value) for e in events] == [("M104", 205.0), ("M109", 205.0), ("M104", 0.0)]
