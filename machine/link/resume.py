@@ -23,13 +23,17 @@ from machine.link.retreat import heated, pushing
 from machine.link.way import home_way, way_back
 from mdp.mesh import Floats
 from mdp.pose import Pose
-from profiles.errors import JournalError
+from profiles.errors import JournalError, SilenceError
 from profiles.profile import Profile
 
 ANEW = "hardly anything was printed: the program begins anew"
 AWAY = ("paused", LEFT)  # states in which the journal's pose is where the tip has been taken
 ON_THE_WAY = ("pausing", "resuming")
 HOME_IT = "machine.gcode.resume must tell how it is homed with a print on it"
+UNHEARD = (
+    "the printer did not answer when it was asked where it stands: is it switched on, is --baud the firmware's rate, does it "
+    "still heat or move? Nothing was changed: when it has come to rest, resume can be tried again"
+)
 SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
 SAME = 0.02  # mm or deg: M114 tells hundredths
 NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: questions have numbers too
@@ -103,7 +107,9 @@ def alive(point: Point, found: Found) -> bool | None:
 
 
 def way_on(point: Point, found: Found, profile: Profile) -> Way:
-    """Decide. Raises JournalError where going on would be a guess."""
+    """Decide. Raises JournalError where going on would be a guess, SilenceError where the printer has told nothing."""
+    if found.position is None and found.last_number is None:
+        raise SilenceError(UNHEARD)
     standing = _standing(point, found)
     if standing is not None:
         before = (*heated(standing.modal, profile), *standing.modal.lines())

@@ -11,6 +11,7 @@ import pytest
 
 from machine.app.cli import main
 from machine.app.traffic import tapped
+from machine.link import inquiry
 from machine.link.events import Position, Temperature
 from machine.link.faults import Fault, FaultScript
 from machine.link.habits import Habits
@@ -25,8 +26,9 @@ from machine.link.resume import Point, Way, point_of, way_on
 from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import print_lines
 from machine.link.virtual import PATH, VirtualPrinter
-from profiles.errors import FirmwareError, JournalError, PrinterError
+from profiles.errors import FirmwareError, JournalError, SilenceError
 from profiles.profile import Profile, load
+from tests.machine.peers import on_terminal
 
 PROFILE = load()
 LIMIT = 95
@@ -405,6 +407,18 @@ def test_the_command_refuses_a_journal_of_another_program(
     assert words in capsys.readouterr().err
 
 
+def test_a_journal_stays_whole_when_the_printer_does_not_answer(
+    text: GcodeFile, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inquiry, "ANSWER_S", 0.1)
+    with journal_of(text, "j") as journal:
+        journal.mark(Moment(233, 233, 220, 20))
+    with on_terminal(lambda data, baud: b"") as path:
+        assert main(["resume", str(journal.path), "--port", path, "--yes"]) == 1
+    assert "is --baud the firmware's rate" in capsys.readouterr().err
+    assert read_journal(journal.path).rest is None
+
+
 def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that_nobody_gives(
     text: GcodeFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -444,7 +458,7 @@ def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
         seen.append(asked)
         return way_on(point_of(text, story.last, PROFILE, LIMIT), asked, PROFILE).begin
 
-    with pytest.raises(PrinterError, match=r"greetings|answer"):
+    with pytest.raises(SilenceError, match=r"did not answer when it was asked where it stands"):
         print_lines(text, PATH, medium=deaf, profile=PROFILE, begin=begin)
     assert seen == [Found(None, None, Temperature())]
 
