@@ -44,7 +44,7 @@ def choose(browser: Browser, name: str, value: object) -> None:
 def shoot(browser: Browser, demo: str, folder: Path, page: Path) -> Path:
     """Open a page, choose what is told for this demo, and keep what is seen."""
     share, choices, boxes, keys = SHOTS[demo]
-    browser.open(page.as_uri() + "#all")
+    browser.open(page.as_uri())
     choose(browser, "position", round(share * int(browser.value("document.getElementById('position').max"))))
     for name, value in choices.items():
         choose(browser, name, value)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -230,6 +231,31 @@ def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:
     assert finding.message in text(page, "findings")
 
 
+def test_findings_that_lie_together_share_a_marker_that_goes_through_them(browser: Browser, tmp_path: Path) -> None:
+    profile, printed = program()
+    found = printed.run.findings[0]
+    crowd = tuple(replace(found, message=f"complaint {k}") for k in range(400))
+    page = opened(browser, tmp_path, print_page("crowd", replace(printed, run=replace(printed.run, findings=crowd)), profile))
+    page.value(PICTURE)
+    assert page.value("[...document.querySelectorAll('#markers button')].map((e) => e.textContent)") == ["99+"]
+    for told in ("complaint 0", "complaint 1"):
+        page.click("#markers button")
+        assert told in page.value("document.querySelector('#findings .chosen').textContent")
+
+
+def test_a_long_print_is_drawn_coarsely_at_once_and_then_every_move(browser: Browser, tmp_path: Path) -> None:
+    profile, lines = load(), [*FOREIGN.splitlines()]
+    for k in range(110_000):
+        lines.append(f"G1 X{k % 40} Y{k // 1000 % 30 + k % 2} E{10 + k * 0.01:.2f} F1200")
+    long = Program(tuple(lines), dry_run(lines, profile), None)
+    page = opened(browser, tmp_path, print_page("long.gcode", long, profile, known=False))
+    browser.wait("document.documentElement.dataset.picture === 'idle'")
+    first, whole = (int(page.value(f"document.documentElement.dataset.{name}Ms")) for name in ("first", "whole"))
+    assert 0 < first < whole
+    assert drawn(page) == len(long.run.program.line)
+    assert page.complaints == []
+
+
 def test_a_hostile_name_is_only_text(foreign: Browser) -> None:
     assert text(foreign, "title") == HOSTILE
     assert foreign.value("document.title") == HOSTILE
@@ -327,7 +353,7 @@ def test_the_picture_returns_after_the_graphics_card_has_let_go_of_it(page: Brow
     page.wait("!document.getElementById('notice').hidden")
     page.value("card.restoreContext()")
     page.wait("document.getElementById('notice').hidden")
-    page.wait(f"{PICTURE}.then((now) => now === {json.dumps(before)})")  # coarse at first, for nothing has been drawn yet
+    page.wait(f"{PICTURE}.then((now) => now === {json.dumps(before)})")
     page.complaints.clear()
 
 

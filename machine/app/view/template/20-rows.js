@@ -56,7 +56,7 @@ function placeAt(rows, row, share) {
 function pathOf(rows, chain) {
   const jumps = rows.jumpRow.filter((row) => row > 0), slots = rows.count + jumps.length;
   const texels = Math.max(Math.ceil((slots + 2) / TEXELS), 1) * TEXELS; // whole lines of a texture
-  const points = new Float32Array(3 * texels), verticals = new Int16Array(2 * texels), sizes = new Uint16Array(4 * texels);
+  const points = new Float32Array(3 * texels), verticals = new Int16Array(2 * texels), sizes = new Uint16Array(2 * texels);
   const place = workpieceOf(chain), [x, y, z, tilt, turn] = rows.axes;
   let jump = 0, slot = 0;
   const begin = (k) => place(...rows.jumpStart.map((axis) => axis[k] / 1000), points, 3 * slot);
@@ -67,23 +67,12 @@ function pathOf(rows, chain) {
     } else if (row === 0) place(x[0] / 1000, y[0] / 1000, z[0] / 1000, tilt[0] / 1000, turn[0] / 1000, points, 0);
     const up = place(x[row] / 1000, y[row] / 1000, z[row] / 1000, tilt[row] / 1000, turn[row] / 1000, points, 3 * slot + 3);
     verticals[2 * slot] = up[0]; verticals[2 * slot + 1] = up[1];
-    if (rows.kind[row] === KIND.extrude) { sizes[4 * slot] = rows.width[row]; sizes[4 * slot + 1] = rows.height[row]; }
+    if (rows.kind[row] === KIND.extrude) { sizes[2 * slot] = rows.width[row]; sizes[2 * slot + 1] = rows.height[row]; }
     slot++;
   }
-  countRuns(sizes, slots);
   const slotOf = jumps.length ? (row) => row + countUpTo(jumps, row) : (row) => row;
   const breaks = jumps.map((row, k) => row + k); // the empty slots
   return { slots, texels, points, verticals, sizes, slot: slotOf, row: (slot) => slot - countUpTo(breaks, slot) };
-}
-
-/** Behind width and height of every slot: how many beads follow each other from it on, and how many slots until the next bead. */
-function countRuns(sizes, slots) {
-  let run = 0, gap = 0;
-  for (let at = 4 * slots - 4; at >= 0; at -= 4) {
-    [run, gap] = sizes[at] ? [Math.min(run + 1, 65535), 0] : [0, Math.min(gap + 1, 65535)];
-    sizes[at + 2] = run;
-    sizes[at + 3] = gap;
-  }
 }
 
 /** Rows at which something stands to be marked: where an outer wall begins, where filament is pulled back, pushed forward. */
@@ -103,12 +92,11 @@ function marksOf(rows) {
 
 /** Volume that a row lays, mm3 a second, as the file asks for; 0 where nothing flows. */
 function flowOf(rows, path, area) {
-  const flow = new Float32Array(rows.count), p = path.points;
-  for (let i = 0; i < rows.count; i++) {
-    if (rows.kind[i] !== KIND.extrude) continue;
+  const p = path.points;
+  return (i) => {
+    if (rows.kind[i] !== KIND.extrude) return 0;
     const a = 3 * path.slot(i), b = a + 3, pushed = (rows.filament[i] - (i ? rows.filament[i - 1] : 0)) * 1e-5;
     const way = Math.hypot(p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]);
-    flow[i] = way > 0 ? (pushed * area * rows.speed[i]) / 1000 / way : 0;
-  }
-  return flow;
+    return way > 0 ? (pushed * area * rows.speed[i]) / 1000 / way : 0;
+  };
 }

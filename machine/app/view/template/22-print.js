@@ -6,22 +6,25 @@ async function printOf(text) {
   const layerTime = new Float32Array(rows.count);
   for (const layer of rows.layers) layerTime.fill(layer.time, layer.first, layer.last + 1);
   const box = boxOf(rows, path, surfaces, header), area = (Math.PI * header.filament.diameter_mm ** 2) / 4;
-  const worked = { box, span: length(sub(box[1], box[0])), flow: flowOf(rows, path, area), marks: marksOf(rows) };
+  const worked = { box, span: length(sub(box[1], box[0])), flow: flowOf(rows, path, area), marks: once(() => marksOf(rows)) };
   return { header, chain, rows, path, surfaces, layerTime, ...worked };
 }
 
 /** What is to be seen of the work: plastic and surfaces, else the room over the table. */
 function boxOf(rows, path, surfaces, { machine }) {
   const corners = surfaces ? bounds(surfaces.places).flat() : [];
-  const laid = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < rows.count; i++) {
-    if (rows.kind[i] !== KIND.extrude || !rows.width[i]) continue;
-    for (let at = 3 * path.slot(i) + 3, k = 0; k < 3; k++) {
-      laid[k] = Math.min(laid[k], path.points[at + k]);
-      laid[k + 3] = Math.max(laid[k + 3], path.points[at + k]);
-    }
+  let [x0, y0, z0, x1, y1, z1] = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
+  for (let slot = 0, p = path.points; slot < path.slots; slot++) {
+    if (!path.sizes[2 * slot]) continue;
+    const at = 3 * slot + 3, x = p[at], y = p[at + 1], z = p[at + 2];
+    if (x < x0) x0 = x;
+    if (x > x1) x1 = x;
+    if (y < y0) y0 = y;
+    if (y > y1) y1 = y;
+    if (z < z0) z0 = z;
+    if (z > z1) z1 = z;
   }
-  if (laid[0] <= laid[3]) corners.push(...laid);
+  if (x0 <= x1) corners.push(x0, y0, z0, x1, y1, z1);
   const { radius_mm: r, thickness_mm: t } = machine.table;
   return bounds(corners.length ? corners : [-r, -r, -t, r, r, r]);
 }

@@ -10,32 +10,37 @@ vec3 lit(vec3 colour, vec3 n) {
 
 const PROGRAMS = new WeakMap(); // of each context: a program is made once, however many things are drawn with it
 
-const forgetPrograms = (gl) => PROGRAMS.set(gl, new Map());
-
 function programOf(gl, vertex, fragment) {
+  if (!PROGRAMS.has(gl)) PROGRAMS.set(gl, new Map());
   const made = PROGRAMS.get(gl), name = vertex + fragment;
   if (!made.has(name)) made.set(name, linked(gl, vertex, fragment));
   return made.get(name);
 }
 
-/** A linked program {use, at: place of an attribute, to: place of a uniform}. Raises what the compiler says. */
+/** A program {use, at: place of an attribute, to: place of a uniform}; the card compiles it while the page goes on. */
 function linked(gl, vertex, fragment) {
-  const program = gl.createProgram();
-  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+  const program = gl.createProgram(), places = new Map();
+  const shaders = [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].map(([kind, text]) => {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, `#version 300 es\nprecision highp float;\nprecision highp int;\n${text}`);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) throw new Error(gl.getShaderInfoLog(shader));
-  }
+    return shader;
+  });
   gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) throw new Error(gl.getProgramInfoLog(program));
-  const places = new Map();
+  let checked = false;
+  /** Raises what the compiler says, asked when the program is first needed: to ask sooner is to wait. */
+  const ready = () => {
+    if (!checked && !gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
+      throw new Error(shaders.map((shader) => gl.getShaderInfoLog(shader)).join("") || gl.getProgramInfoLog(program));
+    checked = true;
+    return program;
+  };
   const to = (name) => {
-    if (!places.has(name)) places.set(name, gl.getUniformLocation(program, name));
+    if (!places.has(name)) places.set(name, gl.getUniformLocation(ready(), name));
     return places.get(name);
   };
-  return { use: () => gl.useProgram(program), at: (name) => gl.getAttribLocation(program, name), to };
+  return { use: () => gl.useProgram(ready()), at: (name) => gl.getAttribLocation(ready(), name), to };
 }
 
 function bufferOf(gl, content, usage = gl.STATIC_DRAW, target = gl.ARRAY_BUFFER) {

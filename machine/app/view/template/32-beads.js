@@ -1,6 +1,6 @@
 // Beads: every extruding row at its true width and height, in the order of the print, so that the slider is a count.
 // Near: a prism of eight sides with a rounded shade, mitred where one bead follows the other, a blunt tip where it ends.
-// Far: the two faces of a box that the eye can see, shaded as if their common edge were round.
+// Far: a ribbon that faces the eye and is as wide as the bead's outline, in the light of its side and of its back.
 
 const AT_ONCE = 4096; // beads in one draw
 const CLOSE_PIXELS = 3; // a bead this wide on the screen is drawn as a prism
@@ -10,17 +10,16 @@ const CLOSE_PIXELS = 3; // a bead this wide on the screen is drawn as a prism
 const BEAD_HEAD = `
 in vec4 corner;
 uniform highp sampler2D points;
-uniform highp usampler2D sizes; // width and height, thousandths of mm; beads in a row from here on; slots until the next bead
+uniform highp usampler2D sizes; // width and height, thousandths of mm
 uniform highp isampler2D verticals;
 uniform lowp sampler2D colours;
 uniform mat4 toClip, toEye;
 uniform vec3 eye;
 uniform vec4 tint;
-uniform int first, behind, stride, corners, last; // behind: the first slot that is not drawn
+uniform int first, corners, last;
 uniform float share;
 flat out vec4 paint;
 flat out int slot;
-out vec3 normal;
 vec3 start, end, stop, up, along;
 vec2 size;
 ivec2 texel(int k) { return ivec2(k & ${TEXELS - 1}, k >> ${Math.log2(TEXELS)}); }
@@ -31,16 +30,13 @@ vec3 unfolded(vec2 f) {
   if (v.z < 0.0) v.xy = (1.0 - abs(v.yx)) * vec2(v.x < 0.0 ? -1.0 : 1.0, v.y < 0.0 ? -1.0 : 1.0);
   return normalize(v);
 }
-int next; // the slot after the bead
-/** Takes the bead's values; false where nothing is to be drawn. With a stride, the first beads of so many rows as one. */
+/** Takes the bead's values; false where nothing is to be drawn. */
 bool laid() {
-  int begin = first + (gl_VertexID / corners) * stride, most = min(begin + stride, behind);
-  slot = min(begin + int(texelFetch(sizes, texel(begin), 0).w), most - 1);
-  next = min(slot + max(int(texelFetch(sizes, texel(slot), 0).z), 1), most);
+  slot = first + gl_VertexID / corners;
   size = sizeOf(slot);
   vec4 colour = texelFetch(colours, texel(slot), 0);
   start = point(slot);
-  end = point(next);
+  end = point(slot + 1);
   if (colour.a == 0.0 || size.x == 0.0 || start == end) {
     gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
     return false;
@@ -54,6 +50,7 @@ bool laid() {
 `;
 
 const BEAD_NEAR = `${BEAD_HEAD}
+out vec3 normal;
 // corner: which end, side of the flat middle, place on the round across and up; ends 2, 3: the tips
 vec3 sideways(vec3 along, vec3 up) { return normalize(cross(along, up)); }
 vec3 mitred(vec3 mine, vec3 other) {
@@ -65,7 +62,7 @@ void main() {
   vec3 mine = sideways(along, up), across = mine;
   bool ending = mod(corner.x, 2.0) > 0.5, tip = corner.x > 1.5;
   vec3 here = ending ? stop : start, other = vec3(0.0);
-  int beside = ending ? next : slot - 1;
+  int beside = ending ? slot + 1 : slot - 1;
   if (sizeOf(beside).x > 0.0 && !(ending && slot == last)) other = point(beside + 1) - point(beside);
   bool joined = dot(other, other) > 0.0 && dot(normalize(other), along) > -0.3;
   if (joined) across = mitred(mine, sideways(normalize(other), up));
@@ -79,31 +76,55 @@ void main() {
 }`;
 
 const BEAD_FAR = `${BEAD_HEAD}
-// corner: which end; across and up, 1: towards the eye; 0: the side's face, 1: the one above or below
-uniform float roundness;
+// corner: which end; 0: the edge of the side that is seen, 1: the edge of the back or the belly
+out float across;
+flat out float fold; // where the side ends, as a share of the ribbon
+flat out vec3 beneath, above;
+${LIGHT}
 void main() {
   if (!laid()) return;
   vec3 side = normalize(cross(along, up)), middle = (corner.x > 0.5 ? stop : start) - up * 0.5 * size.y, sight = eye - middle;
   if (dot(sight, side) < 0.0) side = -side;
-  vec3 over = dot(sight, up) < 0.0 ? -up : up;
-  vec3 place = middle + 0.5 * (side * corner.y * size.x + over * corner.z * size.y) + along * (corner.x - 0.5) * 0.5 * size.y;
-  vec3 flat_ = corner.w > 0.5 ? over : side, edge = normalize(side * (corner.y + 0.4) + over * (corner.z + 0.4));
-  normal = mat3(toEye) * normalize(mix(flat_, edge, roundness));
+  vec3 over = dot(sight, up) < 0.0 ? -up : up, wide = cross(along, sight);
+  wide = dot(wide, wide) > 0.0 ? normalize(wide) : over;
+  if (dot(wide, over) < 0.0) wide = -wide;
+  float tall = dot(wide, over) * size.y, deep = abs(dot(wide, side)) * size.x;
+  fold = tall / (tall + deep);
+  across = corner.y;
+  beneath = lit(paint.rgb, mat3(toEye) * side);
+  above = lit(paint.rgb, mat3(toEye) * over);
+  vec3 place = middle + wide * (corner.y - 0.5) * (tall + deep) + along * (corner.x - 0.5) * 0.5 * size.y;
   gl_Position = toClip * vec4(place, 1.0);
 }`;
 
-const BEAD_PAINT = `
+const PAINT_HEAD = `
 flat in vec4 paint; // a: 0 for what is drawn faint, with gaps to look through
 flat in int slot;
-in vec3 normal;
 uniform bool picking;
 out vec4 colour;
+bool gap() { return paint.a == 0.0 && (int(gl_FragCoord.x) + int(gl_FragCoord.y)) % 3 != 0; }
+vec4 number() { return vec4(slot & 255, (slot >> 8) & 255, (slot >> 16) & 255, (slot >> 24) & 255) / 255.0; }
+`;
+
+const PAINT_NEAR = `${PAINT_HEAD}
+in vec3 normal;
 ${LIGHT}
 void main() {
-  if (paint.a == 0.0 && (int(gl_FragCoord.x) + int(gl_FragCoord.y)) % 3 != 0) discard;
-  if (picking) colour = vec4(slot & 255, (slot >> 8) & 255, (slot >> 16) & 255, (slot >> 24) & 255) / 255.0;
-  else colour = vec4(lit(paint.rgb, normalize(normal)), 1.0);
+  if (gap()) discard;
+  colour = picking ? number() : vec4(lit(paint.rgb, normalize(normal)), 1.0);
 }`;
+
+const PAINT_FAR = `${PAINT_HEAD}
+in float across;
+flat in float fold;
+flat in vec3 beneath, above;
+uniform float roundness; // 0: the fold is sharp
+void main() {
+  if (gap()) discard;
+  float soft = 0.02 + 0.45 * roundness;
+  colour = picking ? number() : vec4(mix(beneath, above, smoothstep(fold - soft, fold + soft, across)), 1.0);
+}`;
+
 /** The prism's eighteen corners and the tips, and its triangles. */
 function prism() {
   const ring = [[1, 0, 1], [1, 1, 0.4], [1, 1, -0.4], [1, 0, -1], [-1, 0, -1], [-1, -1, -0.4], [-1, -1, 0.4], [-1, 0, 1]];
@@ -115,33 +136,32 @@ function prism() {
   return { corners: new Float32Array(corners), faces: new Uint16Array(faces) };
 }
 
-/** The two faces of a box that look at the eye. */
-function twoFaces() {
-  const face = (w, places) => [0, 1].flatMap((end) => places.flatMap((place) => [end, ...place, w]));
-  const corners = [...face(0, [[1, -1], [1, 1]]), ...face(1, [[1, 1], [-1, 1]])];
-  return { corners: new Float32Array(corners), faces: new Uint16Array([0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 5, 7]) };
-}
+const RIBBON = { corners: new Float32Array([0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0]), faces: new Uint16Array([0, 1, 2, 2, 1, 3]) };
 
-function beadsOf(gl, path) {
+/** The two shapes of a bead, for as many paths as there are. */
+const shapesOf = (gl) => ({
+  near: shapeOf(gl, programOf(gl, BEAD_NEAR, PAINT_NEAR), prism()),
+  far: shapeOf(gl, programOf(gl, BEAD_FAR, PAINT_FAR), RIBBON),
+});
+
+/** Drawing for a path {slots, texels, points, sizes, verticals}: paint(colours of all texels), draw(...). */
+function beadsOf(gl, shapes, path) {
   const textures = {
     points: texture(gl, gl.RGB32F, gl.RGB, gl.FLOAT, path.points, 3),
-    sizes: texture(gl, gl.RGBA16UI, gl.RGBA_INTEGER, gl.UNSIGNED_SHORT, path.sizes, 4),
+    sizes: texture(gl, gl.RG16UI, gl.RG_INTEGER, gl.UNSIGNED_SHORT, path.sizes, 2),
     verticals: texture(gl, gl.RG16I, gl.RG_INTEGER, gl.SHORT, path.verticals, 2),
     colours: texture(gl, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4 * path.texels), 4),
   };
-  const near = bodyOf(gl, BEAD_NEAR, prism()), far = bodyOf(gl, BEAD_FAR, twoFaces());
+  const boxes = boxesOfRuns(path);
   const paint = (colours) => {
     gl.bindTexture(gl.TEXTURE_2D, textures.colours);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, colours.length / 4 / TEXELS, gl.RGBA, gl.UNSIGNED_BYTE, colours);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS, path.texels / TEXELS, gl.RGBA, gl.UNSIGNED_BYTE, colours);
   };
-  /**
-   * seen: {toClip, toEye, eye, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share} of
-   * the row under way; stride: 1, or only every second, third ... bead.
-   */
-  const draw = (seen, ranges, moving, stride, picking = false) => {
-    const body = seen.pixels > CLOSE_PIXELS ? near : far, { to } = body.program;
-    body.program.use();
-    gl.bindVertexArray(body.vao);
+  /** seen: {toClip, toEye, eye, pixels: width of a usual bead}; ranges: [{first, end, tint}] of slots; moving: {slot, share}. */
+  const draw = (seen, ranges, moving, picking = false) => {
+    const shape = seen.pixels > CLOSE_PIXELS ? shapes.near : shapes.far, { to } = shape.program;
+    shape.program.use();
+    gl.bindVertexArray(shape.vao());
     Object.entries(textures).forEach(([name, held], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, held);
@@ -154,20 +174,45 @@ function beadsOf(gl, path) {
     gl.uniform1i(to("picking"), picking ? 1 : 0);
     gl.uniform1i(to("last"), moving.slot);
     gl.uniform1f(to("share"), moving.share);
-    gl.uniform1i(to("stride"), stride);
-    gl.uniform1i(to("corners"), body.corners);
+    gl.uniform1i(to("corners"), shape.corners);
     for (const { first, end, tint } of ranges) {
       gl.uniform4fv(to("tint"), tint);
-      gl.uniform1i(to("behind"), end);
-      for (let from = first; from < end; from += AT_ONCE * stride) {
+      for (const [from, behind] of boxes.seen(seen.toClip, first, end)) {
         gl.uniform1i(to("first"), from);
-        const beads = Math.min(Math.ceil((end - from) / stride), AT_ONCE);
-        gl.drawElements(gl.TRIANGLES, beads * body.indices, gl.UNSIGNED_INT, 0);
+        gl.drawElements(gl.TRIANGLES, (behind - from) * shape.indices, gl.UNSIGNED_INT, 0);
       }
     }
     gl.bindVertexArray(null);
   };
   return { paint, draw };
+}
+
+const WIDEST_MM = 2;
+const widened = ([least, most]) => [least.map((x) => x - WIDEST_MM), most.map((x) => x + WIDEST_MM)];
+
+/** The room that every AT_ONCE slots take; seen(): [from, behind] of those runs that may be in the picture. */
+function boxesOfRuns({ slots, points }) {
+  const boxes = [];
+  for (let from = 0; from < slots; from += AT_ONCE)
+    boxes.push(widened(bounds(points.subarray(3 * from, 3 * Math.min(from + AT_ONCE, slots) + 3))));
+  const seen = (toClip, first, end) => {
+    const runs = [];
+    for (let k = Math.floor(first / AT_ONCE); k * AT_ONCE < end; k++)
+      if (inPicture(toClip, boxes[k])) runs.push([Math.max(first, k * AT_ONCE), Math.min(end, (k + 1) * AT_ONCE)]);
+    return runs;
+  };
+  return { seen };
+}
+
+/** Whether a box may be in the picture: not all of its corners lie beyond the same edge. */
+function inPicture(m, corners) {
+  let beyond = 15;
+  for (let i = 0; i < 8 && beyond; i++) {
+    const v = [corners[i & 1][0], corners[(i >> 1) & 1][1], corners[i >> 2][2]], [x, y] = carried(m, v);
+    const w = m[3] * v[0] + m[7] * v[1] + m[11] * v[2] + m[15];
+    beyond &= (x > w && 1) | (x < -w && 2) | (y > w && 4) | (y < -w && 8);
+  }
+  return !beyond;
 }
 
 /** Values by slot, TEXELS to a line. */
@@ -181,17 +226,22 @@ function texture(gl, inside, format, type, content, each) {
   return held;
 }
 
-/** One shape of a bead: its program, and the corners and triangles of as many beads as are drawn at once. */
-function bodyOf(gl, vertex, { corners, faces }) {
-  const program = programOf(gl, vertex, BEAD_PAINT), vao = gl.createVertexArray(), each = corners.length / 4;
-  const all = new Float32Array(corners.length * AT_ONCE), indices = new Uint32Array(faces.length * AT_ONCE);
-  for (let bead = 0; bead < AT_ONCE; bead++) {
-    all.set(corners, bead * corners.length);
-    faces.forEach((corner, k) => { indices[bead * faces.length + k] = bead * each + corner; });
-  }
-  gl.bindVertexArray(vao);
-  bufferOf(gl, indices, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
-  attribute(gl, program.at("corner"), bufferOf(gl, all), 4, gl.FLOAT, false);
-  gl.bindVertexArray(null);
-  return { program, vao, corners: each, indices: faces.length };
+/** One shape of a bead: its program, and the corners and triangles of as many beads as are drawn at once, made when first used. */
+function shapeOf(gl, program, { corners, faces }) {
+  const each = corners.length / 4;
+  let vao = null;
+  const make = () => {
+    const all = new Float32Array(corners.length * AT_ONCE), indices = new Uint32Array(faces.length * AT_ONCE);
+    for (let bead = 0; bead < AT_ONCE; bead++) {
+      all.set(corners, bead * corners.length);
+      for (let k = 0; k < faces.length; k++) indices[bead * faces.length + k] = bead * each + faces[k];
+    }
+    vao = gl.createVertexArray();
+    gl.bindVertexArray(vao);
+    bufferOf(gl, indices, gl.STATIC_DRAW, gl.ELEMENT_ARRAY_BUFFER);
+    attribute(gl, program.at("corner"), bufferOf(gl, all), 4, gl.FLOAT, false);
+    gl.bindVertexArray(null);
+    return vao;
+  };
+  return { program, vao: () => vao || make(), corners: each, indices: faces.length };
 }

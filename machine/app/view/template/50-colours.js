@@ -23,7 +23,7 @@ function packed([r, g, b]) { return (255 << 24 | Math.round(b) << 16 | Math.roun
 const bySpeed = (rows) => (i) => rows.speed[i] / 1000;
 const SCALES = {
   speed: { unit: "mm/s", digits: 0, of: bySpeed },
-  flow: { unit: "mm³/s", digits: 1, of: (rows, { flow }) => (i) => flow[i] },
+  flow: { unit: "mm³/s", digits: 1, of: (rows, { flow }) => flow },
   fan: { unit: "%", digits: 0, of: (rows) => (i) => rows.fan[i] / 2.55 },
   layer: { unit: "s", digits: 1, logarithmic: true, of: (rows, { layerTime }) => (i) => layerTime[i] },
   nozzle: { unit: "°C", digits: 0, of: (rows) => (i) => rows.nozzle[i] / 10 },

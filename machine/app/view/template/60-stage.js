@@ -8,14 +8,13 @@ function stageOf(gl, print, dark) {
   gl.enable(gl.DEPTH_TEST);
   gl.depthFunc(gl.LEQUAL);
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-  forgetPrograms(gl);
-  const ways = waysOf(rows, path, chain), partColour = (part) => rgb(part.colour), planes = planesOf(parts, partColour);
-  const marksOn = ([name, look]) => [name, marksAt(gl, marks[name], path, look)];
+  const partColour = (part) => rgb(part.colour), planes = planesOf(parts, partColour), shapes = shapesOf(gl);
+  const marksOn = ([name, look]) => [name, once(() => marksAt(gl, marks()[name], path, look))];
   const surface = () => ({ places: surfaces.places, colours: surfaceColours(surfaces, partColour, "printed") });
   return {
-    beads: rows.count ? beadsOf(gl, path) : null,
-    ways: linesOf(gl, ways),
-    wayRow: ways.row,
+    beads: rows.count ? beadsOf(gl, shapes, path) : null,
+    coarse: coarseOn(gl, shapes, print),
+    ways: once(() => waysOn(gl, waysOf(rows, path, chain))),
     marks: Object.fromEntries(Object.entries(MARKS).map(marksOn)),
     model: surfaces && solidOf(gl, surface()),
     planes: solidOf(gl, planes.discs),
@@ -23,6 +22,34 @@ function stageOf(gl, print, dark) {
     arrows: solidOf(gl, arrowsOf(parts, partColour, span)),
     bodies: bodiesOn(gl, header.machine, dark),
   };
+}
+
+/** A value that is worked out when it is first asked for. */
+function once(make) {
+  let value;
+  return () => (value === undefined ? (value = make()) : value);
+}
+
+const waysOn = (gl, ways) => ({ row: ways.row, lines: linesOf(gl, ways) });
+
+/** {at(k): the path of every k-th layer with its drawing, made when first asked for, painted by paint(colours of all slots)}. */
+function coarseOn(gl, shapes, print) {
+  const made = new Map();
+  let painted = null;
+  const dress = ({ path, beads }) => beads.paint(coarseColours(path, print.path, painted));
+  const at = (k) => {
+    if (!made.has(k)) {
+      const path = coarseOf(print.rows, print.path, k);
+      made.set(k, { path, beads: beadsOf(gl, shapes, path) });
+      if (painted) dress(made.get(k));
+    }
+    return made.get(k);
+  };
+  const paint = (colours) => {
+    painted = colours;
+    made.forEach(dress);
+  };
+  return { at, paint };
 }
 
 function bodiesOn(gl, machine, dark) {
@@ -43,26 +70,49 @@ function standing(chain, place, riding) {
   return { work: IDENTITY, cradle: multiply(back, chain.cradle(place[3])), head: multiply(back, tip) };
 }
 
-/** Draws; tells what was drawn where: {work, beads: as the eye sees them, ranges}. */
-function paintStage(gl, stage, print, scene, camera) {
-  const { width, height, clientWidth } = gl.canvas, { on } = scene;
+/** How the eye sees the scene now: {work, cradle, head, beads, below, seenAt, ranges, moving, lift, size}. */
+function viewOf(print, scene, camera, width, height, density) {
   const view = camera.toEye(), lens = camera.lens(width / height), stand = standing(print.chain, scene.place, scene.riding);
   const seenAs = (matrix) => ({ toEye: multiply(view, matrix), toClip: multiply(lens, multiply(view, matrix)) });
   const [work, cradle, head] = [stand.work, stand.cradle, stand.head].map(seenAs);
-  const pixels = (BEAD_MM * height) / (2 * HALF_HEIGHT * camera.distance), ranges = drawnRanges(print, scene);
-  const beads = { ...work, eye: carried(undone(work.toEye), [0, 0, 0]), pixels }, below = beads.eye[2] < 0;
-  const lift = 0.012 / camera.distance; // in depth, by which what lies on a surface is seen before it
-  gl.viewport(0, 0, width, height);
-  gl.clearColor(0, 0, 0, 0);
-  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  if (on.beads && stage.beads) stage.beads.draw(beads, ranges, { slot: print.path.slot(scene.row), share: scene.share }, scene.stride);
+  const pixels = (BEAD_MM * height) / (2 * HALF_HEIGHT * camera.distance), eye = carried(undone(work.toEye), [0, 0, 0]);
+  return {
+    work, cradle, head, beads: { ...work, eye, pixels }, below: eye[2] < 0,
+    seenAt: (shift) => seenAs(multiply(stand.work, moved(shift))),
+    ranges: drawnRanges(print, scene), moving: { slot: print.path.slot(scene.row), share: scene.share },
+    lift: 0.012 / camera.distance, // in depth, by which what lies on a surface is seen before it
+    size: clamp(pixels * 1.8, 3.5, 13) * density,
+  };
+}
+
+/** The first so many slots of ranges, and what is left. */
+function firstOf(ranges, most) {
+  const taken = [], left = [];
+  for (const range of ranges) {
+    const cut = range.first + Math.min(range.end - range.first, most);
+    most -= cut - range.first;
+    if (cut > range.first) taken.push({ ...range, end: cut });
+    if (cut < range.end) left.push({ ...range, first: cut });
+  }
+  return [taken, left];
+}
+
+/** The beads with every k-th layer for all, the last ones as they are. */
+function paintCoarse({ beads, coarse }, print, seen, k) {
+  const { path, beads: rough } = coarse.at(k), divided = dividedRanges(print, path, seen.ranges);
+  rough.draw(seen.beads, divided.rough, { slot: -1, share: 1 });
+  beads.draw(seen.beads, divided.fine, seen.moving);
+}
+
+/** All but the beads. */
+function paintRest(stage, print, scene, seen) {
+  const { on } = scene, { work, cradle, head, below, lift } = seen;
   if (on.machine && !below) paintTable(stage.bodies, work, cradle, {});
   if (on.machine) stage.bodies.nozzle.draw(head);
-  paintPath(stage, ranges, on, work.toClip, lift, clamp(pixels * 1.8, 3.5, 13) * (width / clientWidth || 1));
-  paintModel(stage, print, scene, (shift) => seenAs(multiply(stand.work, moved(shift))), lift);
+  paintPath(stage, seen.ranges, on, work.toClip, lift, seen.size);
+  paintModel(stage, print, scene, seen.seenAt, lift);
   if (on.machine && below) paintTable(stage.bodies, work, cradle, { strength: 0.18 }); // or it would hide everything
   if (on.machine) paintHead(stage.bodies, head);
-  return { work, beads, ranges };
 }
 
 function paintTable(bodies, work, cradle, look) {
@@ -72,15 +122,17 @@ function paintTable(bodies, work, cradle, look) {
   bodies.cradleLines.draw(cradle.toClip, { lift: 1e-5 });
 }
 
-function paintPath({ ways, wayRow, marks }, ranges, on, toClip, lift, size) {
+function paintPath({ ways, marks }, ranges, on, toClip, lift, size) {
   for (const { firstRow, endRow, tint } of ranges) {
     if (tint !== PLAIN_TINT) continue;
-    const first = 2 * countUpTo(wayRow, firstRow - 1), end = 2 * countUpTo(wayRow, endRow - 1);
-    if (on.travels) ways.draw(toClip, { first, end });
-    if (on.seams) marks.seams.draw(toClip, firstRow, endRow, size, lift);
+    if (on.travels) {
+      const { row, lines } = ways(), [first, end] = [firstRow, endRow].map((edge) => 2 * countUpTo(row, edge - 1));
+      lines.draw(toClip, { first, end });
+    }
+    if (on.seams) marks.seams().draw(toClip, firstRow, endRow, size, lift);
     if (!on.retractions) continue;
-    marks.retracts.draw(toClip, firstRow, endRow, size + 2, lift);
-    marks.primes.draw(toClip, firstRow, endRow, size + 2, lift);
+    marks.retracts().draw(toClip, firstRow, endRow, size + 2, lift);
+    marks.primes().draw(toClip, firstRow, endRow, size + 2, lift);
   }
 }
 
@@ -105,7 +157,7 @@ function paintModel(stage, print, scene, seenAt, lift) {
 }
 
 function paintHead(bodies, seen) {
-  bodies.head.draw(seen, { ghost: 0.42 });
-  bodies.boxes.draw(seen, { ghost: 0.14 });
+  bodies.head.draw(seen, { ghost: 0.3 });
+  bodies.boxes.draw(seen, { ghost: 0.08 });
   bodies.boxLines.draw(seen.toClip);
 }

@@ -1,104 +1,109 @@
-// Picture: the canvas and when it is drawn: only after a change, and with fewer beads on a slow computer.
+// Picture: what is drawn into the canvas; how much at a time and when is the pace's affair.
 
-const SLOW_MS = 50;
-const STILL_MS = 180;
-const REST_MS = 1500;
-const AT_FIRST = 100000; // beads, before it is known how fast pictures come
-const COARSEST = 64;
-const ALL = "#all"; // behind the page's address: at rest every bead is drawn, however long it takes
+const USUAL_SAMPLES = { alpha: true, antialias: false, depth: false, powerPreference: "high-performance" }; // frames have their own
 
-/** {canvas, ask, moved, rowAt}, or null where there is no WebGL2. */
-function pictureOf(print, scene, camera, bells, showMarkers) {
-  const canvas = $("canvas"), gl = canvas.getContext("webgl2", { antialias: true, powerPreference: "high-performance" });
-  if (!gl) return null;
-  let stage = null, last = null;
-  const paint = () => {
-    if (!stage || gl.isContextLost()) return;
-    fill(canvas);
-    last = paintStage(gl, stage, print, scene, camera);
-    showMarkers(last.work.toClip, canvas);
-    document.documentElement.dataset.drawn = last.ranges.reduce((sum, range) => sum + range.endRow - range.firstRow, 0);
-  };
-  const ask = oneAtATime(gl, paint, () => scene.stride, (took, stride) => ease.painted(took, stride));
-  const ease = easing(scene, ask, print.rows.count);
+/** The canvas' WebGL2 with its programs on their way, or null. */
+function cardOf(canvas) {
+  const gl = canvas.getContext("webgl2", USUAL_SAMPLES);
+  if (gl) compileAll(gl);
+  return gl;
+}
+
+function compileAll(gl) {
+  const pairs = [
+    [BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [LINE_VERTEX, LINE_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT],
+  ];
+  pairs.forEach((pair) => programOf(gl, ...pair));
+}
+
+/** {canvas, ask, moved, rowAt}: the picture of the scene, drawn whenever a bell rings. */
+function pictureOf(gl, print, scene, camera, bells, showMarkers) {
+  const { canvas } = gl, painter = painterOf(gl, print, scene, camera, showMarkers), pace = paceOf(gl, painter, print.rows.count);
   const colour = () => {
     const { rows, path, header } = print, extra = { ...print, parts: header.parts, hidden: scene.hidden };
     const { colours, legend } = coloured(scene.mode, rows, path, extra);
-    stage.beads?.paint(colours);
+    painter.stage?.beads?.paint(colours);
+    painter.stage?.coarse.paint(colours);
     showLegend(print, scene.mode, legend);
   };
-  const reds = () => stage.model?.paint(surfaceColours(print.surfaces, (part) => rgb(part.colour), scene.risky));
+  const reds = () => painter.stage?.model?.paint(surfaceColours(print.surfaces, (part) => rgb(part.colour), scene.risky));
   const build = () => {
-    stage = stageOf(gl, print, scene.dark);
+    painter.build();
     colour();
     reds();
-    ease.moved();
+    pace.moved();
   };
-  bells.on("colours", () => { if (stage) colour(); ask(); });
-  bells.on("model", () => { if (stage) reds(); ask(); });
-  bells.on("theme", () => {
-    if (stage) stage.bodies = bodiesOn(gl, print.header.machine, scene.dark);
-    ask();
-  });
-  bells.on("row layers look", ask);
-  bells.on("moving", ease.moved);
-  new ResizeObserver(ask).observe(canvas);
-  outlive(canvas, () => { stage = null; }, build);
+  bells.on("colours", () => { colour(); pace.ask(); });
+  bells.on("model", () => { reds(); pace.ask(); });
+  bells.on("theme", () => { painter.dress(); pace.ask(); });
+  bells.on("row layers look", pace.ask);
+  bells.on("moving", pace.moved);
+  new ResizeObserver(() => { if (painter.outgrown()) pace.ask(); }).observe(canvas);
+  outlive(canvas, () => { painter.drop(); PROGRAMS.delete(gl); }, build);
   addEventListener("beforeprint", () => {
-    scene.stride = 1;
-    paint();
+    painter.begin();
+    painter.step(Infinity);
     keepPicture(canvas);
   });
   build();
-  const rowAt = (event) => {
+  return { canvas, ask: pace.ask, moved: pace.moved, rowAt: (event) => print.path.row(painter.slotUnder(event)) };
+}
+
+/** Draws coarse and at once, coarse(k), or fine and piece by piece, begin() and step(beads) until it is done(). */
+function painterOf(gl, print, scene, camera, showMarkers) {
+  const { canvas } = gl, painter = { stage: null, shown: null };
+  let frames = null, seen = null, left = [];
+  const density = () => Math.min(devicePixelRatio || 1, 2);
+  const room = (share) => [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density() * share), 1));
+  const look = (share) => ({ size: room(share), seen: viewOf(print, scene, camera, ...room(share), density() * share) });
+  painter.outgrown = () => room(1).some((x, k) => x !== [canvas.width, canvas.height][k]);
+  const show = (frame, now) => {
+    if (painter.outgrown()) [canvas.width, canvas.height] = room(1);
+    frame.show();
+    painter.shown = now;
+    showMarkers(now.work.toClip, canvas);
+    document.documentElement.dataset.drawn = countRows(now.ranges);
+  };
+  painter.build = () => {
+    painter.stage = stageOf(gl, print, scene.dark);
+    frames = framesOf(gl);
+  };
+  painter.dress = () => { if (painter.stage) painter.stage.bodies = bodiesOn(gl, print.header.machine, scene.dark); };
+  painter.drop = () => { painter.stage = null; };
+  painter.ready = () => painter.stage && !gl.isContextLost();
+  painter.rows = () => countRows(drawnRanges(print, scene));
+  painter.coarse = (k) => {
+    const now = look(COARSE_SHARE);
+    frames.moving.begin(...now.size);
+    if (scene.on.beads && painter.stage.beads) paintCoarse(painter.stage, print, now.seen, k);
+    paintRest(painter.stage, print, scene, now.seen);
+    show(frames.moving, now.seen);
+  };
+  painter.begin = () => {
+    const now = look(1);
+    seen = now.seen;
+    left = scene.on.beads && painter.stage.beads ? [...seen.ranges] : [];
+    frames.still.begin(...now.size);
+  };
+  painter.step = (beads) => {
+    const [pieces, rest] = firstOf(left, beads);
+    frames.still.bind();
+    if (pieces.length) painter.stage.beads.draw(seen.beads, pieces, seen.moving);
+    left = rest;
+    if (left.length) return;
+    paintRest(painter.stage, print, scene, seen);
+    show(frames.still, seen);
+  };
+  painter.left = () => left.reduce((sum, { first, end }) => sum + end - first, 0);
+  painter.slotUnder = (event) => {
     const box = canvas.getBoundingClientRect(), scale = canvas.width / box.width;
     const [x, y] = [event.clientX - box.left, event.clientY - box.top].map((part) => Math.floor(part * scale));
-    return print.path.row(slotAt(gl, stage, last, [x, canvas.height - 1 - y]));
+    return slotAt(gl, painter.stage, painter.shown, [x, canvas.height - 1 - y]);
   };
-  return { canvas, ask, rowAt, moved: ease.moved };
+  return painter;
 }
 
-/**
- * A function that asks for a picture: the next begins when the card has finished the last, so that none pile up. finished is
- * told how many ms a picture took, and what `with_` gave when it began.
- */
-function oneAtATime(gl, paint, with_, finished) {
-  const { dataset } = document.documentElement;
-  let state = "idle", again = false;
-  const done = (start, told) => {
-    const took = performance.now() - start;
-    state = dataset.picture = "idle";
-    dataset.pictureMs = took.toFixed(0);
-    finished(took, told);
-    if (again) ask();
-  };
-  const begin = () => {
-    const start = performance.now(), told = with_();
-    [state, again] = ["drawing", false];
-    paint();
-    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    gl.flush();
-    const look = () => {
-      if (gl.isContextLost() || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED) done(start, told);
-      else setTimeout(look, 3);
-    };
-    setTimeout(look, 1);
-  };
-  const ask = () => {
-    if (state !== "idle") again = true;
-    else {
-      state = dataset.picture = "asked";
-      requestAnimationFrame(begin);
-    }
-  };
-  return () => { if (state === "asked") return; ask(); };
-}
-
-function fill(canvas) {
-  const scale = Math.min(devicePixelRatio || 1, 2);
-  const size = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * scale), 1));
-  if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
-}
+const countRows = (ranges) => ranges.reduce((sum, range) => sum + range.endRow - range.firstRow, 0);
 
 /** The graphics card may take its memory back at any time; the picture returns when it is given again. */
 function outlive(canvas, drop, build) {
@@ -109,37 +114,3 @@ function outlive(canvas, drop, build) {
   });
   canvas.addEventListener("webglcontextrestored", () => { notice(""); build(); });
 }
-
-/**
- * moved() is called whenever eye or slider move, painted() after each picture. Where pictures come slowly, two, four ... moves are
- * drawn as one until all rests; without a graphics card at rest too, so many that a picture takes a moment only.
- */
-function easing(scene, ask, count) {
-  let timer = 0, coarse = doublings(count / AT_FIRST), whole = 0; // whole: ms that all beads would take
-  const settle = () => {
-    scene.stride = count > AT_FIRST && location.hash !== ALL ? doublings(whole / REST_MS) : 1;
-    notice(scene.stride > 1 ? `Without a fast graphics card: up to ${scene.stride} moves are drawn as one.` : "");
-    ask();
-  };
-  const rest = () => {
-    timer = whole ? 0 : setTimeout(rest, STILL_MS);
-    if (whole) settle();
-  };
-  const moved = () => {
-    clearTimeout(timer);
-    timer = setTimeout(rest, STILL_MS);
-    scene.stride = coarse;
-    ask();
-  };
-  const painted = (took, stride) => {
-    whole = took * stride;
-    if (!timer && scene.stride > 1 && doublings(whole / REST_MS) < scene.stride) settle();
-    if (!timer) return;
-    if (took > SLOW_MS) coarse = doublings((stride * took) / SLOW_MS);
-    else if (took < SLOW_MS / 3) coarse = Math.max(coarse / 2, 1);
-  };
-  return { moved, painted };
-}
-
-/** The next power of two, 1 .. COARSEST. */
-const doublings = (x) => clamp(2 ** Math.ceil(Math.log2(Math.max(x, 1))), 1, COARSEST);

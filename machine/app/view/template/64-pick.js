@@ -17,7 +17,7 @@ function slotAt(gl, stage, { beads, ranges }, [x, y]) {
   gl.scissor(x, y, 1, 1);
   gl.clearColor(1, 1, 1, 1);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  stage.beads.draw(beads, ranges, { slot: -1, share: 1 }, 1, true);
+  stage.beads.draw(beads, ranges, { slot: -1, share: 1 }, true);
   gl.readPixels(x, y, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, byte);
   gl.disable(gl.SCISSOR_TEST);
   gl.bindFramebuffer(gl.FRAMEBUFFER, null);

@@ -12,10 +12,10 @@ function made(tag, { text, className, ...properties } = {}, ...children) {
   return element;
 }
 
+/** Seconds as 1h 6m 15s, as everywhere in the program. */
 function duration(seconds) {
-  const whole = Math.round(seconds), two = (x) => String(x).padStart(2, "0");
-  const [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
-  return hours ? `${hours}h ${two(minutes)}m ${two(rest)}s` : `${minutes}m ${two(rest)}s`;
+  const whole = Math.round(seconds), [hours, minutes, rest] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  return hours ? `${hours}h ${minutes}m ${rest}s` : minutes ? `${minutes}m ${rest}s` : `${rest}s`;
 }
 
 function notice(text) {

@@ -5,7 +5,7 @@ function sceneOf(print, bells) {
   const scene = {
     row: last, share: 1, place: restingPlace(header),
     part: null, others: "faint", low: 0, high: Math.max(rows.layers.length - 1, 0),
-    riding: false, dark: false, stride: 1, mode: "part", hidden: new Set(),
+    riding: false, dark: false, mode: "part", hidden: new Set(),
     model: rows.count ? "ghost" : "solid", risky: "printed", apart: 0,
     on: {
       beads: true, travels: false, retractions: false, seams: false,

@@ -14,7 +14,7 @@ function readoutsOf(print, scene, bells) {
     ["type", "doing", (i) => KINDS[rows.kind[i]] || rows.types[rows.type[i]] || "extruding"],
     ["speed", "speed", (i) => `${(rows.speed[i] / 1000).toFixed(1)} ${rows.kind[i] === KIND.rotate ? "°/s" : "mm/s"}`],
     ["size", "bead", (i) => (rows.width[i] ? [rows.width[i], rows.height[i]].map((x) => (x / 1000).toFixed(2)).join(" × ") : "–")],
-    ["flow", "flow", (i) => (flow[i] ? `${flow[i].toFixed(2)} mm³/s` : "–")],
+    ["flow", "flow", (i) => (flow(i) ? `${flow(i).toFixed(2)} mm³/s` : "–")],
     ["fan", "fan", (i) => `${Math.round(rows.fan[i] / 2.55)} %`],
     ["nozzle", "nozzle", (i) => (rows.nozzle[i] ? `${(rows.nozzle[i] / 10).toFixed(0)} °C` : "–")],
     ["bed", "bed", (i) => (rows.bed[i] ? `${(rows.bed[i] / 10).toFixed(0)} °C` : "–")],

@@ -1,7 +1,7 @@
 // Main: the page put together: bytes to print, print to picture, hands to scene.
 
 async function main() {
-  const text = $("tiltprint").textContent.trim();
+  const gl = cardOf($("canvas")), text = $("tiltprint").textContent.trim();
   $("tiltprint").textContent = "";
   const print = await printOf(text), { header, rows } = print;
   const ring = bells(), camera = cameraOf(), scene = sceneOf(print, ring);
@@ -14,8 +14,8 @@ async function main() {
   const toggleTheme = themeOf(scene, ring), player = courseOf(print, scene, ring);
   const showMarkers = findingsOf(print, scene, ring, camera, player.stop);
   scene.go(rows.count - 1);
-  const picture = pictureOf(print, scene, camera, ring, showMarkers);
-  if (!picture) return withoutPicture();
+  if (!gl) return withoutPicture();
+  const picture = pictureOf(gl, print, scene, camera, ring, showMarkers);
   const fit = fitting(print, scene, camera, picture, ring);
   keysOf({ scene, camera, player, look: picture.moved, fit, toggleTheme });
   handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => goTo(picture.rowAt(event), scene, player) });
