@@ -1,5 +1,6 @@
 """Read: a model file into one closed solid in mm that rests on the platform, centred about the turn axis."""
 
+import os
 from importlib import resources
 from pathlib import Path
 
@@ -23,8 +24,10 @@ TYPICAL_MM = 100.0
 def locate(model: str) -> Path:
     """The file of a MODEL argument: `demo:NAME` is a model that ships with the program, anything else a path.
 
-    Raises MeshError for an unknown demo, naming those there are.
+    Raises MeshError for no name at all, and for an unknown demo, naming those there are.
     """
+    if not model.strip():
+        raise MeshError(f"the model's name is empty: a {', '.join(READERS)} file or {DEMO}NAME is expected")
     if not model.startswith(DEMO):
         return Path(model)
     name = model.removeprefix(DEMO)
@@ -35,9 +38,8 @@ def locate(model: str) -> Path:
         else {}
     )
     if name not in found:
-        raise MeshError(
-            f"{model}: there is no demo model {name!r}; allowed are {', '.join(sorted(found)) or 'none: none is installed'}."
-        )
+        known = ", ".join(f"{DEMO}{each}" for each in sorted(found))
+        raise MeshError(f"there is no demo model {name!r}; allowed are {known or 'none: none is installed'}")
     return Path(str(found[name]))
 
 
@@ -54,7 +56,7 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
             surfaces = [Surface(surface.vertices * scale, surface.faces) for surface in surfaces]
         solid, notes = repaired(surfaces)
     except MeshError as error:
-        raise MeshError(f"{path}: {error}.") from None
+        raise MeshError(f"{path}: {error}") from None
     mesh = _resting(solid, rotate_deg)
     return mesh, (*notes, *floating(mesh))
 
@@ -76,22 +78,22 @@ def floating(mesh: Mesh) -> tuple[str, ...]:
 
 def check_file(path: Path) -> None:
     """Refuse what is no model file at all before any work is done. Raises MeshError."""
-    if path.is_dir():
-        raise MeshError(f"{path}: is a folder, not a model file.")
-    if not path.exists():
-        raise MeshError(f"{path}: there is no such file.")
+    if os.path.isdir(path):  # unlike pathlib's, false for a name that is too long to exist
+        raise MeshError(f"{path}: is a folder, not a model file")
+    if not os.path.exists(path):
+        raise MeshError(f"{path}: there is no such file")
     if path.suffix.lower() not in READERS:
-        raise MeshError(f"{path}: the kind of file {path.suffix!r} is not read; allowed are {', '.join(READERS)}.")
+        raise MeshError(f"{path}: the kind of file {path.suffix!r} is not read; allowed are {', '.join(READERS)}")
 
 
 def _surfaces(path: Path) -> list[Surface]:
     check_file(path)
     try:
         if path.stat().st_size == 0:
-            raise MeshError(f"{path}: is empty.")
+            raise MeshError(f"{path}: is empty")
         return READERS[path.suffix.lower()](path)
     except OSError as error:
-        raise MeshError(f"{path}: cannot be read: {error.strerror or error}.") from None
+        raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from None
 
 
 def _check_size(surfaces: list[Surface], scale: float) -> None:

@@ -32,17 +32,17 @@ def checked(path: Path, vertices: Any, faces: Any) -> Surface:
         places = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
     surface = Surface(places, np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3))
     if not len(surface.faces):
-        raise MeshError(f"{path}: holds no faces.")
+        raise MeshError(f"{path}: holds no faces")
     finite = np.atleast_1d(np.isfinite(surface.vertices).all(axis=1))
     if not finite.all():
         worst = int(np.flatnonzero(~finite)[0])
-        raise MeshError(f"{path}: vertex {worst + 1} of {len(finite)} has a coordinate that is not a finite number.")
+        raise MeshError(f"{path}: vertex {worst + 1} of {len(finite)} has a coordinate that is not a finite number")
     inside = np.atleast_1d(((surface.faces >= 0) & (surface.faces < len(surface.vertices))).all(axis=1))
     if not inside.all():
         worst = int(np.flatnonzero(~inside)[0])
         raise MeshError(
             f"{path}: face {worst + 1} of {len(inside)} names vertex {surface.faces[worst].tolist()} (counted from 0), "
-            f"but there are {len(surface.vertices)} vertices."
+            f"but there are {len(surface.vertices)} vertices"
         )
     return surface
 
@@ -52,7 +52,7 @@ def numbers(path: Path, rows: Iterable[Iterable[str | bytes]], what: str) -> Flo
     try:
         return np.fromiter(map(float, chain.from_iterable(rows)), np.float64)
     except ValueError as error:
-        raise MeshError(f"{path}: {what} holds something that is not a number ({error}).") from None
+        raise MeshError(f"{path}: {what} holds something that is not a number ({error})") from None
 
 
 def whole_numbers(path: Path, rows: Iterable[Iterable[str | bytes]], what: str) -> Indices:
@@ -60,7 +60,7 @@ def whole_numbers(path: Path, rows: Iterable[Iterable[str | bytes]], what: str) 
     try:
         return np.fromiter(map(int, chain.from_iterable(rows)), np.int64)
     except (ValueError, OverflowError) as error:
-        raise MeshError(f"{path}: {what} holds something that is not a whole number ({error}).") from None
+        raise MeshError(f"{path}: {what} holds something that is not a whole number ({error})") from None
 
 
 def stacked(pieces: list[Surface]) -> Surface:

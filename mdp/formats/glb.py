@@ -32,18 +32,18 @@ def read(path: Path) -> list[Surface]:
         for node in _roots(document):
             surfaces += _placed(path, document, binary, node, np.eye(4), 0)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {error}).") from None
+        raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {error})") from None
     if not surfaces:
-        raise MeshError(f"{path}: its scene places no mesh.")
+        raise MeshError(f"{path}: its scene places no mesh")
     return surfaces
 
 
 def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
     magic, version, length = struct.unpack("<III", content[:12]) if len(content) >= 20 else (0, 0, 0)
     if magic != MAGIC or version != 2:
-        raise MeshError(f"{path}: is not a GLB file of version 2.")
+        raise MeshError(f"{path}: is not a GLB file of version 2")
     if len(content) < length:
-        raise MeshError(f"{path}: is cut short: it holds {len(content)} of the {length} bytes that its header announces.")
+        raise MeshError(f"{path}: is cut short: it holds {len(content)} of the {length} bytes that its header announces")
     chunks: dict[int, bytes] = {}
     place = 12
     while place + 8 <= length:
@@ -53,7 +53,7 @@ def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
     try:
         return json.loads(chunks.get(JSON_CHUNK, b"")), chunks.get(BINARY_CHUNK, b"")
     except ValueError as error:
-        raise MeshError(f"{path}: its glTF document is malformed ({error}).") from None
+        raise MeshError(f"{path}: its glTF document is malformed ({error})") from None
 
 
 def _roots(document: Any) -> list[int]:
@@ -65,7 +65,7 @@ def _roots(document: Any) -> list[int]:
 
 def _placed(path: Path, document: Any, binary: bytes, number: int, parent: Floats, depth: int) -> list[Surface]:
     if depth > DEEPEST:
-        raise MeshError(f"{path}: its nodes contain each other.")
+        raise MeshError(f"{path}: its nodes contain each other")
     node = document["nodes"][number]
     matrix = parent @ _matrix(node)
     surfaces = []
@@ -95,7 +95,7 @@ def _matrix(node: Any) -> Floats:
 
 def _surface(path: Path, document: Any, binary: bytes, primitive: Any, matrix: Floats) -> Surface:
     if primitive.get("mode", TRIANGLES) != TRIANGLES or primitive.get("extensions", {}).keys() & {"KHR_draco_mesh_compression"}:
-        raise MeshError(f"{path}: holds lines, strips or compressed geometry; only plain triangles are read.")
+        raise MeshError(f"{path}: holds lines, strips or compressed geometry; only plain triangles are read")
     vertices = _rows(path, document, binary, primitive["attributes"]["POSITION"], 3)
     if "indices" in primitive:
         faces = _rows(path, document, binary, primitive["indices"], 1).astype(np.int64).reshape(-1, 3)
@@ -113,12 +113,12 @@ def _rows(path: Path, document: Any, binary: bytes, number: int, width: int) -> 
     view = document["bufferViews"][accessor["bufferView"]]
     if "sparse" in accessor or view.get("extensions") or document["buffers"][view["buffer"]].get("uri"):
         raise MeshError(
-            f"{path}: holds sparse or compressed data or data in another file; only plain data inside the file is read."
+            f"{path}: holds sparse or compressed data or data in another file; only plain data inside the file is read"
         )
     kind = np.dtype(COMPONENTS[accessor["componentType"]])
     count, stride = int(accessor["count"]), int(view.get("byteStride", 0)) or kind.itemsize * width
     start = int(view.get("byteOffset", 0)) + int(accessor.get("byteOffset", 0))
     end = start + stride * (count - 1) + kind.itemsize * width
     if count < 1 or start < 0 or stride < 1 or end > len(binary):
-        raise MeshError(f"{path}: is damaged: an accessor of {count} rows lies outside the file's {len(binary)} bytes of data.")
+        raise MeshError(f"{path}: is damaged: an accessor of {count} rows lies outside the file's {len(binary)} bytes of data")
     return np.ndarray((count, width), kind, binary, start, (stride, kind.itemsize))

@@ -20,7 +20,7 @@ def read(path: Path) -> list[Surface]:
             continue
         if words[0] == "v":
             if len(words) < 4:
-                raise MeshError(f"{path}: the vertex in line {number} has fewer than three coordinates.")
+                raise MeshError(f"{path}: the vertex in line {number} has fewer than three coordinates")
             positions.append(words[1:4])
         elif words[0] == "f":
             polygons.append(_corners(path, number, words[1:], len(positions)))
@@ -30,11 +30,11 @@ def read(path: Path) -> list[Surface]:
 
 def _corners(path: Path, number: int, words: list[str], vertices: int) -> list[int]:
     if len(words) < 3:
-        raise MeshError(f"{path}: the face in line {number} has {len(words)} corners, at least 3 are needed.")
+        raise MeshError(f"{path}: the face in line {number} has {len(words)} corners, at least 3 are needed")
     try:
         named = [int(word.split("/", 1)[0]) for word in words]
     except ValueError:
-        raise MeshError(f"{path}: the face in line {number} is malformed: `{' '.join(words[:8])}`.") from None
+        raise MeshError(f"{path}: the face in line {number} is malformed: `{' '.join(words[:8])}`") from None
     if 0 in named or min(named) < -vertices:
-        raise MeshError(f"{path}: the face in line {number} names a vertex that does not exist: `{' '.join(words[:8])}`.")
+        raise MeshError(f"{path}: the face in line {number} names a vertex that does not exist: `{' '.join(words[:8])}`")
     return [index - 1 if index > 0 else vertices + index for index in named]

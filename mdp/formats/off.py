@@ -18,18 +18,18 @@ def read(path: Path) -> list[Surface]:
     stripped = ((number, line.split("#", 1)[0].split()) for number, line in enumerate(path.read_text("latin-1").splitlines(), 1))
     lines = [(number, words) for number, words in stripped if words]
     if not lines or lines[0][1][0] not in KINDS:
-        raise MeshError(f"{path}: is not an OFF file: its first word is none of {', '.join(KINDS)}.")
+        raise MeshError(f"{path}: is not an OFF file: its first word is none of {', '.join(KINDS)}")
     counts_line, first = (lines[0][1][1:], 1) if len(lines[0][1]) > 1 else (lines[1][1] if len(lines) > 1 else [], 2)
     counts = whole_numbers(path, [counts_line[:2]], "the line of counts").tolist()
     if len(counts) < 2 or min(counts) < 0:
-        raise MeshError(f"{path}: its line of counts must name the vertices and the faces, got `{' '.join(counts_line)}`.")
+        raise MeshError(f"{path}: its line of counts must name the vertices and the faces, got `{' '.join(counts_line)}`")
     held = len(lines) - first
     if sum(counts) > held:
-        raise MeshError(f"{path}: announces {counts[0]} vertices and {counts[1]} faces but holds only {held} lines of them.")
+        raise MeshError(f"{path}: announces {counts[0]} vertices and {counts[1]} faces but holds only {held} lines of them")
     vertex_rows, face_rows = lines[first : first + counts[0]], lines[first + counts[0] : first + sum(counts)]
     short = next((number for number, words in vertex_rows if len(words) < 3), None)
     if short is not None:
-        raise MeshError(f"{path}: the vertex in line {short} has fewer than three coordinates.")
+        raise MeshError(f"{path}: the vertex in line {short} has fewer than three coordinates")
     vertices = numbers(path, [words[:3] for _, words in vertex_rows], "a vertex").reshape(-1, 3)
     return [checked(path, vertices, triangulated(path, vertices, _polygons(path, face_rows)))]
 
@@ -41,6 +41,6 @@ def _polygons(path: Path, rows: list[tuple[int, list[str]]]) -> list[list[int]] 
     for number, words in rows:
         corners = int(words[0]) if words[0].isdecimal() else -1
         if corners < 3 or len(words) <= corners:
-            raise MeshError(f"{path}: the face in line {number} is malformed: `{' '.join(islice(words, 8))}`.")
+            raise MeshError(f"{path}: the face in line {number} is malformed: `{' '.join(islice(words, 8))}`")
         polygons.append(whole_numbers(path, [words[1 : corners + 1]], f"the face in line {number}").tolist())
     return polygons

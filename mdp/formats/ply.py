@@ -64,12 +64,12 @@ def read(path: Path) -> list[Surface]:
             else:
                 columns[element.name], place = _ascii_rows(words, place, element)
         except (ValueError, IndexError, OverflowError):
-            raise MeshError(f"{path}: is cut short or malformed in its {element.count} rows of `{element.name}`.") from None
+            raise MeshError(f"{path}: is cut short or malformed in its {element.count} rows of `{element.name}`") from None
     plain = {(table.name, column.name) for table in elements for column in table.properties if not column.length}
     listed = {(table.name, column.name) for table in elements for column in table.properties if column.length}
     corners = next((name for name in ("vertex_indices", "vertex_index") if ("face", name) in listed), None)
     if corners is None or not {("vertex", axis) for axis in "xyz"} <= plain:
-        raise MeshError(f"{path}: needs the elements `vertex` with x, y, z and `face` with a list vertex_indices.")
+        raise MeshError(f"{path}: needs the elements `vertex` with x, y, z and `face` with a list vertex_indices")
     vertex, polygons = columns["vertex"], columns["face"][corners]
     vertices = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
     return [checked(path, vertices, triangulated(path, vertices, polygons))]
@@ -80,7 +80,7 @@ def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:
     body = content.find(b"\n", end) + 1
     lines = [line.split() for line in content[: max(end, 0)].decode("latin-1").splitlines()]
     if end < 0 or not body or lines[0] != ["ply"]:
-        raise MeshError(f"{path}: is not a PLY file: no header from `ply` to `end_header`.")
+        raise MeshError(f"{path}: is not a PLY file: no header from `ply` to `end_header`")
     order, elements = None, list[Element]()
     try:
         for words in lines[1:]:
@@ -94,13 +94,13 @@ def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:
                 column = Property(words[4], TYPES[words[3]], TYPES[words[2]]) if listed else Property(words[2], TYPES[words[1]])
                 elements.append(Element(last.name, last.count, (*last.properties, column)))
     except (KeyError, IndexError, ValueError):
-        raise MeshError(f"{path}: the header line `{' '.join(words)}` is not understood.") from None
+        raise MeshError(f"{path}: the header line `{' '.join(words)}` is not understood") from None
     if order is None:
-        raise MeshError(f"{path}: its header names no format; allowed are {', '.join(ORDERS)}.")
+        raise MeshError(f"{path}: its header names no format; allowed are {', '.join(ORDERS)}")
     for element in elements:
         least = element.least_bytes if order else 2 * len(element.properties) - 1
         if element.count < 0 or element.count * least > len(content) - body + 1:
-            raise MeshError(f"{path}: announces {element.count} rows of `{element.name}`, more than the file can hold.")
+            raise MeshError(f"{path}: announces {element.count} rows of `{element.name}`, more than the file can hold")
     return order, elements, body
 
 

@@ -26,9 +26,9 @@ def triangulated(path: Path, vertices: Floats, polygons: list[list[int]] | Indic
     for number, polygon in enumerate(polygons, 1):
         corners = np.array(polygon, dtype=np.int64)
         if len(corners) < 3:
-            raise MeshError(f"{path}: face {number} of {len(polygons)} has {len(corners)} corners, at least 3 are needed.")
+            raise MeshError(f"{path}: face {number} of {len(polygons)} has {len(corners)} corners, at least 3 are needed")
         if corners.min() < 0 or corners.max() >= len(vertices):
-            raise MeshError(f"{path}: face {number} names vertex {corners.max()} (counted from 0) of {len(vertices)} vertices.")
+            raise MeshError(f"{path}: face {number} names vertex {corners.max()} (counted from 0) of {len(vertices)} vertices")
         if len(corners) == 3:
             triangles.append(corners[None])
             continue

@@ -30,10 +30,10 @@ def read(path: Path) -> list[Surface]:
     if FACET_START.search(text) and text.lstrip()[:5].lower() == b"solid":
         return [_ascii(path, text)]
     if len(text) < HEADER or b"\0" not in text:
-        raise MeshError(f"{path}: is not an STL file: neither binary nor ASCII with `solid` and `facet` in it.")
+        raise MeshError(f"{path}: is not an STL file: neither binary nor ASCII with `solid` and `facet` in it")
     if len(text) < HEADER + FACET * count:
         held = (len(text) - HEADER) // FACET
-        raise MeshError(f"{path}: is cut short: it holds {held} of the {count} facets that its header announces.")
+        raise MeshError(f"{path}: is cut short: it holds {held} of the {count} facets that its header announces")
     return [_binary(path, text, count)]  # some programs write colours or padding behind the facets
 
 
@@ -47,7 +47,7 @@ def _ascii(path: Path, text: bytes) -> Surface:
     if 3 * len(facets) != text.lower().count(b"vertex") or len(facets) != len(FACET_START.findall(text)):
         bad = _first_bad_facet(text)  # none when only the name of a solid holds these words
         if bad:
-            raise MeshError(f"{path}: {bad}.")
+            raise MeshError(f"{path}: {bad}")
     return checked(path, numbers(path, facets, "a vertex"), np.arange(3 * len(facets)))
 
 

@@ -52,10 +52,10 @@ class Package:
         if name not in self.parts:
             try:
                 if self.archive.getinfo(name).file_size > LARGEST_MODEL_BYTES:
-                    raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes.")
+                    raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes")
                 self.parts[name] = ElementTree.fromstring(self.archive.read(name))
             except DAMAGES as error:
-                raise MeshError(f"{self.path}: its part {name} is missing or malformed ({error}).") from None
+                raise MeshError(f"{self.path}: its part {name} is missing or malformed ({error})") from None
         return self.parts[name]
 
 
@@ -67,7 +67,7 @@ def read(path: Path) -> list[Surface]:
     try:
         archive = zipfile.ZipFile(path)
     except (zipfile.BadZipFile, struct.error, ValueError, NotImplementedError):
-        raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short.") from None
+        raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short") from None
     with archive:
         package = Package(path, archive)
         start = _start(package)
@@ -76,7 +76,7 @@ def read(path: Path) -> list[Surface]:
             part = item.get(PRODUCTION_PATH, start)
             surfaces += _placed(package, part, item.get("objectid", ""), _transform(path, item), 0)
     if not surfaces:
-        raise MeshError(f"{path}: its build places no mesh.")
+        raise MeshError(f"{path}: its build places no mesh")
     return surfaces
 
 
@@ -85,7 +85,7 @@ def _start(package: Package) -> str:
     for relation in package.model("_rels/.rels").iter(RELATION):
         if relation.get("Type") == MODEL_TYPE:
             return relation.get("Target", "")
-    raise MeshError(f"{package.path}: its relationships name no 3D model.")
+    raise MeshError(f"{package.path}: its relationships name no 3D model")
 
 
 def _placed(package: Package, part: str, identity: str, transform: Floats, depth: int) -> list[Surface]:
@@ -94,7 +94,7 @@ def _placed(package: Package, part: str, identity: str, transform: Floats, depth
     found = [element for element in root.iter(f"{CORE}object") if element.get("id") == identity]
     if not found or depth > DEEPEST:
         why = "its components contain each other" if found else "it does not exist"
-        raise MeshError(f"{package.path}: object {identity!r} cannot be placed: {why}.")
+        raise MeshError(f"{package.path}: object {identity!r} cannot be placed: {why}")
     mesh = found[0].find(f"{CORE}mesh")
     if mesh is not None:
         return [_surface(package.path, mesh, transform, _unit_mm(package.path, root))]
@@ -109,7 +109,7 @@ def _placed(package: Package, part: str, identity: str, transform: Floats, depth
 def _unit_mm(path: Path, root: ElementTree.Element) -> float:
     unit = root.get("unit", "millimeter")
     if unit not in UNIT_MM:
-        raise MeshError(f"{path}: its unit {unit!r} is unknown; allowed are {', '.join(UNIT_MM)}.")
+        raise MeshError(f"{path}: its unit {unit!r} is unknown; allowed are {', '.join(UNIT_MM)}")
     return UNIT_MM[unit]
 
 
@@ -135,5 +135,5 @@ def _transform(path: Path, element: ElementTree.Element) -> Floats:
         return _IDENTITY
     values = numbers(path, [text.split()], "a transform")
     if values.shape != (12,) or not np.isfinite(values).all():
-        raise MeshError(f"{path}: a transform has {values.size} numbers instead of 12 finite ones: `{text}`.")
+        raise MeshError(f"{path}: a transform has {values.size} numbers instead of 12 finite ones: `{text}`")
     return values.reshape(4, 3)

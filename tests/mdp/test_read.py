@@ -32,7 +32,7 @@ def refusal(path: Path, **arguments: float) -> str:
         read_mesh(path, **arguments)
     sentence = str(caught.value)
     assert sentence.startswith(f"{path}: ")
-    assert sentence.endswith(".")
+    assert not sentence.endswith(".")
     assert "\n" not in sentence
     return sentence.removeprefix(f"{path}: ")
 
@@ -211,7 +211,7 @@ def test_a_text_file_called_stl_is_refused(tmp_path):
 def test_an_ascii_facet_without_three_vertices_is_named_with_its_line(tmp_path):
     lines = files.ascii_stl(tee()).splitlines()
     four = [*lines[:12], lines[11], *lines[12:]]
-    assert refusal(save(tmp_path / "a.stl", b"\n".join(four))) == "facet 2 of 28 (line 9) has 4 vertices instead of 3."
+    assert refusal(save(tmp_path / "a.stl", b"\n".join(four))) == "facet 2 of 28 (line 9) has 4 vertices instead of 3"
 
 
 def test_a_coordinate_that_is_no_number_is_refused(tmp_path):
