@@ -3,7 +3,8 @@
 import os
 import sys
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -46,8 +47,7 @@ def kind_of(name: str) -> str:
         if name in known(kind):
             return kind
     if not _is_path(name):
-        names = ", ".join(sorted(each for kind in KINDS for each in known(kind)))
-        raise ProfileError(f"profile {name!r} is not known: it must be one of {names}, or the path of a .toml file")
+        raise _unknown("profile", name, (each for kind in KINDS for each in known(kind)))
     return kind_in(Path(name))
 
 
@@ -106,16 +106,16 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     return out
 
 
-def parse(path: Path) -> dict[str, Any]:
-    """A TOML file; ProfileError says what is wrong with it."""
+def parse(path: Path, what: str = "profile") -> dict[str, Any]:
+    """A TOML file; ProfileError says what is wrong with it. what: the file's name for a person."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ProfileError(f"profile {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise ProfileError(f"{what} {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
     except UnicodeDecodeError:
-        raise ProfileError(f"profile {path} is not a text file: TOML in UTF-8 is expected") from None
+        raise ProfileError(f"{what} {path} is not a text file: TOML in UTF-8 is expected") from None
     except tomllib.TOMLDecodeError as error:
-        raise ProfileError(f"profile {path} is not valid TOML: {error}") from None
+        raise ProfileError(f"{what} {path} is not valid TOML: {error}") from None
 
 
 def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, Any], str]:
@@ -131,9 +131,17 @@ def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, An
         return tomllib.loads(source.read_text(encoding="utf-8")), name
     if _is_path(name):
         return parse(Path(name)), str(Path(name).resolve())
-    names = ", ".join(known(kind))
-    raise ProfileError(f"{kind} profile {name!r} is not known: it must be one of {names}, or the path of a .toml file")
+    raise _unknown(f"{kind} profile", name, known(kind))
+
+
+def _unknown(what: str, name: str, names: Iterable[str]) -> ProfileError:
+    allowed = sorted(names)
+    near = get_close_matches(name.lower(), allowed, 1, 0.7)
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    return ProfileError(
+        f"{what} {name!r} is not known{hint}: it must be one of {', '.join(allowed)}, or the path of a .toml file"
+    )
 
 
 def _is_path(name: str) -> bool:
-    return Path(name).suffix == ".toml" or Path(name).exists()
+    return bool(name) and (Path(name).suffix == ".toml" or os.path.exists(name))

@@ -61,6 +61,9 @@ def load_one(name: str, settings: Iterable[str] = ()) -> dict[str, Frozen]:
     whole: dict[str, Any] = {section: {} for section in OF_KIND[kind]} | tables(kind, name)
     for setting in settings:
         _apply(whole, setting)
+        if setting.partition(".")[0].strip() not in OF_KIND[kind]:
+            own_keys = " and ".join(f"{each}." for each in OF_KIND[kind])
+            raise ProfileError(f"--set {setting}: {name} is a {kind} profile, whose keys begin with {own_keys}")
     problems, models = [], {}
     for section in OF_KIND[kind]:
         try:

@@ -6,7 +6,6 @@ Exit codes: 0 done, 1 the user can fix it, 3 a bug (log file named), 130 interru
 import os
 import sys
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -35,15 +34,17 @@ from machine.app.options import (
     sections_named,
 )
 from machine.app.printer_cli import COMMANDS
+from machine.app.usage import sentence
 from profiles.errors import UserError
 
 app = typer.Typer(
     add_completion=False,
+    context_settings={"max_content_width": 120},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="From a mesh to a finished multi-directional print on a 5-axis printer.",
 )
-profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check profiles of machines, materials and processes.")
+profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check machines, materials and processes.")
 app.add_typer(profiles_app, name="profiles")
 
 
@@ -80,16 +81,16 @@ def decompose(
 @app.command()
 def export(
     model: Model,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write; - for standard output")],
     beam_width: BeamWidth = None,
     search: SearchName = None,
     time_limit: TimeLimit = None,
     ranker: RankerName = "classic",
     orient: Orient = False,
     json: JsonFile = None,
-    svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer")] = None,
+    svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer, see --layer")] = None,
     html: HtmlFile = None,
-    layer: Annotated[str | None, typer.Option("--layer", metavar="PART:LAYER", help="which layer, counted from 1:1")] = None,
+    layer: Annotated[str | None, typer.Option("--layer", metavar="PART:LAYER", help="which layer; else the first, 1:1")] = None,
     compare: Annotated[
         bool, typer.Option("--compare", help="tell also time, material, support and risky area printed in one part")
     ] = False,
@@ -127,7 +128,7 @@ def simulate(
     process: ProcessGiven = None,
     settings: Settings = None,
 ) -> int:
-    """Dry-run a model or a G-code file, held against the model; exit 1 when a finding is an error."""
+    """Dry-run a model or a G-code file. The plastic is held against the model; exit 1 when a finding is an error."""
     from machine.app import commands
 
     profile = profile_of(
@@ -155,7 +156,7 @@ def view(
     process: ProcessGiven = None,
     settings: Settings = None,
 ) -> int:
-    """Write one HTML page that shows a model or a G-code file: parts, layers, the moving machine, a report."""
+    """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
     from machine.app import view_command
 
     profile = profile_of(
@@ -189,11 +190,16 @@ def calibrate(
     machine: MachineName = "generic_ac",
     settings: Settings = None,
 ) -> int:
-    """Find signs, zeros and centres of the rotary axes from a few touches of a mark, and keep them in your own profile."""
+    """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
+
+    Without -o and --measured a terminal asks for the touches one by one.
+    """
     from machine.app import calibrate_command
 
+    if out is None and measured is None and sys.stdin.isatty() and sys.stdout.isatty():
+        return calibrate_command.talk(machine, settings or [], mark_height, mark_radius, save, replace, force)
     if (out is None) == (measured is None):
-        raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected")
+        raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
     if out is not None:
         profile = profile_of(machine, "pla", "standard", settings, None, None, None)
         return calibrate_command.write_program(machine, profile, out, mark_height, mark_radius, replace)
@@ -204,7 +210,7 @@ def calibrate(
 
 @profiles_app.command("list")
 def profiles_list() -> int:
-    """The shipped profiles."""
+    """The shipped profiles and your own."""
     from machine.app import profile_commands
 
     return profile_commands.list_profiles()
@@ -212,7 +218,7 @@ def profiles_list() -> int:
 
 @profiles_app.command("show")
 def profiles_show(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="a shipped profile or a .toml file")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="name of a profile, or a .toml file")],
     json: Annotated[bool, typer.Option("--json", help="resolved values as JSON")] = False,
     settings: Settings = None,
 ) -> int:
@@ -257,7 +263,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except typer.Exit as done:
         return done.exit_code
     except TyperException as error:
-        return _complain(_usage(error, given))
+        return _complain(sentence(error, given))
     except UserError as error:
         return _complain(str(error))
     except (KeyboardInterrupt, typer.Abort):
@@ -280,25 +286,6 @@ def _interrupted(error: BaseException | None) -> bool:
             return True
         error = error.__cause__ or error.__context__
     return False
-
-
-def _usage(error: TyperException, given: Sequence[str]) -> str:
-    """A usage error as one sentence that names what is allowed."""
-    message = str(getattr(error, "format_message", lambda: str(error))()).strip().rstrip(".")
-    context = getattr(error, "ctx", None)
-    if context is None:
-        return message
-    files = [word for word in given if word.startswith("-") and Path(word).is_file()]
-    if files:
-        return f"{files[0]} begins with a dash: write ./{files[0]}"
-    if message.startswith("No such option"):
-        allowed = [option for parameter in context.command.params for option in parameter.opts if option.startswith("--")]
-        return f"{message}; {context.command_path} knows {', '.join(allowed)}"
-    if message.startswith("No such command"):
-        return f"{message}; allowed are {', '.join(context.command.commands)}"
-    for option, value in pairwise(given):
-        message = message.replace(f"Invalid value for '{option}': Input", f"{option} is {value!r}: it")
-    return f"{message}; see {context.command_path} --help"
 
 
 def _complain(message: str, code: int = 1) -> int:

@@ -7,7 +7,7 @@ from machine.app.compare import Rival, compare_table, compared, plain
 from machine.app.foot import in_words, told_in
 from machine.app.layer_picture import asked, drawn
 from machine.app.match import check_printer, check_program
-from machine.app.output import check_folder, check_writable, write_bytes, write_json, write_lines
+from machine.app.output import STDOUT, check_folder, check_writable, make_folder, write_bytes, write_json, write_lines
 from machine.app.picture import contact_sheet, parts_picture
 from machine.app.pipeline import Program, build, decompose_model, model_name
 from machine.app.png import write_png
@@ -22,7 +22,7 @@ from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.starvation import check_baud, starved
 from mdp.read import check_file, locate, read_mesh
 from mdp.save import part_file, stl, threemf, values
-from profiles.errors import GcodeError, MoveError, ProfileError
+from profiles.errors import GcodeError, MoveError, OutputError, ProfileError
 from profiles.profile import Profile
 
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
@@ -43,12 +43,11 @@ def decompose(
     """Find the parts of a model and save what is asked for."""
     if out is not None:
         check_folder(out)
-    for file in (json, png, sheet, record, html):
-        _check(file)
+    _check(png, sheet, record, html, json=json)
     found = decompose_model(model, profile, ranker, orient, record)
     told = values(found.decomposition, found.read_s, found.total_s)
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
         for part in found.decomposition.parts:
             write_bytes(out / part_file(part.index), stl(part.mesh))
         write_bytes(out / "decomposition.3mf", threemf(found.decomposition))
@@ -63,7 +62,7 @@ def decompose(
         write_bytes(html, parts_page(found.decomposition, profile))
     if json is not None:
         write_json(json, told)
-    if json is None or str(json) != "-":
+    if json != STDOUT:
         show(parts_table(found, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces))
     return 0
 
@@ -83,13 +82,11 @@ def export(
 ) -> int:
     """Write a model's G-code, and one layer's picture where asked; refused when its dry run finds an error, unless forced.
 
-    compare: tell also what the model costs printed in one part.
+    out: - is standard output, then the table goes to stderr. compare: tell also what the model costs printed in one part.
     """
-    check_writable(out)
-    for file in (json, html):
-        _check(file)
-    if svg is not None:
-        check_writable(svg)
+    if out == json == STDOUT:
+        raise OutputError("-o - and --json -: only one of them can go to standard output")
+    _check(html, svg, None if out == STDOUT else out, json=json)
     wanted = asked(layer, svg is not None)
     found = decompose_model(model, profile, ranker, orient, to_build=True).decomposition
     program = build(found, profile, pictures=True)
@@ -101,7 +98,7 @@ def export(
     rivals = compared(program, profile) if compare else ()
     if html is not None:
         write_bytes(html, print_page(model_name(model), program, profile, rivals=rivals))
-    _tell(program, json, rivals)
+    _tell(program, json, rivals, aside=out == STDOUT)
     return 0
 
 
@@ -121,8 +118,7 @@ def simulate(
     named: profiles given, not taken from the file. beside: the model that a G-code file's plastic is held against. baud: of a
     line whose speed is judged too.
     """
-    for file in (json, html):
-        _check(file)
+    _check(html, json=json)
     if baud is not None:
         check_baud(baud)
     if beside is not None:
@@ -166,8 +162,8 @@ def print_model(
     watch_port: serve the print's page on this port of this computer, 0: on any free one; None: serve nothing.
     log: file for the traffic of the line, journal: for what a resume needs; None: a new one in the state folder.
     """
-    for file in (log, journal):
-        _check(file)
+    _check(log, journal)
+    check_baud(baud)
     answer = check_port(port, baud, sim_speed)
     is_model = Path(model).suffix.lower() not in GCODE_SUFFIXES
     if is_model:
@@ -235,15 +231,23 @@ def _refuse_errors(program: Program, force: bool) -> None:
     )
 
 
-def _check(file: Path | None) -> None:
-    if file is not None and str(file) != "-":
-        check_writable(file)
+def _check(*files: Path | None, json: Path | None = None) -> None:
+    for file in (*files, None if json == STDOUT else json):
+        if file is not None:
+            check_writable(file)
 
 
-def _tell(program: Program, json: Path | None, rivals: tuple[Rival, ...] = (), found: Agreement | None = None) -> None:
+def _tell(
+    program: Program, json: Path | None, rivals: tuple[Rival, ...] = (), found: Agreement | None = None, aside: bool = False
+) -> None:
+    """The result as JSON, and as a table; aside: the table goes to stderr."""
     if json is not None:
         told = {"compare": plain(rivals)} if rivals else {}
         write_json(json, summary(program.run) | told | ({"model": asdict(found)} if found is not None else {}))
-    if json is None or str(json) != "-":
+    if json != STDOUT:
         beside = "" if found is None else agreement_line(found)
-        show(run_table(program.run) + beside + (compare_table(rivals) if rivals else ""))
+        table = run_table(program.run) + beside + (compare_table(rivals) if rivals else "")
+        if aside:
+            say(table.removesuffix("\n"))
+        else:
+            show(table)

@@ -5,20 +5,53 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterable
+from os.path import exists, isdir, isfile, islink  # pathlib's raise for a name that is too long
 from pathlib import Path
 from typing import Any
 
 from profiles.errors import OutputError
 
+STDOUT = Path("-")
+
 
 def check_writable(path: Path) -> None:
     """Refuse early what could not be written at the end of long work."""
-    if path.is_dir():
+    if path == STDOUT:
+        raise OutputError("output -: a file name is expected; --json, and -o of export, can go to standard output")
+    if isdir(path):
         raise OutputError(f"output {path} is a folder: a file name is expected")
-    folder = path.parent
-    if folder.is_file():
+    _check_name(path)
+    if exists(path) and not os.access(path, os.W_OK):
+        raise OutputError(f"output {path} exists and is not writable")
+    if not _is_device(path):
+        _check_parent(path, (path.resolve() if islink(path) else path).parent)
+
+
+def make_folder(path: Path) -> None:
+    """The folder, with those above it. Raises OutputError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _not_written(path, error) from None
+
+
+def _check_name(path: Path) -> None:
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except OSError as error:  # too long, a link to itself, a folder that may not be looked into
+        raise _not_written(path, error) from None
+
+
+def _not_written(path: Path, error: OSError) -> OutputError:
+    return OutputError(f"output {path} cannot be written: {(error.strerror or str(error)).lower()}")
+
+
+def _check_parent(path: Path, folder: Path) -> None:
+    if isfile(folder):
         raise OutputError(f"output {path}: {folder} is a file, not a folder")
-    if not folder.is_dir():
+    if not isdir(folder):
         raise OutputError(f"output {path}: the folder {folder} does not exist")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"output {path}: the folder {folder} is not writable")
@@ -26,45 +59,68 @@ def check_writable(path: Path) -> None:
 
 def check_folder(path: Path) -> None:
     """Refuse early a folder that cannot be made or written."""
-    if path.exists() and not path.is_dir():
+    if path == STDOUT:
+        raise OutputError("output -: a folder is expected; only --json can go to standard output")
+    _check_name(path)
+    if exists(path) and not isdir(path):
         raise OutputError(f"output {path} is a file: a folder is expected")
-    nearest = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
-    if nearest.is_file():
+    nearest = next(folder for folder in (path, *path.absolute().parents) if exists(folder))
+    if isfile(nearest):
         raise OutputError(f"output {path}: {nearest} is a file, not a folder")
     if not os.access(nearest, os.W_OK):
         raise OutputError(f"output {path}: {nearest} is not writable")
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write beside the target, then rename, so that no half-written file is ever seen. Raises OutputError."""
+    """Write a file whole or not at all, through a link that stands in its place. Raises OutputError."""
     check_writable(path)
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-            beside = Path(file.name)
-            try:
-                file.write(content)
-                file.flush()
-                beside.chmod(0o666 & ~_umask())
-            except BaseException:
-                beside.unlink()
-                raise
-        beside.replace(path)
+        if _is_device(path):
+            path.write_bytes(content)
+        else:
+            _replace(path.resolve(), content)
     except OSError as error:
-        raise OutputError(f"output {path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+        raise _not_written(path, error) from None
 
 
 def write_lines(path: Path, lines: Iterable[str]) -> None:
-    """Write text lines, whole or not at all."""
-    write_bytes(path, ("\n".join(lines) + "\n").encode())
+    """Write text lines, whole or not at all; the path - stands for standard output."""
+    _write_text(path, "\n".join(lines) + "\n")
 
 
 def write_json(path: Path, value: Any) -> None:
     """Write a value as JSON; the path - stands for standard output."""
-    text = json.dumps(value, indent=2) + "\n"
-    if str(path) == "-":
+    _write_text(path, json.dumps(value, indent=2) + "\n")
+
+
+def _write_text(path: Path, text: str) -> None:
+    if path == STDOUT:
         sys.stdout.write(text)
     else:
         write_bytes(path, text.encode())
+
+
+def _is_device(path: Path) -> bool:
+    """Whether a name stands for a device or a pipe (/dev/null, /dev/stdout), which must not be replaced by a file."""
+    return exists(path) and not isfile(path) and not isdir(path)
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write beside the target, then rename, so that no half-written file is ever seen."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".tiltprint-", delete=False) as file:
+        beside = Path(file.name)
+        try:
+            file.write(content)
+            file.flush()
+            beside.chmod(0o666 & ~_umask())
+        except BaseException:
+            beside.unlink()
+            raise
+    try:
+        beside.replace(path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
 
 
 def _umask() -> int:

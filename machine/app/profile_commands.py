@@ -53,7 +53,7 @@ def check(file: Path) -> int:
     if not problems and kind_of(str(file)) == "machine":
         problems = _block_problems(load_one(str(file))["machine"])
     for problem in problems:
-        sys.stderr.write(f"tiltprint: {file}: {problem}\n")
+        sys.stderr.write(f"tiltprint: {problem if str(file) in problem else f'{file}: {problem}'}\n")
     if not problems:
         sys.stdout.write(f"{file}: no problem found\n")
     return 1 if problems else 0

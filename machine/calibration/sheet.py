@@ -57,7 +57,7 @@ def read_sheet(path: Path, mark_height_mm: float | None = None) -> Sheet:
 
     mark_height_mm goes before what the file says. Raises ProfileError naming the file and the touch.
     """
-    document = _csv(path) if path.suffix.lower() == ".csv" else parse(path)
+    document = _csv(path) if path.suffix.lower() == ".csv" else parse(path, "sheet")
     unknown = [key for key in document if key not in KEYS]
     if unknown:
         raise ProfileError(f"{path}: {', '.join(unknown)} is not a key of a calibration sheet: allowed are {', '.join(KEYS)}")

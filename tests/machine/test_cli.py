@@ -18,14 +18,28 @@ FAST += ["--set", "process.line_width_mm=0.6", "--set", "process.scale=0.6"]
 WRONG = [
     (["decompose", "nowhere.stl"], "nowhere.stl"),
     (["decompose", "."], "folder"),
+    (["decompose", f"{'long' * 80}.stl"], "there is no such file"),
+    (["decompose", "demo:tree", "--machine", "long" * 80], "is not known"),
+    (["decompose", "demo:tree", "-o", "long" * 80], "file name too long"),
+    (["decompose", "demo:tree", "--json", "long" * 80], "file name too long"),
     (["decompose", "demo:unicorn"], "figure"),
     (["decompose", "demo:tree", "--nonsense"], "--beam-width"),
+    (["decompose", ""], "the model's name is empty"),
     (["decompose", "demo:tree", "--machine", "lathe"], "generic_ac"),
+    (["decompose", "demo:tree", "--machine", "generic_ca"], "did you mean generic_ac?"),
+    (["decompose", "demo:tree", "--material", "PLA"], "did you mean pla?"),
+    (["decompose", "demo:tree", "--process", ""], "process profile '' is not known"),
+    (["decompose", "demo:tree", "--jsn", "x"], "did you mean --json?"),
     (["decompose", "demo:tree", "--set", "process.wals=2"], "process.wals"),
     (["decompose", "demo:tree", "--set", "process.walls=-2"], "process.walls"),
     (["decompose", "demo:tree", "--set", "walls"], "KEY=VALUE"),
     (["decompose", "demo:tree", "--beam-width", "0"], "beam_width"),
-    (["decompose", "demo:tree", "--beam-width", "many"], "many"),
+    (["decompose", "demo:tree", "--beam-width", "many"], "--beam-width is 'many': it must be a whole number"),
+    (["decompose", "demo:tree", "--beam-width=many"], "--beam-width is 'many': it must be a whole number"),
+    (["decompose", "demo:tree", "-o", "-"], "a folder is expected"),
+    (["decompose", "demo:tree", "--png", "-"], "output -: a file name is expected"),
+    (["export", "demo:tree", "-o", "-", "--json", "-"], "only one of them can go to standard output"),
+    (["view", "short.gcode", "-o", "-"], "output -: a file name is expected"),
     (["decompose", "demo:tree", "--search", "luck"], 'search.method is "luck": it must be one of "best", "published"'),
     (["decompose", "demo:tree", "--time-limit", "-1"], "search.time_limit_s is -1"),
     (["decompose", "demo:tree", "--time-limit", "soon"], "--time-limit is 'soon'"),
@@ -42,10 +56,15 @@ WRONG = [
     (["simulate", "short.gcode", "--model", "nowhere.stl"], "nowhere.stl"),
     (["profiles", "show", "unicorn"], "generic_ac"),
     (["profiles", "check", "nowhere.toml"], "nowhere.toml"),
+    (["profiles", "show", "pla", "--set", "process.walls=3"], "pla is a material profile"),
+    (["calibrate", "--measured", "nowhere.toml"], "sheet nowhere.toml cannot be read"),
     (["fly"], "decompose"),
+    (["exprot"], "did you mean export?"),
     (["print", "demo:tree", "--port", "/dev/nowhere"], "/dev/nowhere does not exist"),
     (["print", "demo:tree", "--port", "/dev/null"], "/dev/null"),
     (["print", "demo:tree", "--port", "sim", "--sim-speed", "-1"], "--sim-speed is -1"),
+    (["print", "short.gcode", "--port", "sim", "--baud", "0"], "--baud is 0"),
+    (["print", "short.gcode", "--port", "sim", "--watch-port", "70000"], "--watch-port is '70000': it must be at most 65535"),
     (["decompose", "-lead.stl"], "./-lead.stl"),
     (["decompose", "demo:tree", "--json", "empty.gcode/x.json"], "empty.gcode is a file"),
     (["decompose", "demo:tree", "-o", "empty.gcode/parts"], "empty.gcode is a file"),
@@ -144,6 +163,25 @@ def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Pat
     assert main(["simulate", "a.gcode", "--model", "demo:bracket", "--json", "beside.json"]) == 0
     beside = json.loads(Path("beside.json").read_text())["model"]
     assert (beside["outside"], beside["filled"] > 0.5) == (0.0, True)
+
+
+def test_g_code_on_standard_output_is_the_file_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "demo:bracket", *FAST, "-o", "a.gcode"]) == 0
+    table = capsys.readouterr().out
+    assert main(["export", "demo:bracket", *FAST, "-o", "-"]) == 0
+    told = capsys.readouterr()
+    assert (told.out, table in told.err) == (Path("a.gcode").read_text(), True)
+    assert not Path("-").exists()
+
+
+def test_every_command_is_told_in_one_line_of_a_narrow_screen(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["--help"]) == 0
+    lines = capsys.readouterr().out.partition("Commands:")[2].splitlines()[1:]
+    assert len(lines) == 11
+    assert all(line.endswith(".") and not line.endswith("...") for line in lines)
 
 
 def test_the_simulated_speed_must_be_a_number(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
