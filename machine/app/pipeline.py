@@ -125,7 +125,8 @@ def build(decomposition: Decomposition, profile: Profile, pictures: bool = False
     parts = decomposition.parts
 
     def show(begun: int, of: int, layers: int, all_layers: int) -> None:
-        ticker.tick(f"slicing part {begun} of {of}: {min(100, 100 * layers // max(all_layers, 1))} % of the layers")
+        share = min(100, 100 * layers // max(all_layers, 1))
+        ticker.tick(f"slicing part {max(begun, 1)} of {of}: {share} % of all layers")
 
     check_parts(parts, profile)
     warm_program(profile)
