@@ -4,11 +4,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from machine.app.calibrate_talk import asked
 from machine.app.output import check_writable, write_bytes, write_lines
 from machine.calibration.fit import Calibration, calibrate
 from machine.calibration.program import calibration_lines, course
 from machine.calibration.saved import found_tables, own_document
-from machine.calibration.sheet import read_sheet, sheet_text
+from machine.calibration.sheet import Sheet, read_sheet, sheet_text
 from profiles.errors import OutputError, ProfileError
 from profiles.machine import Machine
 from profiles.places import own_folder
@@ -45,21 +46,62 @@ def work_out(
     name: str, settings: Sequence[str], measured: Path, mark_height_mm: float | None, save: str | None, replace: bool, force: bool
 ) -> int:
     """Find signs, zeros and centres from a filled sheet, tell them and save them."""
-    machine = load_one(name, settings).get("machine")
-    if not isinstance(machine, Machine):
-        raise ProfileError(f"{name} is not a machine profile")
+    machine = _tilting(name, settings)
     sheet = read_sheet(measured, mark_height_mm)
     if sheet.machine not in (None, name):
         raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
-    if not machine.tilts:
-        raise ProfileError(f"{machine.name} has three axes: there is no rotary axis to calibrate")
     found = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
     sys.stdout.write(_told(machine, found, sheet.mark_angle_deg is not None))
     if found.rms_mm > MOST_OFF_MM and not force:
         raise ProfileError(
-            f"the touches are {found.rms_mm:.2f} mm off on average, at most {MOST_OFF_MM:g} mm is taken without --force: "
-            f"look at touch {found.worst} first"
+            f"{_off(found)}, at most {MOST_OFF_MM:g} mm is taken without --force: look at touch {found.worst} first"
         )
+    _save(name, machine, found, sheet, save, replace)
+    return 0
+
+
+def talk(
+    name: str, settings: Sequence[str], mark_height_mm: float | None, mark_radius_mm: float | None, save: str | None,
+    replace: bool, force: bool,
+) -> int:  # fmt: skip
+    """Ask a person for the touches one by one, tell what follows from them, save it."""
+    machine = _tilting(name, settings)
+    _keep(own_document(save or Path(name).stem, name, {})[0], replace)
+    best: list[Calibration] = []
+
+    def judged(sheet: Sheet) -> str | int | None:
+        try:
+            found = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
+        except ProfileError as error:
+            return str(error)
+        sys.stdout.write(_told(machine, found, sheet.mark_angle_deg is not None))
+        if found.rms_mm > MOST_OFF_MM and not force:
+            sys.stdout.write(f"{_off(found)}, at most {MOST_OFF_MM:g} mm is taken without --force\n")
+            return found.worst
+        best.append(found)
+        return None
+
+    height = MARK_HEIGHT_MM if mark_height_mm is None else mark_height_mm
+    sheet = asked(name, machine, height, mark_radius_mm, judged)
+    _save(name, machine, best[-1], sheet, save, replace)
+    return 0
+
+
+def _tilting(name: str, settings: Sequence[str]) -> Machine:
+    machine = load_one(name, settings).get("machine")
+    if not isinstance(machine, Machine):
+        raise ProfileError(f"{name} is not a machine profile")
+    if not machine.tilts:
+        raise ProfileError(f"{machine.name} has three axes: there is no rotary axis to calibrate")
+    return machine
+
+
+def _off(found: Calibration) -> str:
+    return f"the touches are {found.rms_mm:.2f} mm off on average"
+
+
+def _save(name: str, machine: Machine, found: Calibration, sheet: Sheet, save: str | None, replace: bool) -> None:
+    """The found numbers in the user's own profile, and the file before beside it."""
     tables = found_tables(machine, found, sheet.mark_angle_deg is not None)
     file, document = own_document(save or Path(name).stem, name, tables)
     _keep(file, replace)
@@ -68,7 +110,6 @@ def work_out(
         write_bytes(file.with_suffix(".toml.before"), file.read_bytes())
     write_bytes(file, toml(document).encode())
     sys.stdout.write(f"saved: {file}; use it as --machine {file.stem}\n")
-    return 0
 
 
 def _told(before: Machine, found: Calibration, zero_of_turn: bool) -> str:

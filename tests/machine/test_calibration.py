@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from machine.app.calibrate_command import talk
 from machine.app.cli import main
 from machine.calibration.fit import Calibration, Touch, calibrate
 from machine.calibration.program import calibration_lines, course
@@ -218,3 +219,87 @@ def test_an_empty_sheet_holds_no_touch(tmp_path: Path) -> None:
     (tmp_path / "sheet.toml").write_text(sheet_text("generic_ac", machine, course(machine, 20.0)))
     sheet = read_sheet(tmp_path / "sheet.toml")
     assert (sheet.touches, sheet.mark_height_mm, sheet.machine) == ((), 20.0, "generic_ac")
+
+
+class Person:
+    """Someone who types these lines, then Ctrl-C."""
+
+    def __init__(self, *lines: str) -> None:
+        self.lines, self.asked = list(lines), []
+
+    def __call__(self, prompt: str) -> str:
+        self.asked.append(prompt)
+        if not self.lines:
+            raise KeyboardInterrupt
+        return self.lines.pop(0)
+
+
+def talked(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
+    """What a person at the machine is asked; where the lines end, Ctrl-C is pressed."""
+    person = Person(*lines)
+    monkeypatch.setattr("builtins.input", person)
+    try:
+        talk("open5x_voron0", [], None, None, None, replace=False, force=False)
+    except KeyboardInterrupt:
+        person.lines.append("Ctrl-C")
+    return person
+
+
+def at_the_mark(real: Machine) -> list[str]:
+    """The twelve lines of X Y Z that a real machine shows when its tip is on the mark where it stands."""
+    touches = course(machine_of("open5x_voron0"), 20.0)
+    places = [machine_points(real, pose, np.array([touches.mark_mm]))[0] for pose in touches.poses]
+    return [" ".join(f"{letter}{value:.4f}" for letter, value in zip("XYZ", place, strict=True)) for place in places]
+
+
+def test_a_person_who_is_led_through_the_touches_ends_with_an_own_profile(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = really(machine_of("open5x_voron0"), {"zero_deg": 1.2}, {"point_mm": (1.3, -2.2, 0.4), "sign": 1})
+    lines = at_the_mark(real)
+    first = lines[0].replace("X", "").replace("Y", "").replace("Z", "").split()
+    person = talked(monkeypatch, "", "", *first[:2], "b", "", first[2], "s", *lines[2:])
+    assert person.lines == []
+    found = machine_of("open5x_voron0")
+    assert found.turn.point_mm == pytest.approx(real.turn.point_mm, abs=0.01)
+    assert (found.tilt.zero_deg, found.turn.sign) == (pytest.approx(1.2, abs=0.01), 1)
+
+
+def test_a_touch_that_does_not_fit_the_others_is_asked_again(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = at_the_mark(machine_of("open5x_voron0"))
+    x, *others = lines[6].split()
+    misread = " ".join([f"X{float(x[1:]) + 4:.3f}", *others])
+    person = talked(monkeypatch, "", "", *lines[:6], misread, *lines[7:], lines[6])
+    assert person.lines == []
+    assert "look at touch 7 again" in capsys.readouterr().out
+    assert machine_of("open5x_voron0").tilt.point_mm == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("reply", "said"),
+    [
+        ("abc", "'abc' cannot be read: a number such as 12.5 is expected, or X Y Z"),
+        ("1 2", "'1 2' cannot be read"),
+        ("nan", "'nan' cannot be read"),
+        ("500", "X500 is out of reach: -58 to 115 mm is allowed"),
+        ("100", "X100 mm is far from the 29 mm that the profile expects; type it again to keep it"),
+    ],
+)
+def test_a_number_is_judged_as_soon_as_it_is_typed(
+    reply: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    person = talked(monkeypatch, "20", "", reply)
+    assert said in capsys.readouterr().out
+    assert person.asked[-1] == person.asked[-2] == "touch 1 of 12, B0 C0, X mm (near 29): "
+
+
+def test_a_height_unlike_the_others_of_the_level_table_is_doubted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    talked(monkeypatch, "20", "", "29 0 20", "0 -29 30", "0 -29 30")
+    assert "Z30 mm: at the level table the other touches are at 20 mm; type it again" in capsys.readouterr().out
+
+
+def test_ctrl_c_among_the_questions_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert talked(monkeypatch, "20", "", "29 0 20", "0").lines == ["Ctrl-C"]
+    assert not own_folder("machine").exists()
