@@ -25,6 +25,9 @@ class Material(Frozen):
         60.0, gt=0, le=3600, description="layers that take longer have cooled by themselves and need only fan_least, s"
     )
     fan_bridge: float | None = Field(None, ge=0, le=1, description="part fan on bridges and overhanging walls; absent: fan")
+    fan_infill_bridge: float | None = Field(
+        None, ge=0, le=1, description="part fan on the first solid layer over sparse infill; absent: fan_bridge"
+    )
     fan_off_layers: int = Field(1, ge=0, le=1000, description="layers of part 1 without any fan: they must stick to the plate")
     flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on all extruded volume")
     retract_mm: float = Field(ge=0, le=15, description="filament pulled back before a travel that crosses outside, mm")

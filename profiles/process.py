@@ -108,6 +108,9 @@ class Process(Frozen):
     bridge_flow: float = Field(
         1.0, ge=0.3, le=2, description="factor on extruded volume of bridges; 1: as much plastic as the layer has room for"
     )
+    infill_bridge_flow: float = Field(
+        1.0, ge=0.3, le=2, description="factor on extruded volume of the first solid layer over sparse infill, which spans it"
+    )
     support: Literal["none", "auto"] = Field("auto", description="auto: support what the decomposition left risky")
     support_style: Literal["tree", "grid"] = Field(
         "tree",
@@ -224,6 +227,9 @@ class Process(Frozen):
     )
     bridge_speed_mm_s: float = Field(
         30.0, gt=0, le=1000, description="speed of bridges, mm/s: faster strands tear, slower ones sag"
+    )
+    infill_bridge_speed_mm_s: float = Field(
+        40.0, gt=0, le=1000, description="speed of the first solid layer over sparse infill, mm/s: it hangs between the lines"
     )
     infill_speed_mm_s: float = Field(80.0, gt=0, le=1000, description="speed of sparse infill, mm/s")
     support_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of support, mm/s")

@@ -21,7 +21,7 @@ class Bead:
     """points: (n, 2) mm, a closed bead repeats its first point.
 
     rank: beads of an island are printed by rising rank; those of rank 0 and below are its walls and stay together around
-    each outer wall.
+    each outer wall. over_infill: a bridge over the sparse infill of the layer below, which has a speed and a fan of its own.
     """
 
     kind: Kind
@@ -29,6 +29,7 @@ class Bead:
     width_mm: float
     rank: int
     flow: float = 1.0
+    over_infill: bool = False
 
     @property
     def closed(self) -> bool:

@@ -6,6 +6,7 @@ import numpy as np
 
 from mdp.kernel import floats, kernel, table
 from mdp.mesh import Floats
+from profiles.process import Process
 from slicer.bead import Bead
 from slicer.paths import Kind
 from slicer.polygons import Polygons, edges, grown, opened
@@ -17,6 +18,7 @@ from slicer.skin import skin
 TURNS = 18  # directions tried over half a turn, besides those of the place's own sides
 SIDES = 8  # so many of its longest sides are tried, along and across
 LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
+NARROW = 4.0  # line widths: narrower strips of skin over sparse infill are no bridges
 ANCHOR = 2.0  # line widths that the lines of a bridge reach over its banks
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
 ADRIFT = 10.0  # and one held nowhere like this
@@ -127,3 +129,24 @@ def beside(region: Region, area: Polygons, width_mm: float) -> Region:
 def bridge_beads(area: Polygons, angle_deg: float, flow: float, width_mm: float, height_mm: float, overlap: float) -> list[Bead]:
     """The lines of a bridge with its own flow."""
     return [replace(bead, flow=bead.flow * flow) for bead in skin(area, Kind.BRIDGE, angle_deg, width_mm, height_mm, overlap)]
+
+
+def over_infill(solid: Polygons, sparse_below: Polygons, width_mm: float) -> Polygons:
+    """Where solid lines span the sparse infill of the layer below, and as far beyond as they hold on to what is solid there.
+
+    Strips narrower than NARROW lines are left out: the skin beside them carries their lines.
+    """
+    if solid.is_empty() or sparse_below.is_empty():
+        return Polygons()
+    place = solid ^ sparse_below
+    if place.area() < (NARROW * width_mm) ** 2:
+        return Polygons()
+    open_place = opened(place, 0.5 * NARROW * width_mm)
+    return open_place if open_place.is_empty() else grown(open_place, ANCHOR * width_mm) ^ solid
+
+
+def infill_bridge_beads(area: Polygons, angle_deg: float, process: Process, height_mm: float) -> list[Bead]:
+    """The first solid lines over sparse infill, across the lines below wherever those have one direction."""
+    overlap, width = process.infill_overlap if process.walls else 0.0, process.line_width_mm
+    beads = bridge_beads(area, angle_deg, process.infill_bridge_flow, width, height_mm, overlap)
+    return [replace(bead, over_infill=True) for bead in beads]

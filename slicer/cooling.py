@@ -2,6 +2,7 @@
 
 from profiles.material import Material
 from profiles.process import Process
+from slicer.bead import Bead
 from slicer.paths import Kind
 
 HANGING = (Kind.BRIDGE, Kind.OVERHANG)
@@ -20,8 +21,9 @@ def fan_share(material: Material, process: Process, time_s: float) -> float:
     return round((least + share * (material.fan - least)) / STEP) * STEP
 
 
-def hanging_fan(material: Material, kind: Kind, factor: float) -> float | None:
-    """Part fan of a path where it differs from the layer's: bridges and overhanging walls."""
-    if kind not in HANGING:
+def hanging_fan(material: Material, bead: Bead, factor: float) -> float | None:
+    """Part fan of a bead where it differs from the layer's: bridges and overhanging walls."""
+    if bead.kind not in HANGING:
         return None
-    return factor * (material.fan if material.fan_bridge is None else material.fan_bridge)
+    wished = (material.fan_infill_bridge if bead.over_infill else None, material.fan_bridge, material.fan)
+    return factor * next(fan for fan in wished if fan is not None)

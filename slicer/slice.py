@@ -10,7 +10,7 @@ from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import WALLS, Bead, thinned
-from slicer.bridge import beside, bridge_beads, bridged
+from slicer.bridge import beside, bridge_beads, bridged, infill_bridge_beads, over_infill
 from slicer.brim import brim
 from slicer.cooling import fan_share, hanging_fan
 from slicer.gap import gaps
@@ -28,6 +28,8 @@ from slicer.speed import layer_time_s, speeds_mm_s
 from slicer.stack import Stack, stack_of
 from slicer.thin import thin_walls
 from slicer.walls import wall_beads
+
+DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 
 
 def slice_part(
@@ -77,6 +79,11 @@ def _own(stack: Stack, layer: int) -> list[Bead]:
         if not area.is_empty():
             beads += bridge_beads(area, span.angle_deg, process.bridge_flow, width, height_mm, overlap)
             region = beside(region, area, width)
+    if layer and process.infill_density < DENSE:
+        area = over_infill(region.solid, stack.regions[layer - 1].sparse, width)
+        if not area.is_empty():
+            beads += infill_bridge_beads(area, angle, process, height_mm)
+            region = beside(region, area, width)
     beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
     beads += skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
     return beads + infill(region.sparse, process, stack.density, layer, float(stack.at.tip_mm[layer]), height_mm)
@@ -113,7 +120,7 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
     speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)
     if on_platform and index < material.fan_off_layers:
         fan = 0.0
-    blown = [hanging_fan(material, p.bead.kind, fan) for p in placed]
+    blown = [hanging_fan(material, p.bead, fan) for p in placed]
     paths = tuple(
         Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, blow)
         for p, blow, speed in zip(placed, blown, speeds, strict=True)

@@ -48,7 +48,9 @@ def speeds_mm_s(placed: Sequence[Placed], profile: Profile, height_mm: float, fi
 
 
 def _of_bead(bead: Bead, table: dict[Kind, float], process: Process) -> float:
-    """The kind's speed; a small closed wall's at most small_wall_speed_mm_s."""
+    """The kind's speed, over sparse infill a bridge's own; a small closed wall's at most small_wall_speed_mm_s."""
+    if bead.over_infill:
+        return process.infill_bridge_speed_mm_s
     if bead.kind in RINGS and bead.length_mm <= process.small_wall_mm:
         ends = bead.points[-1] - bead.points[0]
         if float(np.hypot(ends[0], ends[1])) <= bead.width_mm:  # a seam gap leaves a wall a little open
