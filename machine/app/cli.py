@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
+from machine.app.interrupts import outside_compiler
 from machine.app.options import (
     BeamWidth,
     Force,
@@ -258,7 +259,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     command = typer.main.get_command(app)
     try:
-        with command.make_context("tiltprint", given or ["--help"]) as context:
+        with outside_compiler(), command.make_context("tiltprint", given or ["--help"]) as context:
             code = command.invoke(context)
     except typer.Exit as done:
         return done.exit_code

@@ -12,6 +12,7 @@ from types import FrameType
 HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
 ALL: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM, *HANGUP)
 AGAIN_S = 0.1
+COMPILER = f"{os.sep}llvmlite{os.sep}"
 
 
 @contextmanager
@@ -38,6 +39,35 @@ def interrupting() -> Iterator[None]:
 
         with _handled(act):
             yield
+
+
+@contextmanager
+def outside_compiler() -> Iterator[None]:
+    """Ctrl-C raises KeyboardInterrupt, but never beneath the compiler, which would lose it or take it for an error of its own."""
+    main, here = threading.main_thread(), threading.current_thread()
+    if (
+        here is not main
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+        or not hasattr(signal, "pthread_kill")
+    ):
+        yield
+        return
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        while frame is not None:
+            if COMPILER in frame.f_code.co_filename:
+                later = threading.Timer(AGAIN_S, signal.pthread_kill, (main.ident, number))
+                later.daemon = True
+                later.start()
+                return
+            frame = frame.f_back
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, handle)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

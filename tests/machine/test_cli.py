@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from machine.app import start
 from machine.app.cli import main
 from mdp.save import stl
 from tests import shapes
@@ -103,6 +104,14 @@ def test_a_bug_ends_with_exit_3_and_a_log_file(monkeypatch: pytest.MonkeyPatch, 
     log = Path(capsys.readouterr().err.strip().rsplit(" ", 1)[1])
     assert "ZeroDivisionError: planted" in log.read_text()
     log.unlink()
+
+
+def test_ctrl_c_before_the_command_line_is_loaded_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("machine.app.cli.main", interrupted)
+    assert start.main() == 130
 
 
 def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:

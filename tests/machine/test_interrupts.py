@@ -4,10 +4,11 @@ import os
 import select
 import signal
 import threading
+from collections.abc import Callable
 
 import pytest
 
-from machine.app.interrupts import interrupting, stopping
+from machine.app.interrupts import COMPILER, interrupting, outside_compiler, stopping
 
 
 def wait_for_nothing() -> None:
@@ -60,3 +61,23 @@ def test_the_first_interrupt_sets_the_flag_and_the_second_raises() -> None:
         assert stop.is_set()
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
+
+
+def test_an_interrupt_beneath_the_compiler_waits_until_it_is_back() -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    beneath: dict[str, Callable[[], str]] = {}
+    exec(
+        compile("def told(): signal.raise_signal(signal.SIGINT); return 'compiled'", f"{COMPILER}x.py", "exec"),
+        globals(),
+        beneath,
+    )
+    finished: list[str] = []
+
+    def work() -> None:
+        finished.append(beneath["told"]())
+        wait_for_nothing()
+
+    with pytest.raises(KeyboardInterrupt), outside_compiler():
+        work()
+    signal.signal(signal.SIGINT, before)
+    assert finished == ["compiled"]

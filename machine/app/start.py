@@ -1,0 +1,14 @@
+"""Start: what the command `tiltprint` runs; it knows Ctrl-C before the command line is loaded."""
+
+import sys
+
+
+def main() -> int:
+    """Load the command line and run it; returns the exit code."""
+    try:
+        from machine.app.cli import main as run
+
+        return run()
+    except KeyboardInterrupt:
+        sys.stderr.write("tiltprint: interrupted\n")
+        return 130
