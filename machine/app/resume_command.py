@@ -61,7 +61,7 @@ def resume(
             raise CancelledError
         # From here on the printer counts its lines anew: only the new journal can tell whether it has restarted.
         done = way.begin.line - 1
-        further.mark(replace(story.last, sent=done, acknowledged=done, executed=done, state="resuming"))
+        further.mark(replace(story.last, sent=done, acknowledged=done, executed=done))
         mark_resumed(journal, story, further.path)
         return way.begin
 
