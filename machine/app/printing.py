@@ -16,7 +16,7 @@ from machine.app.report import duration, show
 from machine.app.screen import Course, Screen, Words
 from machine.app.traffic import TrafficLog, new_log, tapped
 from machine.dialects import DIALECTS
-from machine.link.answer import Answer
+from machine.link.answer import Answer, Kind
 from machine.link.control import Control
 from machine.link.inquiry import Found
 from machine.link.job import Begin
@@ -281,5 +281,5 @@ def ended(outcome: Outcome, log: TrafficLog | None = None) -> int:
         say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {HEATERS[outcome.heaters_off]}")
         return 130
     told = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
-    show(f"{told} ({outcome.firmware[:60]})\n")
+    show(f"{told} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})\n")
     return 0

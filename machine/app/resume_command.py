@@ -99,14 +99,21 @@ def _followed(
 
 
 def _profile(journal: Path, heading: Heading, given: Profile | None) -> Profile:
-    """The journal's own profile; raises JournalError when another machine was named, ProfileError when it is not valid."""
+    """The journal's own profile, homed as the machine says that was named.
+
+    Raises JournalError when that is another machine, ProfileError when the journal's profile is not valid.
+    """
     profile = Profile.model_validate({name: section(name, table) for name, table in heading.profile.items()})
-    if given is not None and given.machine != profile.machine:
+    if given is None:
+        return profile
+    gcode = profile.machine.gcode.model_copy(update={"resume": given.machine.gcode.resume})
+    machine = profile.machine.model_copy(update={"gcode": gcode})
+    if given.machine != machine:
         raise JournalError(
             f"journal {journal} is of a print on {profile.machine.name}; --machine gives another machine ({given.machine.name}), "
             "or one whose profile has changed since"
         )
-    return profile
+    return profile.model_copy(update={"machine": machine})
 
 
 def _program(journal: Path, story: Story) -> GcodeFile:
@@ -143,13 +150,19 @@ def _sentence(way: Way, point: Point, profile: Profile) -> str:
     low, high = heights_mm(point)
     (x, y, z), pose = stood(point, profile)
     tilt, turn, machine = pose.tilt_deg, pose.turn_deg, profile.machine
-    told += f"; nothing may have been moved by hand: tip at X {x:.1f} Y {y:.1f} Z {z:.2f}"
+    place = f"tip at X {x:.1f} Y {y:.1f} Z {z:.2f}"
     if point.moment.state not in AWAY and high - low > UNSURE_MM:
-        told += f" (it may have stood up to {high - low:.2f} mm higher: look at the first lines)"
+        place += f" (or up to {high - low:.2f} mm higher: watch how the first lines lie)"
     if hypot(tilt, turn) > 0:
         turns = f", {int(turn // 360)} whole turns and {turn % 360:.3f}" if abs(turn) >= 360 else ""
-        told += f", table at {machine.tilt.letter} {tilt:.3f} {machine.turn.letter} {turn:.3f}{turns}"
-    return told + "; the nozzle heats where it stands, the tip rises, X and Y are homed, Z and the table are not"
+        place += f", table at {machine.tilt.letter} {tilt:.3f} {machine.turn.letter} {turn:.3f}{turns}"
+    if machine.gcode.resume:
+        return f"{told}\nit was cut off with the {place}\nthen: machine.gcode.resume homes the axes, bed and nozzle heat"
+    return (
+        f"{told}\nlook first: all must stand as it was cut off, {place}\n"
+        "if anything was moved since, answer no, for only X and Y will be homed, Z and the table will not\n"
+        "then: bed and nozzle heat where the tip stands, the tip rises, X and Y are homed"
+    )
 
 
 def _agreed() -> bool:

@@ -29,7 +29,10 @@ from profiles.profile import Profile
 ANEW = "hardly anything was printed: the program begins anew"
 AWAY = ("paused", LEFT)  # states in which the journal's pose is where the tip has been taken
 ON_THE_WAY = ("pausing", "resuming")
-HOME_IT = "machine.gcode.resume must tell how it is homed with a print on it"
+HOME_IT = (
+    "write into machine.gcode.resume of a profile of this machine how it is homed with a print on it (docs/serial.md), and name "
+    "that profile with --machine"
+)
 UNHEARD = (
     "the printer did not answer when it was asked where it stands: is it switched on, is --baud the firmware's rate, does it "
     "still heat or move? Nothing was changed: when it has come to rest, resume can be tried again"

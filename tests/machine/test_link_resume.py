@@ -1,5 +1,6 @@
 """Resuming: where a print goes on after its host or its printer has died, and the way back to it."""
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -405,6 +406,24 @@ def test_the_command_refuses_a_journal_of_another_program(
     spoil(text.path)
     assert main(["resume", str(journal.path), "--port", "/dev/none"]) == 1
     assert words in capsys.readouterr().err
+
+
+def test_a_cut_while_the_table_turned_is_resumed_by_a_profile_that_tells_how_it_is_homed(
+    text: GcodeFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = PROGRAM.index("G0 A30 C725 F6000")
+    with journal_of(text, "j") as journal:
+        journal.mark(Moment(line + 5, line, line, 100))
+    mine = tmp_path / "mine.toml"
+    block = "G28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
+    mine.write_text(f'inherits = "generic_ac"\n\n[machine.gcode]\nresume = {json.dumps(block)}\n')
+    for machine in ((), ("--machine", str(mine))):
+        with SimulatedPrinter(PROFILE.machine) as printer:
+            assert main(["resume", str(journal.path), "--port", printer.path, *machine]) == 1
+    told = capsys.readouterr().err.splitlines()
+    assert "the table was turning about A" in told[2]
+    assert "name that profile with --machine" in told[2]
+    assert told[-2] == "then: machine.gcode.resume homes the axes, bed and nozzle heat"
 
 
 def test_a_journal_stays_whole_when_the_printer_does_not_answer(
