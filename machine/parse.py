@@ -113,7 +113,7 @@ def _irregular(reader: Reader, code: str, text: str) -> None:
         dispatch(reader, name, words)
     elif MACRO.fullmatch(code) and text.isprintable():
         if not macro(reader, code):
-            reader.ignore(code.split()[0])
+            reader.own(code.split()[0])
     elif re.match(r"O *[0-9<]|#|IF *\[|WHILE *\[", code):
         raise GcodeError(f"line {reader.number}: {shown(text)}: parameters and O words are not supported, only plain G-code is")
     else:

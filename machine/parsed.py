@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats
 
+OWN = "macro"  # the code of an Event that is a macro the machine defines for itself, its name in letters
+
 
 class MoveKind(IntEnum):
     """What a straight move does; RETRACT: filament alone, back or forth; ROTATE: the table turns."""

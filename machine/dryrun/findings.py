@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.parsed import ParsedProgram
+from machine.parsed import OWN, ParsedProgram
 
 Severity = Literal["error", "warning"]
 MOST = 20
@@ -45,6 +45,14 @@ def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:
     """Said when a test stops at row `row`, because MOST findings of its kind are enough to refuse a program."""
     message = f"after {MOST} findings the other {what} were not tested"
     return Finding("warning", "not-tested", int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
+
+
+def unless_own(program: ParsedProgram, first: int, last: int) -> tuple[Severity, str]:
+    """How grave it is that something was not told, and what to add: a macro of the machine's own before rows first to last may
+    have done it unseen.
+    """
+    names = [event.letters for event in program.events if event.code == OWN and first <= event.row <= last]
+    return ("warning", f", unless {names[0]} does that") if names else ("error", "")
 
 
 def at_line(program: ParsedProgram, row: int, line: int, severity: Severity, code: str, message: str) -> Finding:

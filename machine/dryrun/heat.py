@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.findings import Finding, at_line, per_part
+from machine.dryrun.findings import Finding, at_line, per_part, unless_own
 from machine.parsed import MoveKind, ParsedProgram
 from profiles.profile import Profile
 
@@ -27,17 +27,25 @@ def _cold(program: ParsedProgram) -> list[Finding]:
         warm = event.value >= MELTING_C and (warm or event.code == "M109")
         hot[event.row :] = warm
     rows = (program.e_mm > 1e-9) & ~hot
-    message = "{count} moves push filament through a nozzle that is not hot: M109 S must come first and stay on"
-    return per_part(program, rows, program.e_mm, "error", "cold-extrusion", message)
+    if not rows.any():
+        return []
+    first = int(np.argmax(rows))
+    told = max((event.row for event in heating if event.row <= first), default=0)
+    severity, unless = unless_own(program, told, first)
+    message = f"{{count}} moves push filament through a nozzle that is not hot: M109 S must come first and stay on{unless}"
+    return per_part(program, rows, program.e_mm, severity, "cold-extrusion", message)
 
 
 def _left_on(program: ParsedProgram) -> list[Finding]:
     found = []
+    laid = np.flatnonzero(program.e_mm > 1e-9)
+    last = int(laid[-1]) if len(laid) else -1  # a macro in the midst of the print ends nothing
     for codes, name, off in ((("M104", "M109"), "nozzle", "M104 S0"), (("M140", "M190"), "bed", "M140 S0")):
         events = [e for e in program.events if e.code in codes]
         if events and events[-1].value > 0:
-            message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing"
-            found.append(at_line(program, events[-1].row, events[-1].line, "error", "heater-on", message))
+            severity, unless = unless_own(program, max(events[-1].row, last + 1), len(program.line))
+            message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing{unless}"
+            found.append(at_line(program, events[-1].row, events[-1].line, severity, "heater-on", message))
     return found
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from machine.dryrun.findings import Finding, at_line, per_part
+from machine.dryrun.findings import Finding, at_line, per_part, unless_own
 from machine.dryrun.timeline import axis_speeds, lengths
 from machine.limits import ROUNDING, axis_limits
 from machine.parsed import MoveKind, ParsedProgram
@@ -89,10 +89,9 @@ def _unhomed(program: ParsedProgram) -> list[Finding]:
         if len(moved) and not homed:
             known.add(letter)
             row = first
-            message = f"{letter} moves before it is homed"
-            return [
-                Finding("error", "not-homed", int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
-            ]
+            severity, unless = unless_own(program, 0, row)
+            place = int(program.line[row]), int(program.part[row]), int(program.layer[row])
+            return [Finding(severity, "not-homed", *place, f"{letter} moves before it is homed{unless}")]
     return []
 
 

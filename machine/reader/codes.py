@@ -28,6 +28,8 @@ def dispatch(reader: Reader, name: str, words: Words) -> None:
         return
     elif name[0] == "T":
         raise GcodeError(f"line {reader.number}: {name} is not supported: this machine has one tool, T0")
+    elif name == "M98":
+        reader.own(name)
     elif name[0] == "G":
         raise GcodeError(
             f"line {reader.number}: {name} is not supported: motion codes are G0 to G4, G10, G11, G28 and G92, modes G17, G20, "

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.dialects import DIALECTS, Dialect
-from machine.parsed import Event
+from machine.parsed import OWN, Event
 from profiles.machine import Machine
 
 DEFAULT_FEED = 1500.0
@@ -75,6 +75,11 @@ class Reader:
         """Count what is not understood and does not move."""
         first, count = self.ignored.get(code, (self.number, 0))
         self.ignored[code] = (first, count + 1)
+
+    def own(self, code: str) -> None:
+        """Count a macro of the machine's own, which may home and heat unseen, and put it on record."""
+        self.ignore(code)
+        self.note(OWN, 0.0, code)
 
 
 def begun(machine: Machine) -> Reader:

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dialects import DIALECTS
+from machine.dryrun import dry_run
 from machine.parse import parse_gcode
 from machine.parsed import MoveKind, ParsedProgram
 from mdp.save import stl
@@ -195,3 +196,18 @@ def test_strokes_of_a_hand_edited_followed_program_are_where_its_author_put_them
     stroke = np.flatnonzero(parsed.kind == MoveKind.EXTRUDE)[0]
     assert parsed.end[stroke, 0] - parsed.start[stroke, 0] == pytest.approx(1.0, abs=1e-9)
     assert parsed.end[stroke, 3] == 90.0
+
+
+@pytest.mark.parametrize(("start", "end"), [("PRINT_START BED=60 EXTRUDER=210", "PRINT_END"), ('M98 P"start.g"', 'M98 P"end.g"')])
+def test_a_macro_of_the_machine_s_own_may_home_and_heat_unseen(start: str, end: str) -> None:
+    klipper = load("three_axis", settings=["machine.dialect=klipper"])
+    print_ = ["M104 S210", "G1 Z0.2 F600", "G1 X50 Y50", "M83", "G1 X90 E1"]
+
+    def severities(lines: list[str]) -> dict[str, str]:
+        found = dry_run(lines, klipper).findings
+        return {f.code: f.severity for f in found if f.code in ("not-homed", "cold-extrusion", "heater-on")}
+
+    assert severities(print_) == dict.fromkeys(("not-homed", "cold-extrusion", "heater-on"), "error")
+    assert severities([start, *print_]) == {"not-homed": "warning", "cold-extrusion": "warning", "heater-on": "error"}
+    assert severities([start, *print_[1:], end]) == {"not-homed": "warning", "cold-extrusion": "warning"}
+    assert severities([*print_, end])["heater-on"] == "warning"
