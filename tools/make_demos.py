@@ -31,16 +31,26 @@ def cone_distance(a: Knot, b: Knot, x: float, y: float, z: float) -> float:
 
 def smooth_union(limbs: Sequence[Limb], blend_mm: float) -> Callable[[float, float, float], float]:
     """The signed field (positive inside) of limbs blended by the quadratic smooth minimum over blend_mm."""
+    balls = [_ball(limb) for limb in limbs]
 
     def field(x: float, y: float, z: float) -> float:
         union = math.inf
-        for limb in limbs:
+        for limb, (centre, radius) in zip(limbs, balls, strict=True):
+            if math.dist(centre, (x, y, z)) - radius > union + 1.001 * blend_mm:
+                continue  # too far away to change a bit of the sum
             d = min(cone_distance(a, b, x, y, z) for a, b in pairwise(limb))
             mix = max(blend_mm - abs(union - d), 0.0) / blend_mm
             union = min(union, d) - mix * mix * blend_mm / 4.0
         return -union
 
     return field
+
+
+def _ball(limb: Limb) -> tuple[tuple[float, float, float], float]:
+    """Centre and radius of a ball that holds a limb, mm."""
+    knots = np.array(limb)
+    centre = (knots[:, :3].min(axis=0) + knots[:, :3].max(axis=0)) / 2.0
+    return tuple(centre.tolist()), float((np.linalg.norm(knots[:, :3] - centre, axis=1) + knots[:, 3]).max())
 
 
 def grown(limbs: Sequence[Limb], blend_mm: float, edge_mm: float, tolerance_mm: float) -> m3.Manifold:
