@@ -158,6 +158,6 @@ function paintModel(stage, print, scene, seenAt, lift) {
 
 function paintHead(bodies, seen) {
   bodies.head.draw(seen, { ghost: 0.3 });
-  bodies.boxes.draw(seen, { ghost: 0.08 });
+  bodies.boxes.draw(seen, { ghost: 0.14, strength: 0.5 });
   bodies.boxLines.draw(seen.toClip);
 }

@@ -4,6 +4,7 @@ const SLOW_MS = 50;
 const LONG_MS = 600; // a whole picture that takes longer is preceded by a coarse one also where only a choice has changed
 const TOLD_MS = 1500; // and of one that takes longer it is told how far it is
 const PIECE_MS = 120; // of a whole picture at a time: so long may a hand wait
+const LEAST = 5000; // beads in a piece
 const STILL_MS = 180;
 const AT_FIRST = 100000; // beads, before it is known how fast pictures come
 const COARSE_ROWS = 120000; // of so many rows every second layer makes a quick picture
@@ -42,7 +43,7 @@ function paceOf(gl, painter, count) {
       return;
     }
     spent += took;
-    piece = Math.ceil(piece * clamp(PIECE_MS / Math.max(took, 1), 0.5, 2));
+    piece = Math.max(Math.ceil(piece * clamp(PIECE_MS / Math.max(took, 1), 0.5, 2)), LEAST);
     const left = painter.left(), rows = painter.rows();
     if (!left) {
       whole = { ms: spent, rows: Math.max(rows, 1) };

@@ -8,6 +8,7 @@ function controlsOf(print, scene, bells) {
   }
   const select = (id, take, bell) => $(id).addEventListener("change", () => { take($(id).value); bells.ring(bell); });
   $("model").value = scene.model;
+  $("colour-by").value = scene.mode;
   select("colour-by", (value) => { scene.mode = value; }, "colours");
   select("others", (value) => { scene.others = value; }, "look");
   select("model", (value) => { scene.model = value; }, "look");

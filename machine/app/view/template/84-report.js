@@ -18,7 +18,7 @@ function sectionOf({ title, head, rows, notes, folded }) {
   const wordy = head.map((_, k) => rows.some((cells) => cells[k].length > WORDY));
   const row = (tag, cells) => made("tr", {}, ...cells.map((text, k) => made(tag, { text, className: wordy[k] ? "words" : "" })));
   const table = made("table", {}, made("thead", {}, row("th", head)), made("tbody", {}, ...rows.map((cells) => row("td", cells))));
-  const content = [made("div", { className: "table" }, table), ...notes.map((text) => made("p", { className: "note", text }))];
+  const content = [...(rows.length ? [made("div", { className: "table" }, table)] : []), ...notes.map((text) => made("p", { className: "note", text }))];
   if (folded) return made("details", {}, made("summary", { text: title }), ...content);
   return made("section", {}, made("h2", { text: title }), ...content);
 }

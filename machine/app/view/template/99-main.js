@@ -32,7 +32,7 @@ function goTo(row, scene, player) {
 
 function summaryOf({ time_s: seconds, filament_mm: filament, parts, thinned }, { count, layers }) {
   const many = (number, thing) => `${number.toLocaleString("en")} ${thing}${number === 1 ? "" : "s"}`;
-  const told = [many(parts.length, "part")];
+  const told = parts.some((part) => part.index) ? [many(parts.length, "part")] : [];
   if (count) told.push(many(layers.length, "layer"), duration(seconds), `${(filament / 1000).toFixed(2)} m of filament`);
   if (thinned) told.push(`thinned: ${thinned.kept.toLocaleString("en")} of ${many(thinned.rows, "move")}`);
   return told.join(" · ");
