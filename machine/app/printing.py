@@ -18,6 +18,7 @@ from machine.app.traffic import TrafficLog, new_log, tapped
 from machine.dialects import DIALECTS
 from machine.link.answer import Answer, Kind
 from machine.link.control import Control
+from machine.link.habits import Habits
 from machine.link.inquiry import Found
 from machine.link.job import Begin
 from machine.link.journal import Journal
@@ -29,6 +30,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 SIMULATED = "sim"
+USB_BYTES, QUEUE = 1024, 16  # the simulated printer is a board with native USB: more lines at a time halve what a line costs
 HEATERS = {
     True: "heaters off",
     False: "the printer did not confirm that its heaters are off: look at it",
@@ -118,9 +120,10 @@ def _print_simulated(
     journal: Journal | None,
 ) -> int:
     """Stream to the simulated printer and tell what it has done."""
-    with SimulatedPrinter(profile.machine, speed) as printer:
+    usb = profile.model_copy(update={"machine": profile.machine.model_copy(update={"receive_bytes": USB_BYTES})})
+    with SimulatedPrinter(profile.machine, speed, Habits(queue=QUEUE)) as printer:
         pace = speed if isfinite(speed) else None
-        outcome = streamed(program, profile, printer.path, baud, title, log, follow, journal, pace=pace)
+        outcome = streamed(program, usb, printer.path, baud, title, log, follow, journal, pace=pace)
         record = printer.record
     if outcome.cancelled:
         return ended(outcome, log)

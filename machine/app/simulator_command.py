@@ -19,6 +19,7 @@ from profiles.machine import Machine
 
 KEPT = 10000  # moves on record; of the others only the sums are told
 LOOK_S = 0.5
+LEAST, MOST = {"rx_ring": 16, "queue": 1}, 65536  # bytes and lines that a firmware may be built with
 
 
 def serve(
@@ -60,19 +61,21 @@ def _check(machine: Machine, link: Path | None, tcp: int | None, speed: float, b
 
 
 def habits_of(text: str, habits: Habits) -> Habits:
-    """Habits changed by words: `no-advanced-ok,realtime,rx-ring=64`. Raises PrinterError."""
+    """Habits changed by words: `no-advanced-ok,realtime,rx-ring=64,queue=16`. Raises PrinterError."""
     names = [field.name for field in fields(Habits)]
     for word in filter(None, (part.strip() for part in text.split(","))):
         name, _, value = word.replace("-", "_").partition("=")
-        if name == "rx_ring" and value.isdigit() and int(value) >= 16:
-            habits = replace(habits, rx_ring=int(value))
+        if value.isdigit() and name in LEAST and LEAST[name] <= int(value) <= MOST:
+            habits = replace(habits, rx_ring=int(value)) if name == "rx_ring" else replace(habits, queue=int(value))
         elif name == "no_rx_ring":
             habits = replace(habits, rx_ring=None)
-        elif not value and name.removeprefix("no_") in names and name != "rx_ring":
+        elif not value and name.removeprefix("no_") in names and name.removeprefix("no_") not in LEAST:
             habits = replace(habits, **{name.removeprefix("no_"): not name.startswith("no_")})
         else:
-            allowed = ", ".join(known.replace("_", "-") for known in names if known != "rx_ring")
-            raise PrinterError(f"--habits holds {word!r}: {allowed}, with or without no-, and rx-ring=BYTES from 16 are allowed")
+            allowed = ", ".join(known.replace("_", "-") for known in names if known not in LEAST)
+            raise PrinterError(
+                f"--habits holds {word!r}: {allowed}, with or without no-, rx-ring=BYTES (from 16) and queue=LINES are allowed"
+            )
     return habits
 
 

@@ -48,6 +48,7 @@ class Firmware:
         self._commands, self._macros = commands_of(machine.dialect), DIALECTS[machine.dialect].macros
         self.body.busy_every_s = self._busy_default_s = busy_s if self._habits.busy and self._manner.options else 0.0
         self._reception = Reception(self._manner, DIALECTS[machine.dialect].longest_line, self._habits.rx_ring)
+        self._room = (self._habits.queue if self._manner.options else None) or self._manner.pending
         self._urgent = Urgent(self._habits.realtime) if self._reads_bytes() else None
         self._busy_s = self._wait_s = inf
         self._queue: deque[tuple[str, str]] = deque()
@@ -203,7 +204,7 @@ class Firmware:
 
         Without an emergency parser Marlin looks for its orders here: a line is seen when it enters the queue.
         """
-        reception, room = self._reception, self._manner.pending
+        reception, room = self._reception, self._room
         while len(reception) and len(self._queue) < room:
             taken = reception.take()
             if isinstance(taken, str):
@@ -276,7 +277,7 @@ class Firmware:
             self._said.append(answer)
         elif self._habits.advanced_ok and self._manner.options:
             free = self.body.motion.planner.free(self.body.now_s)
-            self._said.append(f"ok{label} P{free} B{self._manner.pending - 1 - len(self._queue)}")
+            self._said.append(f"ok{label} P{free} B{self._room - 1 - len(self._queue)}")
         else:
             self._said.append("ok")
 

@@ -14,7 +14,8 @@ BANNER = ("start", "Marlin bugfix-2.1.x (simulated)", "echo: Last Updated: 2024-
 
 @dataclass(frozen=True)
 class Habits:
-    """Build options. rx_ring: bytes of a UART's receive ring that overflows; None: USB, which waits.
+    """Build options. rx_ring: bytes of a UART's receive ring that overflows; None: USB, which waits. queue: Marlin's BUFSIZE,
+    lines kept before the one at work is done; None: its default.
 
     realtime: Marlin's REALTIME_REPORTING_COMMANDS; geometry: its M115_GEOMETRY_REPORT; waits: its NO_TIMEOUTS, `wait` every
     second when idle; resend_ok: an `ok` follows each Resend (Smoothieware has none); must_home: X Y Z are not moved before they
@@ -31,6 +32,7 @@ class Habits:
     waits: bool = False
     resend_ok: bool = True
     must_home: bool = False
+    queue: int | None = None
 
 
 @dataclass(frozen=True)

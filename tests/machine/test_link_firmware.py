@@ -111,6 +111,13 @@ def test_advanced_ok_tells_number_planner_and_queue_where_m105_and_plain_lines_t
     assert answer(firmware, "G21\n", until_s=0.0) == ["ok P12 B3"]
 
 
+def test_the_queue_is_as_long_as_it_was_built() -> None:
+    firmware = Firmware(MACHINE, Habits(queue=16))
+    firmware.receive(b"G4 S5\n" + b"M105\n" * 20)
+    assert firmware.advance(1.0) == b""
+    assert (len(firmware._queue), len(firmware._reception)) == (16, 5)
+
+
 def test_ok_means_accepted_not_done() -> None:
     firmware = printer()
     assert answer(firmware, "G1 X10 F60\n", until_s=0.0) == ["ok"]

@@ -102,6 +102,7 @@ def test_a_file_in_the_way_of_the_link_stays(tmp_path: Path, capsys: pytest.Capt
 def test_habits_are_told_by_words() -> None:
     assert habits_of("", Habits()) == Habits()
     assert habits_of("no-advanced-ok, realtime,rx-ring=64", Habits()) == Habits(advanced_ok=False, realtime=True, rx_ring=64)
-    for bad in ("rx-ring=3", "rx-ring", "busy=1"):
+    assert habits_of("queue=16", Habits()).queue == 16
+    for bad in ("rx-ring=3", "rx-ring", "busy=1", "queue=0", "no-queue"):
         with pytest.raises(PrinterError, match=f"--habits holds '{bad}'"):
             habits_of(bad, Habits())
