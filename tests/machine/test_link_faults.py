@@ -1,5 +1,6 @@
 """Fault scripts strike where they say, once or by chance, and a bad file is refused with a sentence."""
 
+import re
 from itertools import islice, takewhile
 from math import inf
 from pathlib import Path
@@ -181,7 +182,8 @@ def test_a_script_is_read_from_a_file(tmp_path: Path) -> None:
 
 def test_the_page_s_example_is_a_script_and_its_table_has_all_kinds(tmp_path: Path) -> None:
     page = (Path(__file__).parents[2] / "docs" / "serial.md").read_text(encoding="utf-8")
-    (tmp_path / "faults.toml").write_text(page.partition("```toml\n")[2].partition("```")[0])
+    (example,) = (text for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "[[fault]]" in text)
+    (tmp_path / "faults.toml").write_text(example)
     assert [fault.kind for fault in read_script(tmp_path / "faults.toml").faults] == ["flip", "swallow ok", "disconnect"]
     assert all(f"`{kind}`" in page for kind in KINDS)
 
