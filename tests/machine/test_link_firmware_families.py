@@ -35,6 +35,18 @@ def test_reprapfirmware_drops_a_line_with_an_overrun_mark() -> None:
     assert answer(Firmware(RRF), b"N1 G1 \x7fX5\n") == []
 
 
+def test_reprapfirmware_takes_a_crc_of_five_digits_for_a_checksum() -> None:
+    firmware = Firmware(RRF)
+    assert answer(firmware, "N1 G1 X5*43210\nN2 G1 X9*4321\n") == ["ok"]
+    assert firmware.record().end[:, 0].tolist() == [5.0]
+
+
+def test_klipper_does_nothing_at_m110_and_never_asks_for_a_line() -> None:
+    firmware = Firmware(KLIPPER)
+    assert answer(firmware, "M110 N500\nN7 M110 N3*0\nN9 G1 X5*1\n") == ["ok"] * 3
+    assert firmware.record().moves == 1
+
+
 def test_reprapfirmware_neither_numbers_its_ok_nor_says_busy() -> None:
     assert answer(Firmware(RRF), b"N1 G4 S9\n") == ["ok"]
 
