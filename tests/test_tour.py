@@ -6,6 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from machine.app.match import UNDERSTOOD
+from machine.calibration.program import WAIT
+from machine.dialects import DIALECTS
+from machine.link.habits import MANNERS
+
 ROOT = Path(__file__).resolve().parents[1]
 NAME = re.compile(r"`((?:profiles|mdp|slicer|machine)(?:\.[A-Za-z_]\w*)+)([(][^`]*)?`")
 SECTION_KEYS = re.compile(r"machine\.(?:x|y|z|tilt|turn|table|head|gcode|[a-z]+_\w+|uncalibrated|name|dialect)\b")
@@ -76,3 +81,9 @@ def test_the_stages_take_what_the_tour_says(signature: str) -> None:
     found = next(node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == function)
     assert f"{module}.{function}({', '.join(argument.arg for argument in found.args.args)})" == signature
     assert f"`{signature}" in (ROOT / "docs" / "tour.md").read_text(encoding="utf-8")
+
+
+def test_every_dialect_has_the_rows_that_the_tour_asks_for() -> None:
+    serial = {name for name, dialect in DIALECTS.items() if dialect.serial}
+    assert set(WAIT) == set(DIALECTS)
+    assert set(MANNERS) == serial == {name for names in UNDERSTOOD.values() for name in names}
