@@ -113,11 +113,12 @@ def _wrapped(severity: str, message: str) -> list[str]:
 
 def agreement_line(found: Agreement) -> str:
     """How the plastic agrees with the model."""
-    return (
+    told = (
         f"the beads fill {100 * found.filled:.1f} % of the model; of their length {100 * found.outside:.2f} % lie outside it "
         f"by more than half a line ({found.farthest_mm:.2f} mm at the worst), {100 * found.unsupported:.2f} % hang in air "
-        f"and {100 * found.reported:.2f} % are marked overhang or bridge and do\n"
+        f"and {100 * found.reported:.2f} % are marked overhang or bridge and do"
     )
+    return "\n".join(wrap(told, WIDEST, subsequent_indent="  ")) + "\n"
 
 
 def _count(number: int, things: str) -> str:
