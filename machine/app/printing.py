@@ -92,7 +92,7 @@ def print_program(
     keeping = _journal(program, profile, name or "print", source, journal) if wanted else nullcontext()
     with new_log("print", title) if log is None else TrafficLog(log, title) as kept, _pointing_to(kept), keeping as story:
         if port != SIMULATED:
-            return ended(streamed(program, profile, port, baud, title, kept, follow, story), kept)
+            return ended(streamed(program, profile, port, baud, title, kept, follow, story), kept, story)
         return _print_simulated(program, profile, baud, sim_speed or inf, title, kept, follow, story)
 
 
@@ -274,14 +274,19 @@ def status(progress: Progress) -> str:
     return f"{progress.state}: " + ", ".join(told) + (f"; {progress.message}" if progress.message else "")
 
 
-def ended(outcome: Outcome, log: TrafficLog | None = None) -> int:
-    """Tell how the print ended, and where its log is when the printer had something to say; 130 when a person stopped it."""
+def ended(outcome: Outcome, log: TrafficLog | None = None, journal: Journal | None = None) -> int:
+    """Tell how the print ended, where its log is when the printer had something to say, and how to go on with a stopped one.
+
+    130 when a person stopped it.
+    """
     for warning in outcome.warnings:
         say(f"the printer said: {warning}")
     if outcome.warnings and log is not None:
         _point_to(log)
     if outcome.cancelled:
         say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {HEATERS[outcome.heaters_off]}")
+        if journal is not None and journal.last.executed:
+            say(f"tiltprint resume {journal.path} goes on with it")
         return 130
     told = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
     show(f"{told} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})\n")

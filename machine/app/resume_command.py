@@ -82,7 +82,7 @@ def resume(
     if outcome.cancelled and outcome.heaters_off is None:
         say("nothing was moved or heated")
         return 1
-    return ended(outcome)
+    return ended(outcome, journal=further)
 
 
 @contextmanager

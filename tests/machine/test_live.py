@@ -93,6 +93,19 @@ def test_a_closed_terminal_ends_the_print_with_heaters_off(hours: str, tmp_path:
 
 
 @pytest.mark.slow
+def test_a_stopped_print_names_the_journal_to_go_on_with(hours: str, tmp_path: Path) -> None:
+    journal = tmp_path / "journal"
+    with (
+        SimulatedPrinter(MACHINE, speed=60.0) as printer,
+        Person("print", hours, "--port", printer.path, "--force", "--journal", str(journal)) as person,
+    ):
+        person.see("layer 1 of 1")
+        person.press("\x03")
+        person.see(f"tiltprint resume {journal} goes on with it")
+        assert person.end() == 130
+
+
+@pytest.mark.slow
 def test_a_dumb_terminal_gets_plain_lines_and_no_keys(tmp_path: Path) -> None:
     file = tmp_path / "short.gcode"
     file.write_text("\n".join([*HEAT, *OFF]) + "\n")
