@@ -89,12 +89,14 @@ void main() {
   wide = dot(wide, wide) > 0.0 ? normalize(wide) : over;
   if (dot(wide, over) < 0.0) wide = -wide;
   float tall = dot(wide, over) * size.y, deep = abs(dot(wide, side)) * size.x;
+  vec3 near = normalize(sight); // the ribbon lies where the bead comes nearest to the eye, or the model's surface would hide it
+  float out_ = 0.5 * (dot(near, side) * size.x + dot(near, over) * size.y);
   fold = tall / (tall + deep);
   across = corner.y;
   beneath = lit(paint.rgb, mat3(toEye) * side);
   above = lit(paint.rgb, mat3(toEye) * over);
   vec3 place = middle + wide * (corner.y - 0.5) * (tall + deep) + along * (corner.x - 0.5) * 0.5 * size.y;
-  gl_Position = toClip * vec4(place, 1.0);
+  gl_Position = toClip * vec4(place + near * out_, 1.0);
 }`;
 
 const PAINT_HEAD = `
