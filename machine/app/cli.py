@@ -3,6 +3,7 @@
 Exit codes: 0 done, 1 the user can fix it, 3 a bug (log file named), 130 interrupted. Heavy imports stay inside the commands.
 """
 
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -37,6 +38,8 @@ from machine.app.options import (
 from machine.app.printer_cli import COMMANDS
 from machine.app.usage import sentence
 from profiles.errors import UserError
+
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 app = typer.Typer(
     add_completion=False,
@@ -274,6 +277,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:  # noqa: BLE001 - the one place where a bug becomes a message and a log file
         if _interrupted(error):
             return _complain("interrupted", 130)
+        if isinstance(error, OSError) and error.errno in FULL:
+            return _complain(f"{error.filename or 'standard output'} cannot be written: no space is left")
         from machine.app.crash import log_bug
 
         return _complain(f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, given)}", 3)

@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 import signal
@@ -104,6 +105,15 @@ def test_a_bug_ends_with_exit_3_and_a_log_file(monkeypatch: pytest.MonkeyPatch, 
     log = Path(capsys.readouterr().err.strip().rsplit(" ", 1)[1])
     assert "ZeroDivisionError: planted" in log.read_text()
     log.unlink()
+
+
+def test_a_full_disk_under_standard_output_is_no_bug(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def full() -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("machine.app.profile_commands.list_profiles", full)
+    assert main(["profiles", "list"]) == 1
+    assert capsys.readouterr().err == "tiltprint: standard output cannot be written: no space is left\n"
 
 
 def test_ctrl_c_before_the_command_line_is_loaded_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
