@@ -15,7 +15,7 @@ from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.sweep import Remainder, gains, sweep
 from profiles.machine import Machine
-from profiles.process import Search
+from profiles.search import Search
 
 # A plane is never laid into a face that overhangs along its direction: that would look like resting on the cut, over air.
 COPLANAR_MM = 1e-4

@@ -1,4 +1,4 @@
-"""The process: how a part is sliced and printed, and how the parts are searched."""
+"""The process: how a part is sliced and printed."""
 
 from typing import Literal, Self
 
@@ -306,50 +306,3 @@ class Process(Frozen):
                 f"({self.most_layer_height_mm:g} mm) is allowed"
             )
         return self
-
-
-class Search(Frozen):
-    """How the parts are searched."""
-
-    directions: int = Field(600, ge=1, le=100000, description="directions sampled on the Gaussian sphere")
-    least_elevation_deg: float = Field(10.0, ge=0, le=89, description="least angle of a direction above the platform, deg")
-    offset_step_mm: float = Field(1.0, gt=0, le=100, description="distance of the sampled planes of a direction, mm")
-    method: Literal["best", "published"] = Field(
-        "best", description="published: the authors' stop rule and bookkeeping, for comparisons; best: ours"
-    )
-    beam_width: int = Field(2, ge=1, le=1000, description="how many decompositions are followed at a time")
-    polish: bool = Field(
-        True,
-        description="the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added",
-    )
-    least_volume_share: float = Field(
-        0.02, ge=0, lt=1, description="criterion IV: a part has at least this share of the model's volume (published: 0.1)"
-    )
-    preferred_volume_share: float = Field(
-        0.1,
-        ge=0,
-        lt=1,
-        description="criterion IV as a preference: the classic ranking takes parts of at least this share of the volume first",
-    )
-    least_interface_mm2: float = Field(
-        4.0, ge=0, le=1e6, description="least area that a part, and each of its pieces that is no crumb, stands on, mm2"
-    )
-    fragile_mm: float = Field(
-        0.3, ge=0, le=100, description="no plane leaves a sliver thinner than this, a layer and a half or so, mm"
-    )
-    pedestal_mm: float = Field(
-        0.0,
-        ge=0,
-        le=1000,
-        description="height of a pedestal under the model, so that low, strongly tilted cuts become printable, mm",
-    )
-    most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
-    time_limit_s: float | None = Field(None, ge=0, description="the search ends after this time with the best so far, s")
-    least_gain: float = Field(0.002, ge=0, le=1, description="a cut must make at least this share of the model's risky area safe")
-    platform_radius_mm: float | None = Field(
-        None, gt=0, description="criterion III: radius of the disc that every plane must clear; absent: the model's footprint"
-    )
-    count_platform_faces: bool = Field(
-        False, description="true: faces standing on the platform count as risky (the authors' terms)"
-    )
-    clearance: bool = Field(True, description="false: the head's bodies and the axis limits are ignored (the authors' terms)")

@@ -10,7 +10,8 @@ from profiles.errors import ProfileError
 from profiles.machine import Frozen, Machine
 from profiles.material import Material
 from profiles.places import KINDS, OF_KIND, kind_of, known, shipped, tables
-from profiles.process import Process, Search
+from profiles.process import Process
+from profiles.search import Search
 from profiles.wording import sentences
 
 __all__ = ["DEFAULTS", "KINDS", "OF_KIND", "SECTIONS", "Profile", "kind_of", "known", "load", "load_one", "rows", "shipped"]
