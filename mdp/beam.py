@@ -54,7 +54,7 @@ class Beam:
         width = rules.settings.beam_width
         self.nodes: list[Node | None] = [rules.root] + [None] * (width - 1)
         self.bests = [rules.root] * width
-        self._branches: list[Branch | None] = [self._branch(rules.root)]
+        self._branches: list[Branch | None] = [self._branch(rules.root, 0)]
         self._seen = {rules.root.signature: 0}  # solids and the lowest place that had them
         self._children: dict[tuple[int, int], Node | None] = {}
         self._taken: dict[int, list[Plane]] = {}
@@ -75,7 +75,7 @@ class Beam:
         for place in range(len(self.nodes)):
             pick = self._pick([branch for branch in branches[: place + 1] if branch is not None], place)
             picks.append(pick)
-            self._branches.append(None if pick is None or self.rules.full(pick.node) else self._branch(pick.node))
+            self._branches.append(None if pick is None or self.rules.full(pick.node) else self._branch(pick.node, place))
         if self.trace is not None:
             self._record(self.trace, [branch for branch in branches if branch is not None], picks)
         self.nodes = [None if pick is None else pick.node for pick in picks]
@@ -89,8 +89,8 @@ class Beam:
             if branch is not None:
                 branch.coming.cancel()
 
-    def _branch(self, node: Node) -> Branch:
-        return Branch(node, ahead(self.rules.table, node))
+    def _branch(self, node: Node, place: int) -> Branch:
+        return Branch(node, ahead(self.rules.table, node, TRADE_OFFS[place % len(TRADE_OFFS)] is None))
 
     def finalists(self) -> list[Node]:
         """The nodes worth polishing: at the second place and at every place with a square number the best one that it or a

@@ -32,9 +32,16 @@ class Table:
     """The candidates of one node that are worth a cut; whether they can be cut is looked up direction by direction."""
 
     def __init__(
-        self, worth: Worth, limits: Bounds, saved_mm2: float, residual_mm2: float, check: Callable[[Ints, Floats], Checked]
+        self,
+        worth: Worth,
+        limits: Bounds,
+        saved_mm2: float,
+        residual_mm2: float,
+        check: Callable[[Ints, Floats], Checked],
+        least_gain_mm2: float = 0.0,
     ) -> None:
-        self.worth, self.limits = worth, limits
+        """least_gain_mm2: what gains less is for parts of the preferred volume only."""
+        self.worth, self.limits, self.least_gain_mm2 = worth, limits, least_gain_mm2
         self.saved_mm2, self.residual_mm2 = saved_mm2, residual_mm2
         self._check = check
         self.reason = np.full(len(worth.gain_mm2), UNKNOWN, np.int32)
@@ -91,7 +98,9 @@ class _Ranking:
 
     def __init__(self, table: Table, trade_off: float) -> None:
         self._table = table
-        self._cost = trade_off * table.worth.residual_mm2 - table.worth.gain_mm2
+        enough = table.worth.gain_mm2 >= table.least_gain_mm2
+        self._cost = np.where(enough, trade_off * table.worth.residual_mm2 - table.worth.gain_mm2, np.inf)
+        self._count = int(enough.sum())
         self._order: Ints = np.zeros(0, np.int64)
         self._next = 0
         self._found: list[int] = []
@@ -108,7 +117,7 @@ class _Ranking:
 
     def _more(self) -> bool:
         """Sort four times as many rows as before; False when all are sorted."""
-        known, count = len(self._order), len(self._cost)
+        known, count = len(self._order), self._count
         if known == count:
             return False
         wanted = min(count, max(SORTED_FIRST, 4 * known))
@@ -189,7 +198,7 @@ class _Pool:
         near: list[list[Plane]] = [[] for _ in self.tables]
         best = -np.inf
         for number in range(ROUNDS):
-            turn = self._turn(number, best)
+            turn = self._turn(number, best, any_gain=least_mm3 > 0.0)
             for place, (index, row) in enumerate(zip(turn.table.tolist(), turn.row.tolist(), strict=True)):
                 table = self.tables[index]
                 if table.reason[row] == UNKNOWN:
@@ -202,9 +211,9 @@ class _Pool:
                     best = max(best, float(turn.reduction[place]))
                     yield Entry(index, row, number)
 
-    def _turn(self, number: int, best: float) -> _Turn:
+    def _turn(self, number: int, best: float, any_gain: bool) -> _Turn:
         """What a round lets in that reduces at least as much as the best so far; few of all, so they are chosen before anything
-        is sorted."""
+        is sorted. any_gain: also what gains enough for large parts only."""
         found: list[tuple[Ints, Ints, Ints]] = []
         sums: list[Floats] = []
         for index, table in enumerate(self.tables):
@@ -212,6 +221,7 @@ class _Pool:
             reduction = np.round((worth.gain_mm2[rows] + table.saved_mm2) / self.risky_mm2 / EQUAL) * EQUAL
             kept = (reduction >= best) & (reduction > self.least_reduction)
             kept &= worth.residual_mm2[rows] + table.residual_mm2 < self.bound_mm2
+            kept &= any_gain | (worth.gain_mm2[rows] >= table.least_gain_mm2)
             rows = rows[kept]
             found.append((np.full(len(rows), index, np.int32), rows.astype(np.int32), worth.direction[rows]))
             sums.append(np.stack([worth.offset_mm[rows], reduction[kept]]))

@@ -11,7 +11,7 @@ from mdp.cut import below, solid_of
 from mdp.features import Model
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.node import Cut, Node
-from mdp.overhang import BASE_TOLERANCE_MM, threshold
+from mdp.overhang import BASE_TOLERANCE_MM, standing, threshold
 from mdp.plane import Plane
 from mdp.pool import Table
 from mdp.sweep import gains
@@ -39,7 +39,9 @@ class Rules:
         self.ground = ground(mesh, settings)
         self.limits: Bounds = bounds(mesh, self.machine, settings)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
-        self.least_gain_mm2 = settings.least_gain * self.root.risky_mm2
+        savable_mm2 = self._savable_mm2()
+        self.least_gain_mm2 = settings.least_gain * savable_mm2
+        self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
         self._evaluated: list[int] = []  # appended to by several threads
         self._began = perf_counter()
         self._stopped = False
@@ -58,19 +60,28 @@ class Rules:
         limit = self.settings.time_limit_s
         return self._stopped or (limit is not None and perf_counter() - self._began >= limit)
 
+    def _savable_mm2(self) -> float:
+        """The risky area that a gain is a share of: without the faces on the platform, which no cut can save, but as published
+        with them."""
+        mesh, risky = self.root.remainder.mesh, self.root.remainder.risky
+        counted = risky if self.settings.method == "published" else risky & ~standing(mesh)
+        return float(mesh.areas_mm2[counted].sum())
+
     def full(self, node: Node) -> bool:
         """Whether a node has as many parts as are allowed."""
         return len(node.cuts) >= self.settings.most_parts - 1
 
-    def table(self, node: Node) -> Table:
-        """The candidates of a node that are worth a cut."""
-        found = worth(node.remainder, self.limits, self.settings, node.angle_deg, self.least_gain_mm2)
+    def table(self, node: Node, large: bool = False) -> Table:
+        """The candidates of a node that are worth a cut; large: those that are worth it only for a part of the preferred volume
+        as well."""
+        least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
+        found = worth(node.remainder, self.limits, self.settings, node.angle_deg, least_mm2)
         self._evaluated.append(found.evaluated)
 
         def look(direction: Ints, offset_mm: Floats) -> Checked:
             return check(node.remainder, self.limits, self.settings, direction, offset_mm)
 
-        return Table(found, self.limits, self.model.risky_mm2 - node.cost_mm2, node.residual_mm2, look)
+        return Table(found, self.limits, self.model.risky_mm2 - node.cost_mm2, node.residual_mm2, look, self.least_gain_mm2)
 
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""

@@ -7,7 +7,7 @@ into vector instructions, then added to the columns one face after the other.
 
 import numpy as np
 
-from mdp.kernel import floats, inlined, int_table, ints, part, table, vector_part
+from mdp.kernel import floats, inlined, int_table, part, table, vector_part
 
 BLOCK = 128
 AHEAD = 3  # columns of a face that are worked out for the whole block; the few faces that cross more are finished singly
@@ -18,15 +18,28 @@ THIRD = 1.0 / 3.0
 def find_heights(x, y, z, d, step, heights):  # type: ignore[no-untyped-def]
     """Fill the heights of all vertices; returns the first offset's number and the count of offsets in between."""
     d0, d1, d2 = d[0], d[1], d[2]
-    least, most = 1e300, -1e300
-    for v in range(len(x)):
-        h = (x[v] * d0 + y[v] * d1 + z[v] * d2) / step
-        heights[v] = h
-        least, most = min(least, h), max(most, h)
+    for v in range(len(heights)):
+        heights[v] = (x[v] * d0 + y[v] * d1 + z[v] * d2) / step
+    least, most = _range(heights)
     begin = int(np.floor(least)) + 1
-    for v in range(len(x)):
-        heights[v] -= begin
+    shift = float(begin)
+    for v in range(len(heights)):
+        heights[v] -= shift
     return begin, max(int(np.ceil(most)) - begin, 0)
+
+
+@vector_part
+def _range(values):  # type: ignore[no-untyped-def]
+    """Least and greatest value; four of each, for one alone waits for the value before."""
+    a, b, c, d = 1e300, 1e300, 1e300, 1e300
+    p, q, r, s = -1e300, -1e300, -1e300, -1e300
+    whole = len(values) // 4 * 4
+    for v in range(0, whole, 4):
+        a, b, c, d = min(a, values[v]), min(b, values[v + 1]), min(c, values[v + 2]), min(d, values[v + 3])
+        p, q, r, s = max(p, values[v]), max(q, values[v + 1]), max(r, values[v + 2]), max(s, values[v + 3])
+    for v in range(whole, len(values)):
+        a, p = min(a, values[v]), max(p, values[v])
+    return min(a, b, c, d), max(p, q, r, s)
 
 
 @inlined
@@ -174,10 +187,13 @@ def _add_areas(kind, column, crossed, low, middle, high, rise, fall, weight, par
 
 
 @part
-def sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, up, residual):  # type: ignore[no-untyped-def]
-    """Risky areas above each offset: printed straight up, and along d. Only the faces that are risky either way count."""
+def sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, room, up, residual):  # type: ignore[no-untyped-def]
+    """Risky areas above each offset: printed straight up, and along d. Only the faces that are risky either way count.
+
+    room: (2, m + 1) whole numbers to work in.
+    """
     sums = table(n + AHEAD + 1, 8)
-    chosen, kind = ints(len(areas) + 1, 0), ints(len(areas) + 1, 0)
+    chosen, kind = room[0], room[1]
     many = _select(normals, risky, d, risky_below, chosen, kind)
     rows, parts, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
     picked = np.empty((3, BLOCK), np.uint32)

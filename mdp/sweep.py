@@ -17,7 +17,7 @@ import numpy as np
 from mdp.facets import Facets, facets
 from mdp.footing import find_footing
 from mdp.fragile import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
-from mdp.kernel import floats, ints, kernel
+from mdp.kernel import floats, int_table, ints, kernel
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.pieces import UNKNOWN, count_pieces, find_critical
@@ -159,12 +159,13 @@ def sweep(
 def _gains(begin_row, end_row, surface, directions, step, risky_below, out):  # type: ignore[no-untyped-def]
     points, corners, normals, areas, risky = surface
     first, count, up, residual = out
+    heights, room = floats(points.shape[1], 0.0), int_table(2, len(areas) + 1)
     for row in range(begin_row, end_row):
-        d, heights = directions[row], floats(points.shape[1], 0.0)
+        d = directions[row]
         begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
         first[row], count[row] = begin, n
         if n > 0:
-            sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, up[row], residual[row])
+            sum_risks(corners, normals, areas, risky, d, heights, n, risky_below, room, up[row], residual[row])
 
 
 @kernel
@@ -172,9 +173,9 @@ def sweep_kernel(begin_row, end_row, rows, solid, directions, watched, needed, c
     points, corners, normals, vectors, edges, vertex_normals, flatness = rows
     surface, standing, sharp, links, tree, anchor = solid
     first, count, pieces, section, volume, footing, lowest, fragile = out
+    heights, cosines, room = floats(points.shape[1], 0.0), floats(points.shape[1], 0.0), ints(points.shape[1], 0)
     for row in range(begin_row, end_row):
-        d, heights = directions[row], floats(points.shape[1], 0.0)
-        cosines, room = floats(points.shape[1], 0.0), ints(points.shape[1], 0)
+        d = directions[row]
         begin, n = find_heights(points[0], points[1], points[2], d, step, heights)
         first[row], count[row] = begin, n
         if n > 0:

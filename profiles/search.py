@@ -44,7 +44,18 @@ class Search(Frozen):
     )
     most_parts: int = Field(12, ge=1, le=1000, description="the search stops at this number of parts")
     time_limit_s: float | None = Field(None, ge=0, description="the search ends after this time with the best so far, s")
-    least_gain: float = Field(0.002, ge=0, le=1, description="a cut must make at least this share of the model's risky area safe")
+    least_gain: float = Field(
+        0.002,
+        ge=0,
+        le=1,
+        description="a cut must make at least this share of the risky area safe, faces that stand on the platform not counted",
+    )
+    least_gain_preferred: float = Field(
+        1e-4,
+        ge=0,
+        le=1,
+        description="the same for parts of the preferred volume in the classic ranking, which may be many (published: 0.0001)",
+    )
     platform_radius_mm: float | None = Field(
         None, gt=0, description="criterion III: radius of the disc that every plane must clear; absent: the model's footprint"
     )

@@ -89,9 +89,9 @@ def _all_heights(x, y, z, directions, step):  # type: ignore[no-untyped-def]
 @numba.njit
 def _risks(areas, directions, heights, counts, angle, columns):  # type: ignore[no-untyped-def]
     corners, normals, sizes, risky = areas
-    up, residual = np.zeros(columns), np.zeros(columns)
+    up, residual, room = np.zeros(columns), np.zeros(columns), np.zeros((2, len(sizes) + 1), np.int32)
     for k in range(len(directions)):
-        sum_risks(corners, normals, sizes, risky, directions[k], heights[k], counts[k], angle, up, residual)
+        sum_risks(corners, normals, sizes, risky, directions[k], heights[k], counts[k], angle, room, up, residual)
 
 
 @numba.njit

@@ -93,3 +93,20 @@ def test_parts_of_the_preferred_volume_come_first_and_all_others_after_them() ->
     large = [volume >= tenth for volume in volumes]
     assert large == sorted(large, reverse=True)
     assert 0 < sum(large) < len(large)
+
+
+def test_what_gains_too_little_is_for_large_parts_of_the_classic_ranking_only() -> None:
+    rules = Rules(shapes.branch(), load(settings=("search.directions=150", "search.least_gain=0.2")))
+    table, least_mm2 = rules.table(rules.root, large=True), rules.least_gain_mm2
+    small = {row for row in range(len(table.reason)) if table.worth.gain_mm2[row] < least_mm2}
+    classic = entries([table], rules.model.risky_mm2, np.inf, preferred_mm3=rules.preferred_mm3)
+    kept = [entry.row for entry in classic if entry.row in small]
+    assert kept
+    assert (table.volume_mm3[kept] >= rules.preferred_mm3).all()
+    assert not small & {entry.row for entry in traded([table], 4.0, np.inf)}
+
+
+def test_a_gain_is_measured_by_what_cuts_can_save() -> None:
+    counted, usual = (Rules(shapes.tee(), load(settings=[f"search.count_platform_faces={on}"])) for on in ("true", "false"))
+    assert counted.root.risky_mm2 > usual.root.risky_mm2 + 1.0
+    assert counted.least_gain_mm2 == pytest.approx(usual.least_gain_mm2)
