@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from profiles.errors import ProfileError
-from profiles.places import OF_KIND, inherited, kind_in, merged, own_tables, parse, strangers, tables
+from profiles.places import OF_KIND, inherited, kind_in, merged, misspelt_parent, own_tables, parse, strangers, tables
 from profiles.profile import DEFAULTS, SECTIONS
 from profiles.wording import sentences
 
@@ -28,6 +28,8 @@ def check_file(path: Path) -> list[str]:
         base = inherited(kind, str(path), document, (str(path.resolve()),))
     except ProfileError as error:
         problems.append(str(error))
+        base = sound
+    if misspelt_parent(document):  # what it would inherit is not missing
         base = sound
     whole = merged(base, own_tables(document))
     for section in OF_KIND[kind]:

@@ -88,8 +88,16 @@ def strangers(kind: str, name: str, document: Mapping[str, Any]) -> str | None:
     unknown = [key for key in document if key not in (*OF_KIND[kind], PARENT)]
     if not unknown and own_tables(document):
         return None
-    what = f"[{'], ['.join(unknown)}] cannot stand in a {kind} profile" if unknown else f"this is not a {kind} profile"
-    return f"{name}: {what}: its tables are {' and '.join(f'[{section}]' for section in OF_KIND[kind])}"
+    named = ", ".join(f"[{key}]" if isinstance(document[key], dict) else repr(key) for key in unknown)
+    what = f"{named} cannot stand in a {kind} profile" if unknown else f"this is not a {kind} profile"
+    meant = " (did you mean inherits?)" if misspelt_parent(document) else ""
+    return f"{name}: {what}{meant}: its tables are {' and '.join(f'[{section}]' for section in OF_KIND[kind])}"
+
+
+def misspelt_parent(document: Mapping[str, Any]) -> bool:
+    """Whether a document means to inherit, under a name like that of the key."""
+    words = [key for key, value in document.items() if isinstance(value, str)]
+    return PARENT not in document and bool(get_close_matches(PARENT, words, 1, 0.7))
 
 
 def own_tables(document: Mapping[str, Any]) -> dict[str, Any]:

@@ -128,3 +128,11 @@ def test_what_is_shown_of_a_machine_tells_where_each_number_comes_from(capsys: p
     lines = {line.partition(" = ")[0]: line for line in capsys.readouterr().out.splitlines()}
     assert lines["machine.x.limits_mm"].endswith("config.g, M208 M203 M201")
     assert lines["machine.tilt.sign"].endswith("; UNCALIBRATED")
+
+
+def test_a_misspelt_inherits_is_named_and_nothing_is_called_missing_for_it(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('inherit = "fractal5pro"\n[machine]\nname = "mine"\n')
+    assert check_file(file) == [
+        f"{file}: 'inherit' cannot stand in a machine profile (did you mean inherits?): its tables are [machine]"
+    ]
