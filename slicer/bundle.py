@@ -46,6 +46,10 @@ def straight(heights: Floats, box: Box) -> Lines:
     return points.reshape(-1, 2), 2 * np.arange(len(heights))
 
 
-def ruled(angle_deg: float, apart_mm: float) -> Bundle:
-    """Straight lines at an angle, on a grid that is the same in every layer."""
-    return Bundle(angle_deg, lambda box: straight((numbers(box[1], box[3], apart_mm) + 0.5) * apart_mm, box))
+def ruled(angle_deg: float, apart_mm: float, shift_mm: float = 0.0) -> Bundle:
+    """Straight lines at an angle, on a grid that is the same in every layer but for a shift across the lines."""
+
+    def draw(box: Box) -> Lines:
+        return straight((numbers(box[1] - shift_mm, box[3] - shift_mm, apart_mm) + 0.5) * apart_mm + shift_mm, box)
+
+    return Bundle(angle_deg, draw)

@@ -1,6 +1,7 @@
 """Infill: sparse patterns; each pattern tells the bundles of lines that one layer takes."""
 
 from collections.abc import Callable, Sequence
+from math import sqrt
 
 from mdp.mesh import Floats
 from profiles.process import Process
@@ -72,6 +73,11 @@ def _triangles(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, den
     return [ruled(angle_deg + 60.0 * k, 3.0 * spacing_mm / density) for k in range(3)]
 
 
+def _cubic(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[Bundle]:
+    """Cubes that stand on a corner: their faces, three families of planes, move sideways by z / sqrt(2)."""
+    return [ruled(angle_deg + 120.0 * k, 3.0 * spacing_mm / density, z_mm / sqrt(2.0)) for k in range(3)]
+
+
 def _gyroid(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[Bundle]:
     return [gyroid(angle_deg, z_mm, spacing_mm, density)]
 
@@ -93,6 +99,7 @@ PATTERNS: dict[str, Callable[[float, int, float, float, float], list[Bundle]]] =
     "rectilinear": _rectilinear,
     "grid": _grid,
     "triangles": _triangles,
+    "cubic": _cubic,
     "gyroid": _gyroid,
     "honeycomb": _honeycomb,
 }

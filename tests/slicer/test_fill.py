@@ -92,7 +92,7 @@ def test_infill_is_chained_into_few_long_paths(pattern):
     assert pattern == "concentric" or len(chained) <= 0.2 * len(single) + 2
 
 
-@pytest.mark.parametrize("pattern", ["rectilinear", "grid", "triangles", "honeycomb"])
+@pytest.mark.parametrize("pattern", ["rectilinear", "grid", "triangles", "cubic", "honeycomb"])
 def test_every_end_of_an_infill_line_runs_along_the_wall(pattern):
     border = as_shapely(grown(square(), -(0.5 * (WIDTH - HEIGHT * (1 - np.pi / 4)) - OVERLAP * WIDTH))).boundary
     for bead in filled(square(), pattern, 0.2, joint=0):
@@ -118,6 +118,19 @@ def test_gyroid_lines_lie_on_the_minimal_surface(height):
     x, y = (bundle.draw((-20, -20, 20, 20))[0] @ turn(bundle.angle_deg).T / unit).T
     z = height / unit
     assert np.abs(np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)).max() < 1e-9
+
+
+def test_cubic_lines_lie_on_planes_at_right_angles():
+    normals = [
+        np.array([np.sqrt(2 / 3) * np.cos(a), np.sqrt(2 / 3) * np.sin(a), -np.sqrt(1 / 3)]) for a in np.radians((120, 240, 0))
+    ]
+    assert np.array(normals) @ np.array(normals).T == pytest.approx(np.eye(3), abs=1e-12)
+    apart = 3 * (WIDTH - HEIGHT * (1 - np.pi / 4)) / 0.2
+    for layer in (0, 7, 40):
+        for bead in filled(square(), "cubic", 0.2, layer, anchor=0, joint=0):
+            middle = [*bead.points.mean(axis=0), (layer + 1) * HEIGHT]
+            places = [n @ middle / (np.sqrt(2 / 3) * apart) for n in normals]
+            assert min(abs(place % 1 - 0.5) for place in places) < 1e-6
 
 
 def test_honeycomb_cells_are_hexagons_of_their_side():
