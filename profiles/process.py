@@ -6,6 +6,16 @@ from pydantic import Field, model_validator
 
 from profiles.machine import Frozen, Vector
 
+HEIGHTS = ("layer_height_mm", "first_layer_height_mm")
+WIDTHS = (
+    "line_width_mm",
+    "first_layer_line_width_mm",
+    "outer_wall_line_width_mm",
+    "top_skin_line_width_mm",
+    "infill_line_width_mm",
+    "support_line_width_mm",
+)
+
 
 class Process(Frozen):
     """Slicing and printing settings."""
@@ -33,6 +43,21 @@ class Process(Frozen):
         0.28, ge=0.02, le=2, description="adaptive layers are not thicker: seven tenths of the nozzle still bond well, mm"
     )
     line_width_mm: float = Field(0.45, ge=0.1, le=4, description="width of a bead, mm")
+    first_layer_line_width_mm: float | None = Field(
+        None, ge=0.1, le=4, description="width of all beads of part 1's first layer: wide ones stick; absent: as elsewhere, mm"
+    )
+    outer_wall_line_width_mm: float | None = Field(
+        None, ge=0.1, le=4, description="width of outer walls: narrow ones show finer detail; absent: line_width_mm, mm"
+    )
+    top_skin_line_width_mm: float | None = Field(
+        None, ge=0.1, le=4, description="width of the uppermost skins' lines; absent: line_width_mm, mm"
+    )
+    infill_line_width_mm: float | None = Field(
+        None, ge=0.1, le=4, description="width of sparse infill, which keeps its density; absent: line_width_mm, mm"
+    )
+    support_line_width_mm: float | None = Field(
+        None, ge=0.1, le=4, description="width of support: narrow lines break away more easily; absent: line_width_mm, mm"
+    )
     slit_closing_mm: float = Field(
         0.018,
         ge=0,
@@ -74,7 +99,7 @@ class Process(Frozen):
     infill_density: float = Field(0.2, ge=0, le=1, description="share of the inside that is filled")
     infill_pattern: Literal["rectilinear", "grid", "triangles", "cubic", "gyroid", "honeycomb", "concentric"] = Field(
         "grid",
-        description="pattern of the sparse infill, cubic and gyroid are equally stiff all ways; a density of 1 is always solid lines",
+        description="pattern of the sparse infill, cubic and gyroid are equally stiff all ways; a density of 1 is always solid",
     )
     infill_angle_deg: float = Field(45.0, ge=0, le=360, description="direction of the infill lines in the part's frame, deg")
     infill_overlap: float = Field(
@@ -106,6 +131,7 @@ class Process(Frozen):
     bridge_longest_mm: float = Field(
         6.0, ge=0, le=100, description="spans up to this print without support; PLA with a fan manages more, PETG hardly, mm"
     )
+    first_layer_flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on extruded volume of part 1's first layer")
     bridge_flow: float = Field(
         1.0, ge=0.3, le=2, description="factor on extruded volume of bridges; 1: as much plastic as the layer has room for"
     )
@@ -290,12 +316,11 @@ class Process(Frozen):
     @model_validator(mode="after")
     def _check(self) -> Self:
         adaptive = ("least_layer_height_mm", "most_layer_height_mm") if self.adaptive_cusp_mm > 0 else ()
-        for key in ("layer_height_mm", "first_layer_height_mm", *adaptive):
-            if getattr(self, key) > 0.9 * self.line_width_mm:
-                raise ValueError(
-                    f"{key} is {getattr(self, key):g} mm: at most 0.9 of line_width_mm "
-                    f"({0.9 * self.line_width_mm:g} mm) is allowed"
-                )
+        for wide, width in ((wide, getattr(self, wide)) for wide in WIDTHS):
+            first = wide == "first_layer_line_width_mm"
+            for key in ("first_layer_height_mm",) if first else (*HEIGHTS, *adaptive):
+                if width is not None and getattr(self, key) > 0.9 * width:
+                    raise ValueError(f"{key} is {getattr(self, key):g} mm: at most 0.9 of {wide} ({0.9 * width:g} mm) is allowed")
         if self.interlock_mm > self.line_width_mm - self.layer_height_mm + 1e-9:
             raise ValueError(
                 f"interlock_mm is {self.interlock_mm:g} mm: at most line_width_mm less layer_height_mm "

@@ -10,7 +10,7 @@ from profiles.errors import ProfileError
 from profiles.machine import Frozen, Machine
 from profiles.material import Material
 from profiles.places import KINDS, OF_KIND, kind_of, known, shipped, tables
-from profiles.process import Process
+from profiles.process import HEIGHTS, WIDTHS, Process
 from profiles.search import Search
 from profiles.wording import sentences
 
@@ -114,7 +114,7 @@ def _apply(whole: dict[str, Any], setting: str) -> None:
 def _check_together(profile: Profile) -> list[str]:
     """What no single file can know: material and process against machine; every problem one sentence."""
     machine, material = profile.machine, profile.material
-    width_mm, nozzle_mm = profile.process.line_width_mm, machine.head.nozzle_mm
+    nozzle_mm = machine.head.nozzle_mm
     problems = [
         f"material.{key} is {getattr(material, key):g}: {machine.name} allows at most {machine.nozzle_limit_c:g} deg C"
         for key in ("nozzle_c", "first_layer_nozzle_c")
@@ -122,12 +122,14 @@ def _check_together(profile: Profile) -> list[str]:
     ]
     if material.bed_c > machine.bed_limit_c > 0:
         problems.append(f"material.bed_c is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} deg C")
-    if not LEAST_WIDTH * nozzle_mm <= width_mm <= MOST_WIDTH * nozzle_mm:
-        problems.append(
-            f"process.line_width_mm is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of "
-            f"{LEAST_WIDTH * nozzle_mm:g} to {MOST_WIDTH * nozzle_mm:g} mm"
-        )
-    for key in ("layer_height_mm", "first_layer_height_mm"):
+    for key in WIDTHS:
+        width_mm = getattr(profile.process, key)
+        if width_mm is not None and not LEAST_WIDTH * nozzle_mm <= width_mm <= MOST_WIDTH * nozzle_mm:
+            problems.append(
+                f"process.{key} is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of "
+                f"{LEAST_WIDTH * nozzle_mm:g} to {MOST_WIDTH * nozzle_mm:g} mm"
+            )
+    for key in HEIGHTS:
         if getattr(profile.process, key) > nozzle_mm:
             problems.append(
                 f"process.{key} is {getattr(profile.process, key):g}: a {nozzle_mm:g} mm nozzle prints layers of at most "

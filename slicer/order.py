@@ -20,6 +20,7 @@ from slicer.paths import Kind
 from slicer.polygons import Polygons, area_mm2, contours
 from slicer.scanline import inside
 from slicer.tour import tour
+from slicer.widths import outer_wall_mm
 
 OUTSIDE = -1000  # ranks up to this belong to no island: skirt, brim, support
 PROPS = "Support"  # with this word begin the kinds that are torn off: a travel among them may ooze
@@ -44,7 +45,7 @@ def ordered(beads: Sequence[Bead], section: Polygons, process: Process, tip: Flo
     to = np.array([points[0] for _, points in placed])
     since = np.array([first, *(points[-1] for _, points in placed[:-1])])
     props = np.array([bead.kind.value.startswith(PROPS) for bead, _ in placed])
-    retracts, ways = _travels(Ground(section, process.line_width_mm), since, to, props, process)
+    retracts, ways = _travels(Ground(section, min(process.line_width_mm, outer_wall_mm(process))), since, to, props, process)
     retracts[0] = retracts[0] or tip is None
     return [
         Placed(bead, points, bool(pull), ways.get(k, NOWHERE))

@@ -28,6 +28,7 @@ from slicer.speed import layer_time_s, speeds_mm_s
 from slicer.stack import Stack, stack_of
 from slicer.thin import thin_walls
 from slicer.walls import wall_beads
+from slicer.widths import of_width
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 
@@ -85,8 +86,9 @@ def _own(stack: Stack, layer: int) -> list[Bead]:
             beads += infill_bridge_beads(area, angle, process, height_mm)
             region = beside(region, area, width)
     beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
-    beads += skin(region.top, Kind.TOP_SKIN, angle, width, height_mm, overlap)
-    return beads + infill(region.sparse, process, stack.density, layer, float(stack.at.tip_mm[layer]), height_mm)
+    beads += skin(region.top, Kind.TOP_SKIN, angle, process.top_skin_line_width_mm or width, height_mm, overlap)
+    sparse = of_width(process, process.infill_line_width_mm)
+    return beads + infill(region.sparse, sparse, stack.density, layer, float(stack.at.tip_mm[layer]), height_mm)
 
 
 def _beside(stack: Stack, layer: int, part: Part, later: Sequence[Part]) -> list[Bead]:
@@ -94,7 +96,8 @@ def _beside(stack: Stack, layer: int, part: Part, later: Sequence[Part]) -> list
     process, height_mm = stack.processes[layer], float(stack.at.height_mm[layer])
     props, outline, on_platform = stack.supports, stack.outlines[layer], part.index == 1
     foot = layer == 0 and on_platform
-    beads = support_beads(props.areas[layer], props.dense[layer], process, height_mm, foot)
+    propped = of_width(process, process.support_line_width_mm)
+    beads = support_beads(props.areas[layer], props.dense[layer], propped, height_mm, foot)
     if layer < stack.pedestal_layers:
         beads += pedestal_beads(outline, layer, stack.pedestal_layers, process, height_mm)
     if foot:
@@ -107,7 +110,8 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
     """The beads in order, with speeds, flow, fan and heat."""
     process, material, outline = profile.process, profile.material, stack.outlines[index]
     z_mm, height_mm = float(stack.at.tip_mm[index]), float(stack.at.height_mm[index])
-    placed = overhanging(ordered(beads, outline, process, tip), outline, stack.bank(index), process)
+    own = stack.processes[index]
+    placed = overhanging(ordered(beads, outline, own, tip), outline, stack.bank(index), own)
     on_platform = part.index == 1
     if index == 0 and not on_platform and process.interlock_mm > 0.0:
         placed = interlocked(placed, part, process, height_mm)
@@ -116,7 +120,7 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
         fan, add_c = process.interface_fan, process.interface_temperature_add_c
     if index == 0:
         fixed = process.first_layer_speed_mm_s if on_platform else process.interface_speed_mm_s
-        flow *= 1.0 if on_platform else process.interface_flow
+        flow *= process.first_layer_flow if on_platform else process.interface_flow
     speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)
     if on_platform and index < material.fan_off_layers:
         fan = 0.0

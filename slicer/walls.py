@@ -12,6 +12,7 @@ from slicer.bead import HIDDEN_RESOLUTION_MM, Bead, bulged, spacing_mm
 from slicer.gap import LEAST_GAP, LEAST_LINE
 from slicer.paths import Kind
 from slicer.polygons import Polygons, contours, grown, opened, rounded
+from slicer.widths import outer_wall_mm
 
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner; what it leaves there is looked at again with round beads
 LEAST_REST_MM2 = 1e-3
@@ -31,16 +32,17 @@ class Walls:
     inside: Polygons
 
 
-def walls(section: Polygons, count: int, width_mm: float, height_mm: float) -> Walls:
-    """Up to `count` walls of a section for beads of that width and height."""
+def walls(section: Polygons, count: int, width_mm: float, height_mm: float, outer_mm: float | None = None) -> Walls:
+    """Up to `count` walls of a section for beads of that width and height, the outermost outer_mm wide where that is given."""
+    outer = width_mm if outer_mm is None else outer_mm
     spacing = spacing_mm(width_mm, height_mm)
     area, levels = section, []
     free, narrow = Polygons(), Polygons()
     for level in range(count):
-        half = 0.5 * (width_mm if level == 0 else spacing)
+        half, behind = (0.5 * spacing, 0.5 * spacing) if level else (0.5 * outer, 0.5 * spacing_mm(outer, height_mm))
         line = grown(area, -half)
-        core = grown(line, -0.5 * spacing)
-        line, rest = _split(area, line, core, half, 0.5 * spacing, (LEAST_GAP if level else LEAST_LINE) * width_mm)
+        core = grown(line, -behind)
+        line, rest = _split(area, line, core, half, behind, (LEAST_GAP if level else LEAST_LINE) * width_mm)
         if not rest.is_empty():
             free, narrow = (rest, narrow) if level == 0 else (free, narrow + rest)
         levels.append(tuple(contours(line)))
@@ -76,10 +78,10 @@ def wall_beads(found: Walls, process: Process, height_mm: float) -> list[Bead]:
 
     Outer beads make up for what their outer round side leaves out of the section.
     """
-    width, beads = process.line_width_mm, []
-    outer_flow = bulged(width, height_mm, 1, process.outer_bulge * width)
+    outer, beads = outer_wall_mm(process), []
+    outer_flow = bulged(outer, height_mm, 1, process.outer_bulge * outer)
     for level, loops in enumerate(found.loops):
-        kind, flow = (Kind.INNER_WALL, 1.0) if level else (Kind.OUTER_WALL, outer_flow)
+        kind, width, flow = (Kind.INNER_WALL, process.line_width_mm, 1.0) if level else (Kind.OUTER_WALL, outer, outer_flow)
         rank = -level if process.wall_order == "inner-first" else level - process.walls
         beads += [Bead(kind, loop, width, rank, flow) for loop in loops]
     return beads

@@ -113,6 +113,14 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
         ),
         ("process.line_width_mm=0.2", "process.layer_height_mm is 0.2 mm: at most 0.9 of line_width_mm (0.18 mm) is allowed"),
         ("process.interface_overlap=1", "process.interface_overlap is 1: it must be a number from 0 to 0.9"),
+        (
+            "process.infill_line_width_mm=0.2",
+            "process.layer_height_mm is 0.2 mm: at most 0.9 of infill_line_width_mm (0.18 mm) is allowed",
+        ),
+        (
+            "process.outer_wall_line_width_mm=2",
+            "process.outer_wall_line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm",
+        ),
         ("process.line_width_mm=2", "process.line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm"),
         ("material.nozzle_c=400", "material.nozzle_c is 400: generic A/C table allows at most 300 deg C"),
         ("material.bed_c=150", "material.bed_c is 150: generic A/C table allows at most 110 deg C"),
