@@ -9,7 +9,6 @@ from mdp.mesh import Floats
 from slicer.polygons import Polygons, edges
 from slicer.scanline import inside
 
-AROUND_MM = 2.0  # of the section's borders, those so near a place matter
 CELLS = 40  # along the longer side of the grid on which the ways to the borders are known
 EVERY = 3  # cells between the places through which a bead is tried
 TURNS = 18  # directions tried over half a turn
@@ -19,13 +18,10 @@ THINNER = 0.93  # from one width tried to the next
 def dash(island: Polygons, borders: Floats, least_mm: float, most_mm: float, spare_mm: float) -> tuple[Floats, float] | None:
     """Ends (2, 2) mm and width of the straight bead that covers most of an island; None where not even the least fits.
 
-    borders: (m, 4) edges of the section, over which the bead reaches by spare_mm at most.
+    borders: (m, 4) edges of the section near the island, over which the bead reaches by spare_mm at most.
     """
     x0, y0, x1, y1 = island.bounds()
-    low, high = np.array([x0, y0]) - AROUND_MM, np.array([x1, y1]) + AROUND_MM
-    ends = borders.reshape(-1, 2, 2)
-    near = np.ascontiguousarray(borders[((ends.max(axis=1) > low) & (ends.min(axis=1) < high)).all(axis=1)])
-    found, width = _best(edges(island), near, np.array([x0, y0, x1, y1]), least_mm, most_mm, spare_mm)
+    found, width = _best(edges(island), borders, np.array([x0, y0, x1, y1]), least_mm, most_mm, spare_mm)
     return (found, float(width)) if width > 0.0 else None
 
 

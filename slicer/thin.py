@@ -19,6 +19,7 @@ EVEN = 1.06, 0.4  # factor of the width and line widths of length in which a bea
 DASHED = 12.0  # line widths squared: larger places are no dashes
 POINTS = 9  # of a dash at which its way to the borders is measured
 TAPER = 0.9  # of the middle clearance: ends of a line with less run into a corner
+AROUND = 4.5  # line widths: of the section's borders, those so near a place matter
 SPARE = 0.04  # of the line width by which a bead may reach over the section where that tapers
 
 
@@ -30,16 +31,25 @@ def thin_walls(places: Polygons, section: Polygons, line_width_mm: float, height
     """
     beads: list[Bead] = []
     borders = np.zeros((0, 4)) if places.is_empty() else edges(section)
+    boxes = np.hstack([np.minimum(borders[:, :2], borders[:, 2:]), np.maximum(borders[:, :2], borders[:, 2:])])
     for island in [] if places.is_empty() else places.decompose():
         if island.area() < FEW_MM2 * line_width_mm**2:
             continue
-        laid = _laid(island, borders, line_width_mm)
+        laid = _laid(island, borders[_around(boxes, island, AROUND * line_width_mm)], line_width_mm)
         for stroke in laid:
             width = min(max(stroke.across_mm, LEAST_LINE * line_width_mm), 2.0 * line_width_mm)
             flow = flow_of(island.area(), laid, stroke.across_mm / width)
             flow *= bulged(width, height_mm, 2, bulge * line_width_mm)
             beads.append(Bead(Kind.GAP, stroke.points, width, RANK, flow))
     return beads
+
+
+def _around(boxes: Floats, island: Polygons, reach_mm: float) -> NDArray[np.bool_]:
+    """Which boxes x0 y0 x1 y1 (n, 4) come near an island: those of the borders that a bead in it could meet."""
+    x0, y0, x1, y1 = island.bounds()
+    across = (boxes[:, 2] > x0 - reach_mm) & (boxes[:, 0] < x1 + reach_mm)
+    near: NDArray[np.bool_] = across & (boxes[:, 3] > y0 - reach_mm) & (boxes[:, 1] < y1 + reach_mm)
+    return near
 
 
 def _laid(island: Polygons, borders: Floats, line_width_mm: float) -> list[Stroke]:
