@@ -8,14 +8,16 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.polygons import Polygons, contours, grown, sealed, united
-from slicer.room import EVEN_MM, FINE_MM, LEAST_MM2, SMOOTH_MM, Room, carried, leaning, solid
+from slicer.depth import depths
+from slicer.polygons import Polygons, contours, edges, grown, sealed, united
+from slicer.room import EVEN_MM, FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, Room, carried, leaning, solid
 
 CORNERS = 12  # of a trunk's outline
 THICKEST_MM = 2.5  # a trunk's radius: enough for any part that fits a machine
 MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
 FATTER = 3.0  # times the usual growth: how fast a branch that had to be thin recovers
 THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
+TIDIED = 4  # slits and slivers of branches in the way of something are seen to in every so many layers
 DRAWN_IN = 0.7  # of the lean: then right corners move by the lean
 
 
@@ -32,6 +34,11 @@ class Branch:
     radius: float
     top_mm: float
     full: bool = False
+
+    @property
+    def reach_mm(self) -> float:
+        """How far from x, y its farthest place is."""
+        return self.radius / cos(pi / CORNERS) if self.full else self.radius
 
     def shrunk(self, radius: float) -> "Branch":
         """Every place moved towards the middle, by no more than the radius becomes less."""
@@ -77,21 +84,30 @@ def lowered(branches: Sequence[Branch], room: Room, layer: int, growth: Growth) 
     """
     z, lean, reached = float(room.top_mm[layer - 1]), float(room.lean_mm[layer]), room.reached[layer - 1]
     wished = _wished(branches, z, lean, float(room.top_mm[layer]) - z, growth)
-    bad = united([branch.area for branch in wished]) - reached
+    borders = edges(reached)
+    free = _depths(wished, borders) >= np.array([branch.reach_mm for branch in wished])
+    doubtful = [branch.area for branch, is_free in zip(wished, free, strict=True) if not is_free]
+    bad = united(doubtful) - reached
     if bad.area() < LEAST_MM2:
         return _apart(wished)
     low: list[Branch] = []
     left: list[Branch] = []
-    for old, new in zip(branches, wished, strict=True):
-        if (new.area ^ bad).area() < LEAST_MM2:
+    for old, new, is_free, depth in zip(branches, wished, free, _depths(branches, borders), strict=True):
+        if is_free or (new.area ^ bad).area() < LEAST_MM2:
             low.append(new)
             continue
-        narrow = _narrowed(old, reached, lean)
+        narrow = _narrowed(old, reached, borders, float(depth), lean)
         if narrow is not None:
             low.append(narrow)
         elif not old.full or not _rests(old, room.ground[layer]):
             left.append(old)
     return _apart(low + _aside(left, room, layer))
+
+
+def _depths(branches: Sequence[Branch], borders: Floats) -> Floats:
+    """How deep the middles of branches lie inside an area with those edges."""
+    found: Floats = depths(np.array([[branch.x, branch.y] for branch in branches]).reshape(-1, 2), borders)
+    return found
 
 
 def _wished(branches: Sequence[Branch], z_mm: float, lean: float, rise: float, growth: Growth) -> list[Branch]:
@@ -126,14 +142,23 @@ def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in goals]
 
 
-def _narrowed(branch: Branch, reached: Polygons, lean: float) -> Branch | None:
-    """The branch where it is, as thick as it was or by the lean thinner, if that is free."""
-    if branch.full and (branch.area - reached).area() < LEAST_MM2:
+def _narrowed(branch: Branch, reached: Polygons, borders: Floats, depth_mm: float, lean: float) -> Branch | None:
+    """The branch where it is, as thick as it was or by the lean thinner, if that is free.
+
+    borders: edges of the reached places; depth_mm: how deep inside them the branch's middle lies.
+    """
+    if branch.full and depth_mm >= branch.reach_mm:
         return branch
     if branch.radius <= THIN_MM:
         return None
-    thin = trunk(branch.x, branch.y, max(branch.radius - lean, THIN_MM), branch.top_mm)
-    thin = thin if branch.full or branch.radius - lean <= THIN_MM else branch.shrunk(branch.radius - lean)
+    if branch.full or branch.radius - lean <= THIN_MM:
+        thin = trunk(branch.x, branch.y, max(branch.radius - lean, THIN_MM), branch.top_mm)
+        return thin if depth_mm >= thin.reach_mm else None
+    thin = branch.shrunk(branch.radius - lean)
+    if depth_mm >= thin.radius:
+        return thin
+    if depths(contours(thin.area)[0][:1], borders)[0] < 0.0:
+        return None
     return thin if (thin.area - reached).area() < LEAST_MM2 else None
 
 
@@ -147,14 +172,34 @@ def _aside(branches: Sequence[Branch], room: Room, layer: int) -> list[Branch]:
     if not branches:
         return []
     reached, lean = room.reached[layer - 1], float(room.lean_mm[layer])
-    area = sealed(united([branch.area for branch in branches]), SMOOTH_MM)
+    area = united([branch.area for branch in branches])
+    tidy = layer % TIDIED == 0
+    area = sealed(area, SMOOTH_MM) if tidy else area
     kept = carried(area, reached, room.ground[layer], lean)
-    kept = _thinned(kept, lean) if (area - reached).is_empty() else kept
+    kept = _thinned(kept, lean) if tidy and (area - reached).is_empty() else kept
+    islands = _tidied(kept, reached).decompose() if tidy else _followed(kept, reached)
     top = max(branch.top_mm for branch in branches)
-    thick = solid(kept)
-    thin = leaning(kept - thick, THIN_MM) ^ reached
-    islands = (thick.simplify(FINE_MM) + thin).decompose()
     return [branch_of(island, top) for island in islands if island.area() >= LEAST_MM2]
+
+
+def _tidied(places: Polygons, reached: Polygons) -> Polygons:
+    """Places whose slivers are wide enough to be followed down."""
+    thick = solid(places)
+    return thick.simplify(FINE_MM) + (leaning(places - thick, THIN_MM) ^ reached)
+
+
+def _followed(places: Polygons, reached: Polygons) -> list[Polygons]:
+    """The islands of places, wider where all of an island is a sliver: what is just a thin limb of one can wait."""
+    islands: list[Polygons] = []
+    for island in places.decompose():
+        islands += (leaning(island, THIN_MM) ^ reached).decompose() if _sliver(island) else [island.simplify(FINE_MM)]
+    return islands
+
+
+def _sliver(island: Polygons) -> bool:
+    """Whether an island is on average narrower than a sliver, as far as its box tells."""
+    x0, y0, x1, y1 = island.bounds()
+    return bool(island.area() < 2.0 * SLIVER_MM * hypot(x1 - x0, y1 - y0))
 
 
 def _thinned(area: Polygons, lean: float) -> Polygons:

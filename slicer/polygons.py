@@ -57,6 +57,17 @@ def united(several: Sequence[Polygons]) -> Polygons:
     return Polygons.batch_boolean(list(several), OpType.Add) if several else Polygons()
 
 
+def without(polygons: Polygons, *others: Polygons) -> Polygons:
+    """What of polygons lies in none of the others, in one pass."""
+    return Polygons.batch_boolean([polygons, *others], OpType.Subtract)
+
+
+def around(polygons: Polygons, reach_mm: float) -> Polygons:
+    """The upright rectangle round polygons, farther out by the reach."""
+    x0, y0, x1, y1 = polygons.bounds()
+    return Polygons.square((x1 - x0 + 2.0 * reach_mm, y1 - y0 + 2.0 * reach_mm)).translate((x0 - reach_mm, y0 - reach_mm))
+
+
 def strips(lines: Sequence[Floats], reach_mm: float) -> Polygons:
     """Everything nearer than the reach to lines (n, 2), with square ends."""
     quads = [_quads(line, reach_mm) for line in lines]

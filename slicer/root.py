@@ -6,7 +6,7 @@ from math import radians, tan
 import numpy as np
 
 from profiles.process import Process
-from slicer.polygons import Polygons, grown, united
+from slicer.polygons import Polygons, around, grown, united
 from slicer.room import COARSE_MM, EVEN_MM, SPECK_MM2, Room, leaning, slivers, solid
 
 
@@ -44,9 +44,7 @@ def _ended(bodies: Sequence[Polygons], room: Room, m: int) -> Polygons:
 
 def _barred(root: Polygons, outlines: Sequence[Polygons], room: Room, process: Process, m: int) -> Polygons:
     """Where the gaps to the part forbid support, about a root."""
-    x0, y0, x1, y1 = root.bounds()
-    far = process.support_distance_mm + 1.0
-    window = Polygons.square((x1 - x0 + 2.0 * far, y1 - y0 + 2.0 * far)).translate((x0 - far, y0 - far))
+    window = around(root, process.support_distance_mm + 1.0)
     under = int(np.searchsorted(room.top_mm, room.bottom_mm[m] - process.support_bottom_gap_mm + EVEN_MM, side="right"))
     over = int(np.searchsorted(room.bottom_mm, room.top_mm[m] + process.support_gap_mm - EVEN_MM))
     beside = grown((outlines[m] ^ window).simplify(COARSE_MM), process.support_distance_mm + COARSE_MM)

@@ -11,12 +11,13 @@ from slicer.branch import Growth
 from slicer.columns import Columns
 from slicer.contact import RIM_MM
 from slicer.heights import Heights
-from slicer.polygons import Polygons, grown, opened, sealed, united
+from slicer.polygons import Polygons, around, grown, opened, sealed, united, without
 from slicer.room import COARSE_MM, EVEN_MM, SMOOTH_MM, Room, leaning, rooms, slivers, solid
 from slicer.root import rooted
 from slicer.tree import Tree
 
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
+HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
 SLACK_MM = 0.01  # what rounding may add to the lean
 
 
@@ -92,7 +93,7 @@ def _afloat(
 def _worthwhile(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
     """The hanging places without those that, seen from above, are too small to matter."""
     places = [grown(place, RIM_MM) for place in hanging if not place.is_empty()]
-    islands = united(places).decompose()
+    islands = united([united(places[k : k + HEAP]) for k in range(0, len(places), HEAP)]).decompose()
     small = united([island for island in islands if island.area() < least_mm2])
     if small.is_empty():
         return list(hanging)
@@ -159,20 +160,29 @@ def _contact(place: Polygons, body: Polygons, reached: Polygons, radius: float) 
 def _standing(bodies: Sequence[Polygons], room: Room, process: Process, on_platform: bool) -> list[Polygons]:
     """Support from the ground up: what lies within the lean of the layer below or on ground, wide enough for a bead."""
     printed: list[Polygons] = []
-    least = 0.5 * np.pi * room.radius_mm**2
     for m, body in enumerate(bodies):
-        if body.is_empty() or (m == 0 and on_platform):
-            printed.append(body)
-            continue
-        carried = printed[-1] if m else Polygons()
-        if not slivers(body - carried):
-            carried = leaning(carried, float(room.lean_mm[m]) + SLACK_MM)
-        if not slivers(body - carried):
-            stands = opened((body ^ (carried + room.ground[m])).simplify(COARSE_MM), 0.45 * process.line_width_mm)
-            islands = [island for island in stands.decompose() if island.area() >= least]
-            body = Polygons.compose(islands) if islands else Polygons()
+        if not body.is_empty() and (m > 0 or not on_platform):
+            carried = leaning(printed[-1], float(room.lean_mm[m]) + SLACK_MM) if m else Polygons()
+            loose = without(body, carried, room.ground[m])
+            if not slivers(loose):
+                body = _clipped(body, loose, room, process)
         printed.append(body)
     return printed
+
+
+def _clipped(body: Polygons, loose: Polygons, room: Room, process: Process) -> Polygons:
+    """A layer's support without what is loose: the islands that had some of it, where they are wide enough for a bead."""
+    boxes = np.array([piece.bounds() for piece in loose.decompose()])
+    least = 0.5 * np.pi * room.radius_mm**2
+    kept = []
+    for island in body.decompose():
+        x0, y0, x1, y1 = island.bounds()
+        if ((boxes[:, 0] < x1) & (boxes[:, 2] > x0) & (boxes[:, 1] < y1) & (boxes[:, 3] > y0)).any():
+            stands = opened((island - loose).simplify(COARSE_MM), 0.45 * process.line_width_mm)
+            kept += [piece for piece in stands.decompose() if piece.area() >= least]
+        else:
+            kept.append(island)
+    return Polygons.compose(kept) if kept else Polygons()
 
 
 def _foot(area: Polygons, outlines: Sequence[Polygons], room: Room, process: Process) -> Polygons:
@@ -204,7 +214,7 @@ def _missed(
     the part.
     """
     missed = []
-    half = 0.5 * process.line_width_mm
+    half, reach = 0.5 * process.line_width_mm, 2.0 * process.support_distance_mm + 1.0
     for k, place in enumerate(wanted):
         if place.is_empty():
             missed.append(place)
@@ -213,10 +223,7 @@ def _missed(
         held = held if held.is_empty() else grown(held, half)
         bare = place - held
         if k and not held.is_empty() and bare.area() >= LEAST_MM2:
-            x0, y0, x1, y1 = bare.bounds()
-            reach = 2.0 * process.support_distance_mm + 1.0
-            window = Polygons.square((x1 - x0 + 2.0 * reach, y1 - y0 + 2.0 * reach)).translate((x0 - reach, y0 - reach))
-            spanned = sealed((held + outlines[k - 1]) ^ window, 0.5 * process.support_distance_mm + RIM_MM)
+            spanned = sealed((held + outlines[k - 1]) ^ around(bare, reach), 0.5 * process.support_distance_mm + RIM_MM)
             bare = bare - spanned
         missed.append(bare if bare.area() >= LEAST_MM2 else Polygons())
     small = _worthwhile(missed, process.support_least_mm2)

@@ -1,6 +1,7 @@
 """Tree: support as branches; what begins near each other grows down as one branch."""
 
 from dataclasses import dataclass
+from itertools import product
 from math import floor
 
 from slicer.branch import Branch, Growth, branch_of, lowered
@@ -52,14 +53,14 @@ def _cell(x: float, y: float) -> tuple[int, int]:
 
 def _pieces(area: Polygons) -> list[tuple[tuple[int, int], Polygons]]:
     """An area cut along a fixed lattice, with the lattice's numbers."""
-    x0, y0, x1, y1 = area.bounds()
-    (i0, j0), (i1, j1) = _cell(x0, y0), _cell(x1, y1)
-    if (i0, j0) == (i1, j1):
-        return [((i0, j0), area)]
-    pieces = []
-    for i in range(i0, i1 + 1):
-        for j in range(j0, j1 + 1):
-            piece = area ^ Polygons.square((CELL_MM, CELL_MM)).translate((i * CELL_MM, j * CELL_MM))
+    pieces: dict[tuple[int, int], list[Polygons]] = {}
+    square = Polygons.square((CELL_MM, CELL_MM))
+    for island in area.decompose():
+        x0, y0, x1, y1 = island.bounds()
+        (i0, j0), (i1, j1) = _cell(x0, y0), _cell(x1, y1)
+        for i, j in product(range(i0, i1 + 1), range(j0, j1 + 1)):
+            whole = (i0, j0) == (i1, j1)
+            piece = island if whole else island ^ square.translate((i * CELL_MM, j * CELL_MM))
             if piece.area() > LEAST_MM2:
-                pieces.append(((i, j), piece))
-    return pieces
+                pieces.setdefault((i, j), []).append(piece)
+    return [(cell, Polygons.compose(several)) for cell, several in sorted(pieces.items())]
