@@ -29,6 +29,12 @@ class Material(Frozen):
         None, ge=0, le=1, description="part fan on the first solid layer over sparse infill; absent: fan_bridge"
     )
     fan_off_layers: int = Field(1, ge=0, le=1000, description="layers of part 1 without any fan: they must stick to the plate")
+    fan_full_layer: int = Field(
+        0,
+        ge=0,
+        le=1000,
+        description="layer of part 1 from which the fan may blow fully; it rises evenly from fan_off_layers to there",
+    )
     flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on all extruded volume")
     retract_mm: float = Field(ge=0, le=15, description="filament pulled back before a travel that crosses outside, mm")
     retract_speed_mm_s: float = Field(35.0, gt=0, le=200, description="speed of retraction and priming, mm/s")

@@ -21,6 +21,13 @@ def fan_share(material: Material, process: Process, time_s: float) -> float:
     return round((least + share * (material.fan - least)) / STEP) * STEP
 
 
+def rising_fan(material: Material, layer: int) -> float:
+    """Factor on the fan of part 1's layer (counted from 0): none up to fan_off_layers, then rising, 1 from fan_full_layer on."""
+    if layer < material.fan_off_layers:
+        return 0.0
+    return min((layer + 1 - material.fan_off_layers) / max(material.fan_full_layer - material.fan_off_layers, 1), 1.0)
+
+
 def hanging_fan(material: Material, bead: Bead, factor: float) -> float | None:
     """Part fan of a bead where it differs from the layer's: bridges and overhanging walls."""
     if bead.kind not in HANGING:

@@ -12,7 +12,7 @@ from profiles.profile import Profile
 from slicer.bead import WALLS, Bead, thinned
 from slicer.bridge import beside, bridge_beads, bridged, infill_bridge_beads, over_infill
 from slicer.brim import brim
-from slicer.cooling import fan_share, hanging_fan
+from slicer.cooling import fan_share, hanging_fan, rising_fan
 from slicer.gap import gaps
 from slicer.infill import infill
 from slicer.interlock import filled as interlocked
@@ -122,8 +122,8 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
         fixed = process.first_layer_speed_mm_s if on_platform else process.interface_speed_mm_s
         flow *= process.first_layer_flow if on_platform else process.interface_flow
     speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)
-    if on_platform and index < material.fan_off_layers:
-        fan = 0.0
+    if on_platform:
+        fan = rising_fan(material, index)
     blown = [hanging_fan(material, p.bead, fan) for p in placed]
     paths = tuple(
         Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, blow)

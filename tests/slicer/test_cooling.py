@@ -38,6 +38,13 @@ def test_the_first_layers_on_the_platform_get_no_fan_but_those_on_plastic_do():
     assert all(layer.fan > 0 for layer in top.layers)
 
 
+def test_the_fan_rises_evenly_to_its_full_layer():
+    chosen = profile("material.fan_off_layers=1", "material.fan_full_layer=4", "material.fan_least=1")
+    base, top = (slice_part(part, chosen) for part in cut(box(10, 10, 6), ((0.0, 0.0, 1.0), 3.0)))
+    assert [layer.fan for layer in base.layers[:6]] == pytest.approx([0, 1 / 3, 2 / 3, 1, 1, 1], abs=0.026)
+    assert {layer.fan for layer in top.layers[3:]} == {1.0}
+
+
 def test_bridges_get_a_fan_of_their_own():
     wall, roof = m3.Manifold.cube((5, 8, 6)), m3.Manifold.cube((20, 8, 4)).translate((0, 0, 6))
     arch = from_manifold(wall + wall.translate((15, 0, 0)) + roof)
