@@ -20,6 +20,7 @@ from mdp.mesh import Floats
 from slicer.bead import length_mm
 from slicer.chords import chains
 from slicer.halfedges import opposites
+from slicer.polygons import turned
 
 SMOOTHINGS = 3  # moving averages over three points
 REACH = 0.1  # of the width: a shorter way between two corners is none
@@ -79,7 +80,7 @@ def centrelines(outlines: Sequence[Floats], step_mm: float, even: float, shortes
 
 def _sampled(loop: Floats, step_mm: float) -> Floats:
     """The loop with points added so that no edge is longer than the step."""
-    steps = np.roll(loop, -1, axis=0) - loop
+    steps = turned(loop, 1) - loop
     counts = np.maximum(np.ceil(np.hypot(*steps.T) / step_mm), 1).astype(np.int64)
     first = np.repeat(np.cumsum(counts) - counts, counts)
     share = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from itertools import groupby
 from math import pi
 
-import numpy as np
-
 from mdp.mesh import Floats
 from slicer.bead import Bead, length_mm, width_for_mm
 from slicer.centreline import centrelines
@@ -41,17 +39,22 @@ def gaps(places: Polygons, line_width_mm: float, height_mm: float) -> list[Bead]
     beads: list[Bead] = []
     for area, several in strokes(places, line_width_mm, 0.0, *EVEN):
         long = [stroke for stroke in several if length_mm(stroke.points) > SHORTEST * line_width_mm]
+        drawn = drawn_mm2(long)
         for stroke in long:
             wished = width_for_mm(stroke.across_mm, height_mm)
             width = min(max(wished, 0.5 * line_width_mm), 2.0 * line_width_mm)
-            beads.append(Bead(Kind.GAP, stroke.points, width, RANK, flow_of(area, long, wished / width)))
+            beads.append(Bead(Kind.GAP, stroke.points, width, RANK, flow_of(area, drawn, wished / width)))
     return beads
 
 
-def flow_of(area_mm2: float, laid: Sequence[Stroke], wished: float) -> float:
-    """Flow with which the strokes laid in a place give its area times height; wished: width over that of the bead."""
-    drawn = sum(length_mm(stroke.points) * stroke.across_mm for stroke in laid)
-    return float(np.clip(area_mm2 / drawn * min(wished, 1.0), LEAST_FLOW, MOST_FLOW))
+def drawn_mm2(laid: Sequence[Stroke]) -> float:
+    """Area that strokes as wide as their places cover."""
+    return sum(length_mm(stroke.points) * stroke.across_mm for stroke in laid)
+
+
+def flow_of(area: float, drawn: float, wished: float) -> float:
+    """Flow with which strokes that cover `drawn` give a place's area, mm2, times height; wished: width over the bead's."""
+    return min(max(area / drawn * min(wished, 1.0), LEAST_FLOW), MOST_FLOW)
 
 
 def strokes(

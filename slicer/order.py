@@ -17,7 +17,7 @@ from profiles.process import Process
 from slicer.bead import Bead
 from slicer.combing import NOWHERE, Ground
 from slicer.paths import Kind
-from slicer.polygons import Polygons, area_mm2, contours
+from slicer.polygons import Polygons, area_mm2, contours, turned
 from slicer.scanline import inside
 from slicer.tour import tour
 from slicer.widths import outer_wall_mm
@@ -196,7 +196,7 @@ def _islands(starts: Floats, ranks: Ints, section: Polygons) -> Ints:
     outer = sorted((loop for loop in contours(section) if area_mm2(loop) > 0), key=lambda loop: abs(area_mm2(loop)))
     if len(outer) < 2:
         return np.where(ranks <= OUTSIDE, -1, 0).astype(np.int32)
-    sides = [np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in outer]
+    sides = [np.hstack([loop, turned(loop, 1)]) for loop in outer]
     offsets = np.cumsum([0, *(len(side) for side in sides)])
     boxes = np.array([[*loop.min(axis=0), *loop.max(axis=0)] for loop in outer])
     found = _containing(np.concatenate(sides), offsets, boxes, starts)

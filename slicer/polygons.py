@@ -70,22 +70,27 @@ def around(polygons: Polygons, reach_mm: float) -> Polygons:
 
 def strips(lines: Sequence[Floats], reach_mm: float) -> Polygons:
     """Everything nearer than the reach to lines (n, 2), with square ends."""
-    quads = [_quads(line, reach_mm) for line in lines]
-    return Polygons(list(np.concatenate(quads)), FillRule.Positive)
+    quads = _quads(np.concatenate([line[:-1] for line in lines]), np.concatenate([line[1:] for line in lines]), reach_mm)
+    return Polygons(list(quads), FillRule.Positive)
 
 
-def _quads(line: Floats, reach_mm: float) -> Floats:
-    """(n - 1, 4, 2) a counter-clockwise rectangle round every segment."""
-    steps = np.diff(line, axis=0)
+def _quads(starts: Floats, ends: Floats, reach_mm: float) -> Floats:
+    """(n, 4, 2) a counter-clockwise rectangle round every segment."""
+    steps = ends - starts
     along = steps * (reach_mm / np.maximum(np.hypot(*steps.T), 1e-9))[:, None]
     left = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    a, b = line[:-1] - along, line[1:] + along
+    a, b = starts - along, ends + along
     return np.stack([a - left, b - left, b + left, a + left], axis=1)
 
 
 def contours(polygons: Polygons) -> list[Floats]:
     """Contours as (n, 2) arrays, the first point not repeated."""
     return [np.asarray(loop, dtype=np.float64) for loop in polygons.to_polygons() if len(loop) > 2]
+
+
+def turned(loop: Floats, at: int) -> Floats:
+    """The loop (n, 2) from another of its points on."""
+    return np.concatenate([loop[at:], loop[:at]])
 
 
 def closed(loop: Floats) -> Floats:

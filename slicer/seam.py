@@ -15,6 +15,7 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead
 from slicer.paths import Kind
+from slicer.polygons import turned
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
@@ -95,7 +96,7 @@ def _begun(loop: Floats, outer: Floats, kind: Kind, process: Process, around: Su
     if share > 0.0:
         new = loop[at] + share * (loop[(at + 1) % len(loop)] - loop[at])
         return np.concatenate([new[None], loop[at + 1 :], loop[: at + 1]]), free
-    return np.roll(loop, -at, axis=0), free
+    return turned(loop, at), free
 
 
 def _target(loop: Floats, process: Process, around: Surroundings) -> tuple[tuple[float, float, float], tuple[float, float]]:

@@ -11,7 +11,7 @@ from mdp.kernel import floats, kernel
 from mdp.mesh import Floats
 from slicer.bead import Bead, bulged, length_mm
 from slicer.dash import dash
-from slicer.gap import FEW_MM2, LEAST_LINE, RANK, SHORTEST, Stroke, flow_of, strokes
+from slicer.gap import FEW_MM2, LEAST_LINE, RANK, SHORTEST, Stroke, drawn_mm2, flow_of, strokes
 from slicer.paths import Kind
 from slicer.polygons import Polygons, edges
 
@@ -38,7 +38,7 @@ def thin_walls(places: Polygons, section: Polygons, line_width_mm: float, height
         laid = _laid(island, borders[_around(boxes, island, AROUND * line_width_mm)], line_width_mm)
         for stroke in laid:
             width = min(max(stroke.across_mm, LEAST_LINE * line_width_mm), 2.0 * line_width_mm)
-            flow = flow_of(island.area(), laid, stroke.across_mm / width)
+            flow = flow_of(island.area(), drawn_mm2(laid), stroke.across_mm / width)
             flow *= bulged(width, height_mm, 2, bulge * line_width_mm)
             beads.append(Bead(Kind.GAP, stroke.points, width, RANK, flow))
     return beads
