@@ -13,10 +13,13 @@ from slicer.clip import Border, Indices, Pieces
 TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
 
 
-def anchored(pieces: Pieces, border: Border, hook_mm: float, most_mm: float, apart_mm: float) -> list[Floats]:
+def anchored(
+    pieces: Pieces, border: Border, hook_mm: float, most_mm: float, apart_mm: float, group: Indices | None = None
+) -> list[Floats]:
     """Pieces as long lines (n, 2): joined where ends are at most most_mm apart along the border, else with hooks.
 
-    A hook is hook_mm long, less where it would come nearer than apart_mm to another end or hook.
+    A hook is hook_mm long, less where it would come nearer than apart_mm to another end or hook. group: (k,) only pieces
+    of one group are joined.
     """
     if not len(pieces.starts):
         return []
@@ -25,7 +28,8 @@ def anchored(pieces: Pieces, border: Border, hook_mm: float, most_mm: float, apa
     out = np.empty((len(pieces.points) + 2 * len(border.edges) + 4 * len(pieces.ends) + 8, 2))
     starts = np.empty(len(pieces.ends), np.int64)
     limits_mm = (hook_mm, most_mm, apart_mm)
-    n, count = _anchored(pieces.points, bounds, pieces.ends, border.edges, border.offsets, contour, limits_mm, out, starts)
+    own = np.zeros(len(pieces.ends), np.int64) if group is None else group
+    n, count = _anchored(pieces.points, bounds, pieces.ends, border.edges, border.offsets, contour, own, limits_mm, out, starts)
     return np.split(out[:n].copy(), starts[1:count])
 
 
@@ -64,7 +68,7 @@ def _following(place: Floats, contour: Indices, way: Floats, offsets: Indices) -
 
 
 @part
-def _joined(after: Indices, gap: Floats, most_mm: float) -> tuple[Indices, Indices]:
+def _joined(after: Indices, gap: Floats, group: Indices, most_mm: float) -> tuple[Indices, Indices]:
     """Of each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
     partner, sense, ties = longs(len(after), -1), longs(len(after), 0), floats(len(after), 0.0)
     for here in range(len(after)):
@@ -79,6 +83,8 @@ def _joined(after: Indices, gap: Floats, most_mm: float) -> tuple[Indices, Indic
         if partner[here] >= 0 or partner[there] >= 0:
             continue
         a, b = here // 2, there // 2
+        if group[a] != group[b]:
+            continue
         while root[a] != a:
             root[a] = root[root[a]]
             a = root[a]
@@ -136,13 +142,13 @@ def _run(out: Floats, n: int, e: int, place: float, length: float, edges: Floats
 
 @kernel
 def _anchored(  # type: ignore[no-untyped-def]
-    points, bounds, ends, edges, offsets, contour, limits_mm, out, starts
+    points, bounds, ends, edges, offsets, contour, group, limits_mm, out, starts
 ):
     """Fills in the lines and where each begins; returns the number of points and of lines. limits_mm: hook, most, apart."""
     hook_mm, most_mm, apart_mm = limits_mm
     way, place = _places(points, bounds, ends, edges)
     after, gap = _following(place, contour, way, offsets)
-    partner, sense = _joined(after, gap, most_mm)
+    partner, sense = _joined(after, gap, group, most_mm)
     hooks = _hooks(partner, sense, after, gap, hook_mm, apart_mm)
     done = flags(len(ends))
     n = count = 0

@@ -22,6 +22,7 @@ class Bead:
 
     rank: beads of an island are printed by rising rank; those of rank 0 and below are its walls and stay together around
     each outer wall. over_infill: a bridge over the sparse infill of the layer below, which has a speed and a fan of its own.
+    follows: printed right after the bead before it in the list.
     """
 
     kind: Kind
@@ -30,6 +31,7 @@ class Bead:
     rank: int
     flow: float = 1.0
     over_infill: bool = False
+    follows: bool = False
 
     @property
     def closed(self) -> bool:

@@ -112,7 +112,11 @@ def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
     walls = [bead for bead in beads if leaders and OUTSIDE < bead.rank <= 0]
     phases: defaultdict[int, list[list[Bead]]] = defaultdict(list)
     for bead in beads:
-        if not leaders or not OUTSIDE < bead.rank <= 0:
+        if leaders and OUTSIDE < bead.rank <= 0:
+            continue
+        if bead.follows and phases[bead.rank]:
+            phases[bead.rank][-1].append(bead)
+        else:
             phases[bead.rank].append([bead])
     if walls:
         phases[0] = _families(walls, leaders)

@@ -11,6 +11,7 @@ from slicer.bead import Bead, length_mm, spacing_mm
 from slicer.bundle import MARGIN_MM, Box, Bundle, Lines, cut_to, straight
 from slicer.clip import border_of
 from slicer.gap import LEAST_GAP, gaps
+from slicer.monotonic import monotonic
 from slicer.paths import Kind
 from slicer.polygons import Polygons, grown, opened, strips
 
@@ -21,8 +22,12 @@ FEW_MM2 = 0.6  # of the line width squared: a smaller place beside the lines sta
 LEAST_FLOW, MOST_FLOW = 0.85, 1.15
 
 
-def skin(area: Polygons, kind: Kind, angle_deg: float, width_mm: float, height_mm: float, overlap: float) -> list[Bead]:
+def skin(
+    area: Polygons, kind: Kind, angle_deg: float, width_mm: float, height_mm: float, overlap: float, in_order: bool = False
+) -> list[Bead]:
     """Beads that fill an area completely; `overlap` is the reach into the walls around, share of a line width.
+
+    in_order: every line is printed on the same side of its neighbour.
 
     The lines of each connected piece are spread evenly; places they leave get beads of their own. The flow makes the
     plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill it.
@@ -31,14 +36,18 @@ def skin(area: Polygons, kind: Kind, angle_deg: float, width_mm: float, height_m
     beads: list[Bead] = []
     for island in area.decompose() if not area.is_empty() else []:
         border = border_of(grown(island, -(0.5 * spacing - overlap * width_mm)))
-        lines = anchored(cut_to(border, _even(angle_deg, spacing)), border, 0.0, JOIN * spacing, 0.0)
+        pieces = cut_to(border, _even(angle_deg, spacing))
+        if in_order:
+            lines = monotonic(pieces, border, angle_deg, spacing, JOIN * spacing)
+        else:
+            lines = anchored(pieces, border, 0.0, JOIN * spacing, 0.0)
         lines = [line for line in lines if length_mm(line) > 0.5 * width_mm]
         rest = left_over(island, lines, width_mm)
         beads += gaps(rest, width_mm, height_mm)
         total = sum(length_mm(line) for line in lines)
         if total > 0:
             flow = min(max((island.area() - rest.area()) / (total * spacing), LEAST_FLOW), MOST_FLOW)
-            beads += [Bead(kind, line, width_mm, RANK, flow) for line in lines]
+            beads += [Bead(kind, line, width_mm, RANK, flow, follows=in_order and k > 0) for k, line in enumerate(lines)]
     return beads
 
 

@@ -86,7 +86,8 @@ def _own(stack: Stack, layer: int) -> list[Bead]:
             beads += infill_bridge_beads(area, angle, process, height_mm)
             region = beside(region, area, width)
     beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
-    beads += skin(region.top, Kind.TOP_SKIN, angle, process.top_skin_line_width_mm or width, height_mm, overlap)
+    top_width = process.top_skin_line_width_mm or width
+    beads += skin(region.top, Kind.TOP_SKIN, angle, top_width, height_mm, overlap, process.top_skin_monotonic)
     sparse = of_width(process, process.infill_line_width_mm)
     return beads + infill(region.sparse, sparse, stack.density, layer, float(stack.at.tip_mm[layer]), height_mm)
 
