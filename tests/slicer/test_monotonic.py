@@ -79,5 +79,6 @@ def test_without_it_lines_meet_from_both_sides_of_a_hole() -> None:
 def test_the_order_of_a_layer_keeps_it() -> None:
     area = plate([(3, 2, 3), (-5, -3, 2)])
     beads = skin(area, Kind.TOP_SKIN, 45.0, WIDTH, HEIGHT, 0.0, True)
-    placed = [Bead(each.bead.kind, each.points, WIDTH, 2) for each in ordered(beads, area, profile().process, np.array([20.0, 20.0]))]
-    assert out_of_order(lines_of([bead for bead in placed if bead.kind is Kind.TOP_SKIN], 45.0)) == 0
+    placed = ordered(beads, area, profile().process, np.array([20.0, 20.0]))
+    printed = [Bead(each.bead.kind, each.points, WIDTH, 2) for each in placed if each.bead.kind is Kind.TOP_SKIN]
+    assert out_of_order(lines_of(printed, 45.0)) == 0
