@@ -116,3 +116,4 @@ class Talk:
             raise error
         self.wire, done = self._lost(error)
         self.protocol.interrupted(self.medium.now_s(), done)
+        self.wire.write(self.protocol.take())  # one that takes nothing over a new wire either has not been found again

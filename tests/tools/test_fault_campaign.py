@@ -1,13 +1,17 @@
 """A shorter run of the fault campaign, and proofs that its judge sees what is wrong."""
 
+from math import inf
+
 import numpy as np
 import pytest
 
 from machine.link.faults import Fault, FaultScript
+from machine.link.firmware import Habits
 from machine.link.framing import frame
 from machine.link.stream import print_lines
 from machine.link.virtual import PATH, EndlessError, VirtualPrinter
 from machine.link.window import Window
+from profiles.errors import PortError
 from tools import fault_campaign
 from tools.fault_campaign import PROFILE, judged, order, program, reasons, table, trial, wanted
 
@@ -69,6 +73,13 @@ def test_a_host_that_waits_for_ever_is_stopped() -> None:
     printer = VirtualPrinter(PROFILE.machine, most_s=30.0)
     with pytest.raises(EndlessError):
         print_lines(["M109 S200"], PATH, medium=printer.medium)
+
+
+def test_a_printer_that_never_reads_again_ends_the_print_over_a_new_wire_too() -> None:
+    blocked = FaultScript((Fault("block", 60, seconds=inf),))
+    printer = VirtualPrinter(PROFILE.machine, Habits(rx_ring=None), blocked, most_s=600.0)
+    with pytest.raises(PortError, match="has stopped reading: it took no bytes for 10 s"):
+        print_lines(program(2000), PATH, medium=printer.medium, profile=PROFILE)
 
 
 def test_the_table_counts_every_script_once() -> None:
