@@ -100,14 +100,15 @@ class _Finder:
     def __call__(self, error: PortError) -> Mended:
         feed, medium = self._feed, self._medium
         feed.talk.wire.close()
+        end_s = medium.now_s() + medium.lost_s
         with feed.apart("reconnecting", f"{error}; waiting {medium.lost_s:.0f} s for it to come back"):
-            while (wire := found_again(self._name, self._baud, medium, feed.heed)) is not None:
+            while medium.now_s() < end_s and (wire := found_again(self._name, self._baud, medium, feed.heed)) is not None:
                 if feed.talk.protocol.family.resends:
                     return Mended(wire, None)
                 feed.talk.wire = wire  # whoever cancels meanwhile wants the heaters off
                 try:
                     return Mended(wire, feed.was_done(inquire(wire, medium, feed.heed)))
-                except PortError:  # a plug that is still loose
+                except PortError:  # a plug that is still loose, or a printer that has stopped reading
                     wire.close()
         raise PortError(f"{error}; it did not come back within {medium.lost_s:.0f} s")
 

@@ -12,6 +12,7 @@ from machine.link.stream import print_lines
 from machine.link.virtual import PATH, EndlessError, VirtualPrinter
 from machine.link.window import Window
 from profiles.errors import PortError
+from profiles.profile import load
 from tools import fault_campaign
 from tools.fault_campaign import PROFILE, judged, order, program, reasons, table, trial, wanted
 
@@ -75,11 +76,12 @@ def test_a_host_that_waits_for_ever_is_stopped() -> None:
         print_lines(["M109 S200"], PATH, medium=printer.medium)
 
 
-def test_a_printer_that_never_reads_again_ends_the_print_over_a_new_wire_too() -> None:
-    blocked = FaultScript((Fault("block", 60, seconds=inf),))
-    printer = VirtualPrinter(PROFILE.machine, Habits(rx_ring=None), blocked, most_s=600.0)
-    with pytest.raises(PortError, match="has stopped reading: it took no bytes for 10 s"):
-        print_lines(program(2000), PATH, medium=printer.medium, profile=PROFILE)
+@pytest.mark.parametrize("dialect", ["marlin", "klipper", "reprapfirmware"])
+def test_a_printer_that_never_reads_again_ends_the_print_over_a_new_wire_too(dialect: str) -> None:
+    profile, blocked = load(settings=[f"machine.dialect={dialect}"]), FaultScript((Fault("block", 60, seconds=inf),))
+    printer = VirtualPrinter(profile.machine, Habits(rx_ring=None), blocked, most_s=900.0)
+    with pytest.raises(PortError, match=r"has stopped reading: it took no bytes for 10 s.*heaters may still be on"):
+        print_lines(program(2000), PATH, medium=printer.medium, profile=profile)
 
 
 def test_the_table_counts_every_script_once() -> None:
