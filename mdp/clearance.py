@@ -19,14 +19,20 @@ from profiles.machine import Machine
 
 def least_tip_height_mm(machine: Machine, pose: Pose) -> float:
     """Least height of the tip above the table's plane at a pose, the profile's clearance included; 0 at a level table."""
+    return lowest_body(machine, pose)[0]
+
+
+def lowest_body(machine: Machine, pose: Pose) -> tuple[float, str]:
+    """The same, and the body of the head that asks for it."""
     normal = rotation(machine, pose) @ UP
     across, along = hypot(normal[0], normal[1]), float(normal[2])
     if across < 1e-9:
-        return 0.0
-    needed = [radius * across - height * along for radius, height in machine.head.silhouette_mm]
+        return 0.0, "nozzle tip"
+    needed = [(radius * across - height * along, "hot end") for radius, height in machine.head.silhouette_mm]
     for box in machine.head.boxes:
-        needed.append(float(-(corners(box.min_mm, box.max_mm) @ normal).min()))
-    return max(0.0, max(needed) + machine.clearance_mm)
+        needed.append((float(-(corners(box.min_mm, box.max_mm) @ normal).min()), box.name))
+    height, name = max(needed)
+    return max(0.0, height + machine.clearance_mm), name
 
 
 def least_height_mm(machine: Machine, direction: Floats) -> float:
@@ -36,23 +42,30 @@ def least_height_mm(machine: Machine, direction: Floats) -> float:
 
 def allowed_poses(machine: Machine, direction: Floats, points_mm: Floats, near_turn_deg: float | None = None) -> list[Pose]:
     """Poses at which a part with these (n, 3) workpiece points can be printed: clear of the table, inside X Y Z limits."""
-    lowest = float(points_mm[:, 2].min())
-    found = []
-    for pose in poses(machine, direction, near_turn_deg):
-        reached = points_mm @ rotation(machine, pose).T + shift(machine, pose)
-        limits = np.array([axis.limits_mm for axis in (machine.x, machine.y, machine.z)])
-        inside = (reached.min(axis=0) >= limits[:, 0]).all() and (reached.max(axis=0) <= limits[:, 1]).all()
-        if inside and lowest >= least_tip_height_mm(machine, pose) and _clear_of_cradle(machine, pose, reached):
-            found.append(pose)
-    return found
+    return [pose for pose in poses(machine, direction, near_turn_deg) if find_obstacle(machine, pose, points_mm) is None]
 
 
-def _clear_of_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> bool:
-    """Whether the head keeps off all of the cradle that stands higher than the table, the tip anywhere in the hull of (n, 3)
-    machine points: one direction must part each body there from each box."""
+def find_obstacle(machine: Machine, pose: Pose, points_mm: Floats) -> str | None:
+    """Why a part with these (n, 3) workpiece points cannot be printed at a pose; None: it can."""
+    reached = points_mm @ rotation(machine, pose).T + shift(machine, pose)
+    low, high = reached.min(axis=0), reached.max(axis=0)
+    for axis, letter in enumerate("XYZ"):
+        least, most = (machine.x, machine.y, machine.z)[axis].limits_mm
+        if low[axis] < least or high[axis] > most:
+            return f"{letter} would go from {low[axis]:.1f} to {high[axis]:.1f} mm, {least:g} to {most:g} is allowed"
+    lowest, (needed, body) = float(points_mm[:, 2].min()), lowest_body(machine, pose)
+    if lowest < needed:
+        return f"the head's {body} would meet the table: the part begins {lowest:.1f} mm above it, {needed:.1f} mm are needed"
+    met = _find_in_cradle(machine, pose, reached)
+    return None if met is None else f"the head's {met[0]} would meet the cradle's {met[1]}"
+
+
+def _find_in_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> tuple[str, str] | None:
+    """The body of the head and that of the cradle, of those that stand higher than the table, that could meet, the tip anywhere
+    in the hull of (n, 3) machine points: one direction must part each body there from each box."""
     higher = [box for box in machine.cradle if box.max_mm[2] > 0.0]
     if not higher:
-        return True
+        return None
     tried = directions(rotation(machine, pose) @ UP)
     least = (tried @ tips_mm.T).min(axis=1)
     tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)  # the cradle does not turn with the table
@@ -61,5 +74,5 @@ def _clear_of_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> bool:
         reach = (tried @ reached.T).max(axis=1)
         for body in bodies(machine):
             if float((least + body.least(tried) - reach).max()) < body.need_mm:
-                return False
-    return True
+                return body.name, box.name
+    return None

@@ -1,16 +1,19 @@
-"""Cut: exact, closed halves of a solid by manifold3d."""
+"""Cut: exact, closed halves of a solid, and convex hulls, by manifold3d."""
 
 from math import asin, atan2, degrees
+from typing import TypeAlias
 
 import manifold3d as m3
 import numpy as np
 
-from mdp.mesh import Mesh
+from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from profiles.errors import MeshError
 
+Solid: TypeAlias = m3.Manifold
 
-def solid_of(mesh: Mesh) -> m3.Manifold:
+
+def solid_of(mesh: Mesh) -> Solid:
     """The mesh as a manifold3d solid; MeshError when it is none."""
     solid = m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64)))
     if solid.status() != m3.Error.NoError:
@@ -18,28 +21,33 @@ def solid_of(mesh: Mesh) -> m3.Manifold:
     return solid
 
 
-def mesh_of(solid: m3.Manifold) -> Mesh:
+def mesh_of(solid: Solid) -> Mesh:
     """The solid's mesh, its vertices and faces in manifold3d's spatial order."""
     mesh = solid.to_mesh64()
     return Mesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))
 
 
-def cut(solid: m3.Manifold, plane: Plane) -> tuple[m3.Manifold, m3.Manifold]:
+def cut(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
     """The solid above the plane and the solid below it; their volumes add up."""
     return above(solid, plane), below(solid, plane)
 
 
-def above(solid: m3.Manifold, plane: Plane) -> m3.Manifold:
+def above(solid: Solid, plane: Plane) -> Solid:
     """What of a solid lies above a plane."""
     return solid ^ _half_space(solid, plane)
 
 
-def below(solid: m3.Manifold, plane: Plane) -> m3.Manifold:
+def below(solid: Solid, plane: Plane) -> Solid:
     """What of a solid lies below a plane."""
     return solid - _half_space(solid, plane)
 
 
-def _half_space(solid: m3.Manifold, plane: Plane) -> m3.Manifold:
+def convex_hull(points: Floats) -> Mesh:
+    """The mesh of the convex hull of (n, 3) points."""
+    return mesh_of(m3.Manifold.hull_points(points.copy()))
+
+
+def _half_space(solid: Solid, plane: Plane) -> Solid:
     """A cube whose one face lies in the plane and covers the solid, all of the cube above it: the cutter of manifold3d's own
     split_by_plane, which makes both halves and takes half as long again as one."""
     low, high = np.array(solid.bounding_box()).reshape(2, 3)

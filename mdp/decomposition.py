@@ -36,7 +36,28 @@ class Part:
 
     def in_part_frame(self) -> Mesh:
         """The part's mesh in its own frame: direction is +z, base plane is z = 0."""
-        return self.mesh.moved(self.rotation, (0.0, 0.0, -self.base.offset_mm))
+        return self.mesh.transform(self.rotation, (0.0, 0.0, -self.base.offset_mm))
+
+
+@dataclass(frozen=True, eq=False)
+class FrontRow:
+    """A decomposition: its planes in the order of the cuts, and what it costs.
+
+    seam_mm: length of the rims of all cuts; time_s, filament_mm: estimates, None where there is none.
+    """
+
+    planes: tuple[Plane, ...]
+    support_area_mm2: float
+    seam_mm: float
+    cost_mm2: float
+    chosen: bool = False
+    time_s: float | None = None
+    filament_mm: float | None = None
+
+    @property
+    def parts(self) -> int:
+        """How many parts it has."""
+        return len(self.planes) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +80,7 @@ class Decomposition:
     search_s: float
     notes: tuple[str, ...] = ()
     folded_mm3: float = 0.0
+    front: tuple[FrontRow, ...] = ()
 
     def __post_init__(self) -> None:
         self._check_volume()
@@ -68,6 +90,21 @@ class Decomposition:
     def reduction(self) -> float:
         """Share of the risky area that the parts make safe, 0..1; 0 for a model without risky faces."""
         return 1.0 - self.residual_area_mm2 / self.risky_area_mm2 if self.risky_area_mm2 > 0 else 0.0
+
+    @property
+    def chosen(self) -> FrontRow | None:
+        """The row of the front that the parts are; None where they come from no search."""
+        return next((row for row in self.front if row.chosen), None)
+
+    @property
+    def cost_mm2(self) -> float:
+        """Area that needs support and the scars of the seams; the area alone where the parts come from no search."""
+        return self.residual_area_mm2 if self.chosen is None else self.chosen.cost_mm2
+
+    @property
+    def seam_mm(self) -> float:
+        """Length of the seams that are seen."""
+        return 0.0 if self.chosen is None else self.chosen.seam_mm
 
     @property
     def volume_mm3(self) -> float:

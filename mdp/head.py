@@ -73,8 +73,8 @@ def directions(normal: Floats) -> Floats:
     faces = np.vstack([np.eye(3), -np.eye(3)])
     tried = np.vstack([*fan, faces, spread(FIELD)])
     size = np.linalg.norm(tried, axis=1)
-    kept: Floats = tried[size > 1e-9] / size[size > 1e-9][:, None]
-    return kept
+    units: Floats = tried[size > 1e-9] / size[size > 1e-9][:, None]
+    return units
 
 
 def spread(count: int) -> Floats:

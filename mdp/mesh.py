@@ -72,6 +72,6 @@ class Mesh:
         """(2, 3) least and greatest coordinates."""
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
-    def moved(self, rotation: Any, shift_mm: Any = (0.0, 0.0, 0.0)) -> "Mesh":
+    def transform(self, rotation: Any, shift_mm: Any = (0.0, 0.0, 0.0)) -> "Mesh":
         """The mesh with every vertex v at rotation @ v + shift_mm; rotation is (3, 3)."""
         return Mesh(self.vertices @ np.asarray(rotation, dtype=np.float64).T + np.asarray(shift_mm, dtype=np.float64), self.faces)

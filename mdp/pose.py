@@ -70,15 +70,15 @@ def poses(machine: Machine, direction: Floats, near_turn_deg: float | None = Non
     limits. At a level table any turn serves and the one nearest to `near_turn_deg` is given. Empty: out of reach.
     """
     near = machine.turn.zero_deg if near_turn_deg is None else near_turn_deg
-    found = []
+    reachable = []
     for tilt_rad, turn_rad in _angles(unit(machine.tilt.axis), unit(machine.turn.axis), direction):
         tilt = machine.tilt.zero_deg - machine.tilt.sign * degrees(tilt_rad)
         turn = near if turn_rad is None else machine.turn.zero_deg - machine.turn.sign * degrees(turn_rad)
         tilt_inside = nearest_turn(tilt, machine.tilt.reach_deg, machine.tilt.zero_deg)
         turn_inside = nearest_turn(turn, machine.turn.reach_deg, near)
         if tilt_inside is not None and turn_inside is not None:
-            found.append(Pose(tilt_inside, turn_inside))
-    return found
+            reachable.append(Pose(tilt_inside, turn_inside))
+    return reachable
 
 
 def nearest_turn(value_deg: float, limits_deg: tuple[float, float], near_deg: float) -> float | None:

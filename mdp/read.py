@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from mdp.formats import READERS
+from mdp.formats.readers import READERS
+from mdp.formats.surface import Surface
 from mdp.mesh import Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.pose import about
-from mdp.repair import repaired
-from mdp.repair.edges import components
-from mdp.surface import Surface
+from mdp.repair.edges import connected_components
+from mdp.repair.repair import repair
 from profiles.errors import MeshError
 
 DEMO = "demo:"
@@ -32,15 +32,15 @@ def locate(model: str) -> Path:
         return Path(model)
     name = model.removeprefix(DEMO)
     folder = resources.files("mdp").joinpath("demos")
-    found = (
+    demos = (
         {entry.name.removesuffix(".ply"): entry for entry in folder.iterdir() if entry.name.endswith(".ply")}
         if folder.is_dir()
         else {}
     )
-    if name not in found:
-        known = ", ".join(f"{DEMO}{each}" for each in sorted(found))
+    if name not in demos:
+        known = ", ".join(f"{DEMO}{each}" for each in sorted(demos))
         raise MeshError(f"there is no demo model {name!r}; allowed are {known or 'none: none is installed'}")
-    return Path(str(found[name]))
+    return Path(str(demos[name]))
 
 
 def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, float] = (0, 0, 0)) -> tuple[Mesh, tuple[str, ...]]:
@@ -49,22 +49,22 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
     Scaled, then rotated about x, then y, then z, then moved so that its box rests on z = 0 and is centred in x and y.
     Raises MeshError with one sentence: unreadable, damaged, open, flat, or of a size that no printer makes.
     """
-    surfaces = _surfaces(path)
+    surfaces = _read_surfaces(path)
     try:
         _check_size(surfaces, scale)
         if scale != 1.0:
             surfaces = [Surface(surface.vertices * scale, surface.faces) for surface in surfaces]
-        solid, notes = repaired(surfaces)
+        solid, notes = repair(surfaces)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
-    mesh = _resting(solid, rotate_deg)
-    return mesh, (*notes, *floating(mesh))
+    mesh = _place_on_platform(solid, rotate_deg)
+    return mesh, (*notes, *floating_pieces(mesh))
 
 
-def floating(mesh: Mesh) -> tuple[str, ...]:
+def floating_pieces(mesh: Mesh) -> tuple[str, ...]:
     """A sentence about the pieces that do not reach the platform, if there are any; closed voids are no pieces."""
     faces = mesh.faces.astype(np.int64)
-    label = components(len(mesh.vertices), faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())[faces[:, 0]]
+    label = connected_components(len(mesh.vertices), faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())[faces[:, 0]]
     corners = mesh.vertices[faces]
     volumes = np.bincount(label, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
     lowest = np.full(len(volumes), np.inf)
@@ -86,7 +86,7 @@ def check_file(path: Path) -> None:
         raise MeshError(f"{path}: the kind of file {path.suffix!r} is not read; allowed are {', '.join(READERS)}")
 
 
-def _surfaces(path: Path) -> list[Surface]:
+def _read_surfaces(path: Path) -> list[Surface]:
     check_file(path)
     try:
         if path.stat().st_size == 0:
@@ -112,7 +112,7 @@ def _check_size(surfaces: list[Surface], scale: float) -> None:
     )
 
 
-def _resting(solid: Surface, rotate_deg: tuple[float, float, float]) -> Mesh:
+def _place_on_platform(solid: Surface, rotate_deg: tuple[float, float, float]) -> Mesh:
     vertices = solid.vertices
     if any(rotate_deg):
         about_x, about_y, about_z = (about(axis, np.radians(angle)) for axis, angle in zip(np.eye(3), rotate_deg, strict=True))

@@ -59,7 +59,7 @@ def threemf(decomposition: Decomposition) -> bytes:
     return content.getvalue()
 
 
-def values(decomposition: Decomposition, read_s: float, total_s: float) -> dict[str, Any]:
+def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> dict[str, Any]:
     """What `decompose --json` writes."""
     return {
         "model": decomposition.name,
@@ -70,6 +70,8 @@ def values(decomposition: Decomposition, read_s: float, total_s: float) -> dict[
         "risky_area_mm2": decomposition.risky_area_mm2,
         "residual_area_mm2": decomposition.residual_area_mm2,
         "reduction": decomposition.reduction,
+        "cost_mm2": decomposition.cost_mm2,
+        "seam_mm": decomposition.seam_mm,
         "volume_mm3": decomposition.volume_mm3,
         "candidates_evaluated": decomposition.candidates_evaluated,
         "rounds": decomposition.rounds,
@@ -86,6 +88,18 @@ def values(decomposition: Decomposition, read_s: float, total_s: float) -> dict[
                 "file": part_file(part.index),
             }
             for part in decomposition.parts
+        ],
+        "front": [
+            {
+                "parts": row.parts,
+                "support_area_mm2": row.support_area_mm2,
+                "seam_mm": row.seam_mm,
+                "cost_mm2": row.cost_mm2,
+                "time_s": row.time_s,
+                "filament_mm": row.filament_mm,
+                "chosen": row.chosen,
+            }
+            for row in decomposition.front
         ],
     }
 

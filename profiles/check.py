@@ -43,13 +43,13 @@ def table_problems(model: type[BaseModel], prefix: str, table: Any, sound: Mappi
 
     sound: the values of a profile that is fine.
     """
-    found: dict[str, None] = {}
+    problems: dict[str, None] = {}
     given = deepcopy(table)
     for _ in range(MOST_ROUNDS):
         try:
             model.model_validate(given)
         except ValidationError as error:
-            found |= dict.fromkeys(sentences(error.errors(), model, prefix))
+            problems |= dict.fromkeys(sentences(error.errors(), model, prefix))
             places = [_place(problem) for problem in error.errors()]
             if not isinstance(given, dict) or () in places:
                 break
@@ -57,7 +57,7 @@ def table_problems(model: type[BaseModel], prefix: str, table: Any, sound: Mappi
                 _mend(given, place, sound)
         else:
             break
-    return list(found)
+    return list(problems)
 
 
 def _place(problem: Any) -> tuple[str, ...]:

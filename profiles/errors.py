@@ -1,9 +1,10 @@
-"""The tree of errors a person can fix; each class is raised in one package, all are caught in machine/app/cli.py.
+"""The tree of errors a person can fix; each class is raised in one package, machine/app/cli.py makes sentences of them.
 
 UserError                         message (one sentence: thing, value, what is allowed) and exit 1
   ProfileError                    profiles: all problems of a file or of the --set options at once
   MeshError                       mdp: unreadable, empty, open, flat: says what and where
   DecompositionError              mdp: an invariant of the decomposition cannot be met
+  PlanError                       mdp: a plan file, or planes that cannot be cut: which one and why
   SliceError                      slicer: a setting that cannot be sliced with
   MoveError                       machine: out of limits, unreachable, collision: part, axis, value, allowed
   GcodeError                      machine: a G-code text that cannot be read, with the line
@@ -34,6 +35,10 @@ class MeshError(UserError):
 
 class DecompositionError(UserError):
     """The parts of a model cannot be made consistent."""
+
+
+class PlanError(UserError):
+    """A plan file that cannot be used; the message names the key or the plane, and why."""
 
 
 class SliceError(UserError):

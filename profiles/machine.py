@@ -2,16 +2,21 @@
 
 from collections.abc import Iterable
 from math import acos, cos, degrees, hypot, radians
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from profiles.dialects import FOLLOWS_TABLE
 from profiles.wording import keys, nearest
+
+if TYPE_CHECKING:
+    DialectName = str
+else:
+    DialectName = Literal[tuple(FOLLOWS_TABLE)]
 
 Vector = tuple[float, float, float]
 Limits = tuple[float, float]
-FOLLOWING = ("marlin", "linuxcnc", "grblhal")  # dialects whose firmware can keep the tip on the workpiece (TCP)
 LEAST_LEAN_DEG = 1.0  # a table that leans less can print nothing but upright parts
 UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
 Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
@@ -34,9 +39,9 @@ class Frozen(BaseModel):
 
 def _refuse(problems: Iterable[str]) -> None:
     """Raise all problems of a table at once, one a line: profiles.wording makes a sentence of each."""
-    found = list(problems)
-    if found:
-        raise ValueError("\n".join(found))
+    sentences = list(problems)
+    if sentences:
+        raise ValueError("\n".join(sentences))
 
 
 def _reversed(limits: Limits, name: str) -> list[str]:
@@ -230,7 +235,7 @@ class Machine(Frozen):
         "table",
         description="table: it tilts and turns; fixed: three axes only, tilt and turn are left out, all is printed in one part",
     )
-    dialect: Literal["marlin", "reprapfirmware", "klipper", "klipper_steppers", "linuxcnc", "grblhal"] = Field(
+    dialect: DialectName = Field(
         description="the firmware's way of writing G-code; klipper: the rotary steppers are axes of G1 (GCODE_AXIS), "
         "klipper_steppers: they are turned by MANUAL_STEPPER"
     )
@@ -295,8 +300,8 @@ class Machine(Frozen):
         return self
 
     def _words(self) -> Iterable[str]:
-        if self.coordinates == "workpiece" and self.dialect not in FOLLOWING:
-            able = ", ".join(FOLLOWING)
+        if self.coordinates == "workpiece" and not FOLLOWS_TABLE[self.dialect]:
+            able = ", ".join(name for name, follows in FOLLOWS_TABLE.items() if follows)
             yield f"coordinates is workpiece: {self.dialect} does not follow the table, only {able} do; table is left"
         if self.tilt.letter == self.turn.letter:
             yield f"tilt.letter and turn.letter are both {self.tilt.letter}: they must differ"

@@ -1,13 +1,14 @@
 """Places: where profiles stand (shipped with the program, the user's own folder, any file) and what they inherit."""
 
 import os
-import sys
 import tomllib
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Any
+
+from platformdirs import user_config_path
 
 from profiles.errors import ProfileError
 
@@ -24,11 +25,7 @@ def shipped(kind: str) -> list[str]:
 
 def own_folder(kind: str) -> Path:
     """The user's folder for profiles of a kind: in $XDG_CONFIG_HOME, else where the platform keeps settings."""
-    home = os.environ.get("XDG_CONFIG_HOME") or {
-        "win32": os.environ.get("APPDATA", ""),
-        "darwin": str(Path.home() / "Library" / "Application Support"),
-    }.get(sys.platform)
-    return Path(home or Path.home() / ".config") / "tiltprint" / "profiles" / KINDS[kind]
+    return user_config_path("tiltprint", appauthor=False, roaming=True) / "profiles" / KINDS[kind]
 
 
 def own(kind: str) -> list[str]:
@@ -54,10 +51,10 @@ def kind_of(name: str) -> str:
 def kind_in(path: Path) -> str:
     """The kind of a profile file by its tables."""
     document = parse(path)
-    found = next((kind for kind, sections in OF_KIND.items() if any(section in document for section in sections)), None)
-    if found is None:
+    kind = next((kind for kind, sections in OF_KIND.items() if any(section in document for section in sections)), None)
+    if kind is None:
         raise ProfileError(f"{path}: no [machine], [material], [process] or [search] table")
-    return found
+    return kind
 
 
 def tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:

@@ -84,6 +84,14 @@ def section(name: str, table: Any) -> Frozen:
         raise ProfileError("; ".join(sentences(error.errors(), SECTIONS[name], f"{name}."))) from None
 
 
+def sound_section(name: str, table: Any) -> Frozen | None:
+    """The same; None where the table makes no valid section."""
+    try:
+        return SECTIONS[name].model_validate(table)
+    except ValidationError:
+        return None
+
+
 def rows(prefix: str, model: Frozen) -> Iterator[tuple[str, Any, str]]:
     """Every key of a model with its plain value and what it means, tables flattened with dots."""
     for key, field in type(model).model_fields.items():

@@ -17,6 +17,25 @@ class Search(Frozen):
         "best", description="published: the authors' stop rule and bookkeeping, for comparisons; best: ours"
     )
     beam_width: int = Field(2, ge=1, le=1000, description="how many decompositions are followed at a time")
+    objective: Literal["scar", "risky"] = Field(
+        "scar",
+        description="scar: area that needs support and the seams of the cuts, each as wide as its scar; risky: the area alone, "
+        "the terms of the 2020 paper",
+    )
+    seam_mm: float = Field(
+        0.6,
+        ge=0,
+        le=100,
+        description="width of the scar that a seam leaves: a cut must make more surface safe than its rim takes, mm; 0: the "
+        "paper's objective",
+    )
+    feather_weight: float = Field(
+        0.5,
+        ge=0,
+        le=100,
+        description="by how much more a seam counts where face and plane meet at less than 30 deg, times cot angle - cot 30: "
+        "such edges are thin, warp and break",
+    )
     polish: bool = Field(
         True,
         description="the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added",

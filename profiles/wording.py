@@ -1,6 +1,7 @@
 """Wording: what a key of a profile allows, and one sentence for each problem pydantic finds."""
 
 import json
+import re
 from collections.abc import Iterator
 from difflib import get_close_matches
 from types import UnionType
@@ -10,12 +11,14 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 LONGEST_VALUE = 60
+ONE_OF, NAME_OF = re.compile(r"\^\[(\w+)\]\$"), re.compile(r"\^\[([^\]]+)\]\*\$")
+KINDS = (("A-Za-z", "letters"), ("0-9", "digits"))
 
 
 def sentences(problems: list[Any], root: type[BaseModel], prefix: str = "") -> list[str]:
     """One sentence for each problem of a ValidationError: key, value, what is allowed; keys are dotted after the prefix."""
-    found = dict.fromkeys(sentence for problem in problems for sentence in _each(problem, root, prefix))
-    return list(found)
+    unique = dict.fromkeys(sentence for problem in problems for sentence in _each(problem, root, prefix))
+    return list(unique)
 
 
 def allowed(field: FieldInfo) -> str:
@@ -63,21 +66,21 @@ def nearest(key: str, known: list[str]) -> str | None:
     table, _, word = key.rpartition(".")
     same = {name.rpartition(".")[2]: name for name in known if name.rpartition(".")[0] == table}
     every = {name.rpartition(".")[2]: name for name in known}
-    return next((names[found[0]] for names in (same, every) if (found := get_close_matches(word, names, 1, 0.7))), None)
+    return next((names[close[0]] for names in (same, every) if (close := get_close_matches(word, names, 1, 0.7))), None)
 
 
 def _field(root: type[BaseModel], steps: tuple[str | int, ...]) -> FieldInfo | None:
     """The innermost field on the way of an error."""
     model: type[BaseModel] | None = root
-    found = None
+    field = None
     for step in steps:
         if isinstance(step, int):
             continue
         if model is None or step not in model.model_fields:
-            return found
-        found = model.model_fields[step]
-        model = _model(found.annotation)
-    return found
+            return field
+        field = model.model_fields[step]
+        model = _model(field.annotation)
+    return field
 
 
 def _table(root: type[BaseModel], steps: tuple[str | int, ...]) -> type[BaseModel] | None:
@@ -106,11 +109,22 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
         return "true or false"
     if annotation is str:
         pattern = next((text for each in metadata for text in [_bound(each, "pattern")] if text), None)
-        return f"one letter of {pattern.strip('^[]$')}" if pattern else "a text"
+        return _matching(pattern) if pattern else "a text"
     if annotation in (int, float):
         return ("a whole number" if annotation is int else "a number") + _range(metadata)
     model = _model(annotation)
     return f"a table with the keys {', '.join(model.model_fields)}" if model else "a table of keys"
+
+
+def _matching(pattern: str) -> str:
+    """A text's pattern in words: one character of a few, or a name of some kinds of character."""
+    one, name = ONE_OF.fullmatch(pattern), NAME_OF.fullmatch(pattern)
+    if one:
+        return f"one letter of {one[1]}"
+    if not name:
+        return f"a text that matches {pattern}"
+    kinds = [*(word for characters, word in KINDS if characters in name[1]), *re.sub("[A-Za-z0-9]-[A-Za-z0-9]", "", name[1])]
+    return f"a name of {' and '.join([', '.join(kinds[:-1]), kinds[-1]]) if len(kinds) > 1 else kinds[0]}"
 
 
 def _list(item: Any, metadata: list[Any]) -> str:

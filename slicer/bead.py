@@ -1,4 +1,4 @@
-"""Bead: a piece of plastic to lay down, before its place in the order, its speed and its travel are known."""
+"""Bead: a piece of plastic to lay down, before its place in the order, its speed and its travel are known; how wide beads are."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -7,8 +7,10 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernel import kernel
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
+from profiles.process import WIDTHS, Process
+from slicer.geometry.segments import Segment, squared_distance
 from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
@@ -62,36 +64,33 @@ def _length(points: Floats) -> float:
     return total
 
 
-def thinned(bead: Bead) -> Bead:
+def simplify_bead(bead: Bead) -> Bead:
     """The bead without points that lie within HIDDEN_RESOLUTION_MM of the line between their neighbours; a loop's start stays."""
     if len(bead.points) < 3:
         return bead
-    kept = _corners(bead.points, HIDDEN_RESOLUTION_MM)
-    return bead if kept.all() else replace(bead, points=bead.points[kept])
+    corners = _corners(bead.points, HIDDEN_RESOLUTION_MM)
+    return bead if corners.all() else replace(bead, points=bead.points[corners])
 
 
 @kernel
 def _corners(points: Floats, tolerance_mm: float) -> NDArray[np.bool_]:
-    """(n,) points that a polyline keeps (Douglas and Peucker 1973); the chord of a loop is the way from its start."""
-    kept = np.zeros(len(points), np.bool_)
-    kept[0], kept[len(points) - 1] = True, True
+    """(n,) points that a simplified polyline has (Douglas and Peucker 1973); the chord of a loop is its first point."""
+    corner = np.zeros(len(points), np.bool_)
+    corner[0], corner[len(points) - 1] = True, True
     stack = [(0, len(points) - 1)]
     while len(stack):
         a, b = stack.pop()
-        dx, dy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-        square = max(dx * dx + dy * dy, 1e-18)
+        chord = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
         farthest, at = tolerance_mm * tolerance_mm, -1
         for k in range(a + 1, b):
-            x, y = points[k, 0] - points[a, 0], points[k, 1] - points[a, 1]
-            share = min(max((x * dx + y * dy) / square, 0.0), 1.0)
-            away = (x - share * dx) ** 2 + (y - share * dy) ** 2
+            away = squared_distance(chord, points[k, 0], points[k, 1])
             if away > farthest:
                 farthest, at = away, k
         if at >= 0:
-            kept[at] = True
+            corner[at] = True
             stack.append((a, at))
             stack.append((at, b))
-    return kept
+    return corner
 
 
 def spacing_mm(width_mm: float, height_mm: float) -> float:
@@ -104,10 +103,27 @@ def width_for_mm(spacing: float, height_mm: float) -> float:
     return spacing + height_mm * ROUND_SIDES
 
 
-def bulged(width_mm: float, height_mm: float, free_sides: int, most_mm: float) -> float:
+def bulge_flow(width_mm: float, height_mm: float, free_sides: int, most_mm: float) -> float:
     """Flow of a bead that fills the rectangle of its width on its free sides, where nothing covers its round ones.
 
     The bead bulges by most_mm at most: half of height times (1 - pi/4) would fill the rectangle.
     """
     bulge = min(0.5 * height_mm * ROUND_SIDES, most_mm)
     return 1.0 + free_sides * bulge * height_mm / bead_area_mm2(width_mm, height_mm)
+
+
+def with_line_width(process: Process, width_mm: float | None) -> Process:
+    """The process with lines of another width; None: as it is."""
+    return process if width_mm is None else process.model_copy(update={"line_width_mm": width_mm})
+
+
+def first_layer_process(process: Process) -> Process:
+    """The process of part 1's first layer, whose beads all have one width where first_layer_line_width_mm gives one."""
+    if process.first_layer_line_width_mm is None:
+        return process
+    return with_line_width(process.model_copy(update=dict.fromkeys(WIDTHS)), process.first_layer_line_width_mm)
+
+
+def outer_wall_width_mm(process: Process) -> float:
+    """Width of an outer wall."""
+    return process.outer_wall_line_width_mm or process.line_width_mm

@@ -32,5 +32,5 @@ def hanging_fan(material: Material, bead: Bead, factor: float) -> float | None:
     """Part fan of a bead where it differs from the layer's: bridges and overhanging walls."""
     if bead.kind not in HANGING:
         return None
-    wished = (material.fan_infill_bridge if bead.over_infill else None, material.fan_bridge, material.fan)
-    return factor * next(fan for fan in wished if fan is not None)
+    fans = (material.fan_infill_bridge if bead.over_infill else None, material.fan_bridge, material.fan)
+    return factor * next(fan for fan in fans if fan is not None)

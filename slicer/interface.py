@@ -7,13 +7,13 @@ import numpy as np
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from profiles.process import Process
-from slicer.polygons import Polygons, cleaned, contours, united
+from slicer.geometry.polygons import Polygons, clean, contours, union
 from slicer.section import sections
 
 BENEATH_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
 
 
-def beneath(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons | None:
+def plastic_beneath(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons | None:
     """Plastic just below the base plane; None on the platform. Parts not handed over are taken to fill the section."""
     if part.index == 1:
         return None
@@ -24,15 +24,15 @@ def beneath(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons 
 
 def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Polygons]:
     """For every height in the part's frame the sections of other parts together."""
-    layers = [[cleaned(loops) for loops in sections(_in_frame_of(part, other), cuts_mm)] for other in others]
-    return [united(layer) for layer in zip(*layers, strict=True)] if layers else [Polygons()] * len(cuts_mm)
+    layers = [[clean(loops) for loops in sections(_mesh_in_frame_of(part, other), cuts_mm)] for other in others]
+    return [union(layer) for layer in zip(*layers, strict=True)] if layers else [Polygons()] * len(cuts_mm)
 
 
-def _in_frame_of(part: Part, other: Part) -> Mesh:
-    return other.mesh.moved(part.rotation, (0.0, 0.0, -part.base.offset_mm))
+def _mesh_in_frame_of(part: Part, other: Part) -> Mesh:
+    return other.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
 
 
-def strengthened(process: Process, on_plastic: bool, layers: int) -> list[Process]:
+def strengthen_interface(process: Process, on_plastic: bool, layers: int) -> list[Process]:
     """The process of every layer: a part on plastic has more walls in its first ones, if it has walls at all."""
     extra = process.interface_extra_walls if on_plastic and process.walls else 0
     stronger = process.model_copy(update={"walls": process.walls + extra}) if extra else process
@@ -44,12 +44,12 @@ def interface_edges(part: Part, first: Polygons, below: Polygons | None, later: 
 
     first: section of its first layer, below: plastic under its base plane.
     """
-    found = [] if below is None else [_segments(np.insert(loop, 2, 0.0, axis=1)) for loop in contours(first ^ below)]
+    segments = [] if below is None else [_segments(np.insert(loop, 2, 0.0, axis=1)) for loop in contours(first ^ below)]
     for other in later:
-        for loop in contours(cleaned(sections(other.in_part_frame(), np.array([BENEATH_MM]))[0])):
+        for loop in contours(clean(sections(other.in_part_frame(), np.array([BENEATH_MM]))[0])):
             placed = np.insert(loop, 2, other.base.offset_mm, axis=1) @ other.rotation
-            found.append(_segments(placed @ part.rotation.T - np.array([0.0, 0.0, part.base.offset_mm])))
-    return np.concatenate(found) if found else np.zeros((0, 6))
+            segments.append(_segments(placed @ part.rotation.T - np.array([0.0, 0.0, part.base.offset_mm])))
+    return np.concatenate(segments) if segments else np.zeros((0, 6))
 
 
 def _segments(loop: Floats) -> Floats:

@@ -14,12 +14,12 @@ from mdp.cut import mesh_of
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
+from slicer.geometry.polygons import Polygons, clean, offset
 from slicer.interface import BENEATH_MM
-from slicer.order import Placed
 from slicer.paths import Kind
-from slicer.polygons import Polygons, cleaned, grown
 from slicer.section import sections
-from slicer.split import split
+from slicer.travel.order import Placed
+from slicer.travel.split import split
 
 STRIPE = 2.0  # line widths: grooves and ridges as wide as two beads can be printed
 SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
@@ -27,9 +27,9 @@ SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
 
 def grooves(part: Part, process: Process) -> Polygons:
     """Grooves under a part's base, in its frame: stripes along x that end before the walls, so that none is seen."""
-    base = cleaned(sections(part.in_part_frame(), np.array([BENEATH_MM]))[0])
+    base = clean(sections(part.in_part_frame(), np.array([BENEATH_MM]))[0])
     walls = process.walls + process.interface_extra_walls
-    inside = grown(base, -(walls + 1) * process.line_width_mm) if not base.is_empty() else base
+    inside = offset(base, -(walls + 1) * process.line_width_mm) if not base.is_empty() else base
     if inside.is_empty():
         return inside
     x0, y0, x1, y1 = inside.bounds()
@@ -39,7 +39,9 @@ def grooves(part: Part, process: Process) -> Polygons:
     return inside ^ Polygons.compose([stripe.translate((x0 - 1.0, 2.0 * wide * row)) for row in rows])
 
 
-def grooved(outlines: Sequence[Polygons], part: Part, later: Sequence[Part], cuts_mm: Floats, process: Process) -> list[Polygons]:
+def cut_grooves(
+    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], cuts_mm: Floats, process: Process
+) -> list[Polygons]:
     """The part's outlines without the grooves of the parts that will stand on it."""
     left = list(outlines)
     for other in later if process.interlock_mm > 0.0 else ():
@@ -49,12 +51,12 @@ def grooved(outlines: Sequence[Polygons], part: Part, later: Sequence[Part], cut
         solid = m3.Manifold.extrude(area, 2.0 * process.interlock_mm).translate((0.0, 0.0, -process.interlock_mm))
         turn = part.rotation @ other.rotation.T
         shift = turn[:, 2] * other.base.offset_mm - np.array([0.0, 0.0, part.base.offset_mm])
-        loops = sections(mesh_of(solid).moved(turn, shift), cuts_mm)
+        loops = sections(mesh_of(solid).transform(turn, shift), cuts_mm)
         left = [o - Polygons(cut) if cut else o for o, cut in zip(left, loops, strict=True)]
     return left
 
 
-def filled(placed: Sequence[Placed], part: Part, process: Process, height_mm: float) -> list[Placed]:
+def fill_grooves(placed: Sequence[Placed], part: Part, process: Process, height_mm: float) -> list[Placed]:
     """The first layer's beads of a part on plastic, richer over its grooves by what they hold."""
     area = grooves(part, process)
     if area.is_empty():

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from profiles.process import Process
-from slicer.polygons import Polygons, grown, opened
+from slicer.geometry.polygons import Polygons, offset, opening
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,6 +15,15 @@ class Region:
     top: Polygons
     solid: Polygons
     sparse: Polygons
+
+    def without(self, area: Polygons, width_mm: float) -> "Region":
+        """The region without the place of a bridge."""
+
+        def rest(polygons: Polygons) -> Polygons:
+            left = polygons - area
+            return left if left.is_empty() or left.area() == polygons.area() else opening(left, 0.25 * width_mm)
+
+        return Region(rest(self.top), rest(self.solid), rest(self.sparse))
 
 
 def regions(
@@ -31,38 +40,38 @@ def regions(
     top, bottom = shell_layers(process)
     above = _common([*sections[1:], empty], top) if top else list(insides)
     below = _common([*reversed(sections[:-1]), beneath if on_plastic else empty], bottom, on_plastic)[::-1]
-    found = []
+    layers = []
     for i, inside in enumerate(insides):
         if inside.is_empty():
-            found.append(Region(empty, empty, empty))
+            layers.append(Region(empty, empty, empty))
             continue
         whole = process.infill_density >= 1.0 or (on_plastic and i == 0)
-        sparse = empty if whole else _sparse(inside, above[i], below[i] if bottom else inside, process)
+        sparse = empty if whole else sparse_area(inside, above[i], below[i] if bottom else inside, process)
         next_section = sections[i + 1] if i + 1 < len(sections) else empty
-        found.append(_region(inside, sparse, next_section if top else inside, process.line_width_mm))
-    return found
+        layers.append(_region(inside, sparse, next_section if top else inside, process.line_width_mm))
+    return layers
 
 
 def shell_layers(process: Process) -> tuple[int, int]:
     """Solid layers under and over a surface: as many as asked for, more where layers are thin; 0 stays 0."""
-    wished = (process.top_layers, process.top_thickness_mm), (process.bottom_layers, process.bottom_thickness_mm)
-    top, bottom = (max(count, ceil(mm / process.layer_height_mm - 1e-6)) if count else 0 for count, mm in wished)
+    counts = (process.top_layers, process.top_thickness_mm), (process.bottom_layers, process.bottom_thickness_mm)
+    top, bottom = (max(count, ceil(mm / process.layer_height_mm - 1e-6)) if count else 0 for count, mm in counts)
     return top, bottom
 
 
-def _sparse(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:
+def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Process) -> Polygons:
     """The inside that is covered above and below, a line width away from every skin that is anchored in it."""
     width_mm = process.line_width_mm
     covered = inside ^ above ^ below
     sparse = inside
     if inside.area() - covered.area() > 1e-6:
-        skin = opened(inside - covered, 0.25 * width_mm)
-        sparse = inside if skin.is_empty() else opened(inside - grown(skin, width_mm), width_mm)
+        skin = opening(inside - covered, 0.25 * width_mm)
+        sparse = inside if skin.is_empty() else opening(inside - offset(skin, width_mm), width_mm)
     if process.infill_density <= 0.0 or sparse.is_empty():
         return sparse
     islands = sparse.decompose()
-    kept = [island for island in islands if island.area() >= process.solid_below_mm2]
-    return sparse if len(kept) == len(islands) else Polygons.compose(kept) if kept else Polygons()
+    large = [island for island in islands if island.area() >= process.solid_below_mm2]
+    return sparse if len(large) == len(islands) else Polygons.compose(large) if large else Polygons()
 
 
 def _region(inside: Polygons, sparse: Polygons, next_section: Polygons, width_mm: float) -> Region:
@@ -74,10 +83,10 @@ def _region(inside: Polygons, sparse: Polygons, next_section: Polygons, width_mm
     else:
         solid = inside - sparse
     top = solid - next_section
-    top = top if top.is_empty() else opened(top, width_mm)
+    top = top if top.is_empty() else opening(top, width_mm)
     if top.is_empty():
         return Region(top, solid, sparse)
-    under = opened(solid - top, 0.25 * width_mm)
+    under = opening(solid - top, 0.25 * width_mm)
     return Region(solid - under, under, sparse)
 
 

@@ -10,10 +10,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernel import ints, kernel, longs, part, rank, table
+from mdp.kernels.arrays import ints, longs, table
+from mdp.kernels.kernel import kernel, part
+from mdp.kernels.sorting import rank, sort_into_bins
 from mdp.mesh import Floats, Ints, Mesh
 from profiles.errors import SliceError
-from slicer.halfedges import opposites
+from slicer.geometry.halfedges import opposites
 
 
 def sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
@@ -34,38 +36,20 @@ def sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
 
 @part
 def _spans(vertices: Floats, faces: Ints, cuts: Floats) -> tuple[Ints, Ints]:
-    """Per face the first layer it crosses and the one after the last."""
+    """Per face the first and the last layer it crosses; the last is less than the first where it crosses none."""
     first, last = ints(len(faces), 0), ints(len(faces), 0)
     for f in range(len(faces)):
         a, b, c = vertices[faces[f, 0], 2], vertices[faces[f, 1], 2], vertices[faces[f, 2], 2]
         first[f] = rank(cuts, min(a, b, c), True)
-        last[f] = rank(cuts, max(a, b, c), True)
+        last[f] = rank(cuts, max(a, b, c), True) - 1
     return first, last
-
-
-@part
-def _by_layer(first: Ints, last: Ints, layers: int) -> tuple[NDArray[np.int64], Ints]:
-    """Faces listed layer after layer: (layers + 1,) offsets and the list."""
-    offsets, place = longs(layers + 1, 0), longs(layers + 1, 0)
-    for f in range(len(first)):
-        for layer in range(first[f], last[f]):
-            offsets[layer + 1] += 1
-    for layer in range(layers):
-        offsets[layer + 1] += offsets[layer]
-        place[layer + 1] = offsets[layer + 1]
-    listed = ints(offsets[layers], 0)
-    for f in range(len(first)):
-        for layer in range(first[f], last[f]):
-            listed[place[layer]] = f
-            place[layer] += 1
-    return offsets, listed
 
 
 @kernel
 def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
     """Points of all loops, the end of each loop in them (with room for more), the number of loops of each layer."""
     first, last = _spans(vertices, faces, cuts)
-    offsets, listed = _by_layer(first, last, len(cuts))
+    offsets, listed = sort_into_bins(first, last, len(cuts))
     points, ends = table(len(listed), 2), longs(len(listed), 0)
     counts, seen = longs(len(cuts), 0), ints(len(faces), -1)
     n = loop = 0

@@ -9,26 +9,25 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import WALLS, Bead, thinned
-from slicer.bridge import beside, bridge_beads, bridged, infill_bridge_beads, over_infill
-from slicer.brim import brim
+from slicer.bead import WALLS, Bead, simplify_bead, with_line_width
 from slicer.cooling import fan_share, hanging_fan, rising_fan
-from slicer.gap import gaps
-from slicer.infill import infill
-from slicer.interlock import filled as interlocked
-from slicer.order import ordered
-from slicer.overhang import overhanging
+from slicer.fill.bridge import bridge_area, bridge_beads, infill_bridge_area, infill_bridge_beads
+from slicer.fill.infill import infill_beads
+from slicer.fill.skin import angle_of_layer_deg, skin_beads
+from slicer.geometry.polygons import union
+from slicer.interlock import fill_grooves
 from slicer.paths import Kind, Layer, Path, SlicedPart
-from slicer.pedestal import pedestal_beads
-from slicer.polygons import united
-from slicer.props import support_beads
-from slicer.seam import Surroundings, rear_of, seamed
-from slicer.skin import angle_of_layer_deg, skin
 from slicer.speed import layer_time_s, speeds_mm_s
-from slicer.stack import Stack, stack_of
-from slicer.thin import thin_walls
-from slicer.walls import wall_beads
-from slicer.widths import of_width
+from slicer.stack import Stack, build_stack
+from slicer.support.beads import support_beads
+from slicer.support.pedestal import pedestal_beads
+from slicer.travel.order import order_beads
+from slicer.walls.brim import brim
+from slicer.walls.gap import gaps
+from slicer.walls.overhang import split_overhangs
+from slicer.walls.seam import Surroundings, place_seams, rear_of
+from slicer.walls.thin import thin_walls
+from slicer.walls.walls import wall_beads
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 
@@ -38,103 +37,104 @@ def slice_part(
     profile: Profile,
     earlier: Sequence[Part] = (),
     later: Sequence[Part] = (),
-    show: Callable[[int, int], None] | None = None,
+    on_layer: Callable[[int, int], None] | None = None,
 ) -> SlicedPart:
     """The part's layers from its base plane upward.
 
     earlier, later: the parts printed before and after this one; the part with index 1 stands on the platform. The same
-    input gives the same paths. show: hears after each layer its number and how many there are. Raises SliceError when the
-    part gives no bead at all.
+    input gives the same paths. on_layer: called after each layer with its number and how many there are. Raises SliceError
+    when the part gives no bead at all.
     """
-    stack = stack_of(part, profile, earlier, later)
+    stack = build_stack(part, profile, earlier, later)
     bounds_mm = part.in_part_frame().bounds_mm
     rear = rear_of(bounds_mm)
     layers: list[Layer] = []
     tip, seams = rear, np.zeros((0, 2))
     for i in range(len(stack.outlines)):
-        around = Surroundings(rear, seams, tip, stack.edges, float(stack.at.cut_mm[i]), i)
-        laid = [*_own(stack, i), *_beside(stack, i, part, later)]
-        beads, seams = seamed([bead if bead.kind in WALLS else thinned(bead) for bead in laid], profile.process, around)
+        around = Surroundings(rear, seams, tip, stack.edges, float(stack.heights.cut_mm[i]), i)
+        beads = [*_part_beads(stack, i), *_auxiliary_beads(stack, i, part, later)]
+        beads = [bead if bead.kind in WALLS else simplify_bead(bead) for bead in beads]
+        beads, seams = place_seams(beads, profile.process, around)
         layer = _layer(beads, stack, i, part, profile, tip if layers else None)
         if layer.paths:
             tip = layer.paths[-1].points[-1]
             layers.append(layer)
-        if show is not None:
-            show(i + 1, len(stack.outlines))
-    _check(part, bounds_mm, layers, profile.process)
-    missed_mm2, at_mm = stack.supports.unsupported_mm2, stack.at.tip_mm[stack.supports.worst_layer]
+        if on_layer is not None:
+            on_layer(i + 1, len(stack.outlines))
+    _check_not_empty(part, bounds_mm, layers, profile.process)
+    missed_mm2, at_mm = stack.supports.unsupported_mm2, stack.heights.tip_mm[stack.supports.worst_layer]
     worst = sum(layer.z_mm <= at_mm for layer in layers) if missed_mm2 > 0 else 0
     return SlicedPart(part.index, tuple(layers), missed_mm2, worst)
 
 
-def _own(stack: Stack, layer: int) -> list[Bead]:
+def _part_beads(stack: Stack, layer: int) -> list[Bead]:
     """What a layer prints of the part itself."""
-    process, height_mm = stack.processes[layer], float(stack.at.height_mm[layer])
+    process, height_mm = stack.processes[layer], float(stack.heights.height_mm[layer])
     region, around, outline = stack.regions[layer], stack.walls[layer], stack.own[layer]
     width, overlap = process.line_width_mm, process.infill_overlap if process.walls else 0.0
     angle = angle_of_layer_deg(process.infill_angle_deg, layer)
     beads = wall_beads(around, process, height_mm)
     beads += thin_walls(around.free, outline, width, height_mm, process.outer_bulge) + gaps(around.narrow, width, height_mm)
-    for span in stack.contacts[layer].bridges:
-        area = bridged(span, around.inside, width)
+    for span in stack.overhangs[layer].bridges:
+        area = bridge_area(span, around.inside, width)
         if not area.is_empty():
             beads += bridge_beads(area, span.angle_deg, process.bridge_flow, width, height_mm, overlap)
-            region = beside(region, area, width)
+            region = region.without(area, width)
     if layer and process.infill_density < DENSE:
-        area = over_infill(region.solid, stack.regions[layer - 1].sparse, width)
+        area = infill_bridge_area(region.solid, stack.regions[layer - 1].sparse, width)
         if not area.is_empty():
             beads += infill_bridge_beads(area, angle, process, height_mm)
-            region = beside(region, area, width)
-    beads += skin(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
+            region = region.without(area, width)
+    beads += skin_beads(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
     top_width = process.top_skin_line_width_mm or width
-    beads += skin(region.top, Kind.TOP_SKIN, angle, top_width, height_mm, overlap, process.top_skin_monotonic)
-    sparse = of_width(process, process.infill_line_width_mm)
-    return beads + infill(region.sparse, sparse, stack.density, layer, float(stack.at.tip_mm[layer]), height_mm)
+    beads += skin_beads(region.top, Kind.TOP_SKIN, angle, top_width, height_mm, overlap, process.top_skin_monotonic)
+    sparse = with_line_width(process, process.infill_line_width_mm)
+    return beads + infill_beads(region.sparse, sparse, stack.density, layer, float(stack.heights.tip_mm[layer]), height_mm)
 
 
-def _beside(stack: Stack, layer: int, part: Part, later: Sequence[Part]) -> list[Bead]:
+def _auxiliary_beads(stack: Stack, layer: int, part: Part, later: Sequence[Part]) -> list[Bead]:
     """What a layer prints for the part: support, pedestal, skirt and brim."""
-    process, height_mm = stack.processes[layer], float(stack.at.height_mm[layer])
-    props, outline, on_platform = stack.supports, stack.outlines[layer], part.index == 1
-    foot = layer == 0 and on_platform
-    propped = of_width(process, process.support_line_width_mm)
-    beads = support_beads(props.areas[layer], props.dense[layer], propped, height_mm, foot)
+    process, height_mm = stack.processes[layer], float(stack.heights.height_mm[layer])
+    supports, outline, on_platform = stack.supports, stack.outlines[layer], part.index == 1
+    on_plate = layer == 0 and on_platform
+    support_process = with_line_width(process, process.support_line_width_mm)
+    beads = support_beads(supports.areas[layer], supports.dense[layer], support_process, height_mm, on_plate)
     if layer < stack.pedestal_layers:
         beads += pedestal_beads(outline, layer, stack.pedestal_layers, process, height_mm)
-    if foot:
+    if on_plate:
         top_mm = max(float(each.mesh.bounds_mm[1, 2]) for each in (part, *later))
-        beads += brim(united([outline, props.areas[0]]), outline, stack.floor, top_mm, process, height_mm)
+        beads += brim(union([outline, supports.areas[0]]), outline, stack.floor, top_mm, process, height_mm)
     return beads
 
 
 def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Profile, tip: Floats | None) -> Layer:
     """The beads in order, with speeds, flow, fan and heat."""
     process, material, outline = profile.process, profile.material, stack.outlines[index]
-    z_mm, height_mm = float(stack.at.tip_mm[index]), float(stack.at.height_mm[index])
+    z_mm, height_mm = float(stack.heights.tip_mm[index]), float(stack.heights.height_mm[index])
     own = stack.processes[index]
-    placed = overhanging(ordered(beads, outline, own, tip), outline, stack.bank(index), own)
+    ordered = split_overhangs(order_beads(beads, outline, own, tip), outline, stack.bank(index), own)
     on_platform = part.index == 1
     if index == 0 and not on_platform and process.interlock_mm > 0.0:
-        placed = interlocked(placed, part, process, height_mm)
+        ordered = fill_grooves(ordered, part, process, height_mm)
     flow, fixed, fan, add_c = material.flow, None, 1.0, 0.0
     if not on_platform and index < process.interface_layers:
         fan, add_c = process.interface_fan, process.interface_temperature_add_c
     if index == 0:
         fixed = process.first_layer_speed_mm_s if on_platform else process.interface_speed_mm_s
         flow *= process.first_layer_flow if on_platform else process.interface_flow
-    speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)
+    speeds = speeds_mm_s(ordered, profile, height_mm, fixed, flow)
     if on_platform:
         fan = rising_fan(material, index)
-    blown = [hanging_fan(material, p.bead, fan) for p in placed]
+    fans = [hanging_fan(material, p.bead, fan) for p in ordered]
     paths = tuple(
-        Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, blow)
-        for p, blow, speed in zip(placed, blown, speeds, strict=True)
+        Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, own_fan)
+        for p, own_fan, speed in zip(ordered, fans, speeds, strict=True)
     )
-    fan *= fan_share(material, process, layer_time_s(placed, speeds, profile))
+    fan *= fan_share(material, process, layer_time_s(ordered, speeds, profile))
     return Layer(z_mm, height_mm, paths, fan, add_c)
 
 
-def _check(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Process) -> None:
+def _check_not_empty(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Process) -> None:
     own = (
         path for layer in layers for path in layer.paths if path.kind not in (Kind.SKIRT, Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
     )

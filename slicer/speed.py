@@ -10,8 +10,8 @@ from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import Bead, length_mm
-from slicer.order import Placed
 from slicer.paths import Kind, bead_area_mm2
+from slicer.travel.order import Placed
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 
@@ -40,11 +40,11 @@ def speeds_mm_s(placed: Sequence[Placed], profile: Profile, height_mm: float, fi
     below least_speed_mm_s.
     """
     process, table = profile.process, of_kind_mm_s(profile.process)
-    wished = np.array([_of_bead(p.bead, table, process) if fixed_mm_s is None else fixed_mm_s for p in placed])
+    asked = np.array([_of_bead(p.bead, table, process) if fixed_mm_s is None else fixed_mm_s for p in placed])
     areas = np.array([bead_area_mm2(p.bead.width_mm, height_mm) * p.bead.flow * flow for p in placed])
-    speeds = np.minimum(wished, profile.material.volumetric_limit_mm3_s / areas)
+    speeds = np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas)
     lengths = np.array([p.bead.length_mm for p in placed])
-    return _slowed(speeds, lengths, process.least_layer_time_s - travel_time_s(placed, profile), process.least_speed_mm_s)
+    return _slow_down(speeds, lengths, process.least_layer_time_s - travel_time_s(placed, profile), process.least_speed_mm_s)
 
 
 def _of_bead(bead: Bead, table: dict[Kind, float], process: Process) -> float:
@@ -80,7 +80,7 @@ def layer_time_s(placed: Sequence[Placed], speeds: Floats, profile: Profile) -> 
     return float((lengths / speeds).sum()) + travel_time_s(placed, profile)
 
 
-def _slowed(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float) -> Floats:
+def _slow_down(speeds: Floats, lengths: Floats, time_s: float, least_mm_s: float) -> Floats:
     """Speeds by one factor slower so that the lengths take the time, none pushed below the least speed."""
     floor = np.minimum(speeds, least_mm_s)
     factor = 1.0

@@ -7,39 +7,39 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.base import compensated, plate
-from slicer.contact import Contact, contacts
-from slicer.forbidden import far_mm, forbidden
-from slicer.heights import Heights, heights_of
-from slicer.infill import pattern_density
-from slicer.interface import beneath, interface_edges, strengthened
-from slicer.interlock import grooved
-from slicer.pedestal import pedestal_layers, without_pedestal
-from slicer.polygons import Polygons, cleaned
+from slicer.bead import first_layer_process, with_line_width
+from slicer.fill.infill import pattern_density
+from slicer.geometry.polygons import Polygons, clean
+from slicer.heights import Heights, layer_heights
+from slicer.interface import interface_edges, plastic_beneath, strengthen_interface
+from slicer.interlock import cut_grooves
+from slicer.plate import compensate_elephant_foot, plate_outline
 from slicer.region import Region, regions
 from slicer.section import sections
-from slicer.support import Supports, supports
-from slicer.walls import Walls, walls
-from slicer.widths import of_first_layer, of_width
+from slicer.support.blocker import blocked_areas, far_mm
+from slicer.support.overhang import Overhang, detect_overhangs
+from slicer.support.pedestal import pedestal_layers, without_pedestal
+from slicer.support.support import Supports, generate_supports
+from slicer.walls.walls import Walls, walls
 
 
 @dataclass(frozen=True, eq=False)
 class Stack:
     """A part's layers, one entry each.
 
-    outlines: whole sections; own: without the pedestal; walls and regions: of own; contacts: what hangs and what bridges;
+    outlines: whole sections; own: without the pedestal; walls and regions: of own; overhangs: what hangs and what bridges;
     processes: the settings, with the extra walls of an interface and the widths of part 1's first layer. beneath: the
     plastic under the first layer, None on the platform; floor: the plate's outline, of use to part 1; pedestal_layers: how
     many of the lowest layers the pedestal takes; density: of the sparse infill's pattern; edges: where a seam would lie on
     an interface's edge.
     """
 
-    at: Heights
+    heights: Heights
     outlines: Sequence[Polygons]
     own: Sequence[Polygons]
     walls: Sequence[Walls]
     regions: Sequence[Region]
-    contacts: Sequence[Contact]
+    overhangs: Sequence[Overhang]
     processes: Sequence[Process]
     supports: Supports
     beneath: Polygons | None
@@ -53,41 +53,42 @@ class Stack:
         return self.outlines[layer - 1] if layer else self.beneath
 
 
-def stack_of(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequence[Part]) -> Stack:
+def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequence[Part]) -> Stack:
     """The stack of a part that is printed after `earlier` and before `later` parts."""
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
-    at = heights_of(mesh, process, on_platform, pedestal_mm)
-    low = pedestal_layers(at.tip_mm, pedestal_mm)
-    outlines = [cleaned(loops, process.slit_closing_mm) for loops in sections(mesh, at.cut_mm)]
-    outlines = grooved(outlines, part, later, at.cut_mm, process)
+    heights = layer_heights(mesh, process, on_platform, pedestal_mm)
+    pedestal_count = pedestal_layers(heights.tip_mm, pedestal_mm)
+    outlines = [clean(loops, process.slit_closing_mm) for loops in sections(mesh, heights.cut_mm)]
+    outlines = cut_grooves(outlines, part, later, heights.cut_mm, process)
     if on_platform:
-        outlines[0] = compensated(outlines[0], process.elephant_foot_mm, of_first_layer(process).line_width_mm)
-    own = without_pedestal(outlines, mesh, at.cut_mm, pedestal_mm, low) if low else outlines
-    processes = strengthened(process, not on_platform, len(outlines))
+        outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
+    own = without_pedestal(outlines, mesh, heights.cut_mm, pedestal_mm, pedestal_count) if pedestal_count else outlines
+    processes = strengthen_interface(process, not on_platform, len(outlines))
     if on_platform:
-        processes[0] = of_first_layer(process)
-    rows = zip(own, processes, at.height_mm, strict=True)
-    walled = [walls(s, p.walls, p.line_width_mm, h, p.outer_wall_line_width_mm) for s, p, h in rows]
-    below = beneath(part, earlier, outlines[0])
-    filled = regions(own, [w.inside for w in walled], below, process)
-    over = contacts(mesh, outlines, at.cut_mm, process, below)
-    shut = forbidden(part, later, at.tip_mm - at.height_mm, at.tip_mm, process.support_distance_mm, far_mm(mesh))
-    floor = plate(profile.machine.table)
-    propped = of_width(process, process.support_line_width_mm)
-    sparse = of_width(process, process.infill_line_width_mm)
+        processes[0] = first_layer_process(process)
+    rows = zip(own, processes, heights.height_mm, strict=True)
+    wall_layers = [walls(s, p.walls, p.line_width_mm, h, p.outer_wall_line_width_mm) for s, p, h in rows]
+    below = plastic_beneath(part, earlier, outlines[0])
+    region_layers = regions(own, [w.inside for w in wall_layers], below, process)
+    overhangs = detect_overhangs(mesh, outlines, heights.cut_mm, process, below)
+    blocked = blocked_areas(part, later, heights, process.support_distance_mm, far_mm(mesh))
+    floor = plate_outline(profile.machine.table)
+    support_process = with_line_width(process, process.support_line_width_mm)
+    infill_process = with_line_width(process, process.infill_line_width_mm)
+    hanging = [overhang.hanging for overhang in overhangs]
     return Stack(
-        at=at,
+        heights=heights,
         outlines=outlines,
         own=own,
-        walls=walled,
-        regions=filled,
-        contacts=over,
+        walls=wall_layers,
+        regions=region_layers,
+        overhangs=overhangs,
         processes=processes,
-        supports=supports([c.hanging for c in over], outlines, at, propped, below, shut, floor),
+        supports=generate_supports(hanging, outlines, heights, support_process, below, blocked, floor),
         beneath=below,
         floor=floor,
-        pedestal_layers=low,
-        density=pattern_density([region.sparse for region in filled], sparse, process.layer_height_mm),
+        pedestal_layers=pedestal_count,
+        density=pattern_density([region.sparse for region in region_layers], infill_process, process.layer_height_mm),
         edges=interface_edges(part, outlines[0], below, later),
     )

@@ -1,51 +1,74 @@
-"""The layers are a straight line and third parties stay where they belong: read from the imports of every module."""
+"""Layers are a straight line, rooms stand above what they import, third parties stay where they belong: read from all imports."""
 
-import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from graphlib import CycleError
 from pathlib import Path
 
 import pytest
 
+from tools.draw_rooms import LAYERS, PICTURE, draw, floors, imports, room_graph, rooms_of
+
 ROOT = Path(__file__).resolve().parents[1]
-LAYERS = ("profiles", "mdp", "slicer", "machine")
+MOST_FILES = 15
 # Third party -> the beginnings of the module paths that may import it; nowhere else in the packages.
 CONFINED = {
-    "trimesh": ("mdp/read", "mdp/formats/", "mdp/repair", "mdp/threemf"),
-    "onnxruntime": ("mdp/ranker",),
+    "trimesh": ("mdp/formats/",),
+    "manifold3d": (
+        "mdp/cut",
+        "mdp/pedestal",
+        "mdp/repair/",
+        "mdp/formats/polygons",
+        "slicer/geometry/",
+        "slicer/interlock",
+        "machine/kinematics/collision",
+        "machine/app/pipeline/precompile",
+    ),
+    "numba": ("mdp/kernels/kernel",),
+    "shapely": (),
+    "onnxruntime": ("mdp/search/ranker",),
     "serial": ("machine/link/port.py",),
     "pydantic": ("profiles/",),
     "rich": ("machine/app/",),
+    "prompt_toolkit": ("machine/app/",),
+    "PIL": ("machine/app/pictures/",),
+    "tomlkit": ("machine/calibration/", "mdp/plan_file.py"),
+    "platformdirs": ("machine/app/state_folder.py", "mdp/kernels/cache.py", "profiles/places.py"),
     "torch": (),
     "tests": (),
     "tools": (),
 }
-HEAVY = {"numba", "rich", "trimesh", "shapely", "manifold3d", "serial", "onnxruntime", "torch"}
-
-
-def imported(source: str) -> Iterator[str]:
-    """Every module that a source imports anywhere, inside functions too."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield "." * node.level + (node.module or "")
+JOINER = "machine.app"  # joins the stages and talks to people: nothing below it knows it
+HEAVY = {
+    "numba",
+    "rich",
+    "PIL",
+    "prompt_toolkit",
+    "tomlkit",
+    "trimesh",
+    "shapely",
+    "manifold3d",
+    "serial",
+    "onnxruntime",
+    "torch",
+}
 
 
 def offences(path: str, source: str) -> list[str]:
-    """What a module at a path relative to the root imports although it must not."""
+    """What a module at a path relative to the root imports although it must not, a sentence for every package."""
     layer = path.split("/")[0]
-    found = []
-    for module in imported(source):
+    wrong: dict[tuple[str, str], str] = {}
+    for module in imports(source):
         top = module.split(".")[0]
-        if module.startswith("."):
-            found.append(f"{path} imports {module} by a relative name")
+        if not top:
+            wrong["relative", top] = f"{path} imports by a relative name"
         if top in LAYERS and LAYERS.index(top) > LAYERS.index(layer):
-            found.append(f"{path} imports {module}, which lies to the right of {layer}")
+            wrong["layer", top] = f"{path} imports {module}, which lies to the right of {layer}"
+        if module.startswith(JOINER) and not path.startswith(JOINER.replace(".", "/")):
+            wrong["joiner", top] = f"{path} imports {module}: only machine/app, which joins the stages, knows it"
         if top in CONFINED and not path.startswith(CONFINED[top]):
-            found.append(f"{path} imports {module}, which is confined to {CONFINED[top] or 'no package'}")
-    return found
+            wrong["confined", top] = f"{path} imports {module}, which is confined to {CONFINED[top] or 'no package'}"
+    return list(wrong.values())
 
 
 def modules() -> list[str]:
@@ -54,7 +77,7 @@ def modules() -> list[str]:
 
 def test_every_package_is_looked_at() -> None:
     assert {path.split("/")[0] for path in modules()} == set(LAYERS)
-    assert "machine/app/picture.py" in modules()
+    assert "machine/app/pictures/picture.py" in modules()
 
 
 @pytest.mark.parametrize("path", modules())
@@ -70,11 +93,14 @@ def test_a_module_imports_only_from_its_left_and_third_parties_only_where_they_b
         ("mdp/a.py", "def late():\n    from machine import gcode", 1),
         ("profiles/a.py", "import mdp.mesh, pydantic", 1),
         ("slicer/a.py", "import trimesh.repair", 1),
-        ("mdp/read.py", "import trimesh", 0),
+        ("mdp/formats/off.py", "import trimesh", 0),
         ("machine/link/port.py", "import serial", 0),
         ("machine/link/stream.py", "import serial", 1),
         ("machine/app/a.py", "from tests.shapes import box\nimport torch", 2),
         ("slicer/a.py", "from . import walls", 1),
+        ("slicer/walls/a.py", "import numba, shapely, manifold3d", 3),
+        ("machine/view/a.py", "from machine.app.pipeline import build", 1),
+        ("machine/app/a.py", "from machine.app.pipeline import build", 0),
     ],
 )
 def test_the_check_finds_what_is_forbidden_and_only_that(path: str, source: str, count: int) -> None:
@@ -91,3 +117,25 @@ def test_the_command_line_starts_without_heavy_imports() -> None:
     )
     assert "typer" in run.stdout.split()
     assert HEAVY & set(run.stdout.split()) == set()
+
+
+def test_no_room_imports_one_above_it_and_the_picture_of_the_house_is_the_code_s() -> None:
+    assert PICTURE.read_text(encoding="utf-8") == draw(), "python tools/draw_rooms.py draws it anew"
+
+
+def test_two_rooms_that_import_each_other_are_found() -> None:
+    graph = {"a.one.x": {"a.two.y"}, "a.two.y": {"a.one.x"}}
+    with pytest.raises(CycleError):
+        floors(room_graph(graph, rooms_of(graph)))
+
+
+def test_files_at_the_top_of_a_folder_are_values_below_its_rooms_or_stages_above_them() -> None:
+    graph = {"a.value": set(), "a.room.x": {"a.value"}, "a.stage": {"a.room.x", "a.value"}}
+    rooms = rooms_of(graph)
+    assert rooms == {"a.value": "a.value", "a.room.x": "a.room", "a.stage": "a.stage"}
+    assert floors(room_graph(graph, rooms)) == {"a.value": 0, "a.room": 1, "a.stage": 2}
+
+
+@pytest.mark.parametrize("room", sorted({path.rpartition("/")[0] for path in modules()}))
+def test_a_room_has_at_most_fifteen_files(room: str) -> None:
+    assert len([file for file in (ROOT / room).glob("*.py") if file.name != "__init__.py"]) <= MOST_FILES

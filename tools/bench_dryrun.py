@@ -19,15 +19,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from machine.app.pipeline import decompose_model
-from machine.dryrun import clearance, dry_run, heat, laying, made, motion, plate, sequence
-from machine.dryrun.ground import beads, walk
-from machine.dryrun.timeline import move_times
-from machine.gcode import write_gcode
+from machine.app.pipeline.pipeline import decompose_model
+from machine.app.requests import ModelRequest
+from machine.dryrun import clearance, dry_run, heat, motion, placement, provenance, sequence
+from machine.dryrun.replay import beads_of, replay
+from machine.gcode.writer import write_gcode
 from machine.kinematics.table import workpiece_path
-from machine.parse import parse_gcode
-from machine.parsed import MoveKind
-from machine.plan import plan
+from machine.planning.plan import plan
+from machine.planning.timing import move_times
+from machine.reader.parse import parse_gcode
+from machine.reader.parsed import MoveKind
 from profiles.profile import Profile, load
 from slicer.parts import slice_parts
 
@@ -62,7 +63,7 @@ def make(model: str, machine: str, scale: str, layer: str, file: Path) -> None:
     """Write the long program."""
     fine = [f"process.scale={scale}", f"process.layer_height_mm={layer}", "process.infill_density=1"]
     profile = load(machine=machine, settings=fine)
-    found = decompose_model(model, profile, "classic").decomposition
+    found = decompose_model(ModelRequest(model, profile)).decomposition
     sliced = slice_parts(found.parts, profile)
     file.write_text("\n".join(write_gcode(plan(found, sliced, profile), profile)) + "\n")
 
@@ -80,15 +81,15 @@ def stages(file: Path, profile: Profile) -> None:
     segments = np.stack(ends, axis=1)
     stop = np.zeros(len(program.line), dtype=np.bool_)
     timed("timeline", lambda: move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration))
-    deposited = beads(program, segments, rows, profile)
-    ground = timed("plastic under every move", lambda: walk(program, deposited, profile))
+    deposited = beads_of(program, segments, rows, profile)
+    contacts = timed("plastic under every move", lambda: replay(program, deposited, profile))
     timed("head against table and cradle", lambda: clearance.findings(program, segments, rows, machine))
     timed(
         "other findings",
         lambda: [
-            *laying.findings(program, deposited, ground), *sequence.findings(program, profile),
-            *made.findings(lines, program, profile), *motion.findings(program, machine),
-            *plate.findings(program, segments, rows, profile), *heat.findings(program, profile),
+            *placement.findings(program, deposited, contacts), *sequence.findings(program, profile),
+            *provenance.findings(lines, program, profile), *motion.findings(program, machine),
+            *placement.off_plate(program, segments, rows, profile), *heat.findings(program, profile),
         ],
     )  # fmt: skip
 

@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 
-from machine.dialects import DIALECTS
-from machine.gcode import write_gcode
-from machine.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel
-from machine.parse import parse_gcode
+from machine.firmware import dialects
+from machine.gcode.writer import write_gcode
+from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel
+from machine.reader.parse import parse_gcode
 from mdp.pose import Pose
 from profiles.profile import load
 from slicer.paths import Kind
@@ -38,7 +38,7 @@ def program() -> MachineProgram:
 def main() -> None:
     """Write and read, and tell how long each took."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("dialect", choices=DIALECTS, nargs="?", default="marlin")
+    parser.add_argument("dialect", choices=dialects(), nargs="?", default="marlin")
     parser.add_argument("coordinates", choices=("table", "workpiece"), nargs="?", default="table")
     given = parser.parse_args()
     profile = load(settings=[f"machine.dialect={given.dialect}", f"machine.coordinates={given.coordinates}"])

@@ -13,14 +13,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
-from machine.app.traffic import tapped
-from machine.link.firmware import Firmware, Habits
-from machine.link.framing import frame
+from machine.app.printer.serial_log import tap
 from machine.link.medium import Medium
-from machine.link.protocol import Protocol
-from machine.link.simulator import SimulatedPrinter
+from machine.link.protocol import connection as protocol
+from machine.link.protocol.framing import frame
 from machine.link.stream import print_lines
-from machine.link.virtual import PATH, VirtualPrinter
+from machine.simulator.board import BuildOptions
+from machine.simulator.firmware import SimulatedFirmware
+from machine.simulator.simulator import SimulatedPrinter
+from machine.simulator.virtual import PATH, VirtualPrinter
 from profiles.profile import load
 
 BAUDS = (115200, 250000)
@@ -48,7 +49,7 @@ def _padded(number: int) -> str:
     return RESTING[: next(lengths, whole)]
 
 
-def used(lines: list[str], baud: int, habits: Habits, terminal: bool) -> tuple[float, float, int, int]:
+def used(lines: list[str], baud: int, build: BuildOptions, terminal: bool) -> tuple[float, float, int, int]:
     """Lines a second, share of the bandwidth used from the first to the last line, resends and lost bytes over a paced UART."""
     sent, times = [0], []
 
@@ -59,50 +60,50 @@ def used(lines: list[str], baud: int, habits: Habits, terminal: bool) -> tuple[f
 
     if terminal:
         clock, (here, there) = perf_counter, Pipe()
-        printer = Process(target=serve, args=(there, habits, baud))
+        printer = Process(target=serve, args=(there, build, baud))
         printer.start()
-        outcome = print_lines(lines, here.recv(), baud, medium=tapped(traffic))
+        outcome = print_lines(lines, here.recv(), baud, medium=tap(traffic))
         here.send("end")
         lost = here.recv()
         printer.join()
     else:
-        virtual = VirtualPrinter(load().machine, habits, baud=baud)
+        virtual = VirtualPrinter(load().machine, build, baud=baud)
         clock = virtual.medium.now_s
-        outcome = print_lines(lines, PATH, baud, medium=tapped(traffic, virtual.medium))
+        outcome = print_lines(lines, PATH, baud, medium=tap(traffic, virtual.medium))
         lost = virtual.record.lost_bytes
     seconds = times[-1] - times[0]
     return len(lines) / seconds, sent[0] * 10 / baud / seconds, outcome.repeated, lost
 
 
-def serve(host: Connection, habits: Habits, baud: int) -> None:
+def serve(host: Connection, build: BuildOptions, baud: int) -> None:
     """A paced printer in a process of its own, until the host says that it has enough."""
-    with SimulatedPrinter(load().machine, habits=habits, baud=baud, speed=1.0) as printer:
+    with SimulatedPrinter(load().machine, build=build, baud=baud, speed=1.0) as printer:
         host.send(printer.path)
         host.recv()
         host.send(printer.record.lost_bytes)
 
 
-def over_the_terminal(lines: list[str], habits: Habits) -> tuple[float, float]:
+def over_the_terminal(lines: list[str], build: BuildOptions) -> tuple[float, float]:
     """Seconds of the clock and of the processor for a whole print, greeting included."""
-    with SimulatedPrinter(load().machine, habits=habits) as printer:
+    with SimulatedPrinter(load().machine, build=build) as printer:
         wall, work = perf_counter(), process_time()
         print_lines(lines, printer.path, 250000)
         return perf_counter() - wall, process_time() - work
 
 
 def sender_alone(lines: list[str]) -> float:
-    """Processor seconds that the protocol takes for these lines with answers out of the air."""
-    protocol, began = Protocol(), process_time()
-    protocol.tick(1.0)
-    protocol.receive(b"ok N0 P15 B3\nok N1 P15 B3\nok T:20.00 /0.00\n", 1.0)
+    """Processor seconds that the connection takes for these lines with answers out of the air."""
+    connection, began = protocol.Connection(), process_time()
+    connection.tick(1.0)
+    connection.receive(b"ok N0 P15 B3\nok N1 P15 B3\nok T:20.00 /0.00\n", 1.0)
     for number, line in enumerate(lines, 3):
-        while not protocol.room(line):
-            protocol.tick(1.0)
-            if said := answers(protocol.take()):
-                protocol.receive(said, 1.0)
+        while not connection.can_send(line):
+            connection.tick(1.0)
+            if said := answers(connection.take()):
+                connection.receive(said, 1.0)
             else:
-                protocol.receive(b"ok N%d P15 B3\n" % protocol.window.wire(number - 1), 1.0)
-        protocol.send(line, 1.0)
+                connection.receive(b"ok N%d P15 B3\n" % connection.window.wire_number(number - 1), 1.0)
+        connection.send(line, 1.0)
     return process_time() - began
 
 
@@ -114,7 +115,7 @@ def answers(data: bytes) -> bytes:
 def firmware_alone(lines: list[str]) -> float:
     """Processor seconds that the simulated firmware takes for these lines."""
     framed = [frame(number, line) for number, line in enumerate(lines, 1)]
-    firmware, began = Firmware(load().machine), process_time()
+    firmware, began = SimulatedFirmware(load().machine), process_time()
     for line in framed:
         firmware.receive(line)
         firmware.advance()
@@ -184,13 +185,13 @@ def main() -> None:
     lines = program(asked.lines)
     kinds = (("window", True), ("ping-pong", False))
     for name, advanced in kinds if "terminal" in what else ():
-        wall_s, work_s = over_the_terminal(lines, Habits(advanced_ok=advanced))
+        wall_s, work_s = over_the_terminal(lines, BuildOptions(advanced_ok=advanced))
         print(f"{name:10s} {len(lines) / wall_s:8.0f} lines/s  ({len(lines)} lines in {wall_s:.1f} s, processor {work_s:.1f} s)")
     for where in (place for place in ("uart", "virtual") if place in what):
         for baud in BAUDS:
             for name, advanced in kinds:
-                habits = Habits(advanced_ok=advanced, rx_ring=128)
-                rate, share, again, lost = used(resting(UART_LINES), baud, habits, where == "uart")
+                build = BuildOptions(advanced_ok=advanced, rx_ring=128)
+                rate, share, again, lost = used(resting(UART_LINES), baud, build, where == "uart")
                 told = f"{rate:6.1f} lines/s, {100 * share:5.1f} % of the line, {again} resends, {lost} bytes lost"
                 print(f"{where:8s} {baud:7d} {name:10s} {told}", flush=True)
     if "alone" in what:

@@ -13,20 +13,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-import mdp.threads
-from mdp.candidates import Bounds, bounds
+import mdp.kernels.threads
 from mdp.cut import mesh_of, solid_of
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright, threshold
 from mdp.read import locate, read_mesh
-from mdp.search import decompose
-from mdp.sweep import Remainder, gains, sweep
+from mdp.search.candidates import Bounds, bounds
+from mdp.search.search import decompose
+from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 
 RUNS = 5
 SMALLEST = 2000
 TERMS = {
-    "the paper's terms": ("search.count_platform_faces=true", "search.clearance=false"),
+    "the paper's terms": ("search.objective=risky", "search.count_platform_faces=true", "search.clearance=false"),
     "our terms": (),
 }
 
@@ -112,11 +112,11 @@ def all_candidates(mesh: Mesh, profile: Profile) -> tuple[Callable[[], object], 
 
 def on_cores(cores: int, work: Callable[[], object]) -> tuple[float, float]:
     """Processor time and wall time on so many threads, each the least of several runs."""
-    usual, mdp.threads.THREADS = mdp.threads.THREADS, cores
+    usual, mdp.kernels.threads.THREADS = mdp.kernels.threads.THREADS, cores
     try:
         return _least(work, time.process_time), _least(work, time.perf_counter)
     finally:
-        mdp.threads.THREADS = usual
+        mdp.kernels.threads.THREADS = usual
 
 
 def _least(work: Callable[[], object], clock: Callable[[], float]) -> float:

@@ -9,15 +9,23 @@ from collections.abc import Callable, Sequence
 import numba
 import numpy as np
 
-from mdp.candidates import bounds
-from mdp.footing import find_footing
-from mdp.fragile import SLIVER_COSINE, find_slivers
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
-from mdp.pieces import count_pieces, find_critical
 from mdp.read import locate, read_mesh
-from mdp.sums import dot, find_heights, find_lowest, sum_risks, sum_volumes
-from mdp.sweep import Remainder, gains, sweep
+from mdp.search.candidates import bounds
+from mdp.sweep.components import View, count_pieces, find_critical
+from mdp.sweep.contact_area import find_contact_areas
+from mdp.sweep.integrals import (
+    OffsetGrid,
+    Overhangs,
+    dot,
+    find_heights,
+    find_lowest,
+    integrate_risky_area,
+    integrate_volume,
+)
+from mdp.sweep.slivers import find_slivers
+from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 from tools.bench_search import on_cores
 
@@ -38,7 +46,7 @@ def kernels(mesh: Mesh, profile: Profile) -> None:
     angle_deg, limits = profile.process.self_supporting_angle_deg, bounds(mesh, profile.machine, profile.search)
     remainder, angle = Remainder(mesh, risky_upright(mesh, angle_deg)), threshold(angle_deg)
     directions, step = limits.directions, profile.search.offset_step_mm
-    count = int(gains(remainder, directions, step, angle).count.sum())
+    count = int(gains(remainder, directions, step, angle).columns.sum())
     print(f"{len(mesh.faces)} faces, {len(directions)} directions, {count} candidates\n")
     print("| kernel | us a direction | us a candidate |\n|---|---|---|")
     for name, work in pieces_of_work(remainder, limits.least_height_mm, directions, step, angle).items():
@@ -50,24 +58,19 @@ def pieces_of_work(
     remainder: Remainder, watched: Floats, directions: Floats, step: float, angle: float
 ) -> dict[str, Callable[[], object]]:
     """Every kernel for all directions, on one thread."""
-    laid, columns = remainder.facets, remainder.columns(step)
-    x, y, z = laid.points
-    heights, counts = _all_heights(x, y, z, directions, step)
-    looks = np.ascontiguousarray(directions @ laid.vertex_normal_rows)
-    tree = (remainder.tree.low, remainder.tree.high)
-    surface = (laid.mesh.vertices, laid.mesh.faces, laid.mesh.normals, laid.vertex_normals)
-    sharp = laid.sharp_corners(SLIVER_COSINE)
-    solid_rows = (laid.points, laid.corners, laid.flatness, surface, laid.standing, laid.links, tree, remainder.anchors)
-    areas = (laid.corners, laid.normals, laid.mesh.areas_mm2, laid.risky)
-    slivers = (laid.flatness, sharp, laid.corners, laid.normals)
+    facets, columns, rows, topology = remainder.facets, remainder.most_columns(step), remainder.rows, remainder.topology
+    heights, counts = _all_heights(rows.points, directions, step)
+    cosines = np.ascontiguousarray(directions @ rows.vertex_normals)
+    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.mesh.areas_mm2, facets.risky, angle)
+    grids = (directions, heights, counts, step, columns)
     return {
-        "heights": lambda: _all_heights(x, y, z, directions, step),
-        "risky areas (gains)": lambda: _risks(areas, directions, heights, counts, angle, columns),
-        "section and volume": lambda: _volumes(laid.corners, laid.vectors_mm2, directions, heights, counts, step, columns),
-        "lowest point": lambda: _lowest(z, laid.rising_edges, heights, counts, watched, columns),
-        "slivers": lambda: _slivers(slivers, looks, laid.vertex_normal_rows, directions, heights, counts, step, columns),
-        "pieces below": lambda: _pieces(solid_rows, looks, directions, heights, counts, columns, False),
-        "pieces below and footing above": lambda: _pieces(solid_rows, looks, directions, heights, counts, columns, True),
+        "heights": lambda: _all_heights(rows.points, directions, step),
+        "risky areas (gains)": lambda: _risks(surface, grids),
+        "section and volume": lambda: _volumes(rows, grids),
+        "lowest point": lambda: _lowest(rows, grids, watched),
+        "slivers": lambda: _slivers(rows, grids, cosines),
+        "pieces below": lambda: _pieces(rows, topology, grids, cosines, False),
+        "pieces below and contact areas above": lambda: _pieces(rows, topology, grids, cosines, True),
         "gains, whole": lambda: gains(remainder, directions, step, angle),
         "sweep, whole": lambda: sweep(remainder, directions, step, watched),
     }
@@ -79,56 +82,61 @@ def core_s(work: Callable[[], object]) -> float:
 
 
 @numba.njit
-def _all_heights(x, y, z, directions, step):  # type: ignore[no-untyped-def]
-    heights, counts = np.empty((len(directions), len(x))), np.empty(len(directions), np.int64)
+def _all_heights(points, directions, step):  # type: ignore[no-untyped-def]
+    heights, counts = np.empty((len(directions), points.shape[1])), np.empty(len(directions), np.int64)
     for k in range(len(directions)):
-        counts[k] = find_heights(x, y, z, directions[k], step, heights[k])[1]
+        counts[k] = find_heights(points[0], points[1], points[2], directions[k], step, heights[k])[1]
     return heights, counts
 
 
 @numba.njit
-def _risks(areas, directions, heights, counts, angle, columns):  # type: ignore[no-untyped-def]
-    corners, normals, sizes, risky = areas
-    up, residual, room = np.zeros(columns), np.zeros(columns), np.zeros((2, len(sizes) + 1), np.int32)
+def _risks(surface, grids):  # type: ignore[no-untyped-def]
+    directions, heights, counts, step, columns = grids
+    up, residual, scratch = np.zeros(columns), np.zeros(columns), np.zeros((2, len(surface.risky) + 1), np.int32)
     for k in range(len(directions)):
-        sum_risks(corners, normals, sizes, risky, directions[k], heights[k], counts[k], angle, room, up, residual)
+        integrate_risky_area(surface, OffsetGrid(directions[k], heights[k], counts[k], step), scratch, up, residual)
 
 
 @numba.njit
-def _volumes(corners, vectors, directions, heights, counts, step, columns):  # type: ignore[no-untyped-def]
+def _volumes(rows, grids):  # type: ignore[no-untyped-def]
+    directions, heights, counts, step, columns = grids
     section, volume = np.zeros(columns), np.zeros(columns)
     for k in range(len(directions)):
-        sum_volumes(corners, vectors, directions[k], heights[k], counts[k], step, section, volume)
+        integrate_volume(rows, OffsetGrid(directions[k], heights[k], counts[k], step), section, volume)
 
 
 @numba.njit
-def _lowest(z, edges, heights, counts, watched, columns):  # type: ignore[no-untyped-def]
+def _lowest(rows, grids, watched):  # type: ignore[no-untyped-def]
+    directions, heights, counts, step, columns = grids
     lowest = np.empty(columns)
-    for k in range(len(heights)):
+    for k in range(len(directions)):
         lowest[:] = np.inf
-        find_lowest(z, edges, heights[k], counts[k], watched[k], lowest)
+        grid = OffsetGrid(directions[k], heights[k], counts[k], step)
+        find_lowest(rows.points[2], rows.rising_edges, grid, watched[k], lowest)
 
 
 @numba.njit
-def _slivers(faces, looks, vertex_normals, directions, heights, counts, step, columns):  # type: ignore[no-untyped-def]
-    flatness, sharp, corners, normals = faces
-    fragile = np.zeros(columns)
-    for k in range(len(heights)):
-        d = directions[k]
-        dot(vertex_normals[0], vertex_normals[1], vertex_normals[2], d[0], d[1], d[2], looks[k])
-        find_slivers(looks[k], flatness, sharp, corners, normals, d, heights[k], counts[k], step, fragile)
+def _slivers(rows, grids, cosines):  # type: ignore[no-untyped-def]
+    directions, heights, counts, step, columns = grids
+    normals, fragile = rows.vertex_normals, np.zeros(columns)
+    for k in range(len(directions)):
+        dot(normals[0], normals[1], normals[2], directions[k], cosines[k])
+        find_slivers(rows, OffsetGrid(directions[k], heights[k], counts[k], step), cosines[k], fragile)
 
 
 @numba.njit
-def _pieces(solid_rows, looks, directions, heights, counts, columns, above):  # type: ignore[no-untyped-def]
-    points, corners, flatness, surface, standing, links, tree, anchor = solid_rows
-    pieces, footing, room = np.zeros(columns, np.int32), np.zeros(columns), np.empty(points.shape[1], np.int32)
-    for k in range(len(heights)):
-        found = room[: find_critical(looks[k], flatness, heights[k], links, room)]
-        count_pieces(surface, standing, links, found, tree, anchor, looks[k], heights[k], counts[k], pieces)
+def _pieces(rows, topology, grids, cosines, above):  # type: ignore[no-untyped-def]
+    directions, heights, counts, step, columns = grids
+    pieces, contact_area = np.zeros(columns, np.int32), np.zeros(columns)
+    scratch, wanted = np.empty(rows.points.shape[1], np.int32), np.zeros(columns, np.int32)
+    for k in range(len(directions)):
+        critical = scratch[: find_critical(cosines[k], rows.flatness, heights[k], topology.rings, scratch)]
+        view = View(OffsetGrid(directions[k], heights[k], counts[k], step), cosines[k], critical)
+        count_pieces(topology, view, pieces)
         if above:
-            rows = (points, corners, surface, links, found, tree, anchor, looks[k])
-            find_footing(rows, directions[k], heights[k], 2.0, pieces[: counts[k]] == 0, footing)
+            for column in range(counts[k]):
+                wanted[column] = pieces[column] == 0
+            find_contact_areas(rows, topology, view, 2.0, wanted[: counts[k]], contact_area)
 
 
 if __name__ == "__main__":

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from machine.gcode import write_gcode
-from machine.plan import plan
+from machine.gcode.writer import write_gcode
+from machine.planning.plan import plan
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM

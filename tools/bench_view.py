@@ -6,8 +6,9 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from machine.app.pipeline import build, decompose_model, model_name
-from machine.app.view.page import parts_page, print_page
+from machine.app.pipeline.pipeline import build, decompose_model
+from machine.app.requests import ModelRequest
+from machine.view.page import parts_page, print_page
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
 
@@ -21,13 +22,14 @@ WHEEL = "document.getElementById('canvas').dispatchEvent(new WheelEvent('wheel',
 def made(model: str, settings: list[str]) -> bytes:
     """The page of a model, and its row of the first table."""
     profile = load(settings=settings)
-    found = decompose_model(model, profile, "classic", to_build=True).decomposition
+    request = ModelRequest(model, profile)
+    found = decompose_model(request, to_build=True).decomposition
     program = build(found, profile)
     began = perf_counter()
-    page = print_page(model_name(model), program, profile)
+    page = print_page(request.name, program, profile)
     seconds, moves = perf_counter() - began, len(program.run.program.line)
     alone = len(parts_page(found, profile)) / 1e6
-    print(f"| {model_name(model)} | {moves} | {len(page) / 1e6:.2f} | {len(page) / moves:.1f} | {seconds:.2f} | {alone:.2f} |")
+    print(f"| {request.name} | {moves} | {len(page) / 1e6:.2f} | {len(page) / moves:.1f} | {seconds:.2f} | {alone:.2f} |")
     return page
 
 

@@ -15,10 +15,12 @@ from dataclasses import replace
 from pathlib import Path
 from time import process_time
 
-from machine.app.pipeline import Program, build, decompose_model
+from machine.app.pipeline.pipeline import build, decompose_model
+from machine.app.requests import ModelRequest
 from machine.dryrun.agreement import agreement
-from machine.link.simulator import SimulatedPrinter
 from machine.link.stream import print_lines
+from machine.simulator.simulator import SimulatedPrinter
+from machine.view.program import Program
 from mdp.decomposition import Decomposition
 from profiles.errors import UserError
 from profiles.profile import Profile, load
@@ -60,7 +62,7 @@ def row(file: Path, machine: str, settings: list[str], stream: bool) -> str:
     began = process_time()
     try:
         profile = load(machine=machine, settings=["process.infill_density=1", *settings])
-        found = decompose_model(str(file), profile, "classic").decomposition
+        found = decompose_model(ModelRequest(str(file), profile)).decomposition
         searched = process_time()
         program = build(found, profile)
     except UserError as error:

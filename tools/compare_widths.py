@@ -7,7 +7,8 @@
 FOLDER holds models as npz (vertices in mm and faces). One line of FILE.csv is one search, written as soon as it is done; lines
 that are there already are not searched again, so an interrupted run goes on where it stopped, and runs with other settings
 (told apart by the column `settings`) may share the file. --summary prints the tables and searches nothing. --paper-terms:
-faces on the platform count as risky, head and axes do not limit (`search.count_platform_faces=true`, `search.clearance=false`).
+seams cost nothing, faces on the platform count as risky, head and axes do not limit (`search.objective=risky`,
+`search.count_platform_faces=true`, `search.clearance=false`).
 J(1) in the tables is J at the least width there is.
 """
 
@@ -23,14 +24,14 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from mdp.formats.surface import check_surface
 from mdp.mesh import Floats, Mesh
-from mdp.repair import repaired
-from mdp.search import decompose
-from mdp.surface import checked
+from mdp.repair.repair import repair
+from mdp.search.search import decompose
 from profiles.errors import MeshError
 from profiles.profile import Profile, load
 
-PAPER_TERMS = ("search.count_platform_faces=true", "search.clearance=false")
+PAPER_TERMS = ("search.objective=risky", "search.count_platform_faces=true", "search.clearance=false")
 EQUAL = 1e-6  # shares of the risky area that differ less are a tie
 RESAMPLES = 10_000
 
@@ -130,7 +131,7 @@ def model(path: Path) -> Mesh:
     """The solid of an npz file, repaired as a model file is, resting on the platform and centred; MeshError when it is none."""
     try:
         with np.load(path) as arrays:
-            solid, _ = repaired([checked(path, arrays["vertices"], arrays["faces"])])
+            solid, _ = repair([check_surface(path, arrays["vertices"], arrays["faces"])])
     except (KeyError, ValueError, BadZipFile) as error:
         raise MeshError(f"{path}: holds no vertices and faces ({error})") from None
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)

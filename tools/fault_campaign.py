@@ -19,11 +19,11 @@ from functools import partial
 
 import numpy as np
 
-from machine.link.faults import HEALED, KINDS, Fault, FaultScript, random_script
-from machine.link.firmware import Habits
-from machine.link.record import Record
 from machine.link.stream import print_lines
-from machine.link.virtual import PATH, EndlessError, VirtualPrinter
+from machine.simulator.board import BuildOptions
+from machine.simulator.faults import HEALED, KINDS, Fault, FaultScript, random_script
+from machine.simulator.record import Record
+from machine.simulator.virtual import PATH, EndlessError, VirtualPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
 
@@ -111,10 +111,10 @@ def script(seed: int, lines: int) -> FaultScript:
     return random_script(seed, rng.randint(1, 12), range(5, lines), kinds)
 
 
-def habits(seed: int) -> Habits:
+def build_options(seed: int) -> BuildOptions:
     """The printer's build options of a trial."""
     rng = random.Random(~seed)
-    return Habits(*(rng.random() < share for share in (0.5, 0.7, 0.8, 0.7)), rx_ring=128 if seed % 2 else None)
+    return BuildOptions(*(rng.random() < share for share in (0.5, 0.7, 0.8, 0.7)), rx_ring=128 if seed % 2 else None)
 
 
 def trial(seed: int, lines: int) -> Trial:
@@ -122,7 +122,7 @@ def trial(seed: int, lines: int) -> Trial:
     text, faults, began_s = program(lines), script(seed, lines), time.perf_counter()
     profile = TRUSTING.get(seed % 16, PROFILE)
     baud = None if profile is not PROFILE else (None, None, 250000, 115200)[seed % 4]
-    printer = VirtualPrinter(profile.machine, habits(seed), faults, baud, MOST_S)
+    printer = VirtualPrinter(profile.machine, build_options(seed), faults, baud, MOST_S)
     error, repeated = "", 0
     try:
         repeated = print_lines(text, PATH, medium=printer.medium, profile=profile).repeated

@@ -21,13 +21,13 @@ from time import monotonic, sleep
 
 import numpy as np
 
-from machine.link.inquiry import Found
-from machine.link.journal import Heading, Journal, read_journal
-from machine.link.program import GcodeFile
-from machine.link.protocol import Timing
-from machine.link.resume import point_of, way_on
-from machine.link.simulator import SimulatedPrinter
-from machine.link.stream import Begin, print_lines
+from machine.link.journal import Journal, JournalHeading, read_journal
+from machine.link.protocol.timeout import Timing
+from machine.link.resume import ResumePoint, plan_resume, read_interrupted_print
+from machine.link.status import PrinterStatus
+from machine.link.stream import print_lines
+from machine.reader.gcode_file import GcodeFile
+from machine.simulator.simulator import SimulatedPrinter
 from profiles.profile import load
 
 PROFILE = load()
@@ -102,7 +102,7 @@ def printer(folder: Path, speed: float) -> Iterator[Path]:
 
 
 def apart(work: Callable[[], object]) -> int:
-    """Begin work in a child process; its id."""
+    """ResumePoint work in a child process; its id."""
     child = os.fork()
     if child == 0:
         code = 1
@@ -116,19 +116,19 @@ def apart(work: Callable[[], object]) -> int:
 
 def begin_print(text: GcodeFile, port: Path, journal: Path) -> None:
     """A print with a journal."""
-    with Journal(journal, Heading(str(text.path), text.sha256(), "campaign", {})) as kept:
+    with Journal(journal, JournalHeading(str(text.path), text.sha256(), "campaign", {})) as kept:
         print_lines(text, str(port), 250000, timing=QUICK, journal=kept, profile=PROFILE)
 
 
 def go_on(text: GcodeFile, port: Path, journal: Path, told: Path) -> None:
     """Resume as the command does, without asking; writes down how."""
     story = read_journal(journal)
-    point = point_of(text, story.last, PROFILE, LIMIT)
+    point = read_interrupted_print(text, story.last, PROFILE, LIMIT)
 
-    def begin(found: Found) -> Begin:
-        way = way_on(point, found, PROFILE)
-        told.write_text(json.dumps([way.begin.line, way.certain.partition(":")[0].partition(";")[0]]), encoding="utf-8")
-        return way.begin
+    def begin(found: PrinterStatus) -> ResumePoint:
+        way = plan_resume(point, found, PROFILE)
+        told.write_text(json.dumps([way.start.line, way.reason.partition(":")[0].partition(";")[0]]), encoding="utf-8")
+        return way.start
 
     with Journal(journal.with_suffix(".rest"), story.heading) as kept:
         print_lines(text, str(port), 250000, timing=QUICK, journal=kept, profile=PROFILE, begin=begin)

@@ -8,8 +8,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from machine.app.pipeline import build, decompose_model
-from machine.app.view.page import print_page
+from machine.app.pipeline.pipeline import build, decompose_model
+from machine.app.requests import ModelRequest
+from machine.view.page import print_page
 from profiles.profile import load
 from tests.machine.browser import Browser
 
@@ -29,7 +30,7 @@ SHOTS = {
 def content(demo: str) -> bytes:
     """The page of a demo model, sliced for the usual machine."""
     profile = load()
-    found = decompose_model(f"demo:{demo}", profile, "classic")
+    found = decompose_model(ModelRequest(f"demo:{demo}", profile))
     return print_page(f"demo:{demo}", build(found.decomposition, profile), profile)
 
 

@@ -1,0 +1,1 @@
+"""The program: joins the stages and talks to people."""

@@ -9,6 +9,7 @@ from os.path import exists, isdir, isfile, islink  # pathlib's raise for a name 
 from pathlib import Path
 from typing import Any
 
+from machine.app.requests import Outputs
 from profiles.errors import OutputError
 
 STDOUT = Path("-")
@@ -25,6 +26,16 @@ def check_writable(path: Path) -> None:
         raise OutputError(f"output {path} exists and is not writable")
     if not _is_device(path):
         _check_parent(path, (path.resolve() if islink(path) else path).parent)
+
+
+def check_outputs(outputs: Outputs) -> None:
+    """The same for all files and the folder that a command was asked for."""
+    if outputs.folder is not None:
+        check_folder(outputs.folder)
+    streams = (None if file == STDOUT else file for file in (outputs.gcode, outputs.json))
+    for file in (outputs.png, outputs.sheet, outputs.record, outputs.html, outputs.svg, outputs.plan, *streams):
+        if file is not None:
+            check_writable(file)
 
 
 def make_folder(path: Path) -> None:

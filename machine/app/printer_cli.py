@@ -1,4 +1,4 @@
-"""The command line of the printer: print, resume, ports, console, simulator. Heavy imports stay inside the commands."""
+"""The command line of printers: print, resume, ports, console, simulator. Heavy imports stay inside the commands."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,43 +6,50 @@ from typing import Annotated
 
 import typer
 
-from machine.app.options import (
+from machine.app.requests import ConsoleRequest, Cuts, ModelRequest, PrintRequest, SimulatorRequest
+from machine.app.terminal.options import (
+    Baud,
     BeamWidth,
+    LogFile,
     MachineGiven,
     MachineName,
     MaterialGiven,
     ModelOrGcode,
     Orient,
+    PartsGiven,
+    PlanGiven,
+    PortOrSim,
     ProcessGiven,
     RankerName,
     SearchName,
     Settings,
+    SimSpeed,
     TimeLimit,
+    Watch,
+    WatchPort,
+    chosen_sections,
+    machine_profile,
+    page_port,
     profile_of,
-    sections_named,
+    with_search,
 )
-
-Watch = Annotated[bool, typer.Option("--watch", help="serve a page on this computer that follows the print")]
-WatchPort = Annotated[
-    int | None, typer.Option("--watch-port", metavar="N", min=0, max=65535, help="serve it on this port; else on any free one")
-]
 
 
 def print_(
     model: ModelOrGcode,
-    port: Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")],
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
+    port: PortOrSim,
+    baud: Baud = 115200,
     beam_width: BeamWidth = None,
     search: SearchName = None,
     time_limit: TimeLimit = None,
     ranker: RankerName = "classic",
     orient: Orient = False,
-    speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
+    plan: PlanGiven = None,
+    parts: PartsGiven = None,
+    speed: SimSpeed = 0.0,
     watch: Watch = False,
     watch_port: WatchPort = None,
-    log: Annotated[
-        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
-    ] = None,
+    log: LogFile = None,
     journal: Annotated[
         Path | None, typer.Option("--journal", metavar="FILE", help="for resume; else a new file in the state folder")
     ] = None,
@@ -59,41 +66,32 @@ def print_(
     PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT. The printer is asked who it is before anything moves.
     Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
     """
-    from machine.app import commands
+    from machine.app.commands.print import print_model
 
-    profile = profile_of(
-        machine or "generic_ac", material or "pla", process or "standard", settings, beam_width, search, time_limit
-    )
-    named = sections_named(machine=machine, material=material, process=process, settings=settings)
-    page = _page_port(watch, watch_port)
-    return commands.print_model(model, profile, ranker, orient, port, baud, speed, force, named, page, log, journal)
-
-
-def _page_port(watch: bool, watch_port: int | None) -> int | None:
-    """Where the page of a print is served, 0: at any free port; None: nowhere."""
-    return (watch_port or 0) if watch or watch_port is not None else None
+    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit))
+    chosen = chosen_sections(settings, machine=machine, material=material, process=process)
+    request = ModelRequest(model, profile, chosen, ranker, orient, force=force, cuts=Cuts(plan, parts))
+    return print_model(request, PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port)))
 
 
 def resume(
     journal: Annotated[Path, typer.Argument(metavar="JOURNAL", help="journal of the print that was cut off")],
     port: Annotated[str, typer.Option("--port", metavar="PORT", help="serial port")],
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
+    baud: Baud = 115200,
     yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
     watch: Watch = False,
     watch_port: WatchPort = None,
     further: Annotated[
         Path | None, typer.Option("--journal", metavar="FILE", help="journal of the rest; else a new file in the state folder")
     ] = None,
-    log: Annotated[
-        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
-    ] = None,
+    log: LogFile = None,
     machine: MachineGiven = None,
 ) -> int:
     """Go on with a print after a power cut, a crash or a pulled plug."""
-    from machine.app import resume_command
+    from machine.app.commands.resume import resume
 
-    given = None if machine is None else profile_of(machine, "pla", "standard", None, None, None, None)
-    return resume_command.resume(journal, port, baud, yes, given, further, log, _page_port(watch, watch_port))
+    named = None if machine is None else machine_profile(machine)
+    return resume(journal, PrintRequest(port, baud, 0.0, log, further, page_port(watch, watch_port)), named, yes)
 
 
 def ports(
@@ -104,22 +102,20 @@ def ports(
     ] = True,
 ) -> int:
     """List serial ports and what answers at each. It tells firmware, axes and rate, or why nothing answers."""
-    from machine.app import ports_command
+    from machine.app.commands.ports import ports
 
-    return ports_command.ports(baud, json, ask)
+    return ports(baud, json, ask)
 
 
 def console(
-    port: Annotated[str, typer.Option("--port", metavar="PORT|sim", help="serial port; sim: the simulated printer")],
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="bits a second")] = 115200,
-    speed: Annotated[float, typer.Option("--sim-speed", metavar="X", help="X times real time; 0: as fast as possible")] = 0.0,
+    port: PortOrSim,
+    baud: Baud = 115200,
+    speed: SimSpeed = 0.0,
     reports: Annotated[bool, typer.Option("--reports/--no-reports", help="show temperatures that the printer reports")] = True,
     leave_heaters: Annotated[
         bool, typer.Option("--leave-heaters", help="heaters stay as they are on leaving; else they are switched off")
     ] = False,
-    log: Annotated[
-        Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
-    ] = None,
+    log: LogFile = None,
     machine: MachineName = "generic_ac",
     settings: Settings = None,
 ) -> int:
@@ -127,10 +123,9 @@ def console(
 
     /help tells what else can be typed; Ctrl-D leaves. Heaters that are on are then switched off, after a question at a terminal.
     """
-    from machine.app import console_command
+    from machine.app.commands.console import console
 
-    profile = profile_of(machine, "pla", "standard", settings, None, None, None)
-    return console_command.console(profile.machine, port, baud, speed, reports, leave_heaters, log)
+    return console(ConsoleRequest(machine_profile(machine, settings), port, baud, speed, reports, leave_heaters, log))
 
 
 def simulator(
@@ -146,10 +141,9 @@ def simulator(
     settings: Settings = None,
 ) -> int:
     """A simulated printer for any host to print on; Ctrl-C ends it."""
-    from machine.app import simulator_command
+    from machine.app.commands.simulator import simulate_printer
 
-    profile = profile_of(machine, "pla", "standard", settings, None, None, None)
-    return simulator_command.serve(profile.machine, pty, tcp, faults, speed, baud, habits)
+    return simulate_printer(SimulatorRequest(machine_profile(machine, settings), pty, tcp, faults, speed, baud, habits or ""))
 
 
 COMMANDS: dict[str, Callable[..., int]] = {

@@ -1,9 +1,12 @@
-"""State folder: where logs and other traces of runs are kept for the user to look at later."""
+"""State folder: where logs and other traces of runs are left for the user to look at later."""
 
 import os
-import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+
+from platformdirs import user_state_path
 
 
 def state_folder() -> Path:
@@ -11,7 +14,7 @@ def state_folder() -> Path:
 
     Where neither can be had (no home, a full or read-only disk) it is the folder for temporary files.
     """
-    for folder in (_own(), Path(tempfile.gettempdir()) / "tiltprint"):
+    for folder in _candidates():
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:
@@ -21,13 +24,7 @@ def state_folder() -> Path:
     return Path(tempfile.gettempdir())
 
 
-def _own() -> Path:
-    try:
-        home = Path.home()
-    except RuntimeError:  # a user without a home
-        home = Path(tempfile.gettempdir())
-    given = os.environ.get("XDG_STATE_HOME") or {
-        "win32": os.environ.get("LOCALAPPDATA", ""),
-        "darwin": str(home / "Library" / "Application Support"),
-    }.get(sys.platform)
-    return Path(given or home / ".local" / "state") / "tiltprint"
+def _candidates() -> Iterator[Path]:
+    with suppress(RuntimeError):  # a user without a home
+        yield user_state_path("tiltprint", appauthor=False)
+    yield Path(tempfile.gettempdir()) / "tiltprint"

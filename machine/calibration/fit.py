@@ -24,7 +24,7 @@ UPSIDE_DOWN_DEG = 90.0
 STARTS_DEG = (0.0, 25.0, -25.0)
 ROUNDS = 40
 STEP = 1e-4
-TOLD = 1e-4  # a number that moves no touch by this share of its change is not told by them
+LEAST_SHARE = 1e-4  # a number that moves no touch by this share of its change is not determined by them
 APART = 4.0  # the next best signs must fit this much worse
 LEAST_MM = 1e-3
 GOOD_MM = 0.5  # a fit as good as this needs no other start
@@ -67,53 +67,55 @@ def calibrate(
     mark_angle_deg: where the mark is seen from the turn axis, counted from the workpiece's +x: then turn.zero_deg is found
     too, else it stays. Raises ProfileError when the touches cannot tell all numbers or both signs.
     """
-    _enough(touches)
+    _check_count(touches)
     fits: list[tuple[float, tuple[int, int], Floats]] = []
     for start_deg in STARTS_DEG:
-        fits += [_fitted(machine, signs, start_deg, touches, mark_height_mm) for signs in SIGNS]
+        fits += [_fit(machine, signs, start_deg, touches, mark_height_mm) for signs in SIGNS]
         if min(fits, key=lambda fit: fit[0])[0] < GOOD_MM**2:
             break
     each = [min((fit for fit in fits if fit[1] == signs), key=lambda fit: fit[0]) for signs in SIGNS]
     ranked = sorted(each, key=lambda fit: fit[0])
-    (cost, signs, found), (next_cost, next_signs, _) = ranked[:2]
+    (cost, signs, numbers), (next_cost, next_signs, _) = ranked[:2]
     if next_cost < APART**2 * cost + LEAST_MM**2:
         axis = machine.tilt if signs[0] != next_signs[0] else machine.turn
         raise ProfileError(
             f"the touches do not tell the sign of {axis.letter}: touch the mark at turns 0, 90, 180 and 270 and at two tilts"
         )
-    sigma = _sigma(machine, signs, found, touches, mark_height_mm)
-    calibrated = _with(machine, signs, found)
-    mark = (float(found[6]), float(found[7]), mark_height_mm)
+    sigma = _sigma(machine, signs, numbers, touches, mark_height_mm)
+    calibrated = _machine_with(machine, signs, numbers)
+    mark = (float(numbers[6]), float(numbers[7]), mark_height_mm)
     if mark_angle_deg is not None:
-        calibrated, mark = _turned(calibrated, mark, mark_angle_deg)
+        calibrated, mark = _set_turn_zero(calibrated, mark, mark_angle_deg)
     least, most = machine.tilt.limits_deg
     if not least <= calibrated.tilt.zero_deg <= most:
         raise ProfileError(
             f"the table would be level at {machine.tilt.letter}{calibrated.tilt.zero_deg:.2f}, outside tilt.limits_deg "
             f"{list(machine.tilt.limits_deg)}: check the touches"
         )
-    off = _residuals(machine, signs, found, touches, mark_height_mm)
+    off = _residuals(machine, signs, numbers, touches, mark_height_mm)
     owner = np.repeat(np.arange(len(touches)), [1 if touch.on_plate else 3 for touch in touches])
     return Calibration(calibrated, mark, tuple(np.sqrt(np.bincount(owner, weights=off**2)).tolist()), sigma)
 
 
-def _enough(touches: Sequence[Touch]) -> None:
-    told = sum(1 if touch.on_plate else 3 for touch in touches)
-    if told < len(UNKNOWN):
-        raise ProfileError(f"{len(touches)} touches tell {told} numbers, {len(UNKNOWN)} are sought: touch the mark more often")
+def _check_count(touches: Sequence[Touch]) -> None:
+    coordinates = sum(1 if touch.on_plate else 3 for touch in touches)
+    if coordinates < len(UNKNOWN):
+        raise ProfileError(
+            f"{len(touches)} touches tell {coordinates} numbers, {len(UNKNOWN)} are sought: touch the mark more often"
+        )
     tilts = {round(touch.pose.tilt_deg, 1) for touch in touches}
     if len(tilts) < 2:
         raise ProfileError(f"all touches are at tilt {tilts.pop():g}: the tilt axis is found from two tilts or more")
 
 
-def _fitted(
+def _fit(
     machine: Machine, signs: tuple[int, int], start_deg: float, touches: Sequence[Touch], height_mm: float
 ) -> tuple[float, tuple[int, int], Floats]:
     """Mean square, signs and numbers of the best fit with these signs that begins at a zero so far from the profile's."""
-    cost, found = _descend(machine, signs, _start(machine, signs, touches, start_deg), touches, height_mm)
-    if abs(found[5] - machine.tilt.zero_deg) > UPSIDE_DOWN_DEG:  # turning the other way fits a table seen from below
+    cost, numbers = _descend(machine, signs, _start(machine, signs, touches, start_deg), touches, height_mm)
+    if abs(numbers[5] - machine.tilt.zero_deg) > UPSIDE_DOWN_DEG:  # turning the other way fits a table seen from below
         cost = np.inf
-    return cost, signs, found
+    return cost, signs, numbers
 
 
 def _start(machine: Machine, signs: tuple[int, int], touches: Sequence[Touch], start_deg: float) -> Floats:
@@ -121,7 +123,7 @@ def _start(machine: Machine, signs: tuple[int, int], touches: Sequence[Touch], s
     across = _across(machine)
     tilt_point = np.array(machine.tilt.point_mm)
     numbers = np.array([*machine.turn.point_mm, *(across @ tilt_point), machine.tilt.zero_deg + start_deg, 0.0, 0.0])
-    marks = workpiece_path(_with(machine, signs, numbers), _rows([t for t in touches if not t.on_plate] or touches))
+    marks = workpiece_path(_machine_with(machine, signs, numbers), _positions([t for t in touches if not t.on_plate] or touches))
     numbers[6:8] = marks[:, :2].mean(axis=0)
     return numbers
 
@@ -147,11 +149,11 @@ def _descend(
 
 def _residuals(machine: Machine, signs: tuple[int, int], numbers: Floats, touches: Sequence[Touch], height_mm: float) -> Floats:
     """Where the touches lie from the mark, x y z each; of a touch on the plate the height over the table alone."""
-    seen = workpiece_path(_with(machine, signs, numbers), _rows(touches))
+    seen = workpiece_path(_machine_with(machine, signs, numbers), _positions(touches))
     off = seen - np.array([numbers[6], numbers[7], height_mm])
     off[[touch.on_plate for touch in touches], 2] += height_mm
-    kept = np.array([[not touch.on_plate, not touch.on_plate, True] for touch in touches])
-    residuals: Floats = off[kept]
+    measured = np.array([[not touch.on_plate, not touch.on_plate, True] for touch in touches])
+    residuals: Floats = off[measured]
     return residuals
 
 
@@ -172,7 +174,7 @@ def _sigma(
     """How sure each number is; raises ProfileError for those that the touches do not tell."""
     slope = _slope(machine, signs, numbers, touches, height_mm)
     _, sizes, directions = np.linalg.svd(slope, full_matrices=False)
-    if len(sizes) < len(numbers) or sizes[-1] < TOLD * sizes[0]:
+    if len(sizes) < len(numbers) or sizes[-1] < LEAST_SHARE * sizes[0]:
         lost = np.abs(directions[-1])
         names = dict.fromkeys(name for name, share in zip(UNKNOWN, lost, strict=True) if share > 0.3 * lost.max())
         raise ProfileError(f"the touches do not tell {' and '.join(names)}: touch the mark at four turns and at two more tilts")
@@ -186,7 +188,7 @@ def _sigma(
     return sigma
 
 
-def _with(machine: Machine, signs: tuple[int, int], numbers: Floats) -> Machine:
+def _machine_with(machine: Machine, signs: tuple[int, int], numbers: Floats) -> Machine:
     """The machine with these numbers; along its own axis the tilt's point stays where the profile has it."""
     along = unit(machine.tilt.axis)
     point = along * (along @ np.array(machine.tilt.point_mm)) + numbers[3:5] @ _across(machine)
@@ -204,7 +206,7 @@ def _across(machine: Machine) -> Floats:
     return np.array([first, np.cross(along, first)])
 
 
-def _turned(
+def _set_turn_zero(
     machine: Machine, mark_mm: tuple[float, float, float], angle_deg: float
 ) -> tuple[Machine, tuple[float, float, float]]:
     """The machine whose turn.zero_deg puts the mark into a direction of the workpiece."""
@@ -217,6 +219,6 @@ def _turned(
     return machine.model_copy(update={"turn": turn}), (radius * cos(angle), radius * sin(angle), mark_mm[2])
 
 
-def _rows(touches: Sequence[Touch]) -> Floats:
+def _positions(touches: Sequence[Touch]) -> Floats:
     """(n, 5) X Y Z tilt turn of the touches."""
     return np.array([[*touch.at_mm, touch.pose.tilt_deg, touch.pose.turn_deg] for touch in touches])

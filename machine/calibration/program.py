@@ -6,14 +6,13 @@ from math import pi
 
 import numpy as np
 
-from machine.blocks import filled
-from machine.dialects import DIALECTS
-from machine.gcode import BLOCKS
+from machine.firmware import dialect_of
+from machine.gcode.pen import Pen, number
+from machine.gcode.placeholders import fill_block, placeholders
+from machine.gcode.turning import turn
+from machine.gcode.writer import BLOCKS
 from machine.kinematics.table import machine_points
-from machine.limits import turn_speed
-from machine.pen import Pen, number
-from machine.placeholders import placeholders
-from machine.turning import turn
+from machine.planning.limits import turn_speed
 from mdp.clearance import least_tip_height_mm
 from mdp.head import corners
 from mdp.mesh import Floats
@@ -28,14 +27,6 @@ MOST_MARK_RADIUS_MM = 45.0
 MARGIN_MM = 10.0  # how far the centres of a machine that is not calibrated yet may be from where the profile has them
 ABOVE_MM = 8.0
 HEATING = ("M104", "M109", "M140", "M190", "M141", "M191", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT")
-WAIT = {  # how each firmware says something and waits; where it can, the tip may be jogged meanwhile
-    "marlin": ("M0 {text}",),
-    "reprapfirmware": ('M291 P"{text}" R"calibrate" S3 X1 Y1 Z1',),
-    "klipper": ("M117 {text}", "PAUSE"),
-    "klipper_steppers": ("M117 {text}", "PAUSE"),
-    "linuxcnc": ("(MSG, {text})", "M0"),
-    "grblhal": ("(MSG, {text})", "M0"),
-}
 
 
 @dataclass(frozen=True)
@@ -62,27 +53,27 @@ def course(machine: Machine, mark_height_mm: float, mark_radius_mm: float | None
     mark = (radius, 0.0, mark_height_mm)
     tilts = _tilts(machine, mark)
     turns = _turns(machine)
-    found = tuple(Pose(tilt, value) for tilt in (machine.tilt.zero_deg, *tilts) for value in turns)
-    expected = tuple(_expected(machine, pose, mark) for pose in found)
-    return Course(found, expected, _safe_z_mm(machine, mark, max(abs(t - machine.tilt.zero_deg) for t in tilts)), mark)
+    poses = tuple(Pose(tilt, value) for tilt in (machine.tilt.zero_deg, *tilts) for value in turns)
+    expected = tuple(_expected_mm(machine, pose, mark) for pose in poses)
+    return Course(poses, expected, _safe_z_mm(machine, mark, max(abs(t - machine.tilt.zero_deg) for t in tilts)), mark)
 
 
 def calibration_lines(profile: Profile, touches: Course) -> Iterator[str]:
     """The lines of the program: homing as the start block does it but without heat, then every touch, then level again."""
     machine = profile.machine.model_copy(update={"coordinates": "table"})
-    dialect = DIALECTS[machine.dialect]
+    dialect = dialect_of(machine)
     pen = Pen(dialect, machine, "", level(machine))
     pen.values = placeholders("calibration", profile, [], 0.0, 0.0)
     yield f"; {machine.name}: calibration, {len(touches.poses)} touches of one mark, nozzle cold and clean"
     radius, _, height = touches.mark_mm
     yield f"; the mark is {height:g} mm high and stands {radius:g} mm from the middle, towards +X at turn 0"
     for word in dialect.before_start:
-        yield from _filled(word, pen)
-    yield from (line for line in _filled(machine.gcode.start, pen) if line.split(" ")[0] not in HEATING)
+        yield from _fill(word, pen)
+    yield from (line for line in _fill(machine.gcode.start, pen) if line.split(" ")[0] not in HEATING)
     yield from (mode for mode in dialect.modes if mode not in ("M83", "M82"))
     for word in dialect.after_start:
-        yield from _filled(word, pen)
-    if dialect.follow_off and dialect.follow_off.startswith("M"):
+        yield from _fill(word, pen)
+    if dialect.follow_persists:
         yield dialect.follow_off
     up, across = 60.0 * machine.z.speed_mm_s, 60.0 * min(machine.x.speed_mm_s, machine.y.speed_mm_s, 100.0)
     for place, (pose, (x, y, z)) in enumerate(zip(touches.poses, touches.expected_mm, strict=True), start=1):
@@ -92,17 +83,17 @@ def calibration_lines(profile: Profile, touches: Course) -> Iterator[str]:
         yield from _turn(pose, pen)
         yield f"G1 X{x:.3f} Y{y:.3f} F{across:.0f}"
         yield f"G1 Z{_hover(machine, z, touches.safe_z_mm):.3f} F{up:.0f}"
-        yield from (line.format(text=f"touch {place} {name} note X Y Z") for line in WAIT[machine.dialect])
+        yield from (line.format(text=f"touch {place} {name} note X Y Z") for line in dialect.wait_for_person)
     yield f"G1 Z{touches.safe_z_mm:.3f} F{up:.0f}"
     yield from _turn(level(machine), pen)
     for word in dialect.before_end:
-        yield from _filled(word, pen)
+        yield from _fill(word, pen)
     if dialect.last:
         yield dialect.last
 
 
-def _filled(block: str, pen: Pen) -> list[str]:
-    return filled(block, BLOCKS[0], pen.values, pen.dialect.longest_line)
+def _fill(block: str, pen: Pen) -> list[str]:
+    return fill_block(block, BLOCKS[0], pen.values, pen.dialect.longest_line)
 
 
 def _turn(pose: Pose, pen: Pen) -> Iterator[str]:
@@ -140,14 +131,14 @@ def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: flo
     """Whether the tip can touch the mark at a tilt at every turn: head over the plate, X Y Z inside, room above to turn."""
     if _safe_z_mm(machine, mark, abs(tilt_deg - machine.tilt.zero_deg)) > machine.z.limits_mm[1]:
         return False
-    if least_tip_height_mm(_clipped(machine, mark), Pose(tilt_deg, machine.turn.zero_deg)) > mark[2]:
+    if least_tip_height_mm(_clip_head(machine, mark), Pose(tilt_deg, machine.turn.zero_deg)) > mark[2]:
         return False
     limits = np.array([axis.limits_mm for axis in (machine.x, machine.y, machine.z)])
-    places = np.array([_expected(machine, Pose(tilt_deg, value), mark) for value in _turns(machine)])
+    places = np.array([_expected_mm(machine, Pose(tilt_deg, value), mark) for value in _turns(machine)])
     return bool((places >= limits[:, 0]).all() and (places <= limits[:, 1]).all())
 
 
-def _clipped(machine: Machine, mark: tuple[float, float, float]) -> Machine:
+def _clip_head(machine: Machine, mark: tuple[float, float, float]) -> Machine:
     """The machine with its head's boxes cut where the plate cannot reach them."""
     far = machine.table.radius_mm + mark[0] + MARGIN_MM
     boxes = []
@@ -163,11 +154,11 @@ def _turns(machine: Machine) -> list[float]:
     """The four turns inside limits and cables, each as near to the zero as can be."""
     least, most = machine.turn.reach_deg
     zero = machine.turn.zero_deg
-    found = [next((zero + v for v in (t, t - 360.0) if least <= zero + v <= most), None) for t in TURNS_DEG]
-    return [value for value in found if value is not None]
+    inside = [next((zero + v for v in (t, t - 360.0) if least <= zero + v <= most), None) for t in TURNS_DEG]
+    return [value for value in inside if value is not None]
 
 
-def _expected(machine: Machine, pose: Pose, mark: tuple[float, float, float]) -> tuple[float, float, float]:
+def _expected_mm(machine: Machine, pose: Pose, mark: tuple[float, float, float]) -> tuple[float, float, float]:
     x, y, z = machine_points(machine, pose, np.array([mark]))[0].tolist()
     return x, y, z
 

@@ -1,8 +1,11 @@
 """Saved: the numbers that a calibration found, as a profile in the user's own folder that inherits the rest."""
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 from typing import Any
+
+import tomlkit
 
 from machine.calibration.fit import Calibration
 from profiles.machine import Machine
@@ -29,10 +32,25 @@ def found_tables(before: Machine, calibration: Calibration, zero_of_turn: bool) 
     return {"machine": {"uncalibrated": left, **axes, "sources": dict.fromkeys(keys, source)}}
 
 
-def own_document(name: str, parent: str, tables: Mapping[str, Any]) -> tuple[Path, dict[str, Any]]:
-    """The file in the user's folder and what it shall hold: what it holds already, the new tables over it."""
+def own_profile(name: str, parent: str, tables: Mapping[str, Any]) -> tuple[Path, str]:
+    """The file in the user's folder and its new text: what it holds already, comments too, the new tables over it."""
     file = own_folder("machine") / f"{name}.toml"
-    if name in own("machine"):
-        return file, merged(parse(file), tables)
-    inherited = parent if parent in (*shipped("machine"), *own("machine")) else str(Path(parent).resolve())
-    return file, {PARENT: inherited, **tables}
+    if name not in own("machine"):
+        known = parent in (*shipped("machine"), *own("machine"))
+        return file, tomlkit.dumps({PARENT: parent if known else str(Path(parent).resolve()), **tables})
+    whole = merged(parse(file), tables)
+    document = tomlkit.parse(file.read_text(encoding="utf-8"))
+    _overlay(document, tables)
+    text = tomlkit.dumps(document)
+    # Beside dotted keys tomlkit puts a new table before the keys that follow: then the comments are given up.
+    return file, text if tomllib.loads(text) == whole else tomlkit.dumps(whole)
+
+
+def _overlay(table: MutableMapping[str, Any], values: Mapping[str, Any]) -> None:
+    """Put values into a table, its other keys left as they are."""
+    for key, value in values.items():
+        below = table.get(key)
+        if isinstance(value, Mapping) and isinstance(below, MutableMapping):
+            _overlay(below, value)
+        else:
+            table[key] = value

@@ -7,6 +7,8 @@ from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+
 from machine.calibration.fit import Touch
 from machine.calibration.program import Course
 from mdp.pose import Pose
@@ -31,10 +33,11 @@ class Sheet:
 
 def sheet_text(name: str, machine: Machine, touches: Course) -> str:
     """An empty sheet for the touches of a calibration program; name: of the machine's profile."""
+    quoted = tomlkit.string(name, literal=name.isprintable() and "'" not in name)
     lines = [
         f"# Calibration of {machine.name}: what the machine shows while the tip touches the mark, instead of each nan.",
         "# A touch that is left at nan is not used.",
-        f"machine = '{name}'",
+        f"machine = {quoted.as_string()}",
         "# Height of the mark over the plate's surface, measured with a caliper.",
         f"mark_height_mm = {touches.mark_mm[2]:g}",
         "# Where the mark is seen from the middle, counted from the workpiece's +X towards +Y: turn.zero_deg is then found too.",

@@ -6,10 +6,10 @@ import numpy as np
 
 from machine.dryrun.deposit import Share, inside_share
 from machine.dryrun.dryrun import DryRun
-from machine.dryrun.fill import filled_share
+from machine.dryrun.filling import filled_share
 from machine.dryrun.findings import Finding
-from machine.dryrun.ground import beads
-from machine.dryrun.laying import unsupported_mm
+from machine.dryrun.placement import unsupported_mm
+from machine.dryrun.replay import beads_of
 from mdp.mesh import Mesh
 from profiles.profile import Profile
 
@@ -38,24 +38,26 @@ def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, Dry
     """
     share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm)
     filled = filled_share(run, mesh, profile).share
-    deposited = beads(run.program, run.segments_mm, run.segment_row, profile)
-    length, loose, told = unsupported_mm(run.program, deposited, run.ground)
+    deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
+    length, loose, reported = unsupported_mm(run.program, deposited, run.contacts)
     whole = max(length, 1e-9)
-    found = Agreement(filled, 1.0 - share.share, share.farthest_mm, loose / whole, told / whole)
-    return found, replace(run, findings=(*run.findings, *_findings(run, share, found, profile)))
+    result = Agreement(filled, 1.0 - share.share, share.farthest_mm, loose / whole, reported / whole)
+    return result, replace(run, findings=(*run.findings, *_findings(run, share, result, profile)))
 
 
-def _findings(run: DryRun, share: Share, found: Agreement, profile: Profile) -> list[Finding]:
+def _findings(run: DryRun, share: Share, result: Agreement, profile: Profile) -> list[Finding]:
     findings = []
-    if found.outside > MOST_OUTSIDE:
+    if result.outside > MOST_OUTSIDE:
         row = int(run.segment_row[np.flatnonzero(share.outside)[0]])
         message = (
-            f"{100 * found.outside:.1f} % of the extruded length lie outside the model by more than half a line, "
-            f"{found.farthest_mm:.2f} mm and more at the worst"
+            f"{100 * result.outside:.1f} % of the extruded length lie outside the model by more than half a line, "
+            f"{result.farthest_mm:.2f} mm and more at the worst"
         )
         place = (int(run.program.line[row]), int(run.program.part[row]), int(run.program.layer[row]))
         findings.append(Finding("error", "outside", *place, message))
-    if profile.process.infill_density >= 1.0 and found.filled < LEAST_FILLED:
-        message = f"the beads fill {100 * found.filled:.1f} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"
+    if profile.process.infill_density >= 1.0 and result.filled < LEAST_FILLED:
+        message = (
+            f"the beads fill {100 * result.filled:.1f} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"
+        )
         findings.append(Finding("warning", "unfilled", 0, 0, 0, message))
     return findings

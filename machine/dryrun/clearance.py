@@ -5,21 +5,10 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.collide import (
-    Printed,
-    Reach,
-    gaps_of,
-    hull,
-    refined_gap,
-    solids,
-    sweep_gaps,
-    swept,
-    swing_mm,
-)
 from machine.dryrun.findings import MOST, Finding, cut_short
-from machine.dryrun.stretches import stretches
-from machine.limits import axis_limits
-from machine.parsed import MoveKind, ParsedProgram
+from machine.kinematics.collision import Printed, Reach, gaps_of, hull, refined_gap, solids, sweep_gaps, swept, swing_mm
+from machine.planning.limits import axis_limits
+from machine.reader.parsed import MoveKind, ParsedProgram, pose_runs
 from mdp.head import Body, bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
@@ -42,20 +31,20 @@ def findings(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[n
 
 
 def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
-    """Moves with the table at rest, one group for every stretch between turns: two directions settle almost every move."""
-    found: list[Finding] = []
-    for stretch in stretches(program):
-        if len(found) >= MOST:
-            return [*found, cut_short(program, int(stretch.rows[0]), "straight moves")]
-        tried = np.array([rotation(machine, stretch.pose) @ UP, UP])
-        least = swept(program.start[stretch.rows, :3], program.end[stretch.rows, :3], tried)
-        for solid in solids(machine, stretch.pose):
+    """Moves with the table at rest, one group for every pose_run between turns: two directions settle almost every move."""
+    problems: list[Finding] = []
+    for pose_run in pose_runs(program):
+        if len(problems) >= MOST:
+            return [*problems, cut_short(program, int(pose_run.rows[0]), "straight moves")]
+        tried = np.array([rotation(machine, pose_run.pose) @ UP, UP])
+        least = swept(program.start[pose_run.rows, :3], program.end[pose_run.rows, :3], tried)
+        for solid in solids(machine, pose_run.pose):
             reach = solid[1](tried)
             for body in bodies(machine):
                 close = gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM
                 if close.any():
-                    found += _body(program, stretch.rows[close], body, machine, stretch.pose, solid)
-    return found
+                    problems += _body(program, pose_run.rows[close], body, machine, pose_run.pose, solid)
+    return problems
 
 
 def _body(
@@ -89,23 +78,23 @@ def _body(
 
 def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
     """Every turn of the table; of a program that turns all the time (curved layers) an even choice, which is said."""
-    found = []
+    problems = []
     printed, done = hull(np.zeros((0, 3)), 0.0), 0
     rows = np.flatnonzero(program.kind == MoveKind.ROTATE)
     if len(rows) > MOST_TURNS:
         message = f"the table turns {len(rows)} times: only {MOST_TURNS} of the turns were tested for collisions"
-        found.append(Finding("warning", "not-tested", int(program.line[rows[0]]), int(program.part[rows[0]]), 0, message))
+        problems.append(Finding("warning", "not-tested", int(program.line[rows[0]]), int(program.part[rows[0]]), 0, message))
         rows = rows[np.linspace(0, len(rows) - 1, MOST_TURNS).astype(np.int64)]
     for row in rows:
-        if len(found) >= MOST:
-            return [*found, cut_short(program, int(row), "turns")]
+        if len(problems) >= MOST:
+            return [*problems, cut_short(program, int(row), "turns")]
         before = int(np.searchsorted(deposited_row, row))
         if before > done:
             new = deposited[done:before].reshape(-1, 3)
             bead = 0.5 * float(program.width_mm[deposited_row[done:before]].max())
             printed, done = hull(np.vstack([printed.points_mm, new]), max(bead, printed.bead_mm)), before
-        found += _turn(program, int(row), printed, machine)
-    return found
+        problems += _turn(program, int(row), printed, machine)
+    return problems
 
 
 def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) -> list[Finding]:
@@ -114,7 +103,7 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
     Between two poses every point of what turns moves, against the tip, by at most `_way_mm`; where the gaps at both ends do not
     leave half of that, the pose between them is tried too, until the way is MOST_LEFT_MM. What MOST_POSES leave open is said.
     """
-    start, end = _turned_at_most(program.start[row], program.end[row], machine)
+    start, end = _limit_turn(program.start[row], program.end[row], machine)
     way = _way_mm(start, end, printed, machine)
     least: dict[tuple[str, str], tuple[float, Pose]] = {}
 
@@ -157,7 +146,7 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
     ]  # fmt: skip
 
 
-def _turned_at_most(start: Floats, end: Floats, machine: Machine) -> tuple[Floats, Floats]:
+def _limit_turn(start: Floats, end: Floats, machine: Machine) -> tuple[Floats, Floats]:
     """Where a turn begins and ends: beyond its limits no axis goes (another finding says so), and a second turn about the turn
     axis alone meets nothing new.
     """

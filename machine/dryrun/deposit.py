@@ -1,13 +1,15 @@
 """Deposit: how much of the deposited plastic lies inside the model, or within a tolerance of it."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
-from mdp.kernel import kernel, part
+from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Mesh
+from slicer.geometry.segments import squared_distance_in_space
 from slicer.paths import Kind
 
 AROUND = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, "Custom")
@@ -61,8 +63,8 @@ def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:
     corners = mesh.vertices[mesh.faces]
     distances = np.zeros(len(points))
     out = np.flatnonzero(~inside(points, mesh))
-    near = _Cells.over(corners, max(most_mm, _column_mm(mesh)), most_mm)
-    distances[out] = _nearest(points[out], corners, *near.arrays, most_mm)
+    near = _columns(corners, max(most_mm, _column_mm(mesh)), most_mm)
+    distances[out] = _nearest(points[out], corners, near, most_mm)
     return distances
 
 
@@ -70,8 +72,8 @@ def inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
     """(n,) whether (n, 3) points lie in a closed mesh's solid."""
     corners = mesh.vertices[mesh.faces]
     size = max(_column_mm(mesh), float(np.ptp(mesh.vertices[:, :2], axis=0).max()) / 400.0)
-    found: NDArray[np.bool_] = _winding(points, corners, *_Cells.over(corners, size, 0.0).arrays, ASIDE) > 0
-    return found
+    within: NDArray[np.bool_] = _winding(points, corners, _columns(corners, size, 0.0), ASIDE) > 0
+    return within
 
 
 def _column_mm(mesh: Mesh) -> float:
@@ -79,8 +81,7 @@ def _column_mm(mesh: Mesh) -> float:
     return float(np.sqrt(np.ptp(mesh.vertices[:, :2], axis=0).prod() / max(len(mesh.faces), 1)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Cells:
+class Columns(NamedTuple):
     """A lattice over x and y with the faces of each cell: those of cell k are faces[first[k] : first[k + 1]]."""
 
     origin: Floats
@@ -89,21 +90,16 @@ class _Cells:
     first: NDArray[np.int64]
     faces: NDArray[np.int64]
 
-    @classmethod
-    def over(cls, corners: Floats, size: float, grow: float) -> "_Cells":
-        """Cells of a size; a face belongs to those that its box, grown, touches."""
-        low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
-        origin = low.min(axis=0) - 1e-3
-        shape = (np.floor((high.max(axis=0) + 1e-3 - origin) / size) + 1).astype(np.int64)
-        return cls(origin, size, shape, *_listed(low, high, origin, size, shape, grow))
 
-    @property
-    def arrays(self) -> tuple[Floats, float, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-        """What the kernels take."""
-        return self.origin, self.size, self.shape, self.first, self.faces
+def _columns(corners: Floats, size: float, grow: float) -> Columns:
+    """Columns of a size; a face belongs to those that its box, grown, touches."""
+    low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+    origin = low.min(axis=0) - 1e-3
+    shape = (np.floor((high.max(axis=0) + 1e-3 - origin) / size) + 1).astype(np.int64)
+    return Columns(origin, size, shape, *_faces_of_columns(low, high, origin, size, shape, grow))
 
 
-def _listed(
+def _faces_of_columns(
     low: Floats, high: Floats, origin: Floats, size: float, shape: NDArray[np.int64], grow: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """For every cell the faces whose boxes, grown, touch it."""
@@ -119,9 +115,10 @@ def _listed(
 
 
 @kernel
-def _winding(points, corners, origin, size, shape, first, faces, aside):  # type: ignore[no-untyped-def]
+def _winding(points: Floats, corners: Floats, columns: Columns, aside: Floats) -> NDArray[np.int64]:
     """(n,) how often the surface winds about each point: signed crossings of the ray straight up."""
     winding = np.zeros(len(points), np.int64)
+    origin, size, shape, first, faces = columns
     for i in range(len(points)):
         x, y, z = points[i, 0] + aside[0], points[i, 1] + aside[1], points[i, 2]
         cx, cy = int(np.floor((x - origin[0]) / size)), int(np.floor((y - origin[1]) / size))
@@ -140,9 +137,10 @@ def _winding(points, corners, origin, size, shape, first, faces, aside):  # type
 
 
 @kernel
-def _nearest(points, corners, origin, size, shape, first, faces, most):  # type: ignore[no-untyped-def]
+def _nearest(points: Floats, corners: Floats, columns: Columns, most: float) -> Floats:
     """(n,) distance of each point to the nearest face, at most `most`."""
     distances = np.full(len(points), most)
+    origin, size, shape, first, faces = columns
     for i in range(len(points)):
         p = points[i]
         cx = min(max(int(np.floor((p[0] - origin[0]) / size)), 0), shape[0] - 1)
@@ -155,7 +153,7 @@ def _nearest(points, corners, origin, size, shape, first, faces, most):  # type:
 
 
 @part
-def _to_triangle(p, a, b, c):  # type: ignore[no-untyped-def]
+def _to_triangle(p: Floats, a: Floats, b: Floats, c: Floats) -> float:
     """Distance of a point from a triangle: inside its prism the height, else the nearest edge."""
     ab, ac, ap = b - a, c - a, p - a
     n = _cross(ab, ac)
@@ -163,24 +161,16 @@ def _to_triangle(p, a, b, c):  # type: ignore[no-untyped-def]
     if nn > 1e-24:
         v, w = _dot(_cross(ap, ac), n), _dot(_cross(ab, ap), n)
         if v >= 0 and w >= 0 and v + w <= nn:
-            return abs(_dot(ap, n)) / np.sqrt(nn)
-    return min(_to_edge(p, a, b), _to_edge(p, b, c), _to_edge(p, c, a))
+            return float(abs(_dot(ap, n)) / np.sqrt(nn))
+    nearest = min(squared_distance_in_space(p, a, b), squared_distance_in_space(p, b, c), squared_distance_in_space(p, c, a))
+    return float(np.sqrt(nearest))
 
 
 @part
-def _to_edge(p, a, b):  # type: ignore[no-untyped-def]
-    d, ap = b - a, p - a
-    length2 = _dot(d, d)
-    t = min(max(_dot(ap, d) / length2, 0.0), 1.0) if length2 > 0 else 0.0
-    rest = ap - t * d
-    return np.sqrt(_dot(rest, rest))
+def _dot(a: Floats, b: Floats) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @part
-def _dot(a, b):  # type: ignore[no-untyped-def]
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@part
-def _cross(a, b):  # type: ignore[no-untyped-def]
+def _cross(a: Floats, b: Floats) -> Floats:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

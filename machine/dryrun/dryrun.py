@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, heat, laying, made, motion, plate, sequence, switching
+from machine.dryrun import clearance, heat, motion, placement, provenance, sequence
 from machine.dryrun.findings import Finding
-from machine.dryrun.ground import Ground, beads, walk
-from machine.dryrun.timeline import move_times
+from machine.dryrun.replay import Contacts, beads_of, replay
 from machine.kinematics.table import workpiece_path
-from machine.limits import axis_limits
-from machine.parse import parse_gcode
-from machine.parsed import MoveKind, ParsedProgram
+from machine.planning.limits import axis_limits
+from machine.planning.timing import move_times
+from machine.reader.parse import parse_gcode
+from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.profile import Profile
 
@@ -28,7 +28,7 @@ class DryRun:
 
     times_s: (n,) seconds of each row of program; dwell_s: waiting told by G4 (heating and homing are not counted).
     segments_mm: (m, 2, 3) deposited segments, workpiece frame; segment_row: (m,) their rows in program, which hold line,
-    part, layer, type, width and height; segment_mm3: (m,) their volumes. ground: what lay under each row.
+    part, layer, type, width and height; segment_mm3: (m,) their volumes. contacts: what lay under each row.
     """
 
     program: ParsedProgram
@@ -37,7 +37,7 @@ class DryRun:
     segments_mm: Floats
     segment_row: NDArray[np.int64]
     segment_mm3: Floats
-    ground: Ground
+    contacts: Contacts
     findings: tuple[Finding, ...]
     letters: tuple[str, ...]
 
@@ -67,19 +67,18 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     area = pi * profile.material.diameter_mm**2 / 4.0
     stop = np.zeros(len(program.line), dtype=np.bool_)
     stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
-    deposited = beads(program, segments, rows, profile)
-    ground = walk(program, deposited, profile)
-    found = [
+    deposited = beads_of(program, segments, rows, profile)
+    contacts = replay(program, deposited, profile)
+    findings = [
         *motion.findings(program, machine),
         *clearance.findings(program, segments, rows, machine),
-        *laying.findings(program, deposited, ground),
+        *placement.findings(program, deposited, contacts),
         *sequence.findings(program, profile),
-        *switching.findings(program, machine),
-        *made.findings(text, program, profile),
-        *plate.findings(program, segments, rows, profile),
+        *provenance.findings(text, program, profile),
+        *placement.off_plate(program, segments, rows, profile),
         *heat.findings(program, profile),
     ]
-    found = sorted(dict.fromkeys(found), key=lambda finding: (finding.severity, finding.line))
+    findings = sorted(dict.fromkeys(findings), key=lambda finding: (finding.severity, finding.line))
     return DryRun(
         program=program,
         times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration),
@@ -87,8 +86,8 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
         segments_mm=segments,
         segment_row=rows,
         segment_mm3=program.e_mm[rows] * area,
-        ground=ground,
-        findings=tuple(found),
+        contacts=contacts,
+        findings=tuple(findings),
         letters=tuple(axis_limits(machine)),
     )
 

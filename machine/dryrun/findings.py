@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.parsed import OWN, ParsedProgram
+from machine.reader.parsed import OWN, ParsedProgram
 
 Severity = Literal["error", "warning"]
 MOST = 20
@@ -32,13 +32,13 @@ def per_part(
     message takes {value} (the badness of the worst row of that part, as %.3f) and {count}.
     """
     marked = np.flatnonzero(rows)
-    found = []
+    problems = []
     for part in np.unique(program.part[marked]):
         mine = marked[program.part[marked] == part]
         worst = float(badness[mine].max())
         text = message.format(value=f"{worst:.3f}".rstrip("0").rstrip("."), count=len(mine))
-        found.append(Finding(severity, code, int(program.line[mine[0]]), int(part), int(program.layer[mine[0]]), text))
-    return found
+        problems.append(Finding(severity, code, int(program.line[mine[0]]), int(part), int(program.layer[mine[0]]), text))
+    return problems
 
 
 def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:

@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_line, per_part, unless_own
-from machine.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram
 from profiles.profile import Profile
 
 MELTING_C = 150.0
@@ -15,7 +15,13 @@ ROUNDING_MM = 3e-3  # both ends are written to a thousandth, and a point dropped
 
 def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
     """All findings about heat, flow and the profile."""
-    return [*_cold(program), *_left_on(program), *_flow(program, profile), *_profile(program, profile), *_ignored(program)]
+    return [
+        *_cold(program),
+        *_left_on(program),
+        *_flow(program, profile),
+        *_profile(program, profile),
+        *_unknown_commands(program),
+    ]
 
 
 def _cold(program: ParsedProgram) -> list[Finding]:
@@ -30,23 +36,23 @@ def _cold(program: ParsedProgram) -> list[Finding]:
     if not rows.any():
         return []
     first = int(np.argmax(rows))
-    told = max((event.row for event in heating if event.row <= first), default=0)
-    severity, unless = unless_own(program, told, first)
+    waited_row = max((event.row for event in heating if event.row <= first), default=0)
+    severity, unless = unless_own(program, waited_row, first)
     message = f"{{count}} moves push filament through a nozzle that is not hot: M109 S must come first and stay on{unless}"
     return per_part(program, rows, program.e_mm, severity, "cold-extrusion", message)
 
 
 def _left_on(program: ParsedProgram) -> list[Finding]:
-    found = []
-    laid = np.flatnonzero(program.e_mm > 1e-9)
-    last = int(laid[-1]) if len(laid) else -1  # a macro in the midst of the print ends nothing
+    problems = []
+    extruding = np.flatnonzero(program.e_mm > 1e-9)
+    last = int(extruding[-1]) if len(extruding) else -1  # a macro in the midst of the print ends nothing
     for codes, name, off in ((("M104", "M109"), "nozzle", "M104 S0"), (("M140", "M190"), "bed", "M140 S0")):
         events = [e for e in program.events if e.code in codes]
         if events and events[-1].value > 0:
             severity, unless = unless_own(program, max(events[-1].row, last + 1), len(program.line))
             message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing{unless}"
-            found.append(at_line(program, events[-1].row, events[-1].line, severity, "heater-on", message))
-    return found
+            problems.append(at_line(program, events[-1].row, events[-1].line, severity, "heater-on", message))
+    return problems
 
 
 def _flow(program: ParsedProgram, profile: Profile) -> list[Finding]:
@@ -62,21 +68,21 @@ def _flow(program: ParsedProgram, profile: Profile) -> list[Finding]:
 
 
 def _profile(program: ParsedProgram, profile: Profile) -> list[Finding]:
-    found = []
+    problems = []
     machine = profile.machine
     if machine.uncalibrated:
         count = len(machine.uncalibrated)
-        told = f"{count} numbers of {machine.name} are" if count > 1 else f"one number of {machine.name} is"
-        message = f"{told} in no source, measure them (docs/calibration.md): {', '.join(machine.uncalibrated)}"
-        found.append(Finding("warning", "uncalibrated", 0, 0, 0, message))
+        which = f"{count} numbers of {machine.name} are" if count > 1 else f"one number of {machine.name} is"
+        message = f"{which} in no source, measure them (docs/calibration.md): {', '.join(machine.uncalibrated)}"
+        problems.append(Finding("warning", "uncalibrated", 0, 0, 0, message))
     for line, part, area, layer in program.unsupported:
         where = f", most of them in layer {layer}" if layer else ""
         message = f"{area:g} mm2 of risky faces of part {part} could be given no support{where}"
-        found.append(Finding("warning", "unsupported", line, part, layer, message))
-    return found
+        problems.append(Finding("warning", "unsupported", line, part, layer, message))
+    return problems
 
 
-def _ignored(program: ParsedProgram) -> list[Finding]:
+def _unknown_commands(program: ParsedProgram) -> list[Finding]:
     return [
         Finding("warning", "ignored", line, 0, 0, f"{code} is not known to the dry run and was ignored{_times(count)}")
         for code, (line, count) in program.ignored.items()

@@ -1,18 +1,19 @@
-"""Motion: findings about axes: limits, speeds, homing, turning while plastic flows."""
+"""Motion: findings about axes: limits, speeds, homing, turning while plastic flows or while the firmware begins to follow."""
 
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_line, per_part, unless_own
-from machine.dryrun.timeline import axis_speeds, lengths
-from machine.limits import ROUNDING, axis_limits
-from machine.parsed import MoveKind, ParsedProgram
+from machine.firmware import dialect_of
+from machine.planning.limits import ROUNDING, axis_limits
+from machine.planning.timing import axis_speeds, lengths
+from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
 SLACK = 1.001
 WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # how much a step may differ by its ends' rounding
 LEVEL_DEG = 0.01
-HOMED_BEFORE = ("linuxcnc",)  # runs no program before its axes are homed by hand; G28 means another thing there
+TURNED_DEG = 1e-3
 
 
 def findings(program: ParsedProgram, machine: Machine) -> list[Finding]:
@@ -21,21 +22,22 @@ def findings(program: ParsedProgram, machine: Machine) -> list[Finding]:
         *_outside(program, machine),
         *_too_fast(program, machine),
         *_homing(program, machine),
-        *(_unhomed(program) if machine.dialect not in HOMED_BEFORE else ()),
+        *(_moves_before_homing(program) if not dialect_of(machine).homed_before else ()),
         *_turning_strokes(program, machine),
+        *_following_switches(program, machine),
     ]
 
 
 def _outside(program: ParsedProgram, machine: Machine) -> list[Finding]:
-    found = []
+    problems = []
     for axis, (letter, (least, most)) in enumerate(axis_limits(machine).items()):
         values = program.end[:, axis]
         unit = "mm" if axis < 3 else "deg"
         allowed = f"allowed is {least:g} to {most:g} {unit} (moves: {{count}})"
         above, below = values > most + ROUNDING, values < least - ROUNDING
-        found += per_part(program, above, values, "error", "axis-limit", f"{letter} goes to {{value}} {unit}, {allowed}")
-        found += per_part(program, below, -values, "error", "axis-limit", f"{letter} goes to -{{value}} {unit}, {allowed}")
-    return found
+        problems += per_part(program, above, values, "error", "axis-limit", f"{letter} goes to {{value}} {unit}, {allowed}")
+        problems += per_part(program, below, -values, "error", "axis-limit", f"{letter} goes to -{{value}} {unit}, {allowed}")
+    return problems
 
 
 def deltas(program: ParsedProgram) -> Floats:
@@ -49,17 +51,17 @@ def _too_fast(program: ParsedProgram, machine: Machine) -> list[Finding]:
     surely = np.maximum(np.abs(change) - WRITTEN, 0.0)
     speed = surely / np.maximum(length, 1e-9)[:, None] * (program.feed / 60.0)[:, None]
     names = [*axis_limits(machine), "E"]
-    found = []
+    problems = []
     for axis, (letter, most) in enumerate(zip(names, axis_speeds(machine), strict=True)):
         unit = "deg/s" if axis in (3, 4) else "mm/s"
         rounding = length * 0.0 + 1.0 / 60.0  # F is written as a whole number
         message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most:g} {unit} (moves: {{count}})"
-        found += per_part(program, speed[:, axis] > most * SLACK + rounding, speed[:, axis], "warning", "axis-speed", message)
-    return found
+        problems += per_part(program, speed[:, axis] > most * SLACK + rounding, speed[:, axis], "warning", "axis-speed", message)
+    return problems
 
 
 def _homing(program: ParsedProgram, machine: Machine) -> list[Finding]:
-    found = []
+    problems = []
     for event in program.events:
         if event.code != "G28" or event.row == 0:
             continue
@@ -67,15 +69,15 @@ def _homing(program: ParsedProgram, machine: Machine) -> list[Finding]:
         later = [e for e in program.events if e.code == "G92" and machine.tilt.letter in e.letters and e.row == event.row]
         if abs(tilt - machine.tilt.zero_deg) > LEVEL_DEG and not any(e.line < event.line for e in later):
             message = f"homing while the table stands at {machine.tilt.letter}{tilt:.3f}: it must be level"
-            found.append(at_line(program, event.row, event.line, "error", "homing-tilted", message))
+            problems.append(at_line(program, event.row, event.line, "error", "homing-tilted", message))
         printed = program.kind[: event.row] == MoveKind.EXTRUDE
         if printed.any() and (not set(event.letters) & set("XYZ") or "Z" in event.letters):
             message = "Z is homed after plastic was laid: the tip may run into the print unless the machine homes upwards"
-            found.append(at_line(program, event.row, event.line, "warning", "homing-over-print", message))
-    return found
+            problems.append(at_line(program, event.row, event.line, "warning", "homing-over-print", message))
+    return problems
 
 
-def _unhomed(program: ParsedProgram) -> list[Finding]:
+def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
     """The first move of a linear axis that has been neither homed nor given a position."""
     known: set[str] = set()
     events = sorted((e for e in program.events if e.code in ("G28", "G92")), key=lambda e: e.row)
@@ -100,3 +102,22 @@ def _turning_strokes(program: ParsedProgram, machine: Machine) -> list[Finding]:
     letters = f"{machine.tilt.letter} or {machine.turn.letter}"
     message = f"{letters} turns while {{value}} mm of filament are extruded (moves: {{count}})"
     return per_part(program, rows, program.e_mm, "error", "turning-stroke", message)
+
+
+def _following_switches(program: ParsedProgram, machine: Machine) -> list[Finding]:
+    """Switching that keeps the coordinates takes another place for the present one: beyond A0 C0 it is a wrong one."""
+    dialect = dialect_of(machine)
+    if not dialect.follow_keeps_coordinates:
+        return []
+    level = np.array([machine.tilt.zero_deg, machine.turn.zero_deg])
+    problems = []
+    for event in program.events:
+        if event.code not in (dialect.follow_on, dialect.follow_off) or event.row == 0:
+            continue
+        stands = program.end[event.row - 1, 3:5]
+        if np.abs(stands - level).max() > TURNED_DEG:
+            stands_at = f"{machine.tilt.letter}{stands[0]:g} {machine.turn.letter}{stands[1]:g}"
+            home = f"{machine.tilt.letter}{level[0]:g} {machine.turn.letter}{level[1]:g}"
+            message = f"{event.code} while the table stands at {stands_at}: Marlin loses the position; turn it to {home} first"
+            problems.append(at_line(program, event.row, event.line, "error", "following-switched", message))
+    return problems

@@ -3,7 +3,7 @@
 import numpy as np
 
 from machine.dryrun.findings import Finding
-from machine.parsed import MoveKind, ParsedProgram
+from machine.reader.parsed import MoveKind, ParsedProgram
 from profiles.profile import Profile
 
 PURGE = "Custom"
@@ -12,7 +12,7 @@ SLACK_MM = 0.02
 
 def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
     """Errors of code order and retraction."""
-    return [*_parts(program), *_layers(program), *_pulled(program, profile), *_oozing(program)]
+    return [*_parts(program), *_layers(program), *_unbalanced_retractions(program, profile), *_oozing(program)]
 
 
 def _place(program: ParsedProgram, row: int) -> tuple[int, int, int]:
@@ -21,11 +21,11 @@ def _place(program: ParsedProgram, row: int) -> tuple[int, int, int]:
 
 def _parts(program: ParsedProgram) -> list[Finding]:
     """The first part that comes after a part with a greater number."""
-    laid = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
-    falling = np.flatnonzero(np.diff(program.part[laid]) < 0)
+    extruding = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
+    falling = np.flatnonzero(np.diff(program.part[extruding]) < 0)
     if not len(falling):
         return []
-    row, before = int(laid[falling[0] + 1]), int(program.part[laid[falling[0]]])
+    row, before = int(extruding[falling[0] + 1]), int(program.part[extruding[falling[0]]])
     message = f"part {program.part[row]} is printed after part {before}: parts are printed in the order of their numbers"
     return [Finding("error", "order", *_place(program, row), message)]
 
@@ -37,15 +37,15 @@ def _layers(program: ParsedProgram) -> list[Finding]:
     z, height = program.end[rows, 2], program.height_mm[rows]
     same = (np.diff(program.part[rows]) == 0) & np.all(program.end[rows[1:], 3:] == program.end[rows[:-1], 3:], axis=1)
     lower = np.flatnonzero(same & (np.diff(program.layer[rows]) != 0) & (np.diff(z) < -0.25 * height[1:] - SLACK_MM))
-    found = []
+    problems = []
     for part in np.unique(program.part[rows[lower + 1]]):
         k = int(lower[program.part[rows[lower + 1]] == part][0])
         message = f"layer {program.layer[rows[k + 1]]} lies {z[k] - z[k + 1]:.2f} mm lower than the layer before it"
-        found.append(Finding("error", "order", *_place(program, int(rows[k + 1])), message))
-    return found
+        problems.append(Finding("error", "order", *_place(program, int(rows[k + 1])), message))
+    return problems
 
 
-def _pulled(program: ParsedProgram, profile: Profile) -> list[Finding]:
+def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> list[Finding]:
     """Filament pushed at standstill that was not pulled back before, and beads begun with filament still pulled back.
 
     Nothing is said of a program that never pulls back; what the start block does is its own affair.
@@ -65,8 +65,8 @@ def _pulled(program: ParsedProgram, profile: Profile) -> list[Finding]:
     inner = np.arange(len(balance))
     over = stood & (balance < -extra - SLACK_MM) & (inner > 0)
     under = stood & (balance > SLACK_MM) & (inner < run[-1])
-    found = []
-    for wrong, said in (
+    problems = []
+    for wrong, sentence in (
         (over, "{:.3f} mm more filament is pushed than was pulled back"),
         (under, "{:.3f} mm of filament stay pulled back"),
     ):
@@ -75,9 +75,9 @@ def _pulled(program: ParsedProgram, profile: Profile) -> list[Finding]:
             mine = [r for r in runs if program.part[rows[np.searchsorted(run, r)]] == part]
             worst = max(abs(balance[r]) for r in mine)
             row = int(rows[np.searchsorted(run, mine[0], side="right") - 1])
-            message = f"{said.format(worst)} before the next bead (places: {len(mine)})"
-            found.append(Finding("error", "retraction", *_place(program, row), message))
-    return found
+            message = f"{sentence.format(worst)} before the next bead (places: {len(mine)})"
+            problems.append(Finding("error", "retraction", *_place(program, row), message))
+    return problems
 
 
 def _oozing(program: ParsedProgram) -> list[Finding]:

@@ -1,20 +1,24 @@
 """Starvation: findings about moves that a serial line cannot bring to the printer as fast as they are made.
 
-When the line is too slow the printer first slows short moves down, then stops in mid-motion, and a blob is left there.
+When the line is too slow the printer first slows short moves down, then stops in mid-motion, and a blob is left there. The
+planner is Marlin's: at most 15 blocks, each as fast as those behind it let the machine stop; a block lasts at least 20 ms
+while fewer than half of the places are taken, so that the sender catches up; the first block of an idle machine waits for two.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import STANDSTILLS, DryRun
-from machine.dryrun.feeding import played
 from machine.dryrun.findings import Finding
 from machine.dryrun.motion import deltas
-from machine.dryrun.timeline import TINY, axis_accelerations, axis_speeds, lengths
-from machine.parsed import ParsedProgram
+from machine.planning.timing import TINY, Blocks, axis_accelerations, axis_speeds, block_time, corner_speed, lengths
+from machine.reader.parsed import ParsedProgram
+from mdp.kernels.arrays import floats
+from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 from profiles.errors import PrinterError
 from profiles.machine import Machine
@@ -24,6 +28,12 @@ FRAME_BYTES = 6  # N, blank, *, two digits of the checksum, newline; the line's 
 GREETING, DIGITS = 3, 5  # lines sent before the program; digits after which the numbers begin anew
 BAUDS = (1200, 4_000_000)
 FREE_BAUD = 1e12  # a line that takes no time
+LINES = 4  # Marlin's BUFSIZE: more lines are never in flight
+OK_BYTES = 17.0  # of `ok N12345 P15 B3`, during which the printer reads nothing
+BLOCKS = 15  # of Marlin's BLOCK_BUFFER_SIZE 16 one place stays empty
+SEGMENT_S = 0.02  # DEFAULT_MINSEGMENTTIME
+DELIVER_S, DELIVER_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE
+NONE = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,26 +47,45 @@ class Feeding:
     time_s: float
 
 
+class Line(NamedTuple):
+    """How blocks come: (m,) bytes of the line of each, (m,) of other lines before it, bytes in flight at most, seconds a byte."""
+
+    own: Floats
+    ahead: Floats
+    ring: float
+    byte_s: float
+
+
+class Planned(NamedTuple):
+    """The planner at work. state: [begin, duration, end speed, gate]; span: [current, last, first, end] block, NONE: none;
+    entry2: (m + 1,) squares of the speeds at which blocks begin.
+    """
+
+    state: Floats
+    span: NDArray[np.int64]
+    entry2: Floats
+
+
 def check_baud(baud: int) -> None:
     """Raises PrinterError for a rate that no line has."""
     if not BAUDS[0] <= baud <= BAUDS[1]:
         raise PrinterError(f"--baud is {baud}: {BAUDS[0]} to {BAUDS[1]} is allowed, printers use 115200 or 250000")
 
 
-def starved(run: DryRun, lines: Sequence[str], machine: Machine, baud: int) -> DryRun:
+def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: int) -> DryRun:
     """The dry run with a finding for every part that a line of so many bits a second starves."""
     slow, free = (feeding(run.program, lines, machine, rate) for rate in (baud, FREE_BAUD))
     rows = (slow.slowed & ~free.slowed) | (slow.stopped & ~free.stopped)
-    found = _findings(run.program, rows, slow.stopped, run.times_s, baud)
-    return replace(run, findings=tuple(sorted((*run.findings, *found), key=lambda finding: (finding.severity, finding.line))))
+    problems = _findings(run.program, rows, slow.stopped, run.times_s, baud)
+    return replace(run, findings=tuple(sorted((*run.findings, *problems), key=lambda finding: (finding.severity, finding.line))))
 
 
 def _findings(
     program: ParsedProgram, rows: NDArray[np.bool_], stopped: NDArray[np.bool_], times_s: Floats, baud: int
 ) -> list[Finding]:
-    found, marked = [], np.flatnonzero(rows)
-    for part in np.unique(program.part[marked]):
-        mine = marked[program.part[marked] == part]
+    problems, marked = [], np.flatnonzero(rows)
+    for index in np.unique(program.part[marked]):
+        mine = marked[program.part[marked] == index]
         needed = 1.0 / max(float(np.median(times_s[mine])), TINY)
         stops = int(stopped[mine].sum())
         message = (
@@ -64,8 +93,8 @@ def _findings(
             f"{f' and stops {stops} times' if stops else ''}; a faster line or longer segments help"
         )
         row = int(mine[0])
-        found.append(Finding("warning", "starvation", int(program.line[row]), int(part), int(program.layer[row]), message))
-    return found
+        problems.append(Finding("warning", "starvation", int(program.line[row]), int(index), int(program.layer[row]), message))
+    return problems
 
 
 def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> Feeding:
@@ -84,10 +113,9 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
     halts = np.diff(np.cumsum(stop)[blocks], prepend=0) > 0
     own, ahead = _bytes(lines, program.line[blocks])
     flags = np.zeros((2, len(blocks)), dtype=np.bool_)
-    time_s = played(
-        moved / length[:, None], length, speed, acceleration, measure, halts, own, ahead,
-        machine.receive_bytes - 1.0, BITS / baud, machine.junction_speed_mm_s, flags[0], flags[1],
-    )  # fmt: skip
+    planned = Blocks(moved / length[:, None], length, speed, acceleration, measure, halts)
+    line = Line(own, ahead, machine.receive_bytes - 1.0, BITS / baud)
+    time_s = _play(planned, line, machine.junction_speed_mm_s, flags[0], flags[1])
     whole = np.zeros((2, len(program.line)), dtype=np.bool_)
     whole[:, blocks] = flags
     return Feeding(whole[0], whole[1], float(time_s))
@@ -106,3 +134,81 @@ def _bytes(lines: Sequence[str], at: NDArray[np.int64]) -> tuple[Floats, Floats]
     before = np.concatenate([[0], at[:-1]])
     first = at != before
     return np.where(first, sizes[at], 0.0), np.where(first, sums[at] - sizes[at] - sums[before], 0.0)
+
+
+@part
+def _run(now: float, planned: Planned, blocks: Blocks) -> None:
+    """Begin and end what begins and ends until now."""
+    state, span, entry2 = planned.state, planned.span, planned.entry2
+    while True:
+        if span[0] != NONE:
+            end = state[0] + state[1]
+            if end > now:
+                return
+            span[1], span[0] = span[0], NONE
+            begin, v0 = end, state[2]
+        else:
+            begin, v0 = state[3], 0.0
+        if span[2] == span[3] or begin > now:
+            return
+        i = span[2]
+        span[2] += 1
+        fastest2 = v0 * v0 + 2.0 * blocks.acceleration[i] * blocks.length[i]
+        v1 = np.sqrt(min(entry2[span[2]] if span[2] < span[3] else 0.0, fastest2))
+        state[0], state[1], state[2] = begin, block_time(blocks, i, v0, v1), v1
+        span[0] = i
+
+
+@part
+def _wait_for_room(now: float, places: int, planned: Planned, blocks: Blocks) -> float:
+    """The time from which on fewer than `places` blocks are planned."""
+    state, span = planned.state, planned.span
+    _run(now, planned, blocks)
+    while span[3] - span[2] + (1 if span[0] != NONE else 0) >= places:
+        now = max(now, state[0] + state[1] if span[0] != NONE else state[3])
+        _run(now, planned, blocks)
+    return now
+
+
+@kernel
+def _play(blocks: Blocks, line: Line, jerk: float, slowed: NDArray[np.bool_], stopped: NDArray[np.bool_]) -> float:
+    """Seconds until the last block is over; slowed and stopped (m,) are filled in, some cruise speeds lowered."""
+    n = len(blocks.length)
+    corner2, taken = floats(n, 0.0), floats(n, 0.0)
+    planned = Planned(floats(4, 0.0), np.empty(4, np.int64), floats(n + 1, 0.0))
+    state, span, cruise, length = planned.state, planned.span, blocks.cruise, blocks.length
+    span[0], span[1], span[2], span[3] = NONE, NONE, 0, 0
+    sent, flight, oldest, now = 0.0, 0.0, 0, 0.0
+    for i in range(n):
+        flight += line.own[i]
+        while oldest < i and (flight > line.ring or i - oldest >= LINES):
+            flight -= line.own[oldest]
+            oldest += 1
+        begin = max(sent, taken[oldest - 1] + OK_BYTES * line.byte_s) if oldest > 0 else sent
+        sent = begin + (line.ahead[i] + line.own[i]) * line.byte_s
+        now = max(sent, now + OK_BYTES * line.byte_s) if line.own[i] > 0 else now
+        if blocks.halts[i]:
+            now = _wait_for_room(now, 1, planned, blocks)
+            span[1] = NONE
+        now = _wait_for_room(now, BLOCKS, planned, blocks)
+        taken[i] = now
+        queued = span[3] - span[2] + (1 if span[0] != NONE else 0)
+        if 2 <= queued < BLOCKS // 2 + 1 and length[i] / cruise[i] < SEGMENT_S:
+            seconds = length[i] / cruise[i]
+            cruise[i] = length[i] / (seconds + 2.0 * (SEGMENT_S - seconds) / queued)
+            slowed[i] = True
+        if span[3] > span[2]:
+            corner2[i] = corner_speed(blocks, i - 1, i, jerk) ** 2
+        elif span[0] == NONE:
+            stopped[i] = span[1] != NONE and corner_speed(blocks, span[1], i, jerk) > 0.0
+            state[3] = now + DELIVER_S
+        span[3] = i + 1
+        if span[3] - span[2] >= DELIVER_BLOCKS:
+            state[3] = min(state[3], now)
+        after2 = 0.0
+        for k in range(i, span[2] - 1, -1):
+            square = min(corner2[k], after2 + 2.0 * blocks.acceleration[k] * length[k])
+            if square == planned.entry2[k] and k < i:
+                break
+            planned.entry2[k] = after2 = square
+    return _wait_for_room(now, 1, planned, blocks)

@@ -1,0 +1,1 @@
+"""The host's side of the line: streaming, pausing, the journal, resuming."""

@@ -25,7 +25,7 @@ LONGEST_BYTES = 1_000_000  # of one record; the first one holds the resolved pro
 
 
 @dataclass(frozen=True)
-class Heading:
+class JournalHeading:
     """What is printed: the program's file with its SHA-256, the name for people, and the resolved profile as plain values."""
 
     program: str
@@ -35,7 +35,7 @@ class Heading:
 
 
 @dataclass(frozen=True)
-class Moment:
+class Checkpoint:
     """Lines of the program, from 1: sent, acknowledged, surely executed; the newest acknowledged wire number; the pose X Y Z tilt
     turn E after the acknowledged line (of a tip that was taken away from the print, where it stands), unwrapped, None where it is
     not known; what the print was doing.
@@ -50,11 +50,11 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Story:
-    """A journal that was read: its heading, its last moment, how many records a torn end has cost, and where that begins."""
+class JournalContents:
+    """A journal that was read: its heading, its last checkpoint, how many records a torn end has cost, and where that begins."""
 
-    heading: Heading
-    last: Moment
+    heading: JournalHeading
+    last: Checkpoint
     torn: int
     whole_bytes: int
 
@@ -64,23 +64,23 @@ class Story:
         return self.last.state == FINISHED
 
     @property
-    def rest(self) -> str | None:
+    def continued_in(self) -> str | None:
         """The journal of the run that went on with this print."""
-        found = self.last.state.partition(RESUMED)
-        return found[2] if found[1] and not found[0] else None
+        before, resumed, name = self.last.state.partition(RESUMED)
+        return name if resumed and not before else None
 
 
 class Journal:
-    """`with Journal(path, heading) as journal:` note() as often as wished, mark() what must not be lost.
+    """`with Journal(path, heading) as journal:` update() as often as wished, write() what must not be lost.
 
     Writing costs one system call a record; a thread of its own brings the file to the disk, so that a slow disk never holds up
     the line. A journal that can no longer be written ends silently, `trouble` says why. Raises OutputError when it cannot be
     begun.
     """
 
-    def __init__(self, path: Path, heading: Heading) -> None:
+    def __init__(self, path: Path, heading: JournalHeading) -> None:
         self.path, self.trouble = path, ""
-        self.last = Moment()
+        self.last = Checkpoint()
         self._noted_s = 0.0
         self._dirty, self._end = threading.Event(), threading.Event()
         try:
@@ -90,30 +90,30 @@ class Journal:
         except OSError as error:
             raise OutputError(f"journal {path} cannot be written: {(error.strerror or str(error)).lower()}") from None
         self._write({"format": FORMAT} | asdict(heading))
-        self._syncing = threading.Thread(target=self._sync, name="journal", daemon=True)
-        self._syncing.start()
+        self._sync_thread = threading.Thread(target=self._sync, name="journal", daemon=True)
+        self._sync_thread.start()
 
-    def note(self, moment: Moment, now_s: float) -> None:
-        """Take note of a moment when the newest record is old."""
-        if now_s - self._noted_s >= EVERY_S and moment != self.last:
+    def update(self, checkpoint: Checkpoint, now_s: float) -> None:
+        """Write a checkpoint when the newest record is old."""
+        if now_s - self._noted_s >= EVERY_S and checkpoint != self.last:
             self._noted_s = now_s
-            self.mark(moment)
+            self.write(checkpoint)
 
-    def behind(self, line: int) -> bool:
+    def record_due(self, line: int) -> bool:
         """Whether a record is due before this line is sent."""
         return line - self.last.sent >= EVERY_LINES
 
-    def mark(self, moment: Moment) -> None:
-        """Write a moment at once."""
-        self.last = moment
-        self._write(_plain(moment))
+    def write(self, checkpoint: Checkpoint) -> None:
+        """Write a checkpoint at once."""
+        self.last = checkpoint
+        self._write(_as_list(checkpoint))
 
     def close(self) -> None:
         """Bring everything to the disk and end."""
         if not self._end.is_set():
             self._end.set()
             self._dirty.set()
-            self._syncing.join()
+            self._sync_thread.join()
             self._to_disk()
             os.close(self._file)
 
@@ -149,13 +149,13 @@ class Journal:
             self.trouble = self.trouble or (error.strerror or str(error)).lower()
 
 
-def mark_resumed(path: Path, story: Story, rest: Path) -> None:
+def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:
     """Note in a journal which one goes on with its print; a torn end is cut off. Raises JournalError."""
     try:
         with path.open("r+b") as file:
-            file.truncate(story.whole_bytes)
+            file.truncate(contents.whole_bytes)
             file.seek(0, os.SEEK_END)
-            file.write(_record(_plain(replace(story.last, state=f"{RESUMED}{rest}"))))
+            file.write(_record(_as_list(replace(contents.last, state=f"{RESUMED}{rest}"))))
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
@@ -167,14 +167,14 @@ def _record(value: Any) -> bytes:
     return b"%08x %s\n" % (crc32(text), text)
 
 
-def _plain(moment: Moment) -> list[Any]:
-    return [moment.sent, moment.acknowledged, moment.executed, moment.number, moment.pose, moment.state]
+def _as_list(checkpoint: Checkpoint) -> list[Any]:
+    return [checkpoint.sent, checkpoint.acknowledged, checkpoint.executed, checkpoint.number, checkpoint.pose, checkpoint.state]
 
 
-def read_journal(path: Path) -> Story:
-    """The story of a journal. Raises JournalError with one sentence when it is none, or damaged before its end."""
-    heading: Heading | None = None
-    last, bad, whole_bytes = Moment(), 0, 0
+def read_journal(path: Path) -> JournalContents:
+    """The contents of a journal. Raises JournalError with one sentence when it is none, or damaged before its end."""
+    heading: JournalHeading | None = None
+    last, bad, whole_bytes = Checkpoint(), 0, 0
     for number, (value, size) in enumerate(_records(path), 1):
         whole_bytes += size if value is not None else 0
         if value is None:
@@ -184,12 +184,12 @@ def read_journal(path: Path) -> Story:
         elif heading is None:
             heading = _heading(path, value)
         else:
-            last = _moment(path, value, number)
+            last = _checkpoint(path, value, number)
         if heading is None:
             raise JournalError(f"{path} is no journal of a print: its first line is not the heading of one")
     if heading is None:
         raise JournalError(f"journal {path} is empty")
-    return Story(heading, last, bad, whole_bytes)
+    return JournalContents(heading, last, bad, whole_bytes)
 
 
 def _records(path: Path) -> Iterator[tuple[Any, int]]:
@@ -204,17 +204,17 @@ def _records(path: Path) -> Iterator[tuple[Any, int]]:
         raise JournalError(f"journal {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
 
 
-def _heading(path: Path, value: Any) -> Heading:
+def _heading(path: Path, value: Any) -> JournalHeading:
     if not isinstance(value, dict) or value.pop("format", None) != FORMAT:
         raise JournalError(f"journal {path} is of another version of this program: this one reads format {FORMAT}")
     try:
-        return Heading(**value)
+        return JournalHeading(**value)
     except TypeError:
         raise JournalError(f"journal {path} is damaged: its heading does not tell program and profile") from None
 
 
-def _moment(path: Path, value: Any, number: int) -> Moment:
+def _checkpoint(path: Path, value: Any, number: int) -> Checkpoint:
     if not isinstance(value, list) or len(value) != 6:
         raise JournalError(f"journal {path} is damaged: record {number} holds no state of a print")
     sent, acknowledged, executed, wire, pose, state = value
-    return Moment(sent, acknowledged, executed, wire, tuple(pose), state)
+    return Checkpoint(sent, acknowledged, executed, wire, tuple(pose), state)

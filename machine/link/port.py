@@ -170,16 +170,16 @@ def _descriptor(device: Any) -> int | None:
 def serial_devices() -> tuple[SerialDevice, ...]:
     """The serial ports of this computer: those with a stable name first, each once."""
     stable = _stable_names()
-    found = [
+    devices = [
         SerialDevice(
             name=stable.get(os.path.realpath(port.device), port.device),
             path=port.device,
-            description=_described(port),
+            description=_description(port),
             serial_number=port.serial_number or "",
         )
         for port in list_ports.comports()
     ]
-    return tuple(sorted(found, key=lambda device: (device.name == device.path, device.name)))
+    return tuple(sorted(devices, key=lambda device: (device.name == device.path, device.name)))
 
 
 def _stable_names() -> dict[str, str]:
@@ -189,8 +189,8 @@ def _stable_names() -> dict[str, str]:
     return {os.path.realpath(f"{folder}/{name}"): f"{folder}/{name}" for name in names}
 
 
-def _described(port: Any) -> str:
-    """Maker and product as the adapter itself tells them over USB."""
+def _description(port: Any) -> str:
+    """Maker and product as the adapter itself reports them over USB."""
     words = [word for word in (port.manufacturer, port.product or port.description) if word and word != "n/a"]
     ids = f"{port.vid:04x}:{port.pid:04x}" if port.vid is not None and port.pid is not None else ""
     return " ".join([*dict.fromkeys(words), *([f"({ids})"] if ids else [])])
@@ -212,16 +212,16 @@ def refusal(name: str, baud: int, error: Exception) -> str:
     if number in (errno.EACCES, errno.EPERM):
         return f"port {name} may not be used by this user: {_owners(name)}"
     if number == errno.ENOENT:
-        return missing(name)
+        return no_such_port(name)
     if number in (errno.ENOTTY, errno.EINVAL, errno.ENODEV, errno.ENXIO, errno.EIO):
         return f"port {name} is not a working serial device at {baud} baud ({_reason(error)})"
     return f"port {name} cannot be opened: {_reason(error)}"
 
 
-def missing(name: str) -> str:
+def no_such_port(name: str) -> str:
     """One sentence for a port that does not exist, with those that do."""
-    there = port_names()
-    return f"port {name} does not exist: {'there are ' + ', '.join(there) if there else 'no serial port was found'}"
+    names = port_names()
+    return f"port {name} does not exist: {'there are ' + ', '.join(names) if names else 'no serial port was found'}"
 
 
 def _check_address(name: str) -> None:
@@ -244,7 +244,7 @@ def _check_path(name: str) -> None:
     try:
         mode = os.stat(name).st_mode
     except OSError as error:
-        raise PortError(missing(name) if error.errno == errno.ENOENT else refusal(name, 0, error)) from None
+        raise PortError(no_such_port(name) if error.errno == errno.ENOENT else refusal(name, 0, error)) from None
     if not stat.S_ISCHR(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "a file"
         raise PortError(f"port {name} is {kind}, not a serial device")

@@ -1,4 +1,4 @@
-"""How far a print is: counts, temperatures, and what the program's own comments and M73 tell."""
+"""How far a print is: counts, temperatures, and what the program's own comments and M73 say."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from machine.link.events import Temperature
+from machine.gcode.words import read_words
+from machine.link.protocol.events import Temperature
 
 PART = re.compile(r";\s*PART:\s*(\d+)(?:\s+of\s+(\d+))?", re.IGNORECASE)
-WORD = re.compile(r"([PR])\s*(\d+\.?\d*)")
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Schedule:
-    """How long a program takes. remaining_s: what is left of it after a line of its file, s, at the feed rates that it tells.
+    """How long a program takes. remaining_s: what is left of it after a line of its file, s, at its own feed rates.
 
     pace: how many of those seconds pass in one of the clock; None: as many as have so far, whatever the feed.
     """
@@ -57,7 +57,7 @@ class Schedule:
 
 
 @dataclass
-class Place:
+class ProgramPosition:
     """Where in the program the sender stands, gathered line by line."""
 
     part: int | None = None
@@ -65,28 +65,28 @@ class Place:
     layer: int | None = None
     percent: float | None = None
     minutes_left: float | None = None
-    told_at_s: float = field(default=0.0)
+    reported_at_s: float = field(default=0.0)
 
-    def comment(self, line: str) -> None:
+    def read_comment(self, line: str) -> None:
         """Take note of `;PART:2 of 3` and `;LAYER_CHANGE`."""
         if line.startswith(";LAYER_CHANGE"):
             self.layer = 1 if self.layer is None else self.layer + 1
-        elif found := PART.match(line):
-            self.part, self.layer = int(found[1]), None
-            self.parts = int(found[2]) if found[2] else self.parts
+        elif part := PART.match(line):
+            self.part, self.layer = int(part[1]), None
+            self.parts = int(part[2]) if part[2] else self.parts
 
-    def told(self, command: str, now_s: float) -> None:
+    def read_m73(self, command: str, now_s: float) -> None:
         """Take note of M73's P (per cent done) and R (minutes left)."""
-        words = {letter: float(value) for letter, value in WORD.findall(command[3:].upper())}
+        words = dict(read_words(command[3:].upper()))
         self.percent = words.get("P", self.percent)
         if "R" in words:
-            self.minutes_left, self.told_at_s = words["R"], now_s
+            self.minutes_left, self.reported_at_s = words["R"], now_s
 
     def left_s(self, elapsed_s: float, feed_percent: float) -> float | None:
         """Time left by M73's last word, less what has passed since; None when it has said nothing."""
         if self.minutes_left is None:
             return None
-        return max(0.0, 60.0 * self.minutes_left * 100.0 / feed_percent - (elapsed_s - self.told_at_s))
+        return max(0.0, 60.0 * self.minutes_left * 100.0 / feed_percent - (elapsed_s - self.reported_at_s))
 
     def share(self, acknowledged: int, total: int | None) -> float | None:
         """Done so far, 0 to 1: by M73, else by lines."""

@@ -1,4 +1,5 @@
-"""Watchdog: temperatures that stay away from what is wanted, or that are told no more, end a print.
+"""Watchdog: what a printer reports while it prints, and what of it ends the print: temperatures that stay away from their target
+or are reported no more, cold extrusion, a wish to be disconnected.
 
 A firmware guards its heaters itself (Marlin: 40 s beyond 4 K, 20 s without a rise of 2 K); the bounds here are wider, so that
 this one speaks only where the firmware's is missing or does not see the fault.
@@ -7,7 +8,8 @@ this one speaks only where the firmware's is missing or does not see the fault.
 from dataclasses import dataclass, field
 from math import inf
 
-from machine.link.events import Temperature
+from machine.link.pending_commands import Command, PendingCommand
+from machine.link.protocol.events import Action, Echo, Event, Identity, Ok, Temperature
 from profiles.errors import PrinterError
 
 
@@ -23,13 +25,18 @@ class Bounds:
 
 NOZZLE = Bounds("nozzle", 20.0, 60.0)
 BED = Bounds("bed", 15.0, 180.0, 1.0)
-UNHEARD_S = 120.0  # a report is asked for every few seconds: so many questions do not stay unanswered by chance
+SILENCE_S = 120.0  # a report is asked for every few seconds: so many questions do not stay unanswered by chance
 OVER_LIMIT_C = 15.0
 OVER_REPORTS = 2  # in a row: a byte lost on the line makes 200 of 20.0 once
+WARNINGS = 20  # remembered of the printer's own words that show a program it does not understand
+WARNS = ("nknown command", "too long extrusion")
+COLD = ("cold extrusion prevented", "not driven because its heater")  # Marlin, RepRapFirmware; Klipper's is an error
+ASKS = {"pause": Command.PAUSE, "resume": Command.RESUME, "cancel": Command.CANCEL}
+SILENT = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prompt_button", "prompt_show", "prompt_end"}
 
 
 @dataclass
-class Heater:
+class HeaterWatch:
     """One heater's way to its target."""
 
     bounds: Bounds
@@ -38,7 +45,7 @@ class Heater:
     nearest_s: float = 0.0  # when that was
     over: int = 0  # reports in a row beyond what the machine allows
 
-    def saw(self, now_c: float | None, target_c: float | None, now_s: float) -> None:
+    def check(self, now_c: float | None, target_c: float | None, now_s: float) -> None:
         """Judge one report; raises PrinterError."""
         if now_c is None or not target_c:
             self.target_c = None
@@ -57,29 +64,75 @@ class Heater:
 
 @dataclass
 class Watchdog:
-    """saw() with every report; wait() now and then. most_c: what nozzle and bed must never exceed by far, deg C."""
+    """check() every report, check_silence() now and then. most_c: what nozzle and bed must never exceed by far, deg C."""
 
     most_c: tuple[float, float] = (inf, inf)
-    heard_s: float | None = None
-    _heaters: tuple[Heater, Heater] = field(default_factory=lambda: (Heater(NOZZLE), Heater(BED)))
+    reported_s: float | None = None
+    _heaters: tuple[HeaterWatch, HeaterWatch] = field(default_factory=lambda: (HeaterWatch(NOZZLE), HeaterWatch(BED)))
 
-    def saw(self, told: Temperature, now_s: float) -> None:
+    def check(self, report: Temperature, now_s: float) -> None:
         """Judge a report. Raises PrinterError."""
-        self.heard_s = now_s
-        pairs = ((told.nozzle_c, told.nozzle_target_c), (told.bed_c, told.bed_target_c))
+        self.reported_s = now_s
+        pairs = ((report.nozzle_c, report.nozzle_target_c), (report.bed_c, report.bed_target_c))
         for heater, most_c, (now_c, target_c) in zip(self._heaters, self.most_c, pairs, strict=True):
             heater.over = heater.over + 1 if now_c is not None and now_c > most_c + OVER_LIMIT_C else 0
             if heater.over >= OVER_REPORTS:
                 raise PrinterError(f"the {heater.bounds.name} is at {now_c:.0f} deg C: this machine allows at most {most_c:g}")
             if not heater.over:
-                heater.saw(now_c, target_c, now_s)
+                heater.check(now_c, target_c, now_s)
 
-    def wait(self, now_s: float, mute: bool = False) -> None:
-        """Judge silence while a heater is on; raises PrinterError. A printer that never told anything is not judged, nor one that
-        cannot tell anything now (mute).
+    def check_silence(self, now_s: float, mute: bool = False) -> None:
+        """Judge silence while a heater is on; raises PrinterError. A printer that never reported anything is not judged, nor one
+        that cannot report now (mute).
         """
-        if mute and self.heard_s is not None:
-            self.heard_s = now_s
-        heated = any(heater.target_c for heater in self._heaters)
-        if self.heard_s is not None and heated and now_s - self.heard_s > UNHEARD_S:
-            raise PrinterError(f"the printer has told no temperature for {now_s - self.heard_s:.0f} s although a heater is on")
+        if mute and self.reported_s is not None:
+            self.reported_s = now_s
+        silent_s = 0.0 if self.reported_s is None else now_s - self.reported_s
+        if silent_s > SILENCE_S and any(heater.target_c for heater in self._heaters):
+            raise PrinterError(f"the printer has reported no temperature for {silent_s:.0f} s although a heater is on")
+
+
+class PrinterReports:
+    """read() every event; temperature_s: when the newest temperature came."""
+
+    def __init__(self, watchdog: Watchdog, now_s: float) -> None:
+        self.temperature, self.firmware, self.temperature_s = Temperature(), "unknown", now_s
+        self.warnings: list[str] = []
+        self._watchdog = watchdog
+
+    def read(self, event: Event, now_s: float) -> PendingCommand | None:
+        """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
+        report = event.temperature if isinstance(event, Ok) else event
+        if isinstance(report, Temperature):
+            self.temperature, self.temperature_s = report, now_s
+            self._watchdog.check(report, now_s)
+        elif isinstance(event, Identity):
+            self.firmware = event.text.removeprefix("FIRMWARE_NAME:").strip()
+        elif isinstance(event, Echo):
+            self._read_echo(event.text)
+        elif isinstance(event, Action):
+            return self._read_action(event)
+        return None
+
+    def check_silence(self, now_s: float, mute: bool) -> None:
+        """Judge a silence; raises PrinterError. mute: nothing can be reported now."""
+        self._watchdog.check_silence(now_s, mute)
+
+    def _read_echo(self, text: str) -> None:
+        if any(words in text for words in COLD):
+            raise PrinterError(
+                f"the printer said {text!r}: the nozzle is too cold, the filament of a move is missing from the print"
+            )
+        if any(word in text for word in WARNS):
+            self._warn(text)
+
+    def _read_action(self, action: Action) -> PendingCommand | None:
+        if action.name == "disconnect":
+            raise PrinterError("the printer asked to be disconnected (//action:disconnect)")
+        if action.name not in ASKS and action.name not in SILENT:
+            self._warn(f"action {action.name} {action.words}".strip())
+        return PendingCommand(ASKS[action.name]) if action.name in ASKS else None
+
+    def _warn(self, text: str) -> None:
+        if len(self.warnings) < WARNINGS:
+            self.warnings.append(text)

@@ -3,11 +3,10 @@
 from collections.abc import Callable
 from math import pi
 
+from machine.gcode.modes import COMMANDS, E_AXIS
 from machine.reader.motion import arc, flush, follow, push, straight
-from machine.reader.state import E_AXIS, Reader, Words
+from machine.reader.state import Reader, Words
 from profiles.errors import GcodeError
-
-INCH_MM = 25.4
 
 
 def dispatch(reader: Reader, name: str, words: Words) -> None:
@@ -41,9 +40,9 @@ def dispatch(reader: Reader, name: str, words: Words) -> None:
 
 def _move(reader: Reader, name: str, words: Words) -> None:
     reader.motion = name
-    if reader.dialect.firmware == "RepRapFirmware":
-        kind = next((value for letter, value in words if letter == "H"), 0.0)
-        words = [word for word in words if word[0] != "H"]
+    if endstop := reader.dialect.endstop_word:
+        kind = next((value for letter, value in words if letter == endstop), 0.0)
+        words = [word for word in words if word[0] != endstop]
         if kind in (1.0, 3.0, 4.0):  # until an end stop
             named = [letter for letter, _ in words if letter in reader.letters and letter != "E"]
             _at_home(reader, named)
@@ -57,19 +56,9 @@ def _arc(reader: Reader, name: str, words: Words) -> None:
 
 
 def _mode(reader: Reader, name: str, words: Words) -> None:
-    """G20 G21 G90 G91 G93 G94 M82 M83; G90 and G91 set the filament's mode too where the firmware says so."""
-    if name in ("G20", "G21"):
-        reader.scale = INCH_MM if name == "G20" else 1.0
-    elif name in ("G90", "G91"):
-        reader.relative = name == "G91"
-        if reader.dialect.filament_mode == "set":
-            reader.relative_e = reader.relative
-    elif name in ("G93", "G94"):
-        if name == "G93" and not reader.dialect.inverse_time:
-            raise GcodeError(f"line {reader.number}: G93 is not supported: {reader.dialect.firmware} has no inverse time feed")
-        reader.inverse = name == "G93"
-    else:
-        reader.relative_e = name == "M83"
+    if name == "G93" and not reader.dialect.inverse_time:
+        raise GcodeError(f"line {reader.number}: G93 is not supported: {reader.dialect.firmware} has no inverse time feed")
+    reader.modes.set(name)
 
 
 def _home(reader: Reader, name: str, words: Words) -> None:
@@ -89,12 +78,11 @@ def _at_home(reader: Reader, named: list[str]) -> None:
 def _set(reader: Reader, name: str, words: Words) -> None:
     """G92: the named axes stand at the given values from now on; E keeps its sum and changes its zero."""
     _note(reader, name, words)
-    for letter, value in words or [(letter, 0.0) for letter in reader.letters]:
-        axis = reader.letters.get(letter)
+    for axis, coordinate in reader.modes.named(words):
         if axis == E_AXIS:
-            reader.e_shift = reader.at[E_AXIS] - value * reader.scale
-        elif axis is not None:
-            reader.at[axis] = value * (1.0 if axis in (3, 4) else reader.scale)
+            reader.modes.offset[E_AXIS] = coordinate - reader.at[E_AXIS]
+        else:
+            reader.at[axis] = coordinate
 
 
 def _note(reader: Reader, name: str, words: Words) -> None:
@@ -113,7 +101,7 @@ def _note(reader: Reader, name: str, words: Words) -> None:
 
 
 def _offset(reader: Reader, name: str, words: Words) -> None:
-    """G10: pull filament back as M207 says; with P (RepRapFirmware) a tool's temperature; with L20 (CNC) a new zero."""
+    """G10: pull filament back as M207 has it; with P (RepRapFirmware) a tool's temperature; with L20 (CNC) a new zero."""
     values = dict(words)
     if values.get("L") == 20.0:
         _set(reader, "G92", [word for word in words if word[0] in reader.letters])
@@ -158,19 +146,19 @@ def _wait(reader: Reader, name: str, words: Words) -> None:
 
 
 def _accelerate(reader: Reader, name: str, words: Words) -> None:
-    """M204: P while filament moves, T while it stands still, S both; what is not above 0 tells nothing."""
+    """M204: P while filament moves, T while it stands still, S both; what is not above 0 changes nothing."""
     for letter, value in words:
         if value > 0 and letter in "PS":
-            reader.printing = value * reader.scale
+            reader.printing = value * reader.modes.unit_mm
         if value > 0 and letter in "TS":
-            reader.travelling = value * reader.scale
+            reader.travelling = value * reader.modes.unit_mm
 
 
 def _override(reader: Reader, name: str, words: Words) -> None:
-    """M220, M221: S percent of every feed, of all filament; what is not above 0 tells nothing."""
+    """M220, M221: S percent of every feed, of all filament; what is not above 0 changes nothing."""
     percent = dict(words).get("S", 0.0)
     if percent > 0 and name == "M220":
-        reader.pace = percent / 100.0
+        reader.feed_share = percent / 100.0
     elif percent > 0:
         reader.flow = percent / 100.0
 
@@ -178,7 +166,7 @@ def _override(reader: Reader, name: str, words: Words) -> None:
 def _volumetric(reader: Reader, name: str, words: Words) -> None:
     """M200: with D, the filament's diameter, E words are mm3 from here on; D0 or S0: millimetres again."""
     values = dict(words)
-    diameter = values.get("D", 0.0) * reader.scale
+    diameter = values.get("D", 0.0) * reader.modes.unit_mm
     if diameter > 0 or "D" in values or values.get("S") == 0.0:
         reader.filament_mm2 = pi * max(diameter, 0.0) ** 2 / 4.0 if values.get("S") != 0.0 else 0.0
 
@@ -196,7 +184,7 @@ Action = Callable[[Reader, str, Words], None]
 ACTIONS: tuple[tuple[Action, str], ...] = (
     (_move, "G0 G1"),
     (_arc, "G2 G3"),
-    (_mode, "G20 G21 G90 G91 G93 G94 M82 M83"),
+    (_mode, " ".join(COMMANDS)),
     (_note, "G4 M0 M1 M18 M84 M104 M106 M107 M109 M140 M190 M400"),
     (_nothing, "G17 G40 G43 G49 G53 G54 G61 G64 G80 G91.1 G92.1 G92.2 M6"),
     (_nothing, "M17 M73 M105 M110 M115 M117 M118 M155 M201 M203 M205 M126 M127 M208 M486 M502"),

@@ -4,12 +4,11 @@ import re
 from collections.abc import Callable
 from math import inf
 
-from machine.placeholders import stepper
+from machine.gcode.words import read_number, read_values
 from machine.reader.motion import flush
 from machine.reader.state import Reader
 from profiles.errors import GcodeError
 
-VALUE = re.compile(r"([A-Z_]+) *= *(\"[^\"]*\"|[^ ]*)")
 Values = dict[str, str]
 
 
@@ -25,7 +24,7 @@ def macro(reader: Reader, code: str) -> bool:
         return True
     if reader.turning and name != "MANUAL_STEPPER":
         flush(reader)
-    action(reader, dict(VALUE.findall(rest)))
+    action(reader, read_values(rest))
     return True
 
 
@@ -33,9 +32,10 @@ def _number(reader: Reader, values: Values, key: str, default: float | None = No
     text = values.get(key)
     if text is None and default is not None:
         return default
-    if text is None or not re.fullmatch(r"[-+]?[0-9]{1,12}(\.[0-9]{0,20})?", text):
+    number = None if text is None else read_number(text)
+    if number is None:
         raise GcodeError(f"line {reader.number}: {key} is {text!r}: a number is expected"[:200])
-    return float(text)
+    return number
 
 
 def _home(reader: Reader, letters: str) -> None:
@@ -48,13 +48,12 @@ def _home(reader: Reader, letters: str) -> None:
 
 def _turn(reader: Reader, values: Values) -> None:
     """MANUAL_STEPPER of a rotary axis: MOVE, SET_POSITION, homing by STOP_ON_ENDSTOP; SYNC=0 lets the next one begin too."""
-    machine = reader.machine
-    names = {stepper(machine.tilt).upper(): (3, machine.tilt), stepper(machine.turn).upper(): (4, machine.turn)}
-    found = names.get(values.get("STEPPER", ""))
-    if found is None:
+    names = reader.modes.axes.steppers
+    if values.get("STEPPER") not in names:
         reader.ignore("MANUAL_STEPPER")
         return
-    index, axis = found
+    index = 3 + names.index(values["STEPPER"])
+    axis = (reader.machine.tilt, reader.machine.turn)[index - 3]
     if "SET_POSITION" in values:
         reader.at[index] = _number(reader, values, "SET_POSITION")
         reader.note("G92", 0.0, axis.letter)

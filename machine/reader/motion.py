@@ -4,9 +4,10 @@ from math import hypot, inf
 
 import numpy as np
 
-from machine.arcs import centre_of, chord_count, chords, sweep_rad
-from machine.coordinates import axis_positions, followed
-from machine.reader.state import E_AXIS, Reader, Words
+from machine.gcode.arcs import centre_of, chord_count, chords, sweep_rad
+from machine.gcode.modes import E_AXIS
+from machine.kinematics.coordinates import axis_positions, followed_places
+from machine.reader.state import Reader, Words
 from mdp.pose import Pose
 from profiles.errors import GcodeError
 
@@ -18,54 +19,37 @@ def straight(reader: Reader, words: Words, rapid: bool = False) -> None:
     """G0 and G1: a row, unless only F is given."""
     if reader.turning:
         flush(reader)
-    at, letters, before = reader.at, reader.letters, reader.at.copy()
-    moved, told = False, not reader.inverse
-    for letter, value in words:
-        axis = letters.get(letter)
-        if axis is None:
-            if letter != "F":
-                known = " ".join(letters)
-                raise GcodeError(
-                    f"line {reader.number}: word {letter}{value:g} of a move is not known: this machine has {known} F"
-                )
-            if value <= 0:
-                raise GcodeError(f"line {reader.number}: F is {value:g}: a feed must be above 0")
-            reader.feed = value if reader.inverse else value * reader.scale
-            told = True
-        else:
-            moved = True
-            if axis == E_AXIS:
-                _push(reader, value * reader.scale)
-            else:
-                if axis < 3:
-                    value *= reader.scale
-                at[axis] = at[axis] + value if reader.relative else value
-    if moved:
-        rapid = rapid and reader.dialect.rapid
-        if not told and not rapid:
+    modes, before = reader.modes, reader.at.copy()
+    try:
+        moved = modes.move(reader.at, words)
+    except GcodeError as error:
+        raise GcodeError(f"line {reader.number}: {error}") from None
+    if not moved:
+        return
+    if reader.flow != 1.0 or reader.filament_mm2:
+        _scale_filament(reader, before[E_AXIS])
+    feed = modes.feed * reader.feed_share
+    if rapid and reader.dialect.rapid:
+        feed = inf
+    elif modes.inverse_time:
+        if not any(letter == "F" for letter, _ in words):
             raise GcodeError(f"line {reader.number}: after G93 every move needs its own F")
-        feed = reader.feed * reader.pace
-        reader.row(before, inf if rapid else -feed if reader.inverse else feed)
+        feed = -feed
+    reader.row(before, feed)
 
 
-def _push(reader: Reader, value: float) -> None:
-    """A filament word, a step or a sum; the extruder turns by more or less where M221 or M200 says so, the sum stays as told."""
-    at = reader.at
-    told = value if _steps(reader) else value + reader.e_shift - at[E_AXIS]
-    pushed = told * reader.flow / (reader.filament_mm2 or 1.0)
-    at[E_AXIS] += pushed
-    reader.e_shift += pushed - told
-
-
-def _steps(reader: Reader) -> bool:
-    """Whether a filament word is a step."""
-    return reader.relative_e or (reader.relative and reader.dialect.filament_mode == "carried")
+def _scale_filament(reader: Reader, before: float) -> None:
+    """The extruder turns by more or less where M221 or M200 says so; the program's own sum stays."""
+    step = reader.at[E_AXIS] - before
+    pushed = step * reader.flow / (reader.filament_mm2 or 1.0)
+    reader.at[E_AXIS] = before + pushed
+    reader.modes.offset[E_AXIS] -= pushed - step
 
 
 def arc(reader: Reader, name: str, words: Words) -> None:
     """G2 and G3 in the X Y plane, by I J or R: rows of chords, the other axes going along evenly."""
     clockwise, before = name == "G2", reader.at.copy()
-    shape = {letter: value * reader.scale for letter, value in words if letter in "IJR" and letter not in reader.letters}
+    shape = {letter: value * reader.modes.unit_mm for letter, value in words if letter in "IJR" and letter not in reader.letters}
     known = len(reader.rows)
     straight(reader, [(letter, value) for letter, value in words if letter not in shape])
     after = reader.at.copy()
@@ -83,7 +67,7 @@ def arc(reader: Reader, name: str, words: Words) -> None:
     sweep = sweep_rad(start, end, centre, clockwise)
     points = chords(start, end, centre, sweep, chord_count(max(radii), sweep, CHORD_MM))
     reader.at[:] = before
-    feed = reader.feed * reader.pace * (-len(points) if reader.inverse else 1)
+    feed = reader.modes.feed * reader.feed_share * (-len(points) if reader.modes.inverse_time else 1)
     for k, point in enumerate(points, start=1):
         row_before, share = reader.at.copy(), k / len(points)
         others = [a + share * (b - a) for a, b in zip(before[2:], after[2:], strict=True)]
@@ -105,7 +89,7 @@ def push(reader: Reader, filament_mm: float, feed: float) -> None:
     """Filament alone: what G10 and G11 do."""
     before = reader.at.copy()
     reader.at[E_AXIS] += filament_mm
-    reader.e_shift += filament_mm
+    reader.modes.offset[E_AXIS] -= filament_mm
     reader.row(before, feed)
 
 
@@ -115,5 +99,5 @@ def follow(reader: Reader, on: bool) -> None:
         reader.followed = on
         place = np.array([reader.at[:5]])
         pose = Pose(reader.at[3], reader.at[4])
-        moved = followed(reader.machine, pose, place[:, :3]) if on else axis_positions(reader.machine, place)
+        moved = followed_places(reader.machine, pose, place[:, :3]) if on else axis_positions(reader.machine, place)
         reader.at[:3] = moved[0].tolist()

@@ -1,40 +1,38 @@
 """State: what the firmware knows while a text is read, and the rows and events read so far."""
 
 from array import array
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 
-from machine.dialects import DIALECTS, Dialect
-from machine.parsed import OWN, Event
+from machine.firmware import Dialect, dialect_of
+from machine.gcode.modes import Modes, axes_of
+from machine.gcode.words import Word
+from machine.reader.parsed import OWN, Event
 from profiles.machine import Machine
 
 DEFAULT_FEED = 1500.0
-E_AXIS = 5
 ROW = 21  # line, 6 places before, 6 after, feed, part, layer, type, width, height, acceleration, followed
-Words = list[tuple[str, float]]
+Words = list[Word]
 
 
 @dataclass(slots=True)
 class Reader:
     """Position X Y Z tilt turn E, modes, and what the comments said.
 
-    A row's feed below 0 is one over its minutes (G93), inf: as fast as the axes can.
+    at: X Y Z tilt turn as the program counts them, all filament pushed so far. A row's feed below 0 is one over its minutes
+    (G93), inf: as fast as the axes can.
     """
 
     machine: Machine
     dialect: Dialect
-    letters: dict[str, int]
+    modes: Modes
+    letters: Mapping[str, int]
     home: list[float]
     at: list[float]
-    e_shift: float = 0.0
-    relative: bool = False
-    relative_e: bool = False
-    scale: float = 1.0
-    feed: float = DEFAULT_FEED
-    pace: float = 1.0  # of M220, by which every F is multiplied
+    feed_share: float = 1.0  # of M220, by which every F is multiplied
     flow: float = 1.0  # of M221, by which all filament that moves push is
     filament_mm2: float = 0.0  # of M200: E words are then mm3
-    inverse: bool = False
     followed: bool = False
     printing: float = inf
     travelling: float = inf
@@ -64,8 +62,8 @@ class Reader:
         """A move from a place to where the machine is now."""
         at = self.at
         acceleration = self.printing if at[5] != before[5] else self.travelling
-        told = (feed, self.part, self.layer, self.type, self.width, self.height, acceleration, self.followed)
-        self.rows.extend((self.number, *before, *at, *told))
+        remarks = (feed, self.part, self.layer, self.type, self.width, self.height, acceleration, self.followed)
+        self.rows.extend((self.number, *before, *at, *remarks))
 
     def note(self, code: str, value: float, letters: str) -> None:
         """Put an event on record, before the next row."""
@@ -82,12 +80,9 @@ class Reader:
         self.note(OWN, 0.0, code)
 
 
-def begun(machine: Machine) -> Reader:
+def reader_of(machine: Machine) -> Reader:
     """A reader that has read nothing: the machine stands at home."""
-    dialect = DIALECTS[machine.dialect]
-    rotary = () if dialect.steppers or machine.shape == "fixed" else (machine.tilt.letter, machine.turn.letter)
-    filament = next(each for each in dialect.filament if each not in rotary)
-    letters = {"X": 0, "Y": 1, "Z": 2, **{letter: 3 + k for k, letter in enumerate(rotary)}, filament: E_AXIS}
+    modes = Modes(axes_of(machine), feed=DEFAULT_FEED, strict=True)
     linear = [min(max(0.0, axis.limits_mm[0]), axis.limits_mm[1]) for axis in (machine.x, machine.y, machine.z)]
     home = [*linear, machine.tilt.zero_deg, machine.turn.zero_deg, 0.0]
-    return Reader(machine, dialect, letters, home, home.copy())
+    return Reader(machine, dialect_of(machine), modes, modes.axes.words, home, home.copy())

@@ -3,33 +3,33 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.coordinates import axis_positions
-from machine.parsed import Event, MoveKind, ParsedProgram
+from machine.kinematics.coordinates import axis_positions
+from machine.planning.timing import axis_speeds
+from machine.reader.parsed import Event, MoveKind, ParsedProgram
 from machine.reader.state import ROW, Reader
 from mdp.mesh import Floats
-from profiles.machine import Machine
 
 STILL = 1e-9
 SWAY_MM = 0.05  # a followed turn, which goes in straight steps and rounded places, lets the head leave its place by less
 
 
-def arrays(reader: Reader) -> ParsedProgram:
+def parsed_program(reader: Reader) -> ParsedProgram:
     """All that was read."""
     table = np.array(reader.rows, dtype=np.float64).reshape(-1, ROW)
     start, end, feed = table[:, 1:6], table[:, 7:12], table[:, 13]
     e_mm = table[:, 12] - table[:, 6]
     events = tuple(reader.events)
-    asked = _measured(np.column_stack([end - start, e_mm]), reader.dialect.largest_delta)
+    asked = _feed_length(np.column_stack([end - start, e_mm]), reader.dialect.largest_delta)
     rows = np.flatnonzero(table[:, 20] > 0)
     if len(rows):
         start, end = start.copy(), end.copy()
         for side in (start, end):
             side[rows, :3] = axis_positions(reader.machine, side[rows])
-        keep = _one_turn(start, end, e_mm, rows, events)
+        keep = _turn_starts(start, end, e_mm, rows, events)
     change = np.column_stack([end - start, e_mm])
-    feed = _feeds(feed, asked, change, _axis_speeds(reader.machine))
+    feed = _feeds(feed, asked, change, axis_speeds(reader.machine))
     if len(rows):
-        start, end, e_mm, feed, table, events = _merged(keep, start, end, e_mm, feed, change, table, events)
+        start, end, e_mm, feed, table, events = _merge_turns(keep, start, end, e_mm, feed, change, table, events)
         change = np.column_stack([end - start, e_mm])
     whole = table[:, [0, 14, 15, 16]].astype(np.int64)
     return ParsedProgram(
@@ -39,12 +39,6 @@ def arrays(reader: Reader) -> ParsedProgram:
         events=events, ignored=reader.ignored,
         layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
     )  # fmt: skip
-
-
-def _axis_speeds(machine: Machine) -> Floats:
-    """(6,) greatest speeds of X Y Z tilt turn E."""
-    linear = [machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s]
-    return np.array([*linear, machine.tilt.speed_deg_s, machine.turn.speed_deg_s, machine.extruder_speed_mm_s])
 
 
 def _kinds(change: Floats) -> NDArray[np.int8]:
@@ -57,7 +51,7 @@ def _kinds(change: Floats) -> NDArray[np.int8]:
     ).astype(np.int8)
 
 
-def _measured(change: Floats, largest: bool = False) -> Floats:
+def _feed_length(change: Floats, largest: bool = False) -> Floats:
     """(n,) what F counts along (n, 6) changes: X Y Z; where they stand still the rotary axes; else filament.
 
     largest: of a pure turn only the axis that goes farthest (Klipper), else sqrt(tilt^2 + turn^2) (NIST RS274).
@@ -70,23 +64,25 @@ def _measured(change: Floats, largest: bool = False) -> Floats:
 
 def _feeds(feed: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floats:
     """Units per minute along what NIST counts, from the firmware's own measure, inverse time, or as fast as the axes can."""
-    length = _measured(change)
+    length = _feed_length(change)
     other = (feed < 0) | np.isinf(feed) | (np.abs(asked - length) > STILL)
     if not other.any():
         return feed
     rows = np.flatnonzero(other)
-    told, of, want = feed[rows], length[rows], asked[rows]
+    given, of, want = feed[rows], length[rows], asked[rows]
     with np.errstate(divide="ignore", invalid="ignore"):
         fastest = 60.0 * of / (np.abs(change[rows]) / speeds).max(axis=1)
-        minutes = np.where(told < 0, -1.0 / told, want / told)
-        given = np.where(minutes > 0, of / minutes, fastest)
+        minutes = np.where(given < 0, -1.0 / given, want / given)
+        along = np.where(minutes > 0, of / minutes, fastest)
     feed = feed.copy()
-    given = np.where(np.isinf(told), fastest, given)
-    feed[rows] = np.where(np.isfinite(given) & (given > 0), given, 1.0)
+    along = np.where(np.isinf(given), fastest, along)
+    feed[rows] = np.where(np.isfinite(along) & (along > 0), along, 1.0)
     return feed
 
 
-def _one_turn(start: Floats, end: Floats, e_mm: Floats, rows: NDArray[np.int64], events: tuple[Event, ...]) -> NDArray[np.bool_]:
+def _turn_starts(
+    start: Floats, end: Floats, e_mm: Floats, rows: NDArray[np.int64], events: tuple[Event, ...]
+) -> NDArray[np.bool_]:
     """(n,) False for a row that only goes on with the turn of the row before: the head stays, the direction too."""
     turn = end[:, 3:] - start[:, 3:]
     size = np.hypot(turn[:, 0], turn[:, 1])
@@ -106,18 +102,18 @@ def _one_turn(start: Floats, end: Floats, e_mm: Floats, rows: NDArray[np.int64],
     return keep
 
 
-def _merged(
+def _merge_turns(
     keep: NDArray[np.bool_], start: Floats, end: Floats, e_mm: Floats, feed: Floats, change: Floats, table: Floats,
     events: tuple[Event, ...],
 ) -> tuple[Floats, Floats, Floats, Floats, Floats, tuple[Event, ...]]:  # fmt: skip
     """The rows with each turn in one piece, at the pace of the whole."""
     first = np.flatnonzero(keep)
     last = np.append(first[1:], len(keep)) - 1
-    minutes = np.add.reduceat(_measured(change) / feed, first)
+    minutes = np.add.reduceat(_feed_length(change) / feed, first)
     place = np.append(np.cumsum(keep) - 1, len(first))
     moved = tuple(Event(e.line, e.code, e.value, e.letters, int(place[e.row])) for e in events)
     joined = first < last
     start, end, e_mm, feed, table = start[first], end[last], e_mm[first], feed[first].copy(), table[first]
-    whole = _measured(np.column_stack([end - start, e_mm]))
+    whole = _feed_length(np.column_stack([end - start, e_mm]))
     feed[joined] = whole[joined] / minutes[joined]
     return start, end, e_mm, feed, table, moved

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from mdp.formats.surface import Surface, check_placed, check_surface
 from mdp.mesh import Floats
-from mdp.surface import Surface, checked
 from profiles.errors import MeshError
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
@@ -28,9 +28,7 @@ def read(path: Path) -> list[Surface]:
     """
     document, binary = _chunks(path, path.read_bytes())
     try:
-        surfaces: list[Surface] = []
-        for node in _roots(document):
-            surfaces += _placed(path, document, binary, node, np.eye(4), 0)
+        surfaces = _place_all(path, document, binary)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {error})") from None
     if not surfaces:
@@ -63,17 +61,24 @@ def _roots(document: Any) -> list[int]:
     return [number for number in range(len(document.get("nodes", []))) if number not in children]
 
 
-def _placed(path: Path, document: Any, binary: bytes, number: int, parent: Floats, depth: int) -> list[Surface]:
-    if depth > DEEPEST:
-        raise MeshError(f"{path}: its nodes contain each other")
-    node = document["nodes"][number]
-    matrix = parent @ _matrix(node)
-    surfaces = []
-    if "mesh" in node:
-        for primitive in document["meshes"][node["mesh"]]["primitives"]:
-            surfaces.append(_surface(path, document, binary, primitive, matrix))
-    for child in node.get("children", []):
-        surfaces += _placed(path, document, binary, child, matrix, depth + 1)
+def _place_all(path: Path, document: Any, binary: bytes) -> list[Surface]:
+    """The primitives of all nodes of the scene, parents before children, in the order of the file."""
+    pending = [(number, np.eye(4), 0) for number in reversed(_roots(document))]
+    surfaces: list[Surface] = []
+    placed, faces = 0, 0
+    while pending:
+        number, parent, depth = pending.pop()
+        placed += 1
+        check_placed(path, placed, faces)
+        if depth > DEEPEST:
+            raise MeshError(f"{path}: its nodes contain each other")
+        node = document["nodes"][number]
+        matrix = parent @ _matrix(node)
+        for primitive in document["meshes"][node["mesh"]]["primitives"] if "mesh" in node else ():
+            surface = _primitive_surface(path, document, binary, primitive, matrix)
+            surfaces.append(surface)
+            faces += len(surface.faces)
+        pending += [(child, matrix, depth + 1) for child in reversed(node.get("children", []))]
     return surfaces
 
 
@@ -93,21 +98,21 @@ def _matrix(node: Any) -> Floats:
     return matrix
 
 
-def _surface(path: Path, document: Any, binary: bytes, primitive: Any, matrix: Floats) -> Surface:
+def _primitive_surface(path: Path, document: Any, binary: bytes, primitive: Any, matrix: Floats) -> Surface:
     if primitive.get("mode", TRIANGLES) != TRIANGLES or primitive.get("extensions", {}).keys() & {"KHR_draco_mesh_compression"}:
         raise MeshError(f"{path}: holds lines, strips or compressed geometry; only plain triangles are read")
-    vertices = _rows(path, document, binary, primitive["attributes"]["POSITION"], 3)
+    vertices = _accessor_rows(path, document, binary, primitive["attributes"]["POSITION"], 3)
     if "indices" in primitive:
-        faces = _rows(path, document, binary, primitive["indices"], 1).astype(np.int64).reshape(-1, 3)
+        faces = _accessor_rows(path, document, binary, primitive["indices"], 1).astype(np.int64).reshape(-1, 3)
     else:
         faces = np.arange(len(vertices)).reshape(-1, 3)
-    vertices = checked(path, vertices, faces).vertices
+    vertices = check_surface(path, vertices, faces).vertices
     if not np.array_equal(matrix, np.eye(4)):
         vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    return checked(path, vertices, faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces)
+    return check_surface(path, vertices, faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces)
 
 
-def _rows(path: Path, document: Any, binary: bytes, number: int, width: int) -> Any:
+def _accessor_rows(path: Path, document: Any, binary: bytes, number: int, width: int) -> Any:
     """(n, width) values of an accessor, strides honoured."""
     accessor = document["accessors"][number]
     view = document["bufferViews"][accessor["bufferView"]]

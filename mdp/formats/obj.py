@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from mdp.formats.polygons import triangulated
-from mdp.surface import Surface, checked, numbers
+from mdp.formats.polygons import polygon_surface
+from mdp.formats.surface import Surface, parse_floats
 from profiles.errors import MeshError
 
 
@@ -24,8 +24,8 @@ def read(path: Path) -> list[Surface]:
             positions.append(words[1:4])
         elif words[0] == "f":
             polygons.append(_corners(path, number, words[1:], len(positions)))
-    vertices = numbers(path, positions, "a vertex").reshape(-1, 3)
-    return [checked(path, vertices, triangulated(path, vertices, polygons))]
+    vertices = parse_floats(path, positions, "a vertex").reshape(-1, 3)
+    return [polygon_surface(path, vertices, polygons)]
 
 
 def _corners(path: Path, number: int, words: list[str], vertices: int) -> list[int]:

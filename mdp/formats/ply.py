@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from mdp.formats.polygons import triangulated
-from mdp.surface import Surface, checked
+from mdp.formats.polygons import polygon_surface
+from mdp.formats.surface import Surface
 from profiles.errors import MeshError
 
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8"}
@@ -72,7 +72,7 @@ def read(path: Path) -> list[Surface]:
         raise MeshError(f"{path}: needs the elements `vertex` with x, y, z and `face` with a list vertex_indices")
     vertex, polygons = columns["vertex"], columns["face"][corners]
     vertices = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
-    return [checked(path, vertices, triangulated(path, vertices, polygons))]
+    return [polygon_surface(path, vertices, polygons)]
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:

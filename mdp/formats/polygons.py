@@ -1,44 +1,49 @@
-"""Polygons of a file as triangles, without crossing their own outline."""
+"""Polygons of a file as triangles that do not cross the polygon's outline."""
 
 from pathlib import Path
 
+import manifold3d as m3
 import numpy as np
 
-from mdp.loop import fan_is_sound, filled
+from mdp.formats.surface import Indices, Surface, check_surface, check_vertices
 from mdp.mesh import Floats
-from mdp.surface import Indices
 from profiles.errors import MeshError
 
 
-def triangulated(path: Path, vertices: Floats, polygons: list[list[int]] | Indices) -> Indices:
-    """(m, 3) triangles in the order of the polygons; raises MeshError for too few corners and an index out of range.
+def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | Indices) -> Surface:
+    """The surface of (n, 3) vertices and polygons, given as lists of corners or as (m, 3) triangles; triangles in their order.
 
-    A convex polygon becomes a fan about its first corner, any other the triangulation of least area.
+    Raises MeshError for a coordinate that is not finite, too few corners and an index out of range.
     """
     if isinstance(polygons, np.ndarray):
-        return polygons
-    if not polygons:
-        return np.zeros((0, 3), dtype=np.int64)
-    sizes = np.array([len(polygon) for polygon in polygons])
-    if (sizes == 3).all():
-        return np.array(polygons, dtype=np.int64)
+        return check_surface(path, vertices, polygons)
+    if all(len(polygon) == 3 for polygon in polygons):
+        return check_surface(path, vertices, np.array(polygons, dtype=np.int64))
+    check_vertices(path, vertices)
     triangles: list[Indices] = []
     for number, polygon in enumerate(polygons, 1):
         corners = np.array(polygon, dtype=np.int64)
         if len(corners) < 3:
             raise MeshError(f"{path}: face {number} of {len(polygons)} has {len(corners)} corners, at least 3 are needed")
         if corners.min() < 0 or corners.max() >= len(vertices):
-            raise MeshError(f"{path}: face {number} names vertex {corners.max()} (counted from 0) of {len(vertices)} vertices")
-        if len(corners) == 3:
-            triangles.append(corners[None])
-            continue
-        points = vertices[corners]
-        local = fan(len(corners)) if fan_is_sound(points) else filled(points)
-        triangles.append(corners[local])
-    return np.concatenate(triangles)
+            worst = next(corner for corner in polygon if not 0 <= corner < len(vertices))
+            raise MeshError(f"{path}: face {number} names vertex {worst} (counted from 0) of {len(vertices)} vertices")
+        triangles.append(corners[triangulate(vertices[corners])])
+    return check_surface(path, vertices, np.concatenate(triangles))
 
 
-def fan(corners: int) -> Indices:
-    """(corners - 2, 3) triangles about corner 0."""
-    after = np.arange(1, corners - 1, dtype=np.int64)
-    return np.stack([np.zeros_like(after), after, after + 1], axis=1)
+def triangulate(points: Floats) -> Indices:
+    """(n - 2, 3) triangles over the (n, 3) corners of a polygon in space, wound like it.
+
+    A fan about the first corner where it turns the same way everywhere, as that of a convex polygon does. Else the triangles of
+    the polygon's projection along its normal; they keep every edge of the outline even where it touches or crosses itself.
+    """
+    spokes = points[1:] - points[0]
+    crosses = np.cross(spokes[:-1], spokes[1:])
+    normal = crosses.sum(axis=0)
+    if (crosses @ normal >= 0).all() or not 0 < normal @ normal < np.inf:
+        return np.array([(0, after, after + 1) for after in range(1, len(points) - 1)], dtype=np.int64)
+    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    x, y = (axis / np.linalg.norm(axis) for axis in (across, np.cross(normal, across)))
+    triangles: Indices = np.asarray(m3.triangulate([(points - points[0]) @ np.stack([x, y], axis=1)])).astype(np.int64)
+    return triangles

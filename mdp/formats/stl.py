@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mdp.surface import Surface, checked, numbers
+from mdp.formats.surface import Surface, check_surface, parse_floats
 from profiles.errors import MeshError
 
 HEADER, FACET = 84, 50  # bytes: 80 of text and the count; normal, three corners and an attribute
@@ -39,7 +39,7 @@ def read(path: Path) -> list[Surface]:
 
 def _binary(path: Path, text: bytes, count: int) -> Surface:
     records = np.frombuffer(text, dtype=RECORD, count=count, offset=HEADER)
-    return checked(path, records["corners"].reshape(-1, 3), np.arange(3 * count))
+    return check_surface(path, records["corners"].reshape(-1, 3), np.arange(3 * count))
 
 
 def _ascii(path: Path, text: bytes) -> Surface:
@@ -48,7 +48,7 @@ def _ascii(path: Path, text: bytes) -> Surface:
         bad = _first_bad_facet(text)  # none when only the name of a solid holds these words
         if bad:
             raise MeshError(f"{path}: {bad}")
-    return checked(path, numbers(path, facets, "a vertex"), np.arange(3 * len(facets)))
+    return check_surface(path, parse_floats(path, facets, "a vertex"), np.arange(3 * len(facets)))
 
 
 def _first_bad_facet(text: bytes) -> str:

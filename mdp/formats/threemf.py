@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from mdp.formats.surface import Surface, check_placed, check_surface, parse_floats, parse_integers
 from mdp.mesh import Floats
-from mdp.surface import Surface, checked, numbers, whole_numbers
 from profiles.errors import MeshError
 
 UNIT_MM = {"micron": 0.001, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
@@ -20,22 +20,29 @@ PRODUCTION_PATH = "{http://schemas.microsoft.com/3dmanufacturing/production/2015
 RELATION = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
 MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 DAMAGES: tuple[type[Exception], ...] = (
-    KeyError,
+    LookupError,
     ElementTree.ParseError,
     zipfile.BadZipFile,
     zlib.error,
     lzma.LZMAError,
     EOFError,
-)
-DAMAGES += (
     ValueError,
-    LookupError,
-    NotImplementedError,
-    RuntimeError,
-    struct.error,
-)  # unknown compression, a password, a mangled directory
+    NotImplementedError,  # unknown compression
+    RuntimeError,  # a password
+    struct.error,  # a mangled directory
+)
 LARGEST_MODEL_BYTES = 2**30  # a zip of a few kB can unpack to more than any memory
 DEEPEST = 32  # components within components; a ring of them would never end
+_IDENTITY = np.vstack([np.eye(3), np.zeros(3)])
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model part of the package: its root element, its objects by their numbers, and the surfaces made of them so far."""
+
+    root: ElementTree.Element
+    objects: dict[str, ElementTree.Element]
+    surfaces: dict[str, Surface] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -44,19 +51,35 @@ class Package:
 
     path: Path
     archive: zipfile.ZipFile
-    parts: dict[str, ElementTree.Element] = field(default_factory=dict)
+    models: dict[str, Model] = field(default_factory=dict)
 
-    def model(self, name: str) -> ElementTree.Element:
-        """The root element of a model part; raises MeshError when it is missing, too large or malformed."""
+    def parse(self, name: str) -> ElementTree.Element:
+        """The root element of a part; raises MeshError when it is missing, too large or malformed."""
+        try:
+            if self.archive.getinfo(name).file_size > LARGEST_MODEL_BYTES:
+                raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes")
+            return ElementTree.fromstring(self.archive.read(name))
+        except DAMAGES as error:
+            raise MeshError(f"{self.path}: its part {name} is missing or malformed ({error})") from None
+
+    def model(self, name: str) -> Model:
+        """A model part, parsed once; raises MeshError."""
         name = name.lstrip("/")
-        if name not in self.parts:
-            try:
-                if self.archive.getinfo(name).file_size > LARGEST_MODEL_BYTES:
-                    raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes")
-                self.parts[name] = ElementTree.fromstring(self.archive.read(name))
-            except DAMAGES as error:
-                raise MeshError(f"{self.path}: its part {name} is missing or malformed ({error})") from None
-        return self.parts[name]
+        if name not in self.models:
+            root = self.parse(name)
+            objects = {each.get("id", ""): each for each in reversed(root.findall(f"{CORE}resources/{CORE}object"))}
+            self.models[name] = Model(root, objects)
+        return self.models[name]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """An object of a model part that a build item or a component places; a point p lies at [p 1] @ transform."""
+
+    part: str
+    identity: str
+    transform: Floats
+    depth: int
 
 
 def read(path: Path) -> list[Surface]:
@@ -69,41 +92,55 @@ def read(path: Path) -> list[Surface]:
     except (zipfile.BadZipFile, struct.error, ValueError, NotImplementedError):
         raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short") from None
     with archive:
-        package = Package(path, archive)
-        start = _start(package)
-        surfaces: list[Surface] = []
-        for item in package.model(start).iter(f"{CORE}item"):
-            part = item.get(PRODUCTION_PATH, start)
-            surfaces += _placed(package, part, item.get("objectid", ""), _transform(path, item), 0)
+        surfaces = _place_all(Package(path, archive))
     if not surfaces:
         raise MeshError(f"{path}: its build places no mesh")
     return surfaces
 
 
-def _start(package: Package) -> str:
+def _place_all(package: Package) -> list[Surface]:
+    """The meshes of all build items and their components, in the order of the file."""
+    start = _start_part(package)
+    items = package.model(start).root.findall(f"{CORE}build/{CORE}item")
+    pending = [_placement(package, item, start, _IDENTITY, 0) for item in reversed(items)]
+    surfaces: list[Surface] = []
+    placed, faces = 0, 0
+    while pending:
+        placement = pending.pop()
+        placed += 1
+        check_placed(package.path, placed, faces)
+        model = package.model(placement.part)
+        element = model.objects.get(placement.identity)
+        if element is None or placement.depth > DEEPEST:
+            why = "it does not exist" if element is None else "its components contain each other"
+            raise MeshError(f"{package.path}: object {placement.identity!r} cannot be placed: {why}")
+        mesh = element.find(f"{CORE}mesh")
+        if mesh is not None:
+            if placement.identity not in model.surfaces:
+                model.surfaces[placement.identity] = _mesh_surface(package.path, mesh)
+            surface = model.surfaces[placement.identity]
+            surfaces.append(_transformed(package.path, surface, placement.transform, _unit_mm(package.path, model.root)))
+            faces += len(surface.faces)
+            continue
+        components = element.findall(f"{CORE}components/{CORE}component")
+        pending += [
+            _placement(package, each, placement.part, placement.transform, placement.depth + 1) for each in reversed(components)
+        ]
+    return surfaces
+
+
+def _start_part(package: Package) -> str:
     """Name of the part that the package's relationships call the 3D model."""
-    for relation in package.model("_rels/.rels").iter(RELATION):
+    for relation in package.parse("_rels/.rels").iter(RELATION):
         if relation.get("Type") == MODEL_TYPE:
             return relation.get("Target", "")
     raise MeshError(f"{package.path}: its relationships name no 3D model")
 
 
-def _placed(package: Package, part: str, identity: str, transform: Floats, depth: int) -> list[Surface]:
-    """The meshes of an object and its components; a point p of the object lies at [p 1] @ transform in the parent."""
-    root = package.model(part)
-    found = [element for element in root.iter(f"{CORE}object") if element.get("id") == identity]
-    if not found or depth > DEEPEST:
-        why = "its components contain each other" if found else "it does not exist"
-        raise MeshError(f"{package.path}: object {identity!r} cannot be placed: {why}")
-    mesh = found[0].find(f"{CORE}mesh")
-    if mesh is not None:
-        return [_surface(package.path, mesh, transform, _unit_mm(package.path, root))]
-    surfaces: list[Surface] = []
-    for component in found[0].iter(f"{CORE}component"):
-        inner = _transform(package.path, component)
-        whole = np.column_stack([inner, [0, 0, 0, 1]]) @ transform
-        surfaces += _placed(package, component.get(PRODUCTION_PATH, part), component.get("objectid", ""), whole, depth + 1)
-    return surfaces
+def _placement(package: Package, element: ElementTree.Element, part: str, outer: Floats, depth: int) -> Placement:
+    """What an item or a component of a part places, within an outer transform."""
+    transform = np.column_stack([_transform(package.path, element), [0, 0, 0, 1]]) @ outer
+    return Placement(element.get(PRODUCTION_PATH, part), element.get("objectid", ""), transform, depth)
 
 
 def _unit_mm(path: Path, root: ElementTree.Element) -> float:
@@ -113,19 +150,20 @@ def _unit_mm(path: Path, root: ElementTree.Element) -> float:
     return UNIT_MM[unit]
 
 
-def _surface(path: Path, mesh: ElementTree.Element, transform: Floats, unit_mm: float) -> Surface:
+def _mesh_surface(path: Path, mesh: ElementTree.Element) -> Surface:
     points = [(v.get("x", ""), v.get("y", ""), v.get("z", "")) for v in mesh.iter(f"{CORE}vertex")]
     corners = [(t.get("v1", ""), t.get("v2", ""), t.get("v3", "")) for t in mesh.iter(f"{CORE}triangle")]
-    vertices = numbers(path, points, "a vertex").reshape(-1, 3)
-    faces = whole_numbers(path, corners, "a triangle").reshape(-1, 3)
-    checked(path, vertices, faces)
+    return check_surface(path, parse_floats(path, points, "a vertex"), parse_integers(path, corners, "a triangle"))
+
+
+def _transformed(path: Path, surface: Surface, transform: Floats, unit_mm: float) -> Surface:
+    vertices = surface.vertices
     if not np.array_equal(transform, _IDENTITY):
         vertices = vertices @ transform[:3] + transform[3]
     mirrored = np.linalg.det(transform[:3]) < 0
-    return checked(path, vertices * unit_mm if unit_mm != 1.0 else vertices, faces[:, ::-1] if mirrored else faces)
-
-
-_IDENTITY = np.vstack([np.eye(3), np.zeros(3)])
+    return check_surface(
+        path, vertices * unit_mm if unit_mm != 1.0 else vertices, surface.faces[:, ::-1] if mirrored else surface.faces
+    )
 
 
 def _transform(path: Path, element: ElementTree.Element) -> Floats:
@@ -133,7 +171,7 @@ def _transform(path: Path, element: ElementTree.Element) -> Floats:
     text = element.get("transform")
     if text is None:
         return _IDENTITY
-    values = numbers(path, [text.split()], "a transform")
+    values = parse_floats(path, [text.split()], "a transform")
     if values.shape != (12,) or not np.isfinite(values).all():
         raise MeshError(f"{path}: a transform has {values.size} numbers instead of 12 finite ones: `{text}`")
     return values.reshape(4, 3)

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mdp.formats.surface import Indices
 from mdp.mesh import Floats
-from mdp.surface import Indices
 
 Flags = NDArray[np.bool_]
 
@@ -60,7 +60,7 @@ def edges_of(faces: Indices) -> Edges:
     return Edges(starts, ends, edge)
 
 
-def components(count: int, a: Indices, b: Indices) -> Indices:
+def connected_components(count: int, a: Indices, b: Indices) -> Indices:
     """(count,) the least member of the connected component of every node, for edges from a to b.
 
     Labels hook onto the least label next to them and jump to its root until nothing changes: a few vectorised rounds.

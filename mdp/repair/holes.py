@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from mdp.loop import LONGEST, filled
+from mdp.formats.surface import Indices, Surface
 from mdp.mesh import Floats
 from mdp.repair.edges import areas_of, edges_of
-from mdp.repair.winding import paired, point
-from mdp.surface import Indices, Surface
+from mdp.repair.winding import format_point, pair_half_edges
 from profiles.errors import MeshError
 
 # A hole is a defect when it is small beside the model; the opening of a cup is meant, and a lid on it would be another model.
@@ -14,14 +13,15 @@ RIM_SHARE = 0.5  # longest rim of a hole, of the diagonal of the model's box
 HOLE_SHARE = 0.02  # largest area of one filling, of the surface's area
 FACET_SHARE = 0.1  # the same for a rim of three or four edges: a facet or two lost from a coarse model
 TOTAL_SHARE = 0.1  # all fillings together
+LONGEST = 400  # corners of a rim; the table of its chords grows with the square and the work with the cube of it
 
 
-def without_holes(surface: Surface) -> tuple[Surface, list[str]]:
+def fill_holes(surface: Surface) -> tuple[Surface, list[str]]:
     """The surface with its small holes filled, and a sentence about them.
 
     Raises MeshError when a hole is too large: how many edges are open, and a point on a rim.
     """
-    loops = rims(surface)
+    loops = rim_loops(surface)
     if not loops:
         return surface, []
     size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
@@ -33,7 +33,7 @@ def without_holes(surface: Surface) -> tuple[Surface, list[str]]:
         rim = float(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).sum())
         if len(loop) > LONGEST or (len(loop) > 4 and rim > RIM_SHARE * size):
             raise _too_large(loops, surface, loop, rim)
-        cap = loop[filled(points)] if len(loop) > 2 else np.zeros((0, 3), dtype=np.int64)
+        cap = loop[triangulate_loop(points)] if len(loop) > 2 else np.zeros((0, 3), dtype=np.int64)
         cap_area = float(areas_of(surface.vertices, cap).sum())
         total, longest = total + cap_area, max(longest, rim)
         facet = len(loop) <= 4 and cap_area <= FACET_SHARE * area
@@ -49,15 +49,15 @@ def _too_large(loops: list[Indices], surface: Surface, loop: Indices, rim: float
     where: Floats = surface.vertices[loop[0]]
     return MeshError(
         f"is not closed: {open_edges} open edges around {len(loops)} hole{'s' * (len(loops) > 1)}, one with a {rim:.4g} mm rim "
-        f"through {point(where)}; only holes that are small beside the model are filled"
+        f"through {format_point(where)}; only holes that are small beside the model are filled"
     )
 
 
-def rims(surface: Surface) -> list[Indices]:
+def rim_loops(surface: Surface) -> list[Indices]:
     """Simple loops of vertices around the holes, each running so that a face wound like it fits in."""
     edges = edges_of(surface.faces)
     free = np.ones(len(edges.edge), dtype=bool)
-    free[paired(surface, edges).ravel()] = False
+    free[pair_half_edges(surface, edges).ravel()] = False
     numbers = np.flatnonzero(free)
     onward: dict[int, list[int]] = {}
     for start, end in zip(edges.ends[numbers[::-1]].tolist(), edges.starts[numbers[::-1]].tolist(), strict=True):
@@ -77,3 +77,33 @@ def rims(surface: Surface) -> list[Indices]:
                 del place[left]
             del path[place[vertex] + 1 :]
     return loops
+
+
+def triangulate_loop(points: Floats) -> Indices:
+    """(n - 2, 3) triangles of least total area over the (n, 3) corners, wound like the loop.
+
+    Dynamic programming over the loop's chords: G. T. Klincsek, Minimal triangulations of polygonal domains (1980); O(n^3).
+    """
+    n = len(points)
+    if n > LONGEST:
+        raise ValueError(f"a loop of {n} corners")
+    cost = np.zeros((n, n))
+    split = np.zeros((n, n), dtype=np.int64)
+    for span in range(2, n):
+        first = np.arange(n - span)
+        last = first + span
+        middle = first[:, None] + np.arange(1, span)[None, :]
+        a, b, c = points[first][:, None], points[middle], points[last][:, None]
+        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=2)
+        total = cost[first[:, None], middle] + cost[middle, last[:, None]] + area
+        best = total.argmin(axis=1)
+        split[first, last] = middle[first, best]
+        cost[first, last] = total[first, best]
+    triangles, pending = [], [(0, n - 1)]
+    while pending:
+        first_corner, last_corner = pending.pop()
+        if last_corner - first_corner >= 2:
+            between = int(split[first_corner, last_corner])
+            triangles.append((first_corner, between, last_corner))
+            pending += [(between, last_corner), (first_corner, between)]
+    return np.array(triangles, dtype=np.int64)

@@ -44,7 +44,7 @@ def section_area(vertices: Floats, faces: np.ndarray[tuple[int, int], np.dtype[n
     return abs(0.5 * float((start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]).sum()))
 
 
-def disentangled(solid: "m3.Manifold", depth: int = 0) -> "m3.Manifold":
+def resolve_overlap(solid: "m3.Manifold", depth: int = 0) -> "m3.Manifold":
     """The solid with every point counted once.
 
     Halved across its longest side until no piece overlaps itself: pieces that were one body far along the surface
@@ -60,5 +60,5 @@ def disentangled(solid: "m3.Manifold", depth: int = 0) -> "m3.Manifold":
         box = np.array(piece.bounding_box()).reshape(2, 3)
         normal = np.eye(3)[np.argmax(box[1] - box[0])]
         halves = piece.split_by_plane(tuple(normal), float(normal @ box.mean(axis=0)))
-        whole += [disentangled(half, depth + 1) for half in halves]
+        whole += [resolve_overlap(half, depth + 1) for half in halves]
     return m3.Manifold.batch_boolean(whole, m3.OpType.Add)

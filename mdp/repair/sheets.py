@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from mdp.repair.edges import Edges, Flags, areas_of, components, edges_of
-from mdp.repair.weld import compact
-from mdp.surface import Indices, Surface
+from mdp.formats.surface import Indices, Surface
+from mdp.repair.edges import Edges, Flags, areas_of, connected_components, edges_of
+from mdp.repair.weld import drop_unused_vertices
 
 LOOSE_SHARE = 0.2  # of the area; a larger loose patch may well be the model itself
 MOST_LOOSE = 300  # patches taken away; a surface with more of them is no solid with a blemish
 
 
-def single(surface: Surface) -> Surface:
+def drop_duplicate_faces(surface: Surface) -> Surface:
     """Every face once; of faces that lie on each other wound oppositely, both go or one stays, whichever leaves fewer edges odd.
 
     Both go where two bodies touch in a common wall, one stays where a program wrote every face for both sides.
@@ -20,14 +20,14 @@ def single(surface: Surface) -> Surface:
     if len(first) == len(faces):
         return surface
     forward, backward = np.bincount(group, even), np.bincount(group, ~even)
-    kept = np.where(forward >= backward, _first_where(group, even, len(first)), _first_where(group, ~even, len(first)))
+    representative = np.where(forward >= backward, _first_where(group, even, len(first)), _first_where(group, ~even, len(first)))
     opposed = (forward > 0) & (forward == backward)
-    order = np.argsort(kept)
-    chosen = kept[order][~_both_go(faces[kept[order]], opposed[order])]
-    return compact(Surface(surface.vertices, faces[chosen]))
+    order = np.argsort(representative)
+    remaining = representative[order][~_drop_both(faces[representative[order]], opposed[order])]
+    return drop_unused_vertices(Surface(surface.vertices, faces[remaining]))
 
 
-def cancelled(surface: Surface) -> Surface:
+def cancel_opposite_faces(surface: Surface) -> Surface:
     """The surface without pairs of faces that lie on each other wound oppositely: what was balanced stays balanced."""
     group, first, even = _groups(surface.faces)
     if len(first) == len(surface.faces):
@@ -38,7 +38,7 @@ def cancelled(surface: Surface) -> Surface:
     rank = np.arange(len(order)) - starts[group[order]]  # backward ones come first in a group
     pairs = np.minimum(backward, np.diff(starts) - backward)[group[order]]
     goes = np.where(even[order], rank - backward[group[order]] < pairs, rank < pairs)
-    return compact(Surface(surface.vertices, surface.faces[np.sort(order[~goes])]))
+    return drop_unused_vertices(Surface(surface.vertices, surface.faces[np.sort(order[~goes])]))
 
 
 def _groups(faces: Indices) -> tuple[Indices, Indices, Flags]:
@@ -63,14 +63,14 @@ def _first_where(group: Indices, chosen: Flags, groups: int) -> Indices:
     return first
 
 
-def _both_go(faces: Indices, opposed: Flags) -> Flags:
+def _drop_both(faces: Indices, opposed: Flags) -> Flags:
     """Which of the opposed faces to drop, patch by patch: where that makes more edges even than odd."""
     if not opposed.any():
         return opposed
     edges = edges_of(faces)
     twins = edges.twins // 3
     twins = twins[opposed[twins[:, 0]] == opposed[twins[:, 1]]]
-    patch = components(len(faces), twins[:, 0], twins[:, 1])
+    patch = connected_components(len(faces), twins[:, 0], twins[:, 1])
     flags: Flags = opposed & (_gains(edges, patch)[patch] > 0)
     return flags
 
@@ -84,7 +84,7 @@ def _gains(edges: Edges, patch: Indices) -> Indices:
     return gains
 
 
-def without_loose(surface: Surface) -> Surface:
+def drop_loose_sheets(surface: Surface) -> Surface:
     """The surface without the patches that hang on its outside or divide its inside.
 
     Such a patch shares edges with two faces of the rest, which close without it. Taken away one after the other: those with an
@@ -95,12 +95,12 @@ def without_loose(surface: Surface) -> Surface:
         if not (edges.counts % 2 * (edges.counts > 2)).any():
             return surface
         twins = edges.twins // 3
-        patch = components(len(surface.faces), twins[:, 0], twins[:, 1])
+        patch = connected_components(len(surface.faces), twins[:, 0], twins[:, 1])
         area = np.bincount(patch, areas_of(surface.vertices, surface.faces), minlength=len(patch))
         loose = np.flatnonzero((_gains(edges, patch) > 0) & (area <= LOOSE_SHARE * area.sum()))
         if not len(loose):
             return surface
         open_edges = np.bincount(np.repeat(patch, 3), edges.counts[edges.edge] == 1, minlength=len(patch))
         least = loose[np.lexsort((area[loose], open_edges[loose] == 0))[0]]
-        surface = compact(Surface(surface.vertices, surface.faces[patch != least]))
+        surface = drop_unused_vertices(Surface(surface.vertices, surface.faces[patch != least]))
     return surface

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mdp.formats.surface import Indices, Surface, concatenate
 from mdp.mesh import Floats
-from mdp.repair.edges import components, edges_of, normals_of
-from mdp.repair.weld import compact
-from mdp.repair.winding import paired
-from mdp.surface import Indices, Surface, stacked
+from mdp.repair.edges import connected_components, edges_of, normals_of
+from mdp.repair.weld import drop_unused_vertices
+from mdp.repair.winding import pair_half_edges
 from profiles.errors import MeshError
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Shell:
     low: Floats
     high: Floats
 
-    def turned(self) -> "Shell":
+    def flip(self) -> "Shell":
         """The same shell inside out."""
         return Shell(self.vertices, self.faces[:, ::-1], -self.volume, self.low, self.high)
 
@@ -40,10 +40,10 @@ class Shell:
             return False
         corners = np.unique(other.faces)
         sample = other.vertices[corners[np.linspace(0, len(corners) - 1, SAMPLES).astype(np.int64)]]
-        return all(abs(turns_around(p, self.vertices, self.faces)) > 0.5 for p in sample)
+        return all(abs(winding_number(p, self.vertices, self.faces)) > 0.5 for p in sample)
 
 
-def turns_around(position: Floats, vertices: Floats, faces: Indices) -> float:
+def winding_number(position: Floats, vertices: Floats, faces: Indices) -> float:
     """How often the closed faces wind around a point.
 
     Sum of solid angles over 4 pi: A. van Oosterom, J. Strackee, The solid angle of a plane triangle (1983).
@@ -56,8 +56,8 @@ def turns_around(position: Floats, vertices: Floats, faces: Indices) -> float:
 
 def shells_of(surface: Surface) -> list[Shell]:
     """The shells of a closed surface in the order of their first faces."""
-    pairs = paired(surface, edges_of(surface.faces)) // 3
-    label = components(len(surface.faces), pairs[:, 0], pairs[:, 1])
+    pairs = pair_half_edges(surface, edges_of(surface.faces)) // 3
+    label = connected_components(len(surface.faces), pairs[:, 0], pairs[:, 1])
     middle = surface.vertices.mean(axis=0)
     signed = (
         np.einsum("ij,ij->i", surface.vertices[surface.faces[:, 0]] - middle, normals_of(surface.vertices, surface.faces)) / 6.0
@@ -79,21 +79,21 @@ def volume_of(surface: Surface) -> float:
     )
 
 
-def without_specks(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
+def drop_specks(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
     """The shells that enclose a volume worth printing, and a sentence about the others."""
     total = sum(abs(shell.volume) for shell in shells)
-    kept = [
+    sizeable = [
         shell
         for shell in shells
         if abs(shell.volume) > max(NEGLIGIBLE * total, FLAT * float(np.linalg.norm(shell.high - shell.low)) ** 3)
     ]
-    if not kept:
+    if not sizeable:
         raise MeshError(f"encloses no volume: its {sum(len(shell.faces) for shell in shells)} faces are flat")
-    gone = len(shells) - len(kept)
-    return kept, [f"left out {gone} shell{'s' * (gone > 1)} with next to no volume"] if gone else []
+    gone = len(shells) - len(sizeable)
+    return sizeable, [f"left out {gone} shell{'s' * (gone > 1)} with next to no volume"] if gone else []
 
 
-def outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
+def orient_outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
     """Every shell wound so that it bounds solid: outwards, or inwards when it is a void in another.
 
     An outermost shell that is inside out is turned together with all that it contains, since the windings of a file
@@ -104,10 +104,10 @@ def outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
     inside = _containers(shells)
     turn = [shell.volume < 0 and not inside[i] for i, shell in enumerate(shells)]
     turn = [turn[i] ^ bool(sum(turn[j] for j in inside[i] if not inside[j]) % 2) for i in range(len(shells))]
-    result = [shell.turned() if turn[i] else shell for i, shell in enumerate(shells)]
+    result = [shell.flip() if turn[i] else shell for i, shell in enumerate(shells)]
     depth = [sum(1 if result[j].volume > 0 else -1 for j in inside[i]) for i in range(len(shells))]
     stray = [result[i].volume < 0 and depth[i] <= 0 for i in range(len(shells))]
-    result = [shell.turned() if stray[i] else shell for i, shell in enumerate(result)]
+    result = [shell.flip() if stray[i] else shell for i, shell in enumerate(result)]
     count = sum(a ^ b for a, b in zip(turn, stray, strict=True))
     return result, [f"turned {count} of {len(shells)} shells the right side out"] if count else []
 
@@ -116,14 +116,14 @@ def _containers(shells: list[Shell]) -> list[list[int]]:
     """For each shell the larger ones that contain it."""
     low, high = np.array([shell.low for shell in shells]), np.array([shell.high for shell in shells])
     size = np.array([abs(shell.volume) for shell in shells])
-    found = []
+    containers = []
     for shell in shells:
         around = (low <= shell.low).all(axis=1) & (high >= shell.high).all(axis=1) & (size > abs(shell.volume))
-        found.append([j for j in np.flatnonzero(around).tolist() if shells[j].contains(shell)])
-    return found
+        containers.append([j for j in np.flatnonzero(around).tolist() if shells[j].contains(shell)])
+    return containers
 
 
-def united(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
+def unite(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
     """One surface of all shells, overlapping and touching bodies united; shells that stay apart keep their triangles."""
     solid = [i for i, shell in enumerate(shells) if shell.volume > 0]
     voids: dict[int, list[Shell]] = {i: [] for i in solid}
@@ -134,12 +134,12 @@ def united(shells: list[Shell], reach: float) -> tuple[Surface, list[str]]:
     pieces: list[Surface] = []
     fused = 0
     for group in _groups([body[0] for body in bodies], reach):
-        plain = [_joined(bodies[i]) for i in group]
+        plain = [_body_surface(bodies[i]) for i in group]
         union = _union(plain) if len(group) > 1 else None
         pieces += plain if union is None else [union]
         fused += len(group) if union is not None else 0
-    joined = stacked(pieces)
-    return joined, [f"united {fused} bodies that overlap or touch"] if fused else []
+    surface = concatenate(pieces)
+    return surface, [f"united {fused} bodies that overlap or touch"] if fused else []
 
 
 def _groups(outers: list[Shell], reach: float) -> list[list[int]]:
@@ -150,7 +150,7 @@ def _groups(outers: list[Shell], reach: float) -> list[list[int]]:
     ]
     a = np.repeat(np.arange(len(outers)), [len(others) for others in near])
     b = np.concatenate(near)
-    label = components(len(outers), a, b)
+    label = connected_components(len(outers), a, b)
     return [np.flatnonzero(label == first).tolist() for first in np.unique(label)]
 
 
@@ -185,5 +185,5 @@ def solid_of(surface: Surface) -> "m3.Manifold":
     return solid
 
 
-def _joined(body: list[Shell]) -> Surface:
-    return compact(stacked([Surface(shell.vertices, shell.faces) for shell in body]))
+def _body_surface(body: list[Shell]) -> Surface:
+    return drop_unused_vertices(concatenate([Surface(shell.vertices, shell.faces) for shell in body]))

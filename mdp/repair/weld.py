@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from mdp.repair.edges import components, edges_of
-from mdp.surface import Indices, Surface
+from mdp.formats.surface import Indices, Surface
+from mdp.repair.edges import connected_components, edges_of
 
 SKEW = np.array([0.5773, 0.6841, 0.4459])  # a line that no common direction of a model is square to, to sort vertices along
 
 
-def welded(surface: Surface) -> Surface:
+def merge_vertices(surface: Surface) -> Surface:
     """The surface with one vertex for every position, in order of first use, and without the faces that collapse."""
     vertices = surface.vertices + 0.0  # -0.0 and 0.0 are one place
     order = np.lexsort(vertices.T)
@@ -16,10 +16,10 @@ def welded(surface: Surface) -> Surface:
     fresh[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
     place = np.empty(len(vertices), dtype=np.int64)
     place[order] = np.cumsum(fresh) - 1
-    return compact(Surface(vertices[order[fresh]], uncollapsed(place[surface.faces])))
+    return drop_unused_vertices(Surface(vertices[order[fresh]], drop_collapsed_faces(place[surface.faces])))
 
 
-def welded_along_openings(surface: Surface, distance: float) -> Surface:
+def merge_rim_vertices(surface: Surface, distance: float) -> Surface:
     """The surface with the vertices of its open edges merged that lie within the distance of each other."""
     edges = edges_of(surface.faces)
     odd = edges.counts[edges.edge] % 2 == 1
@@ -36,18 +36,18 @@ def welded_along_openings(surface: Surface, distance: float) -> Surface:
         near.append((rim[close], rim[close + step]))
     if not near:
         return surface
-    merged = components(len(surface.vertices), *(np.concatenate(side) for side in zip(*near, strict=True)))
-    return compact(Surface(surface.vertices, uncollapsed(merged[surface.faces])))
+    merged = connected_components(len(surface.vertices), *(np.concatenate(side) for side in zip(*near, strict=True)))
+    return drop_unused_vertices(Surface(surface.vertices, drop_collapsed_faces(merged[surface.faces])))
 
 
-def uncollapsed(faces: Indices) -> Indices:
+def drop_collapsed_faces(faces: Indices) -> Indices:
     """The faces with three different corners."""
     a, b, c = faces.T
-    kept: Indices = faces[(a != b) & (b != c) & (c != a)]
-    return kept
+    proper: Indices = faces[(a != b) & (b != c) & (c != a)]
+    return proper
 
 
-def compact(surface: Surface) -> Surface:
+def drop_unused_vertices(surface: Surface) -> Surface:
     """The surface without unused vertices, the others in order of first use."""
     used, first, place = np.unique(surface.faces.ravel(), return_index=True, return_inverse=True)
     order = np.argsort(first)

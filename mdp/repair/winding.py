@@ -2,14 +2,14 @@
 
 import numpy as np
 
+from mdp.formats.surface import Indices, Surface
 from mdp.mesh import Floats
-from mdp.repair.edges import Edges, components, edges_of, normals_of
-from mdp.repair.weld import compact
-from mdp.surface import Indices, Surface
+from mdp.repair.edges import Edges, connected_components, edges_of, normals_of
+from mdp.repair.weld import drop_unused_vertices
 from profiles.errors import MeshError
 
 
-def paired(surface: Surface, edges: Edges) -> Indices:
+def pair_half_edges(surface: Surface, edges: Edges) -> Indices:
     """(k, 2) half-edges that belong together; where more than two faces meet in an edge, neighbours around it.
 
     Oppositely wound neighbours come first, the nearest in angle before others, so that bodies that only touch stay apart.
@@ -19,8 +19,8 @@ def paired(surface: Surface, edges: Edges) -> Indices:
     normals = normals_of(surface.vertices, surface.faces)
     for number in np.flatnonzero(edges.counts > 2):
         around = order[runs[number] : runs[number + 1]]
-        found = _matched(_angles(surface, edges, around), edges.forward[around], normals[around // 3])
-        pairs.append(around[found])
+        neighbours = _match_around_edge(_angles(surface, edges, around), edges.forward[around], normals[around // 3])
+        pairs.append(around[neighbours])
     return np.concatenate(pairs)
 
 
@@ -37,7 +37,7 @@ def _angles(surface: Surface, edges: Edges, around: Indices) -> Floats:
     return directions
 
 
-def _matched(angles: Floats, forward: object, normals: Floats) -> Indices:
+def _match_around_edge(angles: Floats, forward: object, normals: Floats) -> Indices:
     """(k // 2, 2) pairs of neighbours around an edge."""
     directions = np.asarray(forward)
     ring = [int(k) for k in np.lexsort((directions, angles))]
@@ -55,7 +55,7 @@ def _matched(angles: Floats, forward: object, normals: Floats) -> Indices:
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
-def wound(surface: Surface) -> Surface:
+def orient_faces(surface: Surface) -> Surface:
     """The surface with the faces of every patch wound consistently, as most of its area is.
 
     Raises MeshError when a patch cannot be: a one-sided sheet.
@@ -63,28 +63,28 @@ def wound(surface: Surface) -> Surface:
     edges = edges_of(surface.faces)
     if not len(edges.unbalanced):
         return surface
-    surface = Surface(surface.vertices, _turned(surface, edges, edges.twins, strict=True))
+    surface = Surface(surface.vertices, _turn_faces(surface, edges, edges.twins, strict=True))
     edges = edges_of(surface.faces)
     if not (edges.counts > 2).any():
         return surface
-    return Surface(surface.vertices, _turned(surface, edges, paired(surface, edges), strict=False))
+    return Surface(surface.vertices, _turn_faces(surface, edges, pair_half_edges(surface, edges), strict=False))
 
 
-def _turned(surface: Surface, edges: Edges, pairs: Indices, strict: bool) -> Indices:
+def _turn_faces(surface: Surface, edges: Edges, pairs: Indices, strict: bool) -> Indices:
     """Faces turned over where the pairs ask for it: components of the two-sheeted cover with nodes (face, kept or turned)."""
     m = len(surface.faces)
     a, b = pairs[:, 0] // 3, pairs[:, 1] // 3
     clash = edges.forward[pairs[:, 0]] == edges.forward[pairs[:, 1]]
     if not clash.any():
         return surface.faces
-    cover = components(2 * m, np.concatenate([a, a + m]), np.concatenate([b + m * clash, b + m * ~clash]))
+    cover = connected_components(2 * m, np.concatenate([a, a + m]), np.concatenate([b + m * clash, b + m * ~clash]))
     one_sided = cover[:m] == cover[m:]
     if one_sided.any():
         if strict:
             face = int(np.flatnonzero(one_sided)[0])
             where = surface.vertices[surface.faces[face]].mean(axis=0)
             raise MeshError(
-                f"is not orientable: {int(one_sided.sum())} faces form a one-sided sheet, one of them near {point(where)}"
+                f"is not orientable: {int(one_sided.sum())} faces form a one-sided sheet, one of them near {format_point(where)}"
             )
         return surface.faces
     area = np.linalg.norm(normals_of(surface.vertices, surface.faces), axis=1)
@@ -94,7 +94,7 @@ def _turned(surface: Surface, edges: Edges, pairs: Indices, strict: bool) -> Ind
     return np.where((turn | tie)[:, None], surface.faces[:, ::-1], surface.faces)
 
 
-def parted(surface: Surface) -> Surface:
+def split_touching_fans(surface: Surface) -> Surface:
     """The closed surface with a copy of a vertex for every fan of faces that is connected over paired edges.
 
     Edges that more than two faces share become edges of two faces each, except where the faces hang together at both
@@ -103,36 +103,36 @@ def parted(surface: Surface) -> Surface:
     edges = edges_of(surface.faces)
     if not (edges.counts > 2).any():
         return surface
-    pairs = paired(surface, edges)
+    pairs = pair_half_edges(surface, edges)
     one, other = pairs[:, 0], pairs[:, 1]
     same = edges.starts[one] == edges.starts[other]
-    corners = components(
+    corners = connected_components(
         surface.faces.size,
         np.concatenate([one, _next(one)]),
         np.concatenate([np.where(same, other, _next(other)), np.where(same, _next(other), other)]),
     )
-    kept, place = np.unique(corners, return_inverse=True)
-    return compact(Surface(surface.vertices[surface.faces.ravel()[kept]], place.reshape(-1, 3)))
+    corner, place = np.unique(corners, return_inverse=True)
+    return drop_unused_vertices(Surface(surface.vertices[surface.faces.ravel()[corner]], place.reshape(-1, 3)))
 
 
-def with_single_edges(surface: Surface) -> Surface:
+def split_shared_edges(surface: Surface) -> Surface:
     """The closed surface without edges that more than two faces share: all pairs but one of them get a vertex within the edge."""
     while True:
         edges = edges_of(surface.faces)
         if not (edges.counts > 2).any():
             return surface
-        pairs = paired(surface, edges)
+        pairs = pair_half_edges(surface, edges)
         shared = edges.edge[pairs[:, 0]]
         touched: set[int] = set()
-        kept: set[int] = set()
+        paired_once: set[int] = set()
         for pair, edge in zip(pairs, shared, strict=True):
-            if edges.counts[edge] > 2 and edge in kept and not touched & set((pair // 3).tolist()):
+            if edges.counts[edge] > 2 and edge in paired_once and not touched & set((pair // 3).tolist()):
                 touched |= set((pair // 3).tolist())
-                surface = _with_vertex_within(surface, edges, pair)
-            kept.add(edge)
+                surface = _split_pair(surface, edges, pair)
+            paired_once.add(edge)
 
 
-def _with_vertex_within(surface: Surface, edges: Edges, pair: Indices) -> Surface:
+def _split_pair(surface: Surface, edges: Edges, pair: Indices) -> Surface:
     """The two faces of a pair of half-edges halved by a new vertex in the middle of their edge."""
     middle = surface.vertices[[edges.starts[pair[0]], edges.ends[pair[0]]]].mean(axis=0)
     faces = np.concatenate([surface.faces, surface.faces[pair // 3]])
@@ -146,6 +146,6 @@ def _next(half_edges: Indices) -> Indices:
     return half_edges - half_edges % 3 + (half_edges + 1) % 3
 
 
-def point(position: Floats) -> str:
+def format_point(position: Floats) -> str:
     """A position for a message."""
     return "({:.4g}, {:.4g}, {:.4g})".format(*position)

@@ -5,9 +5,9 @@ from functools import cache
 import manifold3d as m3
 import numpy as np
 
-from machine.gcode import write_gcode
-from machine.moves import MachineProgram
-from machine.plan import plan
+from machine.gcode.writer import write_gcode
+from machine.planning.moves import MachineProgram
+from machine.planning.plan import plan
 from mdp.clearance import allowed_poses
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh

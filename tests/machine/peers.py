@@ -16,9 +16,9 @@ import pytest
 import serial
 import serial.rfc2217
 
-from machine.link import answer
-from machine.link.firmware import Firmware
+from machine.link import identification
 from machine.link.port import Port
+from machine.simulator.firmware import SimulatedFirmware
 
 RATES = {getattr(termios, f"B{rate}"): rate for rate in (9600, 57600, 115200, 230400, 1000000)}
 Answer = Callable[[bytes, int], bytes]  # what is received, baud rate that the host has set -> what is answered
@@ -69,7 +69,7 @@ def _said(line: str, words: dict[str, str], otherwise: str) -> str:
 
 
 @contextmanager
-def on_socket(firmware: Firmware) -> Iterator[str]:
+def on_socket(firmware: SimulatedFirmware) -> Iterator[str]:
     """The socket:// address of a firmware that is as fast as possible; one host after the other."""
     server = socket.create_server(("localhost", 0))
 
@@ -187,11 +187,11 @@ class Ear:
 
 def hear_out(monkeypatch: pytest.MonkeyPatch, asker: ModuleType, *mute: str) -> None:
     """Let a module ask its ports once, with an ear; mute: ports at which nothing will be said, which are given up soon."""
-    monkeypatch.setattr(answer, "monotonic", Ear.now_s)
-    monkeypatch.setattr(answer, "ASK_S", 10 * PATIENCE_S)
-    monkeypatch.setattr(answer, "POSITION_S", PATIENCE_S)
-    monkeypatch.setattr(answer, "QUICK_S", 0.1 if mute else PATIENCE_S)
-    asked = answer.ask_at_any_rate
+    monkeypatch.setattr(identification, "monotonic", Ear.now_s)
+    monkeypatch.setattr(identification, "ASK_S", 10 * PATIENCE_S)
+    monkeypatch.setattr(identification, "POSITION_S", PATIENCE_S)
+    monkeypatch.setattr(identification, "QUICK_S", 0.1 if mute else PATIENCE_S)
+    asked = identification.ask_at_any_rate
 
     def patiently(port: Port, baud: int, _patience_s: float = 0.0, over: threading.Event | None = None) -> object:
         return asked(Ear(port), baud, 0.1 if port.name in mute else PATIENCE_S, over)  # type: ignore[arg-type]

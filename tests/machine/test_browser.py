@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from machine.app.pipeline import Program
-from machine.app.view.live import served
-from machine.app.view.page import parts_page, print_page
 from machine.dryrun.dryrun import dry_run
-from machine.link.events import Temperature
 from machine.link.progress import Progress
+from machine.link.protocol.events import Temperature
+from machine.view.live import serve
+from machine.view.page import parts_page, print_page
+from machine.view.program import Program
 from profiles.profile import load
 from tests.machine import hand
 from tests.machine.browser import CHROMIUM, Browser
@@ -374,7 +374,7 @@ def test_without_webgl_the_report_is_shown_and_a_sentence_says_why(tmp_path: Pat
 
 
 def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.app.view.live.LAST_WORD_S", 0.0)
+    monkeypatch.setattr("machine.view.live.LAST_WORD_S", 0.0)
     profile, printed = program()
     line = int(printed.run.program.line[40])
     heat = Temperature(nozzle_c=209.6, nozzle_target_c=210.0)
@@ -382,7 +382,7 @@ def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.Monke
         sent=60, acknowledged=50, total=100, elapsed_s=10.0, left_s=61.0, share=0.5,
         temperature=heat, part=2, parts=2, layer=7, file_line=line,
     )  # fmt: skip
-    with served(print_page("post and arm", printed, profile, live=True)) as watched:
+    with serve(print_page("post and arm", printed, profile, live=True)) as watched:
         watched.follow(now)
         browser.open(watched.address)
         browser.wait("Number(document.getElementById('position').value) === 40")

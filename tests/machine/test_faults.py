@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from machine.dryrun import dry_run
-from machine.gcode import write_gcode
-from machine.moves import BeginPart, MachineProgram
-from machine.plan import plan
+from machine.gcode.writer import write_gcode
+from machine.planning.moves import BeginPart, MachineProgram
+from machine.planning.plan import plan
 from mdp.clearance import allowed_poses
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part

@@ -7,8 +7,11 @@ from pathlib import Path
 
 import manifold3d as m3
 import numpy as np
+import pytest
 
 from mdp.mesh import Mesh
+from mdp.read import read_mesh
+from profiles.errors import MeshError
 from tests.shapes import from_manifold
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -116,16 +119,25 @@ def threemf_mesh(mesh: Mesh) -> str:
     return f"<mesh><vertices>{points}</vertices><triangles>{faces}</triangles></mesh>"
 
 
-def threemf(path: Path, objects: dict[int, str], items: str, unit: str = "millimeter") -> Path:
-    """A 3MF package: the content of each object by its number, and the build's items as they stand in the file."""
+def threemf_model(objects: dict[int, str], items: str = "", unit: str = "millimeter") -> str:
+    """A model part: the content of each object by its number, and the build's items as they stand in the file."""
     resources = "".join(f'<object id="{number}" type="model">{content}</object>' for number, content in objects.items())
     core = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-    model = f'<model unit="{unit}" xmlns="{core}"><resources>{resources}</resources><build>{items}</build></model>'
+    production = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
+    start = f'<model unit="{unit}" xmlns="{core}" xmlns:p="{production}">'
+    return f"{start}<resources>{resources}</resources><build>{items}</build></model>"
+
+
+def threemf(
+    path: Path, objects: dict[int, str], items: str, unit: str = "millimeter", parts: dict[str, str] | None = None
+) -> Path:
+    """A 3MF package of a model part and others by their names."""
     relation = '<Relationship Target="/3D/a.model" Id="r" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>'
     relations = f'<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">{relation}</Relationships>'
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("_rels/.rels", relations)
-        archive.writestr("3D/a.model", model)
+        for name, text in {"3D/a.model": threemf_model(objects, items, unit), **(parts or {})}.items():
+            archive.writestr(name, text)
     return path
 
 
@@ -135,3 +147,19 @@ def written(path: Path, mesh: Mesh) -> Path:
         return threemf(path, {1: threemf_mesh(mesh)}, '<item objectid="1"/>')
     path.write_bytes({".stl": stl, ".off": off, ".obj": obj, ".ply": ply, ".glb": glb}[path.suffix](mesh))
     return path
+
+
+def save(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
+
+
+def refusal(path: Path, **arguments: float) -> str:
+    """The sentence that reading the file ends in; it names the file."""
+    with pytest.raises(MeshError) as caught:
+        read_mesh(path, **arguments)
+    sentence = str(caught.value)
+    assert sentence.startswith(f"{path}: ")
+    assert not sentence.endswith(".")
+    assert "\n" not in sentence
+    return sentence.removeprefix(f"{path}: ")

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from mdp.clearance import allowed_poses
 from mdp.head import Block, Body, bodies, corners
+from mdp.mesh import Floats
 from mdp.pose import Pose, rotation, shift, unit
 from profiles.machine import CradleBox, Machine
 from profiles.profile import load
@@ -23,7 +24,7 @@ def with_post(machine: Machine, y_mm: float, height_mm: float) -> Machine:
     return machine.model_copy(update={"cradle": [post]})
 
 
-def outline(body: Body) -> np.ndarray:
+def outline(body: Body) -> Floats:
     """Corners of a body of the head; of a ring those of 24-gons inside its discs, and 300 mm above them."""
     if isinstance(body, Block):
         return corners(body.min_mm, body.max_mm)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from mdp.cut import above, below, cut, mesh_of, solid_of
 from mdp.overhang import risky_above
 from mdp.plane import Plane
-from mdp.rules import Rules
+from mdp.search.problem import Problem
 from profiles.profile import load
 from tests import shapes
 from tests.mdp.solids import random_direction, random_solid
@@ -36,11 +36,13 @@ def test_a_plane_beside_the_solid_leaves_one_half_empty() -> None:
 
 @pytest.mark.parametrize("offset_mm", [8.0, 6.3, 11.71])
 def test_what_a_cut_leaves_risky_is_what_is_risky_on_the_part(offset_mm: float) -> None:
-    rules = Rules(shapes.tee(), load(settings=("process.self_supporting_angle_deg=20", "search.clearance=false")))
-    node = rules.cut(rules.root, Plane(np.array([0.8, 0.0, 0.6]), 18.0 + offset_mm))
+    problem = Problem(
+        shapes.tee(), load(settings=("process.self_supporting_angle_deg=20", "search.clearance=false", "search.objective=risky"))
+    )
+    node = problem.cut(problem.root, Plane(np.array([0.8, 0.0, 0.6]), 18.0 + offset_mm))
     assert node is not None
-    made = node.cuts[-1]
-    part = mesh_of(made.solid)
-    risky_mm2 = part.areas_mm2[risky_above(part, made.base, node.angle_deg)].sum()
-    assert made.residual_mm2 == pytest.approx(risky_mm2, rel=1e-9)
+    last = node.cuts[-1]
+    part = mesh_of(last.solid)
+    risky_mm2 = part.areas_mm2[risky_above(part, last.base, problem.terms.angle_deg)].sum()
+    assert last.residual_mm2 == pytest.approx(risky_mm2, rel=1e-9)
     assert risky_mm2 > 1.0

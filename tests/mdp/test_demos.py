@@ -10,7 +10,7 @@ from mdp.cut import solid_of
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.read import locate, read_mesh
-from mdp.search import decompose
+from mdp.search.search import decompose
 from profiles.profile import load
 from tests.checks import assert_closed
 from tools.make_demos import DEMOS, bar, cone_distance, main, smooth_union

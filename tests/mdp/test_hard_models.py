@@ -7,8 +7,8 @@ import pytest
 from mdp.cut import mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
-from mdp.read import floating
-from mdp.search import decompose
+from mdp.read import floating_pieces
+from mdp.search.search import decompose
 from profiles.profile import load
 from tests import shapes
 
@@ -63,14 +63,14 @@ def test_no_part_stands_on_air_where_a_piece_of_the_model_floats(least_mm2: int)
     assert "hang on too small an area" in found.notes[0]
 
 
-def test_pieces_that_float_are_told_and_voids_are_not() -> None:
+def test_pieces_that_float_are_reported_and_voids_are_not() -> None:
     block = m3.Manifold.cube((10, 10, 10), True).translate((0, 0, 5))
     high, higher = (block.translate((20, 0, z)) for z in (12.5, 40))
-    assert floating(mesh_of(block + high)) == (
+    assert floating_pieces(mesh_of(block + high)) == (
         "1 piece floats 12.5 mm above the platform on nothing: no cut changes that, only support can hold such",
     )
-    assert floating(mesh_of(block + high + higher))[0].startswith("2 pieces float at least 12.5 mm")
-    assert floating(shapes.hollow()) == floating(mesh_of(block + block.translate((20, 0, 0)))) == ()
+    assert floating_pieces(mesh_of(block + high + higher))[0].startswith("2 pieces float at least 12.5 mm")
+    assert floating_pieces(shapes.hollow()) == floating_pieces(mesh_of(block + block.translate((20, 0, 0)))) == ()
 
 
 def test_a_model_without_a_feasible_cut_is_one_part_and_every_candidate_has_its_reason() -> None:

@@ -71,6 +71,7 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
         ("process.support=some", 'process.support is "some": it must be one of "none", "auto"'),
         ("machine.name=5", "machine.name is 5: it must be a text"),
         ("machine.tilt.letter=Q", 'machine.tilt.letter is "Q": it must be one letter of ABCUVWIJK'),
+        ("machine.tilt.stepper=my stepper", 'machine.tilt.stepper is "my stepper": it must be a name of letters, digits and _'),
         ("machine.tilt.sign=2", "machine.tilt.sign is 2: it must be one of -1, 1"),
         ("machine.x.limits_mm=[1]", "machine.x.limits_mm is [1]: it must be a list of two numbers"),
         ("machine.tool_mm=[1,2]", "machine.tool_mm is [1, 2]: it must be a list of three numbers"),

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.gcode import write_gcode
+from machine.gcode.writer import write_gcode
 from machine.kinematics.table import machine_points
-from machine.moves import MachineProgram
+from machine.planning.moves import MachineProgram
 from mdp.pose import Pose
 from profiles.errors import ProfileError
 from profiles.profile import SECTIONS, load

@@ -13,9 +13,9 @@ from mdp.mesh import Floats, Mesh
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation, unit
 from profiles.profile import Profile, load
+from slicer.geometry.polygons import Polygons, clean
 from slicer.paths import Kind, SlicedPart
 from slicer.paths import Path as Stroke
-from slicer.polygons import Polygons, cleaned
 from slicer.section import sections
 from tests.shapes import from_manifold
 
@@ -51,7 +51,7 @@ def cut(mesh: Mesh, *planes: tuple[Sequence[float], float]) -> list[Part]:
 
 def section_at(mesh: Mesh, z_mm: float) -> Polygons:
     """The cleaned section at a height."""
-    return cleaned(sections(mesh, np.array([z_mm]))[0])
+    return clean(sections(mesh, np.array([z_mm]))[0])
 
 
 def of_kind(sliced: SlicedPart, *kinds: Kind) -> list[Stroke]:
@@ -92,4 +92,15 @@ def distances_mm(polygons: Polygons, points: Floats) -> Floats:
     """Distance of each point to the polygons' boundary, positive inside, by shapely."""
     area = as_shapely(polygons)
     away = shapely.distance(area.boundary, shapely.points(points))
-    return np.where(shapely.contains_xy(area, points), away, -away)
+    signed: Floats = np.where(shapely.contains_xy(area, points), away, -away)
+    return signed
+
+
+def ragged(seed: int) -> Polygons:
+    """A star with holes and an island in one of them."""
+    random = np.random.default_rng(seed)
+    turn = np.sort(random.uniform(0, 2 * np.pi, 25))
+    star = Polygons([np.column_stack([np.cos(turn), np.sin(turn)]) * random.uniform(8, 30, (25, 1))])
+    for place in random.uniform(-15, 15, (6, 2)):
+        star = star - Polygons.circle(random.uniform(1, 4), 12).translate(place)
+    return star + Polygons.circle(0.8, 8)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from mdp.decomposition import Part
 from profiles.errors import ProfileError
-from slicer.interlock import grooved, grooves
+from slicer.geometry.polygons import Polygons
+from slicer.interlock import cut_grooves, grooves
 from slicer.paths import Kind
-from slicer.polygons import Polygons
 from slicer.slice import slice_part
 from tests.shapes import box, branch
 from tests.slicer.hand import SOLID, as_shapely, cut, profile
@@ -15,11 +16,11 @@ DEEP = "process.interlock_mm=0.2"
 WIDTH = 0.45
 
 
-def stacked():
+def stacked() -> list[Part]:
     return cut(box(24, 24, 20), ((0, 0, 1), 10.0))
 
 
-def test_grooves_are_half_of_the_inside_and_keep_clear_of_the_walls():
+def test_grooves_are_half_of_the_inside_and_keep_clear_of_the_walls() -> None:
     area = as_shapely(grooves(stacked()[1], profile(DEEP).process))
     side = 24 - 2 * 5 * WIDTH
     assert area.area == pytest.approx(0.5 * side**2, rel=0.05)
@@ -27,7 +28,7 @@ def test_grooves_are_half_of_the_inside_and_keep_clear_of_the_walls():
     assert all(part.bounds[3] - part.bounds[1] <= 2 * WIDTH + 1e-4 for part in area.geoms)
 
 
-def test_what_one_part_leaves_out_the_next_one_fills_in():
+def test_what_one_part_leaves_out_the_next_one_fills_in() -> None:
     base, top = stacked()
     area = grooves(top, profile(DEEP).process).area()
     pairs = [(slice_part(base, p, later=[top]), slice_part(top, p, [base])) for p in (profile(*SOLID), profile(*SOLID, DEEP))]
@@ -36,7 +37,7 @@ def test_what_one_part_leaves_out_the_next_one_fills_in():
     assert rich.volume_mm3 - smooth.volume_mm3 == pytest.approx(0.2 * area * 1.05, rel=0.1)
 
 
-def test_the_tip_stays_at_its_height_and_only_the_first_layer_is_richer():
+def test_the_tip_stays_at_its_height_and_only_the_first_layer_is_richer() -> None:
     base, top = stacked()
     plain, rich = (slice_part(top, profile(*s), [base]).layers for s in (SOLID, (*SOLID, DEEP)))
     assert [lay.z_mm for lay in rich] == [lay.z_mm for lay in plain]
@@ -45,18 +46,18 @@ def test_the_tip_stays_at_its_height_and_only_the_first_layer_is_richer():
     assert sum(rich[1].volume_mm3(p) for p in rich[1].paths) == pytest.approx(sum(plain[1].volume_mm3(p) for p in plain[1].paths))
 
 
-def test_grooves_of_a_leaning_part_lie_just_below_its_base_plane():
+def test_grooves_of_a_leaning_part_lie_just_below_its_base_plane() -> None:
     base, arm = cut(branch(), ((np.sin(np.pi / 3), 0, 0.5), 14.0))
     cuts = np.arange(0.1, 40, 0.2)
     whole = [Polygons.square((80, 80), True)] * len(cuts)
     process = profile(DEEP).process
-    for z, left in zip(cuts, grooved(whole, base, [arm], cuts, process), strict=True):
+    for z, left in zip(cuts, cut_grooves(whole, base, [arm], cuts, process), strict=True):
         gone = whole[0] - left
         for x, _ in np.concatenate([*gone.to_polygons(), np.zeros((0, 2))]):
             assert abs(x * np.sin(np.pi / 3) + 0.5 * z - 14.0) < 0.2 + 1e-6
-    assert sum((whole[0] - left).area() for left in grooved(whole, base, [arm], cuts, process)) > 1.0
+    assert sum((whole[0] - left).area() for left in cut_grooves(whole, base, [arm], cuts, process)) > 1.0
 
 
-def test_a_bead_of_no_more_than_its_width_fills_a_groove():
+def test_a_bead_of_no_more_than_its_width_fills_a_groove() -> None:
     with pytest.raises(ProfileError, match=r"interlock_mm is 0.3 mm: at most line_width_mm less layer_height_mm \(0.25 mm\)"):
         profile("process.interlock_mm=0.3")

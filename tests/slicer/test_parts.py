@@ -3,14 +3,14 @@
 import pytest
 
 from profiles.errors import SliceError
-from slicer.parts import _worthwhile, slice_parts
+from slicer.parts import _process_count, slice_parts
 from tests.shapes import box
 from tests.slicer.hand import content, cut, profile
 
 PLANES = (((0.0, 0.0, 1.0), 16.0), ((0.0, 0.0, 1.0), 8.0))
 
 
-def test_processes_side_by_side_give_the_same_bytes_as_one_after_the_other():
+def test_processes_side_by_side_give_the_same_bytes_as_one_after_the_other() -> None:
     parts = cut(box(10, 10, 24), *PLANES)
     alone, together = (slice_parts(parts, profile(), processes=k) for k in (1, 2))
     assert [piece.index for piece in together] == [1, 2, 3]
@@ -18,22 +18,22 @@ def test_processes_side_by_side_give_the_same_bytes_as_one_after_the_other():
 
 
 @pytest.mark.parametrize("processes", [1, 2])
-def test_progress_rises_to_all_layers(processes):
-    told: list[tuple[int, int, int, int]] = []
-    sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), lambda *each: told.append(each), processes)
-    layers = [each[2] for each in told]
+def test_progress_rises_to_all_layers(processes: int) -> None:
+    reports: list[tuple[int, int, int, int]] = []
+    sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), lambda *each: reports.append(each), processes)
+    layers = [each[2] for each in reports]
     assert layers == sorted(layers)
-    assert told[-1][:3] == (3, 3, sum(len(piece.layers) for piece in sliced))
-    assert told[-1][3] == pytest.approx(layers[-1], abs=3)
+    assert reports[-1][:3] == (3, 3, sum(len(piece.layers) for piece in sliced))
+    assert reports[-1][3] == pytest.approx(layers[-1], abs=3)
 
 
 @pytest.mark.parametrize("processes", [1, 2])
-def test_a_part_that_gives_no_path_is_told_from_any_process(processes):
+def test_a_part_that_gives_no_path_is_told_from_any_process(processes: int) -> None:
     nothing = profile("process.walls=0", "process.infill_density=0", "process.top_layers=0", "process.bottom_layers=0")
     with pytest.raises(SliceError, match="part 1 gives no path at all"):
         slice_parts(cut(box(10, 10, 24), *PLANES), nothing, processes=processes)
 
 
-def test_a_single_part_and_few_layers_are_sliced_here():
-    assert _worthwhile(1, 10**6) == 1
-    assert _worthwhile(5, 10) == 1
+def test_a_single_part_and_few_layers_are_sliced_here() -> None:
+    assert _process_count(1, 10**6) == 1
+    assert _process_count(5, 10) == 1

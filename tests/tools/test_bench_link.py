@@ -5,23 +5,23 @@ from collections.abc import Iterator
 
 import pytest
 
-from machine.link.framing import frame
-from machine.link.habits import Habits
 from machine.link.medium import Medium
+from machine.link.protocol.framing import frame
 from machine.link.stream import print_lines
+from machine.simulator.board import BuildOptions
 from tools.bench_link import LINE_BYTES, Echo, resting, used
 
 
 @pytest.mark.parametrize(("baud", "rate"), [(115200, 183), (250000, 397)])
 def test_a_window_uses_all_that_the_line_carries_and_overfills_nothing(baud: int, rate: int) -> None:
-    lines_s, share, repeated, lost = used(resting(600), baud, Habits(rx_ring=128), terminal=False)
+    lines_s, share, repeated, lost = used(resting(600), baud, BuildOptions(rx_ring=128), terminal=False)
     assert lines_s == pytest.approx(rate, rel=0.01)
     assert (share > 0.99, repeated, lost) == (True, 0, 0)
 
 
 @pytest.mark.parametrize(("baud", "rate"), [(115200, 148), (250000, 275)])
 def test_one_line_at_a_time_is_no_slower_than_other_senders(baud: int, rate: int) -> None:
-    lines_s, _, repeated, _ = used(resting(600), baud, Habits(advanced_ok=False, rx_ring=128), terminal=False)
+    lines_s, _, repeated, _ = used(resting(600), baud, BuildOptions(advanced_ok=False, rx_ring=128), terminal=False)
     assert lines_s > rate
     assert repeated == 0
 

@@ -5,12 +5,12 @@ from math import inf
 import numpy as np
 import pytest
 
-from machine.link.faults import Fault, FaultScript
-from machine.link.firmware import Habits
-from machine.link.framing import frame
+from machine.link.protocol.framing import frame
+from machine.link.protocol.window import Window
 from machine.link.stream import print_lines
-from machine.link.virtual import PATH, EndlessError, VirtualPrinter
-from machine.link.window import Window
+from machine.simulator.board import BuildOptions
+from machine.simulator.faults import Fault, FaultScript
+from machine.simulator.virtual import PATH, EndlessError, VirtualPrinter
 from profiles.errors import PortError
 from profiles.profile import load
 from tools import fault_campaign
@@ -79,7 +79,7 @@ def test_a_host_that_waits_for_ever_is_stopped() -> None:
 @pytest.mark.parametrize("dialect", ["marlin", "klipper", "reprapfirmware"])
 def test_a_printer_that_never_reads_again_ends_the_print_over_a_new_wire_too(dialect: str) -> None:
     profile, blocked = load(settings=[f"machine.dialect={dialect}"]), FaultScript((Fault("block", 60, seconds=inf),))
-    printer = VirtualPrinter(profile.machine, Habits(rx_ring=None), blocked, most_s=900.0)
+    printer = VirtualPrinter(profile.machine, BuildOptions(rx_ring=None), blocked, most_s=900.0)
     with pytest.raises(PortError, match=r"has stopped reading: it took no bytes for 10 s.*heaters may still be on"):
         print_lines(program(2000), PATH, medium=printer.medium, profile=profile)
 

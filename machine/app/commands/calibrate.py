@@ -1,0 +1,130 @@
+"""The calibrate command: writes the program and the sheet, works out the numbers, saves them in the user's own profile."""
+
+from pathlib import Path
+
+from machine.app.commands.calibrate_dialogue import ask_touches
+from machine.app.output import check_writable, write_bytes, write_lines
+from machine.app.requests import CalibrationRequest
+from machine.app.terminal.report import show
+from machine.calibration.fit import Calibration, calibrate
+from machine.calibration.program import calibration_lines, course
+from machine.calibration.saved import found_tables, own_profile
+from machine.calibration.sheet import Sheet, read_sheet, sheet_text
+from profiles.errors import OutputError, ProfileError
+from profiles.machine import Machine
+from profiles.places import own_folder
+from profiles.profile import Profile, load_one
+
+MOST_OFF_MM = 0.5
+MARK_HEIGHT_MM = 20.0
+
+
+def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> int:
+    """Write the G-code and, beside it, the sheet to fill in."""
+    sheet = out.with_suffix(".toml")
+    for file in (out, sheet):
+        check_writable(file)
+        _refuse_to_overwrite(file, request.replace)
+    height = _mark_height_mm(request)
+    touches = course(profile.machine, height, request.mark_radius_mm)
+    write_lines(out, calibration_lines(profile, touches))
+    write_bytes(sheet, sheet_text(request.machine, profile.machine, touches).encode())
+    radius = touches.mark_mm[0]
+    show(
+        f"fix a pointed mark, {height:g} mm high, {radius:g} mm from the middle of the plate\n"
+        f"run {out}: it takes the cold nozzle to the mark at {len(touches.poses)} poses\n"
+        f"each time bring the tip onto the mark, note X Y Z in {sheet}, then go on\n"
+        f"then: tiltprint calibrate --machine {request.machine} --measured {sheet}\n"
+    )
+    return 0
+
+
+def evaluate_sheet(request: CalibrationRequest, measured: Path) -> int:
+    """Find signs, zeros and centres from a filled sheet, tell them and save them."""
+    machine, name = _tilting(request), request.machine
+    sheet = read_sheet(measured, request.mark_height_mm)
+    if sheet.machine not in (None, name):
+        raise ProfileError(f"{measured} is a sheet of {sheet.machine}: --machine {sheet.machine} is expected, not {name}")
+    calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
+    show(_comparison(machine, calibration, sheet.mark_angle_deg is not None))
+    if calibration.rms_mm > MOST_OFF_MM and not request.force:
+        raise ProfileError(
+            f"{_off(calibration)}, at most {MOST_OFF_MM:g} mm is taken without --force: look at touch {calibration.worst} first"
+        )
+    _save(request, machine, calibration, sheet)
+    return 0
+
+
+def ask_for_touches(request: CalibrationRequest) -> int:
+    """Ask a person for the touches one by one, tell what follows from them, save it."""
+    machine, name = _tilting(request), request.machine
+    _refuse_to_overwrite(own_profile(request.save or Path(name).stem, name, {})[0], request.replace)
+    accepted: list[Calibration] = []
+
+    def judge(sheet: Sheet) -> str | int | None:
+        try:
+            calibration = calibrate(machine, sheet.touches, sheet.mark_height_mm, sheet.mark_angle_deg)
+        except ProfileError as error:  # the person is asked again
+            return str(error)
+        show(_comparison(machine, calibration, sheet.mark_angle_deg is not None))
+        if calibration.rms_mm > MOST_OFF_MM and not request.force:
+            show(f"{_off(calibration)}, at most {MOST_OFF_MM:g} mm is taken without --force\n")
+            return calibration.worst
+        accepted.append(calibration)
+        return None
+
+    sheet = ask_touches(name, machine, _mark_height_mm(request), request.mark_radius_mm, judge)
+    _save(request, machine, accepted[-1], sheet)
+    return 0
+
+
+def _mark_height_mm(request: CalibrationRequest) -> float:
+    return MARK_HEIGHT_MM if request.mark_height_mm is None else request.mark_height_mm
+
+
+def _tilting(request: CalibrationRequest) -> Machine:
+    machine = load_one(request.machine, request.settings).get("machine")
+    if not isinstance(machine, Machine):
+        raise ProfileError(f"{request.machine} is not a machine profile")
+    if not machine.tilts:
+        raise ProfileError(f"{machine.name} has three axes: there is no rotary axis to calibrate")
+    return machine
+
+
+def _off(calibration: Calibration) -> str:
+    return f"the touches are {calibration.rms_mm:.2f} mm off on average"
+
+
+def _save(request: CalibrationRequest, machine: Machine, calibration: Calibration, sheet: Sheet) -> None:
+    """The found numbers in the user's own profile, and the file before beside it."""
+    tables = found_tables(machine, calibration, sheet.mark_angle_deg is not None)
+    file, text = own_profile(request.save or Path(request.machine).stem, request.machine, tables)
+    _refuse_to_overwrite(file, request.replace)
+    own_folder("machine").mkdir(parents=True, exist_ok=True)
+    if file.exists():
+        write_bytes(file.with_suffix(".toml.before"), file.read_bytes())
+    write_bytes(file, text.encode())
+    show(f"saved: {file}; use it as --machine {file.stem}\n")
+
+
+def _comparison(before: Machine, calibration: Calibration, zero_of_turn: bool) -> str:
+    """The found numbers beside the profile's, and how far the touches are off."""
+    lines = []
+    for axis in ("tilt", "turn"):
+        old, new = getattr(before, axis), getattr(calibration.machine, axis)
+        sigma = max(value for key, value in calibration.sigma.items() if key.startswith(f"{axis}.point_mm"))
+        place = " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", new.point_mm, strict=True))
+        was = " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", old.point_mm, strict=True))
+        lines.append(f"{axis} {new.letter}: through {place} (+-{sigma:.3f} mm), was {was}")
+        lines.append(f"{axis} {new.letter}: sign {new.sign}, was {old.sign}")
+        if axis == "tilt" or zero_of_turn:
+            lines.append(f"{axis} {new.letter}: zero {new.zero_deg:.4f} deg, was {old.zero_deg:g}")
+    touches, mean_mm = len(calibration.residuals_mm), calibration.rms_mm
+    most = f"most at touch {calibration.worst}: {max(calibration.residuals_mm):.4f} mm"
+    lines.append(f"touches: {touches}, {mean_mm:.4f} mm off on average, {most}")
+    return "\n".join(lines) + "\n"
+
+
+def _refuse_to_overwrite(file: Path, replace: bool) -> None:
+    if file.exists() and not replace:
+        raise OutputError(f"{file} exists: --replace writes over it, another name leaves it")

@@ -1,0 +1,307 @@
+"""Console: a person, or a pipe, talks to a printer line by line: what is typed is sent, what it says is shown."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections import deque
+from contextlib import ExitStack, suppress
+from math import inf
+from typing import TYPE_CHECKING
+
+from machine.app.output import check_writable
+from machine.app.printer.command_session import CommandSession, LeftError, StopError
+from machine.app.printer.compatibility import check_speed, describe_answer, identify_printer
+from machine.app.printer.serial_log import TappedWire, new_log
+from machine.app.requests import SIMULATED, ConsoleRequest
+from machine.app.state_folder import state_folder
+from machine.app.terminal.interrupts import calling, interrupting
+from machine.app.terminal.progress import say
+from machine.firmware import dialect_of
+from machine.link.port import open_port
+from machine.link.protocol.events import (
+    Action,
+    Banner,
+    Busy,
+    Echo,
+    Event,
+    FirmwareFault,
+    LineError,
+    Ok,
+    Resend,
+    Start,
+    Temperature,
+    read_event,
+)
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import LocalProtocolError, PrinterError
+
+if TYPE_CHECKING:
+    from prompt_toolkit import PromptSession
+    from prompt_toolkit.application import Application
+
+PROMPT = "> "
+AT_ONCE_S = 0.5
+HELP = """What you type is sent, one line after the other is answered. Besides:
+  /help     this
+  /reports  show or hide temperature reports
+  /stop     emergency stop (M112) at once, even while a command is under way
+  /quit     leave; Ctrl-D and Ctrl-C do too
+"""
+DIM, RED, YELLOW, CYAN = "2", "31", "33", "36"
+COLOURS: dict[type[Event], str] = {
+    Ok: DIM,
+    Busy: DIM,
+    Temperature: CYAN,
+    Echo: YELLOW,
+    Action: YELLOW,
+    Start: YELLOW,
+    Banner: YELLOW,
+    LineError: RED,
+    Resend: RED,
+    FirmwareFault: RED,
+}
+
+
+def console(request: ConsoleRequest) -> int:
+    """Talk to a printer until the person leaves (0; 130 after Ctrl-C) or the pipe ends (1 when a command was not known)."""
+    check_speed(request.sim_speed)
+    if request.log is not None:
+        check_writable(request.log)
+    machine, port = request.profile.machine, request.port
+    with ExitStack() as stack:
+        simulated = port == SIMULATED
+        path = stack.enter_context(SimulatedPrinter(machine, request.sim_speed or inf)).path if simulated else port
+        log = stack.enter_context(new_log("console", f"console at {port}", request.log))
+        wire = stack.enter_context(open_port(path, request.baud))
+        if log.trouble:
+            say(f"the traffic is not logged: {log.file}: {log.trouble}")
+        stack.enter_context(interrupting())
+        shown = Shown(request.reports)
+
+        def tell(direction: str, data: bytes) -> None:
+            log.note(direction, data)
+            if direction == "<":
+                shown.hear(data)
+
+        hint = "; /help tells what can be typed" if sys.stdin.isatty() else ""
+        say(describe_answer(identify_printer(wire, request.baud), request.baud) + hint)
+        session = CommandSession(TappedWire(wire, tell), dialect_of(machine).longest_line)
+        return _Console(session, shown, request.leave_heaters).run()
+
+
+class _Console:
+    """One console from the greeting to a safe end."""
+
+    def __init__(self, session: CommandSession, shown: Shown, leave_heaters: bool) -> None:
+        self._session, self._shown, self._leave_heaters = session, shown, leave_heaters
+        self._waiting: deque[str] = deque()
+        self._done = threading.Event()
+        self._error: Exception | None = None
+        self._interrupted = False
+
+    def run(self) -> int:
+        """The exit code; raises PrinterError."""
+        typed, code = sys.stdin.isatty(), 0
+        try:
+            self._session.greet()
+            self._shown.quiet = False
+            (self._typed if typed else self._piped)()
+        except KeyboardInterrupt:
+            code = 130
+        except StopError:
+            raise self._session.stop() from None
+        except PrinterError as error:
+            raise type(error)(f"{error}{self._given_up()}") from None
+        try:
+            self._leave(ask=typed and not code)
+        except KeyboardInterrupt:
+            say("left at once: heaters may still be on, look at the printer")
+            raise
+        if self._session.unknown and not typed:
+            raise PrinterError(f"the printer did not know {', '.join(repr(line) for line in self._session.unknown[:5])}")
+        return code
+
+    def _piped(self) -> None:
+        """Every line of a pipe, one after the other."""
+        for line in sys.stdin:
+            if self._meant_for_us(line.strip()):
+                return
+            if not line.startswith("/"):
+                self._session.command(line)
+
+    def _typed(self) -> None:
+        """What a person types; a thread of its own keeps listening meanwhile."""
+        from prompt_toolkit.patch_stdout import patch_stdout
+
+        prompt = _prompt_session()
+        worker = threading.Thread(target=self._serve, args=(prompt.app,), name="console", daemon=True)
+        worker.start()
+        try:
+            with patch_stdout(raw=True):
+                self._read_on(prompt)
+        finally:
+            self._part_from(worker)
+            if self._waiting:
+                say(f"not sent any more: {', '.join(self._waiting)}")
+        if self._error is not None:
+            raise self._error
+
+    def _part_from(self, worker: threading.Thread) -> None:
+        """Let the other thread end whatever interrupts: two must not talk at the same time."""
+        while worker.is_alive():
+            with suppress(KeyboardInterrupt):
+                self._session.order(LeftError)
+                worker.join()
+
+    def _read_on(self, prompt: PromptSession[str]) -> None:
+        while self._error is None:
+            try:
+                line = self._read_line(prompt)
+            except EOFError:
+                if not sys.stdin.isatty():  # the terminal was closed: its end can be read before its signal comes
+                    raise KeyboardInterrupt from None
+                return
+            if self._meant_for_us(line):
+                return
+            if line and not line.startswith("/"):
+                self._hand_over(line)
+
+    def _read_line(self, prompt: PromptSession[str]) -> str:
+        """What is typed at the prompt. Raises EOFError, and KeyboardInterrupt when the prompt has put everything in order."""
+        with calling(lambda: self._interrupt(prompt.app)):
+            line = prompt.prompt(PROMPT, pre_run=lambda: self._end_prompt(prompt.app)).strip()
+        if self._interrupted:
+            raise KeyboardInterrupt
+        return line
+
+    def _interrupt(self, app: Application[str]) -> None:
+        self._interrupted = True
+        if app.loop is None:  # the prompt has not begun, or is over
+            raise KeyboardInterrupt
+        self._call_prompt(app)
+
+    def _call_prompt(self, app: Application[str]) -> None:
+        """Have the prompt look whether it must end."""
+        loop = app.loop
+        if loop is not None:
+            with suppress(RuntimeError):  # the prompt has just ended, and its loop with it
+                loop.call_soon_threadsafe(self._end_prompt, app)
+
+    def _end_prompt(self, app: Application[str]) -> None:
+        """Leave the prompt for an interrupt or an error of the other thread, also one that came before it could hear of it."""
+        if (self._interrupted or self._error is not None) and app.is_running and not app.is_done:
+            app.exit(exception=KeyboardInterrupt if self._interrupted else EOFError)
+
+    def _hand_over(self, line: str) -> None:
+        """Let the thread send a line; what is answered at once comes before the next prompt, what takes longer above it."""
+        self._done.clear()
+        self._waiting.append(line)
+        self._done.wait(AT_ONCE_S)
+
+    def _serve(self, app: Application[str]) -> None:
+        try:
+            while True:
+                if not self._waiting:
+                    self._session.listen()
+                    continue
+                try:
+                    self._session.command(self._waiting.popleft())
+                except LocalProtocolError as error:
+                    self._shown.write(str(error))
+                self._done.set()
+        except LeftError:
+            return
+        except (PrinterError, StopError) as error:
+            self._error = error
+            self._done.set()
+            self._call_prompt(app)
+
+    def _meant_for_us(self, line: str) -> bool:
+        """Do what a line with a slash means; True when it means to leave."""
+        word = line.lower()
+        if word == "/stop" or word.split(" ")[0].split("*")[0] == "m112":
+            raise StopError
+        if word == "/reports":
+            self._shown.reports = not self._shown.reports
+            self._shown.write(f"temperature reports are {'shown' if self._shown.reports else 'hidden'}")
+        elif word == "/help":
+            self._shown.write(HELP.rstrip())
+        elif word.startswith("/") and word != "/quit":
+            self._shown.write(f"{line} is not known: /help, /reports, /stop and /quit are")
+        return word == "/quit"
+
+    def _leave(self, ask: bool) -> None:
+        """Tell which heaters are on, and switch them off unless told otherwise."""
+        self._shown.quiet = True
+        try:
+            heated = self._session.heated()
+            if not heated:
+                return
+            if self._leave_heaters or (ask and not _agreed(f"{heated}: switch off? [Y/n] ")):
+                say(f"left on: {heated}")
+                return
+            off = self._session.switch_off()
+        except PrinterError as error:
+            raise type(error)(f"{error}{self._given_up()}") from None
+        if not off:
+            raise PrinterError(f"the printer did not confirm that its heaters are off ({heated}): look at it")
+        say(f"switched off: {heated}")
+
+    def _given_up(self) -> str:
+        """After an error: heaters off where that is wanted; what became of it, in words."""
+        self._shown.quiet = True
+        if self._leave_heaters or not self._session.exchange.greeted:
+            return ""
+        return "" if self._session.give_up() else "; its heaters may still be on, look at the printer"
+
+
+def _agreed(question: str) -> bool:
+    """Anything but a plain no agrees."""
+    try:
+        return not input(question).strip().lower().startswith("n")
+    except (EOFError, KeyboardInterrupt):
+        return True
+
+
+def _prompt_session() -> PromptSession[str]:
+    """A prompt that knows the lines typed in earlier consoles, by the arrow keys, and leaves its own for later ones."""
+    from prompt_toolkit import PromptSession
+    from prompt_toolkit.history import FileHistory
+    from prompt_toolkit.output.defaults import create_output
+
+    output = create_output()
+    setattr(output, "enable_cpr", False)  # noqa: B010 - only menus need to know where the cursor stands, and not all terminals tell
+    return PromptSession(history=FileHistory(str(state_folder() / "console_lines")), output=output)
+
+
+class Shown:
+    """Prints what the printer says, line by line; on a terminal in colours, and around the line that is being typed."""
+
+    def __init__(self, reports: bool) -> None:
+        self.reports = reports
+        self.quiet = True
+        self._half = b""
+        self._colours = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+
+    def hear(self, data: bytes) -> None:
+        """Take what was received."""
+        *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
+        self._half = self._half[-4096:]
+        for line in lines:
+            if line.strip() and not self.quiet:
+                self._show(line)
+
+    def _show(self, line: bytes) -> None:
+        event = read_event(line)
+        if isinstance(event, Temperature) and not self.reports:
+            return
+        text = "".join(c if c.isprintable() else "?" for c in line.decode("ascii", "replace"))
+        colour = COLOURS.get(type(event))
+        self.write(f"\x1b[{colour}m{text}\x1b[0m" if colour and self._colours else text)
+
+    def write(self, text: str) -> None:
+        """One line; while a person types prompt_toolkit puts it above the line that is being typed."""
+        sys.stdout.write(f"{text}\n")
+        sys.stdout.flush()

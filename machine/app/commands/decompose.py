@@ -1,0 +1,60 @@
+"""The decompose command: a model's parts as files, pictures and a table."""
+
+from pathlib import Path
+
+from machine.app.output import STDOUT, check_outputs, make_folder, write_bytes, write_json
+from machine.app.pictures.picture import contact_sheet, parts_picture
+from machine.app.pictures.png import write_png
+from machine.app.pipeline.pipeline import decompose_model
+from machine.app.pipeline.precompile import compile_pictures
+from machine.app.pipeline.priced_front import price_front
+from machine.app.requests import ModelRequest, Outputs
+from machine.app.terminal.report import parts_table, show
+from machine.view.page import parts_page
+from mdp.decomposition import Decomposition
+from mdp.plan_file import plan_text
+from mdp.save import json_values, part_file, stl, threemf
+from profiles.profile import Profile
+
+PLAN = "plan.toml"
+
+
+def decompose(request: ModelRequest) -> int:
+    """Find the parts of a model and save what is asked for."""
+    outputs, profile = request.outputs, request.profile
+    check_outputs(outputs)
+    decomposed = decompose_model(request)
+    decomposition = price_front(decomposed.decomposition, profile)
+    figures = json_values(decomposition, decomposed.read_s, decomposed.total_s)
+    if outputs.folder is not None:
+        make_folder(outputs.folder)
+        for part in decomposition.parts:
+            write_bytes(outputs.folder / part_file(part.index), stl(part.mesh))
+        write_bytes(outputs.folder / "decomposition.3mf", threemf(decomposition))
+        write_json(outputs.folder / "decomposition.json", figures)
+    for file in (outputs.plan, None if outputs.folder is None else outputs.folder / PLAN):
+        if file is not None and not _is_same(file, request.cuts.plan):
+            write_bytes(file, plan_text(decomposed.plan).encode())
+    _draw(outputs, decomposition, profile)
+    if outputs.html is not None:
+        write_bytes(outputs.html, parts_page(decomposition, profile))
+    if outputs.json is not None:
+        write_json(outputs.json, figures)
+    if outputs.json != STDOUT:
+        show(parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces))
+    return 0
+
+
+def _is_same(file: Path, plan: Path | None) -> bool:
+    """Whether a file is the plan that was cut by: it stays as the person left it."""
+    return plan is not None and file.resolve() == plan.resolve()
+
+
+def _draw(outputs: Outputs, decomposition: Decomposition, profile: Profile) -> None:
+    png, sheet = outputs.png, outputs.sheet
+    if png is not None or sheet is not None:
+        compile_pictures()
+    if png is not None:
+        write_png(png, parts_picture(decomposition, profile))
+    if sheet is not None:
+        write_png(sheet, contact_sheet(decomposition, profile.machine))

@@ -1,0 +1,44 @@
+"""The export command: a model's G-code, dry-run first."""
+
+from machine.app.output import STDOUT, check_outputs, write_bytes, write_json, write_lines
+from machine.app.pictures.layer import draw_layer, parse_layer
+from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
+from machine.app.pipeline.pipeline import build, decompose_model
+from machine.app.pipeline.programs import refuse_errors
+from machine.app.requests import ModelRequest
+from machine.app.terminal.progress import say
+from machine.app.terminal.report import run_table, show
+from machine.dryrun.dryrun import summary
+from machine.view.page import print_page
+from profiles.errors import OutputError
+
+
+def export(request: ModelRequest) -> int:
+    """Write a model's G-code, and one layer's picture where asked; refused when its dry run finds an error, unless forced.
+
+    Where the G-code goes to standard output the table goes to stderr.
+    """
+    outputs, profile = request.outputs, request.profile
+    if outputs.gcode == outputs.json == STDOUT:
+        raise OutputError("-o - and --json -: only one of them can go to standard output")
+    check_outputs(outputs)
+    part, layer = parse_layer(outputs.layer, outputs.svg is not None)
+    program = build(decompose_model(request, to_build=True).decomposition, profile, pictures=True)
+    refuse_errors(program, request.force)
+    picture = b"" if outputs.svg is None else draw_layer(program.sliced, part, layer)
+    if outputs.gcode is not None:
+        write_lines(outputs.gcode, program.lines)
+    if outputs.svg is not None:
+        write_bytes(outputs.svg, picture)
+    alternatives = compare_with_one_part(program, profile) if request.compare else ()
+    if outputs.html is not None:
+        write_bytes(outputs.html, print_page(request.name, program, profile, alternatives=alternatives))
+    if outputs.json is not None:
+        comparison = {"compare": alternatives_json(alternatives)} if alternatives else {}
+        write_json(outputs.json, summary(program.run) | comparison)
+    table = run_table(program.run) + (compare_table(alternatives) if alternatives else "")
+    if outputs.gcode == STDOUT:
+        say(table.removesuffix("\n"))
+    elif outputs.json != STDOUT:
+        show(table)
+    return 0

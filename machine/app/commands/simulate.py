@@ -1,0 +1,47 @@
+"""The simulate command: the dry run of a model or a G-code file, its plastic held against the model."""
+
+from dataclasses import asdict, replace
+
+from machine.app.output import STDOUT, check_outputs, write_bytes, write_json
+from machine.app.pipeline.programs import load_program
+from machine.app.requests import ModelRequest
+from machine.app.terminal.report import agreement_line, run_table, show
+from machine.dryrun.agreement import agreement
+from machine.dryrun.dryrun import summary
+from machine.dryrun.starvation import check_baud, find_starvation
+from machine.view.page import print_page
+from mdp.read import check_file, locate, read_mesh
+from profiles.errors import ProfileError
+
+
+def simulate(request: ModelRequest, reference: str | None = None, baud: int | None = None) -> int:
+    """Dry-run a model or a G-code file; 1 when a finding is an error.
+
+    reference: the model that a G-code file's plastic is held against. baud: of a line whose speed is judged too.
+    """
+    outputs = request.outputs
+    check_outputs(outputs)
+    if baud is not None:
+        check_baud(baud)
+    if reference is not None:
+        if not request.is_gcode:
+            raise ProfileError(f"--model {reference}: {request.model} is a model itself; --model goes with a G-code file")
+        check_file(locate(reference))
+    loaded = load_program(request)
+    program, profile = loaded.program, loaded.profile
+    mesh = None if program.decomposition is None else program.decomposition.mesh
+    if reference is not None:
+        mesh, _ = read_mesh(locate(reference), profile.process.scale, profile.process.rotate_deg)
+    agreed = None
+    if mesh is not None:
+        agreed, run = agreement(program.run, mesh, profile)
+        program = replace(program, run=run)
+    if baud is not None:
+        program = replace(program, run=find_starvation(program.run, program.lines, profile.machine, baud))
+    if outputs.html is not None:
+        write_bytes(outputs.html, print_page(request.name, program, profile, loaded.machine_known))
+    if outputs.json is not None:
+        write_json(outputs.json, summary(program.run) | ({} if agreed is None else {"model": asdict(agreed)}))
+    if outputs.json != STDOUT:
+        show(run_table(program.run) + ("" if agreed is None else agreement_line(agreed)))
+    return 1 if program.run.errors else 0

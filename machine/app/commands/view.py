@@ -1,0 +1,55 @@
+"""The view command: a model or a G-code file as one HTML page."""
+
+import webbrowser
+from pathlib import Path
+
+from machine.app.output import check_writable, write_bytes
+from machine.app.pipeline.comparison import compare_with_one_part
+from machine.app.pipeline.programs import load_program
+from machine.app.requests import ModelRequest
+from machine.app.terminal.progress import say
+from machine.app.terminal.report import show
+from machine.view.findings import relevant_findings
+from machine.view.page import DATA, print_page
+from machine.view.program import Program
+from machine.view.thinning import MOST_ROWS
+from profiles.errors import GcodeError, OutputError, ProfileError
+
+
+def view(request: ModelRequest, open_browser: bool = False) -> int:
+    """Write the page, and show it in the browser where asked; what the dry run finds is shown in it and stops nothing."""
+    path = request.outputs.html or _default_page(request.name)
+    check_writable(path)
+    if request.compare and request.is_gcode:
+        raise ProfileError(f"--compare goes with a model: {request.model} is G-code, which prints in one way only")
+    loaded = load_program(request)
+    program, profile, known = loaded.program, loaded.profile, loaded.machine_known
+    if not len(program.run.program.line):
+        raise GcodeError(f"{request.model} holds no move: there is nothing to show")
+    if not known:
+        say(f"{request.name} does not tell its machine: shown for {profile.machine.name}, --machine names another")
+    alternatives = compare_with_one_part(program, profile) if request.compare else ()
+    content = print_page(request.name, program, profile, known, alternatives)
+    write_bytes(path, content)
+    show(f"{path}: {len(content) / 1e6:.1f} MB, {_in_words(program, known)}\n")
+    if open_browser and not webbrowser.open(path.resolve().as_uri()):
+        say(f"no browser could be started: open {path} in one")
+    return 0
+
+
+def _in_words(program: Program, known: bool) -> str:
+    """What the page holds: moves, errors, warnings."""
+    count, findings = len(program.run.program.line), relevant_findings(program.run, known)
+    phrases = [f"{count} moves" if count > 1 else "1 move", *([f"thinned to {MOST_ROWS} or fewer"] if count > MOST_ROWS else [])]
+    for severity in ("error", "warning"):
+        number = sum(finding.severity == severity for finding in findings)
+        phrases += [f"{number} {severity}{'s' * (number > 1)}"] if number else []
+    return ", ".join(phrases)
+
+
+def _default_page(name: str) -> Path:
+    """The page's file where none is named: here, by the model's name; refused where that is a file of another kind."""
+    path = Path(Path(name.removeprefix("demo:")).stem + ".html")
+    if path.is_file() and DATA not in path.read_bytes():
+        raise OutputError(f"output {path} exists and is no page of tiltprint's: -o names another file")
+    return path

@@ -1,0 +1,117 @@
+"""Compare: this print beside the same model printed in one part, straight up and in its best single orientation."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from machine.app.pipeline.pipeline import build, standing_still
+from machine.app.terminal.progress import say
+from machine.app.terminal.report import table
+from machine.view.comparison import Alternative
+from machine.view.program import Program
+from machine.view.quantities import duration, filament_g
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Mesh
+from mdp.plane import PLATFORM
+from mdp.pose import level, rotation
+from mdp.search.orientation import best_orientation, in_words
+from profiles.errors import UserError
+from profiles.profile import Profile
+from slicer.paths import Kind
+
+NAMES = ("parts", "upright", "oriented")  # as scripts know the alternatives
+SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
+
+
+def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternative, ...]:
+    """This print, then the two in one part, which get support whatever the process says: without it they would fail.
+
+    An alternative that the machine cannot print stays in the list, with the reason.
+    """
+    ours = program.decomposition
+    if ours is None:
+        return ()
+    process = profile.process
+    supported = profile.model_copy(update={"process": process.model_copy(update={"support": "auto"})})
+    best = best_orientation(ours.mesh, process.self_supporting_angle_deg)
+    count = len(ours.parts)
+    in_parts = _figures(f"in {count} part{'s' * (count > 1)}", "", count, program, ours.residual_area_mm2, profile)
+    say("comparing: straight up")
+    up = _in_one_part("straight up", "as it stands", ours.mesh, ours.risky_area_mm2, supported)
+    if np.allclose(best.rotation, np.eye(3), atol=1e-9):
+        return in_parts, up, replace(up, name="best single orientation")
+    say("comparing: best single orientation")
+    risky = best.risky_mm2 + (best.base_mm2 if profile.search.count_platform_faces else 0.0)
+    turned = standing_still(ours.mesh, best.rotation)
+    return in_parts, up, _in_one_part("best single orientation", in_words(best), turned, risky, supported)
+
+
+def _in_one_part(name: str, orientation: str, mesh: Mesh, risky_mm2: float, profile: Profile) -> Alternative:
+    """A model in one part as it stands."""
+    pose = level(profile.machine)
+    part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, risky_mm2)
+    whole = Decomposition(name, mesh, (part,), 1, "classic", risky_mm2, risky_mm2, 0, 0, 0.0)
+    try:
+        program = build(whole, profile)
+    except UserError as error:  # the others can still be compared
+        return Alternative(name, orientation, 1, None, None, None, None, risky_mm2, str(error))
+    return _figures(name, orientation, 1, program, risky_mm2, profile)
+
+
+def _figures(name: str, orientation: str, parts: int, program: Program, risky_mm2: float, profile: Profile) -> Alternative:
+    run = program.run
+    filament_mm = float(np.max(run.program.filament_mm, initial=0.0))
+    supports = [place for place, kind in enumerate(run.program.types) if kind in SUPPORT]
+    support_mm3 = float(run.segment_mm3[np.isin(run.program.type[run.segment_row], supports)].sum())
+    seam_mm = 0.0 if program.decomposition is None else program.decomposition.seam_mm
+    return Alternative(
+        name=name,
+        orientation=orientation,
+        parts=parts,
+        time_s=run.time_s,
+        filament_mm=filament_mm,
+        filament_g=filament_g(filament_mm, profile.material),
+        support_mm3=support_mm3,
+        risky_mm2=max(risky_mm2, 0.0),
+        message=run.errors[0].message if run.errors else "",
+        unsupported_mm2=sum(area_mm2 for _, _, area_mm2, _ in run.program.unsupported),
+        seam_mm=seam_mm,
+    )
+
+
+def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, Any]]:
+    """The alternatives for `export --json`: the print that is exported, then upright, then the best single orientation."""
+    return [
+        {
+            "name": name,
+            "orientation": each.orientation,
+            "parts": each.parts,
+            "time_s": each.time_s,
+            "filament_mm": each.filament_mm,
+            "support_mm3": each.support_mm3,
+            "support_area_mm2": each.risky_mm2,
+            "unsupported_area_mm2": each.unsupported_mm2,
+            "seam_mm": each.seam_mm,
+            "message": each.message,
+        }
+        for name, each in zip(NAMES, alternatives, strict=True)
+    ]
+
+
+def compare_table(alternatives: tuple[Alternative, ...]) -> str:
+    """The alternatives for a person."""
+    rows = [["print", "time", "filament", "mass", "support", "risky area"]]
+    rows += [[each.name, *_costs(each), f"{each.risky_mm2:.1f} mm2"] for each in alternatives]
+    head, *lines = table(rows).splitlines()
+    notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
+    return "\n".join(["", head, *lines, *notes]) + "\n"
+
+
+def _costs(alternative: Alternative) -> list[str]:
+    """Time, filament, mass and support; dashes where it cannot be printed."""
+    if alternative.time_s is None:
+        return ["-"] * 4
+    filament_m, support_cm3 = (alternative.filament_mm or 0.0) / 1000, (alternative.support_mm3 or 0.0) / 1000
+    mass = f"{alternative.filament_g or 0.0:.1f} g"
+    return [duration(alternative.time_s), f"{filament_m:.2f} m", mass, f"{support_cm3:.2f} cm3"]

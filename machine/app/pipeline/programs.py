@@ -1,0 +1,69 @@
+"""Programs: of a model, which is cut, sliced and planned, or of a G-code file as it is; dry-run either way."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from machine.app.embedded_profile import in_words, read_embedded_profile
+from machine.app.pipeline.given_plan import refuse_cuts
+from machine.app.pipeline.pipeline import build, decompose_model
+from machine.app.pipeline.precompile import announce_dry_run_compilation
+from machine.app.requests import ModelRequest
+from machine.app.terminal.progress import say
+from machine.dryrun.dryrun import dry_run
+from machine.view.program import Program
+from profiles.errors import GcodeError, MoveError
+from profiles.profile import Profile
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedProgram:
+    """A program and the profile it was tried with, which a G-code file may hold itself.
+
+    machine_known: the machine is told by the file or by the user, not guessed.
+    """
+
+    program: Program
+    profile: Profile
+    machine_known: bool = True
+
+
+def load_program(request: ModelRequest) -> LoadedProgram:
+    """The program of a model or of a G-code file. Raises GcodeError for a file that cannot be read."""
+    if not request.is_gcode:
+        program = build(decompose_model(request, to_build=True).decomposition, request.profile)
+        return LoadedProgram(program, request.profile)
+    refuse_cuts(request)
+    lines = read_gcode_lines(Path(request.model))
+    profile, sections = read_embedded_profile(lines, request.profile, request.chosen_sections)
+    if sections:
+        say(f"{request.name}: {in_words(sections, profile)}, as the file itself tells")
+    announce_dry_run_compilation()
+    known = "machine" in request.chosen_sections or profile.machine is not request.profile.machine
+    return LoadedProgram(Program(lines, dry_run(lines, profile), None), profile, known)
+
+
+def read_gcode_lines(path: Path) -> tuple[str, ...]:
+    """The lines of a G-code file. Raises GcodeError when it cannot be read, is no text or is empty."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise GcodeError(f"G-code file {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+    except UnicodeDecodeError as error:
+        raise GcodeError(f"G-code file {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
+    lines = tuple(text.removesuffix("\n").split("\n"))  # as GcodeFile counts them, which a resume reads
+    if not any(line.strip() for line in lines):
+        raise GcodeError(f"G-code file {path} is empty")
+    return lines
+
+
+def refuse_errors(program: Program, force: bool) -> None:
+    """Raise MoveError for a program whose dry run found errors; force: only say so."""
+    errors = program.run.errors
+    if not errors:
+        return
+    if force:
+        say(f"the dry run found {len(errors)} errors; going on because of --force")
+        return
+    raise MoveError(
+        f"the dry run found {len(errors)} errors, the first: {errors[0].message} (simulate lists all, --force goes on)"
+    )

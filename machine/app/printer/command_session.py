@@ -1,0 +1,108 @@
+"""Command session: single commands to a printer over the same protocol as a print, and a safe end of it."""
+
+from machine.link.exchange import Exchange, Reconnection
+from machine.link.medium import SERIAL, Wire
+from machine.link.protocol.events import Echo, Event, Ok, Temperature
+from machine.link.protocol.framing import LINE_LIMIT, command_of
+from machine.link.protocol.timeout import Timing
+from machine.link.shutdown import emergency_stop, heaters_off
+from profiles.errors import FirmwareError, LocalProtocolError, PortError
+
+FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
+UNKNOWN = "nknown command"
+
+
+class LeftError(Exception):
+    """The person has left while a command was under way."""
+
+
+class StopError(Exception):
+    """The person has asked for the emergency stop."""
+
+
+class CommandSession:
+    """greet(), then command() after command, then leave(). One thread at a time; order() may be called from any other.
+
+    unknown: commands that the printer did not know.
+    """
+
+    def __init__(self, wire: Wire, limit: int = LINE_LIMIT) -> None:
+        self.unknown: list[str] = []
+        self._limit = limit
+        self._ordered: type[Exception] | None = None
+        self._heat = Temperature()
+        self._command = ""
+        self.exchange = Exchange(wire, SERIAL, Timing(), self._heard, self._turned, self._lost, limit)
+
+    def greet(self) -> None:
+        """Agree on line numbers; raises PrinterError."""
+        self.exchange.greet()
+
+    def command(self, line: str) -> None:
+        """Send a command and wait for its answer; a comment is none. Raises PrinterError."""
+        try:
+            command = command_of(line, 0, self._limit)
+        except LocalProtocolError as error:
+            raise LocalProtocolError(str(error).replace("line 0", "the line")) from None
+        if command:
+            self._command = command
+            self.exchange.send(command)
+            self.exchange.settle()
+
+    def listen(self) -> None:
+        """One short turn without sending anything."""
+        self.exchange.pump()
+
+    def order(self, what: type[Exception]) -> None:
+        """Raise LeftError or StopError in the thread that talks, whatever it waits for."""
+        self._ordered = what
+
+    def stop(self) -> FirmwareError:
+        """The emergency stop; returns what became of it as an error to raise."""
+        if emergency_stop(self.exchange.wire, SERIAL):
+            return FirmwareError("emergency stop: the printer has halted; switch it off and on before the next print")
+        return FirmwareError("emergency stop: the printer did not confirm M112: cut the power")
+
+    def heated(self) -> str:
+        """Which heaters are on, as words; "" when none is. A command under way may have switched them on a moment ago."""
+        if not self._idle():
+            return "heaters, for a command was under way"
+        self.command("M105")
+        targets = (("nozzle", self._heat.nozzle_target_c), ("bed", self._heat.bed_target_c))
+        return " and ".join(f"{name} set to {target_c:.0f} deg C" for name, target_c in targets if target_c)
+
+    def switch_off(self) -> bool:
+        """Heaters off; True when the printer's own report shows it. A command under way is broken off."""
+        if self._idle():
+            for command in ("M104 S0", "M140 S0"):
+                self.command(command)
+            return not self.heated()
+        return heaters_off(self.exchange.wire, SERIAL)
+
+    def give_up(self) -> bool:
+        """The same after an error: order it without the protocol, for the printer may not follow it any more."""
+        try:
+            return self.exchange.greeted and heaters_off(self.exchange.wire, SERIAL, FAULT_S)
+        except PortError:
+            return False
+
+    def _idle(self) -> bool:
+        window = self.exchange.connection.window
+        return self.exchange.greeted and self.exchange.connection.fault is None and window.acknowledged == window.sent
+
+    def _heard(self, event: Event) -> None:
+        if isinstance(event, Ok):
+            self._heat = event.temperature or self._heat
+        elif isinstance(event, Temperature):
+            self._heat = event
+        elif isinstance(event, Echo) and UNKNOWN in event.text and self.exchange.greeted:
+            self.unknown.append(self._command)
+
+    def _turned(self, now_s: float) -> None:
+        del now_s
+        ordered, self._ordered = self._ordered, None
+        if ordered is not None:
+            raise ordered
+
+    def _lost(self, error: PortError) -> Reconnection:
+        raise error

@@ -1,0 +1,58 @@
+"""Journal folder: where the journals of prints are, each with its program beside it, the newest ones only."""
+
+import os
+from collections.abc import Iterable
+from datetime import datetime
+from pathlib import Path
+
+from machine.app.output import write_lines
+from machine.app.state_folder import state_folder
+from machine.link.journal import Journal, JournalHeading
+from machine.reader.gcode_file import GcodeFile
+from profiles.errors import OutputError
+from profiles.profile import Profile
+
+KEPT = 20
+PROGRAM = ".gcode"
+
+
+def new_journal(
+    lines: Iterable[str], profile: Profile, name: str, source: Path | None = None, file: Path | None = None
+) -> Journal:
+    """Begin the journal of a print. source: the G-code file that is printed; None: the lines are cached beside the journal.
+
+    file: the journal's own path, else a new one in the state folder, where the oldest ones go. Raises OutputError, GcodeError.
+    """
+    path = file if file is not None else _new_path(name)
+    if source is None:
+        source = path.with_name(path.name + PROGRAM)
+        write_lines(source, tuple(lines))
+    return continue_journal(GcodeFile(source.resolve()), profile, name, path)
+
+
+def continue_journal(program: GcodeFile, profile: Profile, name: str, file: Path | None = None) -> Journal:
+    """Begin another journal of a program that is on disk already."""
+    heading = JournalHeading(str(program.path), program.sha256(), name, profile.model_dump(mode="json"))
+    return Journal(file if file is not None else _new_path(name), heading)
+
+
+def _new_path(name: str) -> Path:
+    """A new file's path, named after the time and the model."""
+    folder = state_folder() / "journals"
+    try:
+        folder.mkdir(exist_ok=True)
+        _thin(folder)
+    except OSError as error:
+        raise OutputError(f"folder {folder} cannot be written: {(error.strerror or str(error)).lower()}") from None
+    plain = "".join(c if c.isalnum() and c.isascii() else "-" for c in name)[:40].strip("-") or "print"
+    return folder / f"{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}-{plain}.journal"
+
+
+def _thin(folder: Path) -> None:
+    """Leave room for one more: delete all but the newest; a program goes when no journal beside it is left that names it."""
+    for old in sorted(folder.glob("*.journal"), reverse=True)[KEPT - 1 :]:
+        old.unlink(missing_ok=True)
+    headings = b"".join(file.open("rb").readline() for file in folder.glob("*.journal"))
+    for program in folder.glob(f"*{PROGRAM}"):
+        if program.name.encode() not in headings:
+            program.unlink(missing_ok=True)

@@ -1,0 +1,184 @@
+"""Serial log: what went over the line, one file a print, bounded in size, old ones deleted."""
+
+import os
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+from datetime import datetime
+from io import BufferedWriter
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from machine.app.state_folder import state_folder
+from machine.link.medium import SERIAL, Medium, Traffic, Wire
+
+KEPT = 10  # logs of each kind
+LIMIT_BYTES = 64_000_000  # of one log: about 600,000 lines with their answers
+PIECES = 4  # the first one is kept for the beginning, the others are the newest
+UNWRITTEN = 512  # chunks between writes: writing each by itself would cost as much as sending it
+UNWRITTEN_S = 1.0  # at most that much is missing after a crash
+
+
+class SerialLog:
+    """`with SerialLog(file) as log:` hand log.note(direction, data) every chunk that is sent (">") or received ("<").
+
+    Chunks are put together to whole lines, each with the time of its end. A log never disturbs the print: where it cannot
+    be written it ends, and `trouble` says why.
+    """
+
+    def __init__(self, file: Path, title: str, limit_bytes: int = LIMIT_BYTES) -> None:
+        self.file, self.title = file, title
+        self.trouble = ""
+        self._unwritten: list[tuple[float, str, bytes]] = []
+        self._due_s = 0.0
+        self._torn = {">": b"", "<": b""}
+        self._second, self._clock = -1, ""
+        self._piece_bytes, self._written, self._piece = limit_bytes // PIECES, 0, 0
+        self._out = self._open(file)
+        self._write(f"# tiltprint, {datetime.now():%Y-%m-%d %H:%M:%S}, {title}\n")
+
+    def note(self, direction: str, data: bytes) -> None:
+        """Take a chunk of bytes; "#" is a remark of this program."""
+        now_s = time.time()
+        self._unwritten.append((now_s, direction, data))
+        if len(self._unwritten) >= UNWRITTEN or now_s > self._due_s:
+            self._due_s = now_s + UNWRITTEN_S
+            self._flush()
+
+    def remark(self, text: str) -> None:
+        """Add a line of this program's own."""
+        self.note("#", f"{text}\n".encode())
+
+    def close(self) -> None:
+        """Write what is held back, lines without an end too."""
+        self._flush()
+        for direction, line in self._torn.items():
+            if line:
+                self._write(f"{self._stamp(time.time())} {direction} {_readable(line)} (unfinished)\n")
+        self._torn = {">": b"", "<": b""}
+        if self._out is not None:
+            self._out.close()
+            self._out = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def _flush(self) -> None:
+        chunks, self._unwritten = self._unwritten, []
+        written = []
+        for now_s, direction, data in chunks:
+            if torn := self._torn.get(direction):
+                data = torn + data
+            *lines, self._torn[direction] = data.split(b"\n")
+            stamp = self._stamp(now_s)
+            written += [f"{stamp} {direction} {_readable(line)}\n" for line in lines if line]
+        if written:
+            self._write("".join(written))
+
+    def _stamp(self, now_s: float) -> str:
+        second = int(now_s)
+        if second != self._second:
+            self._second, self._clock = second, time.strftime("%H:%M:%S", time.localtime(second))
+        return f"{self._clock}.{int(1000 * (now_s - second)):03d}"
+
+    def _write(self, text: str) -> None:
+        if self._out is None:
+            return
+        try:
+            if self._written >= self._piece_bytes:
+                self._next_piece()
+            self._written += self._out.write(text.encode("ascii", "backslashreplace"))
+            self._out.flush()
+        except OSError as error:
+            self._fail(error)
+
+    def _next_piece(self) -> None:
+        """Go on in a new file; the beginning and the newest pieces stay, together never more than the limit."""
+        if self._out is not None:
+            self._out.close()
+        self._piece, self._written = self._piece + 1, 0
+        if self._piece >= PIECES:
+            piece_of(self.file, self._piece - PIECES + 1).unlink(missing_ok=True)
+        self._out = self._open(piece_of(self.file, self._piece))
+
+    def _open(self, file: Path) -> BufferedWriter | None:
+        try:
+            return file.open("wb")
+        except OSError as error:
+            self._fail(error)
+            return None
+
+    def _fail(self, error: OSError) -> None:
+        self.trouble = (error.strerror or str(error)).lower()
+        self._out = None
+
+
+class TappedWire:
+    """A wire whose every byte is reported, those of a safe end and of the emergency stop too."""
+
+    def __init__(self, wire: Wire, tell: Traffic) -> None:
+        self._wire, self._tell = wire, tell
+        self.name = wire.name
+
+    def write(self, data: bytes) -> None:
+        """Send all bytes."""
+        self._tell(">", data)
+        self._wire.write(data)
+
+    def read(self) -> bytes:
+        """The bytes that have come."""
+        data = self._wire.read()
+        if data:
+            self._tell("<", data)
+        return data
+
+    def discard(self) -> None:
+        """Forget bytes that were handed over but not sent yet."""
+        self._wire.discard()
+
+    def close(self) -> None:
+        """Close."""
+        self._wire.close()
+
+
+def tap(tell: Traffic, medium: Medium = SERIAL) -> Medium:
+    """A medium whose wires tell what goes over them."""
+    return replace(medium, open=lambda name, baud: TappedWire(medium.open(name, baud), tell))
+
+
+def _readable(line: bytes) -> str:
+    """A line as ASCII; what cannot be printed is escaped, so that every byte can be read."""
+    text = line.decode("latin-1").rstrip("\r")
+    return text if text.isascii() and text.isprintable() else text.encode("unicode_escape").decode("ascii")
+
+
+def piece_of(file: Path, piece: int) -> Path:
+    """The file of a piece of a log: print.log, print.1.log, print.2.log."""
+    return file.with_name(f"{file.stem}.{piece}{file.suffix}") if piece else file
+
+
+def new_log(kind: str, title: str, file: Path | None = None) -> SerialLog:
+    """A log in the file, else in a new one of the state folder, named after its kind and the time; the oldest of a kind go."""
+    if file is not None:
+        return SerialLog(file, title)
+    folder = state_folder() / "logs"
+    try:
+        folder.mkdir(exist_ok=True)
+        _thin(folder.glob(f"{kind}-*.log"))
+    except OSError:  # what cannot be thinned stays; the log itself says whether it can be written
+        pass
+    return SerialLog(folder / f"{kind}-{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}.log", title)
+
+
+def _thin(files: Iterable[Path]) -> None:
+    """Leave room for one more: delete all but the newest KEPT - 1 logs, each with its pieces."""
+    pieces: dict[str, list[Path]] = {}
+    for file in files:
+        pieces.setdefault(file.name.partition(".")[0], []).append(file)
+    for name in sorted(pieces, reverse=True)[KEPT - 1 :]:
+        for file in pieces[name]:
+            file.unlink(missing_ok=True)

@@ -1,0 +1,192 @@
+"""Stream: a program to a printer, or to the simulated one on a pseudo-terminal, shown to the person watching."""
+
+import threading
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from math import inf, isfinite
+from pathlib import Path
+
+from machine.app.printer.journal_folder import new_journal
+from machine.app.printer.serial_log import SerialLog, new_log, tap
+from machine.app.requests import SIMULATED, PrintRequest
+from machine.app.terminal.interrupts import stopping
+from machine.app.terminal.print_display import Follow, PrintDisplay
+from machine.app.terminal.progress import say
+from machine.app.terminal.report import show
+from machine.app.terminal.screen import Course, Words
+from machine.firmware import dialect_of
+from machine.link.identification import Answer, Kind
+from machine.link.journal import Journal
+from machine.link.pending_commands import Control
+from machine.link.progress import Progress, Schedule
+from machine.link.resume import ResumePoint
+from machine.link.status import PrinterStatus
+from machine.link.stream import Outcome, print_lines
+from machine.simulator.board import BuildOptions
+from machine.simulator.simulator import SimulatedPrinter
+from machine.view.program import Program
+from machine.view.quantities import duration
+from profiles.errors import OutputError, PrinterError
+from profiles.profile import Profile
+
+USB_BYTES, QUEUE = 1024, 16  # the simulated printer is a board with native USB: more lines at a time halve what a line costs
+HEATERS = {
+    True: "heaters off",
+    False: "the printer did not confirm that its heaters are off: look at it",
+    None: "nothing had been sent yet",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PrintJob:
+    """What is printed. source: the G-code file that holds the program; None: it is cached beside the journal."""
+
+    name: str
+    program: Program
+    profile: Profile
+    source: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Observers:
+    """Who is told of a print besides the person at the terminal: the serial log, the journal, the page that follows it."""
+
+    log: SerialLog
+    journal: Journal | None = None
+    follow: Follow | None = None
+
+
+def print_program(job: PrintJob, request: PrintRequest, follow: Follow | None = None) -> int:
+    """Stream a program to the printer asked for and say how it ended; 130 when a person stopped it. Raises PrinterError."""
+    simulated = request.port == SIMULATED
+    title = f"{job.name} to {'the simulated printer' if simulated else request.port}"
+    journalled = _journal(job, request.journal) if not simulated or request.journal is not None else nullcontext()
+    with new_log("print", title, request.log) as log, _LogPointer(log), journalled as journal:
+        observers = Observers(log, journal, follow)
+        if simulated:
+            return _print_simulated(job, request, observers)
+        return report_end(stream_program(job, request, observers), log, journal)
+
+
+def _journal(job: PrintJob, file: Path | None) -> AbstractContextManager[Journal | None]:
+    """The print's journal; a print that was not told where to keep it goes on without one where none can be written."""
+    try:
+        return new_journal(job.program.lines, job.profile, job.name, job.source, file)
+    except OutputError as error:
+        if file is not None:
+            raise
+        say(f"this print cannot be resumed when it is cut off: {error}")
+        return nullcontext()
+
+
+def _print_simulated(job: PrintJob, request: PrintRequest, observers: Observers) -> int:
+    """Stream to the simulated printer and tell what it has done."""
+    machine = job.profile.machine
+    usb = job.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
+    speed = request.sim_speed or inf
+    with SimulatedPrinter(machine, speed, BuildOptions(queue=QUEUE)) as printer:
+        pace = speed if isfinite(speed) else None
+        outcome = stream_program(replace(job, profile=usb), replace(request, port=printer.path), observers, pace=pace)
+        record = printer.record
+    if outcome.cancelled:
+        return report_end(outcome, observers.log)
+    segments, volumes = record.deposited(job.profile.material.diameter_mm)
+    planned = float(job.program.run.segment_mm3.sum())
+    laid = f"{len(segments)} strokes laid {volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f})"
+    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C at the end"
+    show(f"simulated printer: {len(record.start)} moves in {duration(float(record.duration_s.sum()))}, {laid}, {heaters}\n")
+    if record.clamped or record.unknown:
+        raise PrinterError(
+            f"the simulated printer met {record.clamped} coordinates out of limits and {record.unknown} unknown commands"
+        )
+    return 0
+
+
+def stream_program(
+    job: PrintJob,
+    request: PrintRequest,
+    observers: Observers,
+    begin: Callable[[PrinterStatus], ResumePoint] | None = None,
+    pace: float | None = 1.0,
+) -> Outcome:
+    """Stream a program while a person watches: screen or lines, keys, Ctrl-C, log, journal.
+
+    begin: of a resumed print. pace: seconds of the print that pass in one of the clock; None: as fast as it goes.
+    """
+    stop, control, words, course = threading.Event(), Control(), Words(), Course(job.program.run)
+
+    def traffic(direction: str, data: bytes) -> None:
+        observers.log.note(direction, data)
+        words.hear(direction, data)
+
+    with stopping(stop), PrintDisplay(observers.log.title, course, control, words) as display:
+
+        def begin_then_show(status: PrinterStatus) -> ResumePoint:
+            start = ResumePoint(1, ()) if begin is None else begin(status)
+            display.open()
+            return start
+
+        if begin is None:
+            display.open()
+
+        def on_progress(progress: Progress) -> None:
+            display(progress)
+            if observers.follow is not None:
+                observers.follow(progress)
+
+        return print_lines(
+            job.program.lines,
+            request.port,
+            request.baud,
+            on_progress,
+            stop,
+            Schedule(course.remaining_s, pace),
+            limit=dialect_of(job.profile.machine).longest_line,
+            control=control,
+            profile=job.profile,
+            medium=tap(traffic),
+            journal=observers.journal,
+            begin=None if begin is None else begin_then_show,
+        )
+
+
+class _LogPointer:
+    """Says where the serial log is when the print goes wrong, and that nothing is logged when that is so."""
+
+    def __init__(self, log: SerialLog) -> None:
+        self._log = log
+
+    def __enter__(self) -> None:
+        if self._log.trouble:
+            say(f"the traffic is not logged: {self._log.file}: {self._log.trouble}")
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, PrinterError):
+            _point_to(self._log)
+        elif isinstance(error, KeyboardInterrupt):  # the second one: nobody waited for the printer's word
+            say("ended at once: whether the heaters are off is not known, look at the printer")
+
+
+def _point_to(log: SerialLog) -> None:
+    if not log.trouble:
+        say(f"all that was sent and received is in {log.file}")
+
+
+def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal | None = None) -> int:
+    """Tell how the print ended, where its log is when the printer had something to say, and how to go on with a stopped one.
+
+    130 when a person stopped it.
+    """
+    for warning in outcome.warnings:
+        say(f"the printer said: {warning}")
+    if outcome.warnings and log is not None:
+        _point_to(log)
+    if outcome.cancelled:
+        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {HEATERS[outcome.heaters_off]}")
+        if journal is not None and journal.last.executed:
+            say(f"tiltprint resume {journal.path} goes on with it")
+        return 130
+    summary = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
+    show(f"{summary} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})\n")
+    return 0

@@ -1,0 +1,133 @@
+"""Requests: what a person asks a command for, as values: the command line makes them, the commands take them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from profiles.profile import Profile
+
+GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
+SIMULATED = "sim"  # the port that stands for the simulated printer
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files to write; None: not asked for. For gcode and json the path - stands for standard output.
+
+    folder: for parts, decomposition and plan; sheet: picture of the print order; record: what the search saw; plan: what a later
+    run cuts without a search; layer: which one the svg shows, as PART:LAYER.
+    """
+
+    folder: Path | None = None
+    gcode: Path | None = None
+    json: Path | None = None
+    html: Path | None = None
+    png: Path | None = None
+    sheet: Path | None = None
+    svg: Path | None = None
+    layer: str | None = None
+    record: Path | None = None
+    plan: Path | None = None
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """What a person says of the cuts; None: nothing.
+
+    plan: file whose planes are cut instead of a search; parts: into so many parts at most; planes: file of planes by hand that
+    the search starts from.
+    """
+
+    plan: Path | None = None
+    parts: int | None = None
+    planes: Path | None = None
+
+
+@dataclass(frozen=True)
+class ModelRequest:
+    """A model or a G-code file and what is to be made of it.
+
+    chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
+    model down the best way first. compare: with the same model in one part. force: go on although the dry run found errors.
+    """
+
+    model: str
+    profile: "Profile"
+    chosen_sections: frozenset[str] = frozenset()
+    ranker: str = "classic"
+    orient: bool = False
+    outputs: Outputs = Outputs()
+    compare: bool = False
+    force: bool = False
+    cuts: Cuts = Cuts()
+
+    @property
+    def name(self) -> str:
+        """The name that files and messages carry: the file's name without its folder."""
+        return self.model if self.model.startswith("demo:") else Path(self.model).name
+
+    @property
+    def is_gcode(self) -> bool:
+        """Whether the file holds G-code, by its name."""
+        return Path(self.model).suffix.lower() in GCODE_SUFFIXES
+
+
+@dataclass(frozen=True)
+class PrintRequest:
+    """A printer at a port, and how a print on it is recorded and watched.
+
+    sim_speed: times real time on the simulated printer, 0: as fast as possible. log: file for what is sent and received,
+    journal: for what a resume needs; None: a new one in the state folder. watch_port: serve the print's page on this port of
+    this computer, 0: on any free one; None: serve nothing.
+    """
+
+    port: str
+    baud: int = 115200
+    sim_speed: float = 0.0
+    log: Path | None = None
+    journal: Path | None = None
+    watch_port: int | None = None
+
+
+@dataclass(frozen=True)
+class ConsoleRequest:
+    """A printer to talk to line by line. reports: show temperature reports; log as for a print."""
+
+    profile: "Profile"
+    port: str
+    baud: int = 115200
+    sim_speed: float = 0.0
+    reports: bool = True
+    leave_heaters: bool = False
+    log: Path | None = None
+
+
+@dataclass(frozen=True)
+class SimulatorRequest:
+    """A simulated printer for other hosts. link: kept on the terminal's path; tcp: port instead of a terminal; faults: script."""
+
+    profile: "Profile"
+    link: Path | None = None
+    tcp: int | None = None
+    faults: Path | None = None
+    speed: float = 1.0
+    baud: int | None = None
+    habits: str = ""
+
+
+@dataclass(frozen=True)
+class CalibrationRequest:
+    """A machine profile by name, the mark that is touched on it (None: the usual one), and where the result goes.
+
+    save: name of the user's own profile, None: the machine's. replace: write over files that exist. force: save although the
+    touches are far off.
+    """
+
+    machine: str
+    settings: tuple[str, ...] = ()
+    mark_height_mm: float | None = None
+    mark_radius_mm: float | None = None
+    save: str | None = None
+    replace: bool = False
+    force: bool = False

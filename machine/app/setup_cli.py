@@ -1,0 +1,75 @@
+"""The command line of profiles and calibration. Heavy imports stay inside the commands."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from machine.app.requests import CalibrationRequest
+from machine.app.terminal.options import MachineName, Settings, machine_profile
+
+profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check machines, materials and processes.")
+
+
+def calibrate(
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="OUT.gcode", help="program to write, with a sheet beside it to fill in")
+    ] = None,
+    measured: Annotated[
+        Path | None, typer.Option("--measured", metavar="FILE", help="filled sheet, .toml or .csv: work out the numbers")
+    ] = None,
+    mark_height: Annotated[
+        float | None, typer.Option("--mark-height", metavar="MM", min=0, max=200, help="height of the mark over the plate")
+    ] = None,
+    mark_radius: Annotated[
+        float | None, typer.Option("--mark-radius", metavar="MM", help="distance of the mark from the middle of the plate")
+    ] = None,
+    save: Annotated[str | None, typer.Option("--save", metavar="NAME", help="name of your profile; else the machine's")] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
+    force: Annotated[bool, typer.Option("--force", help="save although the touches are far off")] = False,
+    machine: MachineName = "generic_ac",
+    settings: Settings = None,
+) -> int:
+    """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
+
+    Without -o and --measured a terminal asks for the touches one by one.
+    """
+    from machine.app.commands.calibrate import ask_for_touches, evaluate_sheet, write_program
+
+    request = CalibrationRequest(machine, tuple(settings or ()), mark_height, mark_radius, save, replace, force)
+    if out is not None and measured is None:
+        return write_program(request, machine_profile(machine, settings), out)
+    if measured is not None and out is None:
+        return evaluate_sheet(request, measured)
+    if out is None and sys.stdin.isatty() and sys.stdout.isatty():
+        return ask_for_touches(request)
+    raise typer.BadParameter("one of -o OUT.gcode and --measured FILE is expected; in a terminal neither, to be asked")
+
+
+@profiles_app.command("list")
+def profiles_list() -> int:
+    """The shipped profiles and your own."""
+    from machine.app.commands.profiles import list_profiles
+
+    return list_profiles()
+
+
+@profiles_app.command("show")
+def profiles_show(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="name of a profile, or a .toml file")],
+    json: Annotated[bool, typer.Option("--json", help="resolved values as JSON")] = False,
+    settings: Settings = None,
+) -> int:
+    """Resolved values of one profile, with what each key means."""
+    from machine.app.commands.profiles import show
+
+    return show(name, json, settings or [])
+
+
+@profiles_app.command("check")
+def profiles_check(file: Annotated[Path, typer.Argument(metavar="FILE", help="a .toml profile")]) -> int:
+    """All problems of a profile file at once; exit 1 when there are any."""
+    from machine.app.commands.profiles import check
+
+    return check(file)

@@ -1,0 +1,1 @@
+"""The terminal: options, progress, reports, keys, the live screen."""

@@ -1,0 +1,170 @@
+"""Keys: what a person presses while a print runs, read from the terminal as it is pressed, and what it asks for."""
+
+import os
+import re
+import select
+import sys
+import threading
+from collections.abc import Callable
+from time import monotonic
+from types import TracebackType
+from typing import Self
+
+from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
+from machine.link.progress import Progress
+
+STEP_PERCENT = 10.0
+HINT_S = 10.0  # a question that was not answered by then is void
+STANDING = ("pausing", "paused")
+SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
+MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e stops the machine at once (M112)"
+SEQUENCE = re.compile(rb"\x1b(\[[0-9;]*[A-Za-z~]|O[A-Z])")  # arrow and function keys: the letters in them are no keys
+BEGUN = re.compile(rb"\x1b(\[[0-9;]*|O)?$")  # over a slow line a sequence comes in pieces
+SAME = {"=": "+", "_": "-", "?": "q"}
+
+
+class Keyboard:
+    """press() one key after the other; `hint` is what the screen shows in place of the list of keys, for a while."""
+
+    def __init__(self, control: Control, now_s: Callable[[], float] = monotonic) -> None:
+        self._now_s = now_s
+        self._hint, self._hint_until_s = "", 0.0
+        self._control = control
+        self._sure = False
+        self._state, self._feed, self._flow = "printing", 100.0, 100.0
+        self._reported = (100.0, 100.0)
+
+    @property
+    def hint(self) -> str:
+        """A question, an explanation, or what was just asked for; "" when there is none or it is old."""
+        return self._hint if self._now_s() < self._hint_until_s else ""
+
+    def follow(self, progress: Progress) -> None:
+        """Know what the print does, so that one key can mean pause and resume."""
+        self._state = progress.state
+        percents = (progress.feed_percent, progress.flow_percent)
+        if percents != self._reported:  # the program may set them too
+            self._reported, (self._feed, self._flow) = percents, percents
+
+    def press(self, key: str) -> None:
+        """Ask for what a key means; unknown keys mean nothing."""
+        key = SAME.get(key, key).lower()
+        sure, self._sure = self._sure and bool(self.hint), False
+        self._tell("")
+        if key == "e":
+            self._tell("emergency stop")
+            self._control.ask(Command.EMERGENCY_STOP)
+        elif sure:
+            self._answer(key)
+        elif act := _ACTS.get(key):
+            act(self)
+
+    def _answer(self, key: str) -> None:
+        if key in ("c", "y"):
+            self._tell("cancelling")
+            self._control.ask(Command.CANCEL)
+
+    def _pause(self) -> None:
+        self._control.ask(Command.PAUSE)
+
+    def _resume(self) -> None:
+        self._control.ask(Command.RESUME)
+
+    def _toggle(self) -> None:
+        self._control.ask(Command.RESUME if self._state in STANDING else Command.PAUSE)
+
+    def _cancel(self) -> None:
+        self._sure = True
+        self._tell(SURE)
+
+    def _explain(self) -> None:
+        self._tell(MORE)
+
+    def _tell(self, hint: str) -> None:
+        self._hint, self._hint_until_s = hint, self._now_s() + HINT_S
+
+    def _faster(self, step: float) -> None:
+        self._feed = min(max(self._feed + step, FEED_PERCENT[0]), FEED_PERCENT[1])
+        self._control.ask(Command.FEED, self._feed)
+
+    def _more(self, step: float) -> None:
+        self._flow = min(max(self._flow + step, FLOW_PERCENT[0]), FLOW_PERCENT[1])
+        self._control.ask(Command.FLOW, self._flow)
+
+
+_ACTS: dict[str, Callable[[Keyboard], None]] = {
+    "p": Keyboard._pause,
+    "r": Keyboard._resume,
+    " ": Keyboard._toggle,
+    "c": Keyboard._cancel,
+    "q": Keyboard._explain,
+    "+": lambda board: board._faster(STEP_PERCENT),
+    "-": lambda board: board._faster(-STEP_PERCENT),
+    "]": lambda board: board._more(STEP_PERCENT),
+    "[": lambda board: board._more(-STEP_PERCENT),
+}
+
+
+class Typing:
+    """`with Typing(press):` keys go to press() from a thread of its own; the terminal is as before afterwards.
+
+    Ctrl-C still interrupts; Ctrl-Z is switched off, for a stopped sender leaves a hot nozzle standing on the print.
+    """
+
+    def __init__(self, press: Callable[[str], None]) -> None:
+        self._press = press
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        import termios
+        import tty
+
+        self._descriptor = sys.stdin.fileno()
+        self._before = termios.tcgetattr(self._descriptor)
+        tty.setcbreak(self._descriptor, termios.TCSANOW)
+        settings = termios.tcgetattr(self._descriptor)
+        settings[6][termios.VSUSP] = b"\x00"
+        termios.tcsetattr(self._descriptor, termios.TCSANOW, settings)
+        self._end, self._wake = os.pipe()
+        self._thread = threading.Thread(target=self._serve, name="keys", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        import termios
+
+        os.write(self._wake, b"x")
+        if self._thread is not None:
+            self._thread.join()
+        os.close(self._end)
+        os.close(self._wake)
+        try:
+            termios.tcsetattr(self._descriptor, termios.TCSAFLUSH, self._before)
+        except (termios.error, OSError):  # the terminal has gone away
+            return
+
+    def _serve(self) -> None:
+        begun = b""
+        while True:
+            ready = select.select([self._descriptor, self._end], [], [])[0]
+            if self._end in ready:
+                return
+            try:
+                typed = os.read(self._descriptor, 64)
+            except OSError:
+                return
+            if not typed:
+                return
+            typed = SEQUENCE.sub(b"", begun + typed)
+            half = BEGUN.search(typed)
+            begun = half[0] if half else b""
+            for key in typed.removesuffix(begun).decode("ascii", "ignore"):
+                self._press(key)
+
+
+def can_type() -> bool:
+    """Whether keys can be read: stdin is a terminal, and this program stands in its foreground."""
+    try:
+        return os.name == "posix" and sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except (OSError, ValueError):
+        return False

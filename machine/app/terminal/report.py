@@ -1,0 +1,137 @@
+"""Report: the tables that the commands print on stdout."""
+
+import sys
+from collections.abc import Sequence
+from textwrap import wrap
+
+from machine.dryrun.agreement import Agreement
+from machine.dryrun.dryrun import DryRun, summary
+from machine.view.parts import risky_before_mm2
+from machine.view.quantities import duration
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.search.front import EQUAL
+from mdp.search.orientation import best_orientation, in_words
+
+WIDEST = 100  # characters of a line
+NO_BREAK = "\u00a0"  # a space at which no line ends
+
+
+def table(rows: list[list[str]]) -> str:
+    """Rows as right-aligned columns, the first column left-aligned."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines) + "\n"
+
+
+def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_platform_faces: bool = False) -> str:
+    """The parts in print order, what would be risky of their faces straight up and what is, and what the whole saves.
+
+    angle_deg and count_platform_faces as the search had them.
+    """
+    rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm3", "share", "risky before", "after mm2"]]
+    for part in decomposition.parts:
+        angles = [f"{part.pose.tilt_deg:.1f}", f"{part.pose.turn_deg:.1f}", f"{part.base.offset_mm:.1f}"]
+        share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
+        areas = [_number(risky_before_mm2(part, angle_deg, count_platform_faces)), _number(part.risky_area_mm2)]
+        rows.append([str(part.index), *angles, f"{part.volume_mm3:.0f}", share, *areas])
+    front = front_table(decomposition.front) + "\n" if len(decomposition.front) > 1 else ""
+    effort = f"{decomposition.candidates_evaluated} candidates in {decomposition.search_s:.1f} s\n"
+    if decomposition.candidates_evaluated == 0 and len(decomposition.parts) > 1:
+        effort = f"cut by a plan in {decomposition.search_s:.1f} s\n"
+    return table(rows) + "\n" + front + _risky_areas(decomposition, angle_deg, count_platform_faces) + effort
+
+
+def front_table(front: Sequence[FrontRow]) -> str:
+    """The best decomposition for every number of parts, the one taken marked and why."""
+    least_mm2 = min(row.cost_mm2 for row in front)
+    rows = [["in parts", "needs support mm2", "seams mm", "costs mm2", "about", "filament m"]]
+    rows += [
+        [str(row.parts), _number(row.support_area_mm2), f"{row.seam_mm:.0f}", _number(row.cost_mm2), *_estimates(row)]
+        for row in front
+    ]
+    head, *lines = table(rows).splitlines()
+    taken = [row.chosen * ("  taken: " + _reason(row, least_mm2)) for row in front]
+    return "\n".join([head, *(line + reason for line, reason in zip(lines, taken, strict=True))]) + "\n"
+
+
+def _estimates(row: FrontRow) -> list[str]:
+    time = "-" if row.time_s is None else duration(60.0 * round(row.time_s / 60.0)).removesuffix(" 0s")
+    return [time, "-" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}"]
+
+
+def _reason(row: FrontRow, least_mm2: float) -> str:
+    if row.cost_mm2 <= least_mm2:
+        return "the least cost"
+    return "the fewest parts within 1 % of the least cost" if row.cost_mm2 <= least_mm2 * (1.0 + EQUAL) else "asked for"
+
+
+def _risky_areas(decomposition: Decomposition, angle_deg: float, count_platform_faces: bool) -> str:
+    """Straight up, in the best single orientation, in parts: risky area and how much less that is."""
+    best = best_orientation(decomposition.mesh, angle_deg)
+    single = best.risky_mm2 + (best.base_mm2 if count_platform_faces else 0.0)
+    areas = [
+        ("straight up", decomposition.risky_area_mm2, ""),
+        ("best single orientation", single, f"  {in_words(best)}"),
+        (f"in {_count(len(decomposition.parts), 'parts')}", decomposition.residual_area_mm2, ""),
+    ]
+    rows = [["risky area", "mm2", "less"]]
+    for name, area, _ in areas:
+        less = 1.0 - area / decomposition.risky_area_mm2 if decomposition.risky_area_mm2 > 0 else 0.0
+        rows.append([name, _number(area), f"{round(100 * less, 1) + 0.0:.1f} %"])
+    rows[1][2] = ""
+    head, *lines = table(rows).splitlines()
+    return "\n".join([head, *(line + note for line, (_, _, note) in zip(lines, areas, strict=True))]) + "\n"
+
+
+def _number(area_mm2: float) -> str:
+    return f"{max(area_mm2, 0.0):.1f}"
+
+
+def run_table(run: DryRun) -> str:
+    """What a dry run found."""
+    values = summary(run)
+    lines = [
+        f"time {duration(values['time_s'])}, filament {values['filament_mm'] / 1000:.2f} m, "
+        f"{values['extruded_mm3'] / 1000:.2f} cm3",
+        ", ".join(_count(values[key], key) for key in ("parts", "layers", "reorientations", "retractions"))
+        + f", {values['travel_mm'] / 1000:.2f} m travel",
+    ]
+    if values["bounds_mm"]:
+        low, high = (", ".join(f"{value:.1f}" for value in corner) for corner in values["bounds_mm"])
+        lines.append(f"plastic from {low} to {high} mm (workpiece)")
+    moved = [f"{axis} {reach[0]:.1f}..{reach[1]:.1f}" for axis, reach in values["axes"].items() if reach]
+    lines.append("axes " + ", ".join(moved) if moved else "nothing moves")
+    for finding in values["findings"]:
+        where = f" (line{NO_BREAK}{finding['line']})" if finding["line"] else ""
+        lines += _wrap_finding(finding["severity"], finding["message"] + where)
+    return "\n".join(lines) + "\n"
+
+
+def _wrap_finding(severity: str, message: str) -> list[str]:
+    """A finding in lines that can be read, the words after the severity below each other; keys of a profile stay whole."""
+    indent = " " * len(f"{severity}: ")
+    lines = wrap(message, WIDEST, initial_indent=f"{severity}: ", subsequent_indent=indent, break_long_words=False)
+    return [line.replace(NO_BREAK, " ") for line in lines]
+
+
+def agreement_line(agreed: Agreement) -> str:
+    """How the plastic agrees with the model."""
+    sentence = (
+        f"the beads fill {100 * agreed.filled:.1f} % of the model; of their length {100 * agreed.outside:.2f} % lie outside it "
+        f"by more than half a line ({agreed.farthest_mm:.2f} mm at the worst), {100 * agreed.unsupported:.2f} % hang in air "
+        f"and {100 * agreed.reported:.2f} % are marked overhang or bridge and do"
+    )
+    return "\n".join(wrap(sentence, WIDEST, subsequent_indent="  ")) + "\n"
+
+
+def _count(number: int, things: str) -> str:
+    return f"{number} {things if number != 1 else things.removesuffix('s')}"
+
+
+def show(text: str) -> None:
+    """A result on stdout."""
+    sys.stdout.write(text)
+    sys.stdout.flush()

@@ -1,0 +1,180 @@
+"""Height field: the heights of what lies under the head at one pose of the table, on a lattice over X and Y of the machine.
+
+A coarse lattice of the greatest heights settles most moves; near the head every cell is tried at its distance from the move.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.kernel import part
+from mdp.mesh import Floats
+from slicer.geometry.segments import Segment, squared_distance
+
+NOTHING = -1e9
+BLOCK = 16  # cells of the fine lattice to a side of a coarse one
+CELL_MM, MOST_CELLS = 0.15, 6_000_000
+PIECE_MM = 0.25
+
+Point = tuple[float, float, float]
+
+
+class Field(NamedTuple):
+    """(n,) cells, row by row, n = shape[0] shape[1]: height of the plastic, what it was below this layer, which row laid it."""
+
+    origin: Floats
+    cell: float
+    shape: NDArray[np.int64]
+    top: NDArray[np.float32]
+    below: NDArray[np.float32]
+    owner: NDArray[np.int32]
+    coarse: Floats
+    highest: Floats
+
+
+class Head(NamedTuple):
+    """(k, 2) radii and heights of the hot end's lowest points, and (j, 6) boxes that go with the tip: least, greatest x y z."""
+
+    silhouette: Floats
+    boxes: Floats
+
+
+def empty_field(low: Floats, high: Floats) -> Field:
+    """A field over a rectangle with nothing in it; its cells grow with the rectangle."""
+    size = np.maximum(high - low, 1.0)
+    cell = max(CELL_MM, float(np.sqrt(size.prod() / MOST_CELLS)))
+    shape = np.ceil(size / cell).astype(np.int64) + 1
+    count, blocks = int(shape.prod()), (shape + BLOCK - 1) // BLOCK
+    heights = (np.full(count, NOTHING, np.float32), np.full(count, NOTHING, np.float32), np.full(count, -1, np.int32))
+    return Field(np.asarray(low, np.float64), cell, shape, *heights, np.full(int(blocks.prod()), NOTHING), np.full(1, NOTHING))
+
+
+@part
+def _raise_cell(i: int, j: int, z: float, row: int, field: Field) -> None:
+    """Raise one cell to z; `below` keeps what it was before."""
+    k = i * field.shape[1] + j
+    if z > field.top[k] + 1e-4:
+        field.below[k], field.top[k] = field.top[k], z
+        field.owner[k] = row
+        c = (i // BLOCK) * ((field.shape[1] + BLOCK - 1) // BLOCK) + j // BLOCK
+        field.coarse[c] = max(field.coarse[c], z)
+        field.highest[0] = max(field.highest[0], z)
+
+
+@part
+def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
+    """Add a straight bead that reaches `half` to each side: one run of cells across for every cell along."""
+    along = 0 if abs(b[0] - a[0]) >= abs(b[1] - a[1]) else 1
+    if a[along] > b[along]:
+        a, b = b, a
+    other = 1 - along
+    length = b[along] - a[along]
+    slope = (b[other] - a[other]) / length if length > 1e-9 else 0.0
+    rise = (b[2] - a[2]) / length if length > 1e-9 else 0.0
+    across, cell = half * np.sqrt(1.0 + slope * slope), field.cell
+    first = max(int(np.floor((a[along] - field.origin[along]) / cell)), 0)
+    last = min(int(np.floor((b[along] - field.origin[along]) / cell)), field.shape[along] - 1)
+    for p in range(first, last + 1):
+        u = min(max(field.origin[along] + (p + 0.5) * cell, a[along]), b[along]) - a[along]
+        v, z = a[other] + slope * u - field.origin[other], a[2] + rise * u
+        low = max(int(np.floor((v - across) / cell + 0.5)), 0)
+        high = min(int(np.floor((v + across) / cell - 0.5)), field.shape[other] - 1)
+        if high < low:
+            low = high = min(max(int(np.floor(v / cell)), 0), field.shape[other] - 1)
+        for q in range(low, high + 1):
+            if along == 0:
+                _raise_cell(p, q, z, row, field)
+            else:
+                _raise_cell(q, p, z, row, field)
+
+
+@part
+def _lowest_of_hot_end(radius: float, silhouette: Floats) -> float:
+    """Height above the tip of the hot end's lowest point at a radius; a great number beyond its widest."""
+    if radius <= silhouette[0, 0]:
+        return float(silhouette[0, 1])
+    for k in range(len(silhouette) - 1):
+        if radius <= silhouette[k + 1, 0]:
+            share = (radius - silhouette[k, 0]) / (silhouette[k + 1, 0] - silhouette[k, 0])
+            return float(silhouette[k, 1] + share * (silhouette[k + 1, 1] - silhouette[k, 1]))
+    return 1e9
+
+
+@part
+def _distance_across(px: float, py: float, a: Point, b: Point) -> float:
+    """Distance across, in X and Y alone, of a point from a move."""
+    return float(np.sqrt(squared_distance(Segment(a[0], a[1], b[0], b[1]), px, py)))
+
+
+@part
+def _comes_over(px: float, py: float, half: float, a: Point, b: Point, box: Floats) -> bool:
+    """True when a box that goes with the tip from a to b comes over a square of half a side `half` about a point."""
+    low, high = 0.0, 1.0
+    for k in range(2):
+        delta, p = b[k] - a[k], (px if k == 0 else py) - a[k]
+        least, most = p - box[3 + k] - half, p - box[k] + half
+        if abs(delta) < 1e-12:
+            if least > 0.0 or most < 0.0:
+                return False
+        else:
+            low = max(low, min(least / delta, most / delta))
+            high = min(high, max(least / delta, most / delta))
+    return low <= high
+
+
+@part
+def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point, b: Point, head: Head) -> float:
+    """How deep the head goes into a column during a level move; 0 up to `slack`.
+
+    column: x, y, half of its side, and by how much its top stands above the tip.
+    """
+    px, py, half, rise = column
+    deepest = 0.0
+    depth = rise - _lowest_of_hot_end(max(_distance_across(px, py, a, b) - 1.4143 * half, 0.0), head.silhouette)
+    if depth > slack:
+        deepest = depth
+    for k in range(len(head.boxes)):
+        if rise - head.boxes[k, 2] > max(deepest, slack) and _comes_over(px, py, half, a, b, head.boxes[k]):
+            deepest = rise - head.boxes[k, 2]
+    return deepest
+
+
+@part
+def _level_depth(a: Point, b: Point, slack: float, field: Field, head: Head) -> float:
+    """How deep the head goes into the field at most during a level move; 0 up to `slack`."""
+    deepest, size, cell = 0.0, BLOCK * field.cell, field.cell
+    wide = (field.shape[1] + BLOCK - 1) // BLOCK
+    for c in range(len(field.coarse)):
+        if field.coarse[c] - a[2] <= slack:
+            continue
+        i, j = c // wide, c % wide
+        px, py = field.origin[0] + (i + 0.5) * size, field.origin[1] + (j + 0.5) * size
+        if _depth_at((px, py, 0.5 * size, field.coarse[c] - a[2]), slack, a, b, head) == 0.0:
+            continue
+        for p in range(i * BLOCK, min((i + 1) * BLOCK, field.shape[0])):
+            for q in range(j * BLOCK, min((j + 1) * BLOCK, field.shape[1])):
+                rise = field.top[p * field.shape[1] + q] - a[2]
+                if rise > slack and rise > deepest:
+                    x, y = field.origin[0] + (p + 0.5) * cell, field.origin[1] + (q + 0.5) * cell
+                    deepest = max(deepest, _depth_at((x, y, 0.0, rise), slack, a, b, head))
+    return deepest
+
+
+@part
+def depth_of(a: Floats, b: Floats, slack: float, field: Field, head: Head) -> float:
+    """How deep the head goes into the field at most during a move; a slanting one in pieces, each at its lowest place."""
+    if min(a[2], b[2]) + slack >= field.highest[0]:
+        return 0.0
+    across = max(abs(b[0] - a[0]), abs(b[1] - a[1]))
+    pieces = 1
+    if abs(b[2] - a[2]) > 1e-6 and across > 1e-6:
+        pieces = int(max(across, abs(b[2] - a[2])) / PIECE_MM) + 1
+    deepest = 0.0
+    for k in range(pieces):
+        s, t = k / pieces, (k + 1) / pieces
+        z = min(a[2] + s * (b[2] - a[2]), a[2] + t * (b[2] - a[2]))
+        c = (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), z)
+        d = (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), z)
+        deepest = max(deepest, _level_depth(c, d, slack, field, head))
+    return deepest

@@ -1,0 +1,272 @@
+"""Replay: every move in order against the plastic laid before it: does the head run into it, does a bead lie on it or in it.
+
+For each run of moves at one pose the earlier plastic is turned into the machine frame and laid into a field of heights; then
+the run's own moves follow one by one. A bead is carried by what lies under it or beside it along the direction of that
+moment; it overlaps when plastic already reaches its top along its middle and to one side at least.
+"""
+
+from dataclasses import dataclass
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun.height_field import NOTHING, Field, Head, depth_of, empty_field, lay_bead
+from machine.kinematics.table import machine_points
+from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+from mdp.pose import UP, Pose, rotation
+from profiles.machine import Machine
+from profiles.profile import Profile
+from slicer.paths import Kind
+
+STEP_MM = 0.5
+ROUGH = 0.5  # of half a bead: by how much earlier plastic, seen from another side, may seem to stand higher than it does
+SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded
+INNER = 0.35  # of the bead's width: where what lies under it is looked for
+OWN = 3.0  # so many widths back along its path the plastic is the bead's own beginning
+MOST_TURNED = 100_000_000  # segments turned into the frames of all runs together
+STANDS_OFF = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.SKIRT.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Beads:
+    """What was deposited: (m, 2, 3) segments in the workpiece frame, (m,) their rows, widths and heights."""
+
+    segments_mm: Floats
+    rows: NDArray[np.int64]
+    width_mm: Floats
+    height_mm: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """(n,) for the rows of a program: depth of the head in earlier plastic, lengths in air and of overlapping extrusion, mm.
+
+    beside_mm: lengths that only what lies beside them carries.
+
+    untested_row: the first row that was not tried, where the table turns too often; -1: all were.
+    """
+
+    depth_mm: Floats
+    air_mm: Floats
+    overlapping_mm: Floats
+    beside_mm: Floats
+    untested_row: int
+
+
+class Strokes(NamedTuple):
+    """(n,) of each row: half its bead's width and its height (0: no bead), the path it belongs to, how far along all moves it
+    ends, and whether it is support, which stands off by a gap.
+    """
+
+    half: Floats
+    height: Floats
+    path: NDArray[np.int32]
+    way: Floats
+    stands_off: NDArray[np.bool_]
+
+
+class Surroundings(NamedTuple):
+    """What the rows of one pose meet: rows from `first` on are its own, support keeps `gap` away, the plate is a x + b y + c."""
+
+    field: Field
+    first: int
+    gap: float
+    plate: Floats
+
+
+class Measured(NamedTuple):
+    """(n,) what is filled in for each row, see Contacts."""
+
+    depth: Floats
+    air: Floats
+    overlapping: Floats
+    beside: Floats
+
+
+def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Beads:
+    """Widths and heights as the program's comments tell, else by the profile's layer and the filament pushed."""
+    process = profile.process
+    first = segments[:, :, 2].max(axis=1, initial=0.0) <= process.first_layer_height_mm + 1e-3
+    usual = np.where(first, process.first_layer_height_mm, process.layer_height_mm)
+    height = np.where(program.height_mm[rows] > 0, program.height_mm[rows], usual)
+    length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    area = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
+    by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
+    width = np.where(program.width_mm[rows] > 0, program.width_mm[rows], by_flow)
+    return Beads(segments, rows, width, height)
+
+
+def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contacts:
+    """Go through all moves of a program in order."""
+    machine, count = profile.machine, len(program.line)
+    measured = Measured(*(np.zeros(count) for _ in Measured._fields))
+    if not len(deposited.rows):
+        return Contacts(*measured, untested_row=-1)
+    extruded = program.kind == MoveKind.EXTRUDE
+    strokes, head = _strokes(program, deposited, extruded), head_of(machine)
+    ups, turned = np.zeros((len(deposited.rows), 3)), 0
+    process = profile.process
+    gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
+    for run in pose_runs(program):
+        before, after = np.searchsorted(deposited.rows, (run.rows[0], run.rows[-1] + 1))
+        ups[before:after] = rotation(machine, run.pose)[2]
+        turned += before
+        if turned > MOST_TURNED:
+            return Contacts(*measured, untested_row=int(run.rows[0]))
+        field = _field(deposited, int(before), int(after), run, ups, machine)
+        if field is not None:
+            about = Surroundings(field, int(run.rows[0]), gap, _plate(machine, run.pose))
+            _replay_run(run.rows, (program.start, program.end), strokes, about, head, measured)
+    return Contacts(*measured, untested_row=-1)
+
+
+def _strokes(program: ParsedProgram, deposited: Beads, extruded: NDArray[np.bool_]) -> Strokes:
+    half, height = np.zeros(len(extruded)), np.zeros(len(extruded))
+    half[deposited.rows], height[deposited.rows] = 0.5 * deposited.width_mm, deposited.height_mm
+    goes_on = np.all(program.start[1:] == program.end[:-1], axis=1) & extruded[1:] & extruded[:-1]
+    path = np.cumsum(np.concatenate([[True], ~goes_on])).astype(np.int32)
+    way = np.cumsum(np.linalg.norm((program.end - program.start)[:, :3], axis=1))
+    stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.type]
+    return Strokes(half, height, path, way, stands_off)
+
+
+def head_of(machine: Machine) -> Head:
+    """The machine's head as the kernels take it."""
+    boxes = np.array([[*box.min_mm, *box.max_mm] for box in machine.head.boxes]).reshape(-1, 6)
+    return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes)
+
+
+def _field(deposited: Beads, before: int, after: int, run: PoseRun, ups: Floats, machine: Machine) -> Field | None:
+    """The field of a run at one pose with all earlier plastic in it; None where nothing was or will be laid."""
+    if after == 0:
+        return None
+    ends = machine_points(machine, run.pose, deposited.segments_mm[:after].reshape(-1, 3)).reshape(-1, 2, 3)
+    low, high = (
+        edge - 3.0 * sign for edge, sign in ((ends[:, :, :2].min(axis=(0, 1)), 1), (ends[:, :, :2].max(axis=(0, 1)), -1))
+    )
+    field = empty_field(low, high)
+    if before:
+        now, width, height = rotation(machine, run.pose)[2], deposited.width_mm[:before], deposited.height_mm[:before]
+        along = ups[:before] @ now
+        across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
+        middle = rotation(machine, run.pose) @ (ups[:before] * (0.5 * height)[:, None]).T
+        earlier = ends[:before] - middle.T[:, None, :]
+        earlier[:, :, 2] += (0.5 * np.abs(along) * height + 0.5 * across * width)[:, None]
+        _lay_beads(
+            earlier, np.minimum(0.5 * width, 0.5 * width * along**2 + 0.5 * height * across), deposited.rows[:before], field
+        )
+    return field
+
+
+def _plate(machine: Machine, pose: Pose) -> Floats:
+    """(3,) a, b, c of the table's surface z = a x + b y + c in the machine frame; far below where it stands too steep."""
+    normal = rotation(machine, pose) @ UP
+    if normal[2] < 0.5:
+        return np.array([0.0, 0.0, NOTHING])
+    centre = machine_points(machine, pose, np.zeros((1, 3)))[0]
+    return np.array([-normal[0] / normal[2], -normal[1] / normal[2], float(normal @ centre) / normal[2]])
+
+
+@kernel
+def _lay_beads(ends: Floats, half: Floats, rows: NDArray[np.int64], field: Field) -> None:
+    """Lay (m, 2, 3) beads into a field."""
+    for i in range(len(ends)):
+        lay_bead(ends[i, 0], ends[i, 1], half[i], rows[i], field)
+
+
+@part
+def _under(place: tuple[float, float, float, float], row: int, strict: bool, strokes: Strokes, about: Surroundings) -> int:
+    """Under a place of a bead: 0 nothing, 1 plastic that carries it, 2 plastic where the bead itself should lie.
+
+    place: x, y, z of the bead's top, and how far along all moves it is. strict: only what reaches into the bead's own layer
+    carries it (what lies beside it).
+    """
+    x, y, z, at = place
+    field, half, height = about.field, strokes.half[row], strokes.height[row]
+    i, j = int(np.floor((x - field.origin[0]) / field.cell)), int(np.floor((y - field.origin[1]) / field.cell))
+    if i < 0 or j < 0 or i >= field.shape[0] or j >= field.shape[1]:
+        return 0
+    k = i * field.shape[1] + j
+    top, owner = field.top[k], field.owner[k]
+    same_path = owner >= about.first and strokes.path[owner] == strokes.path[row]
+    if same_path and at - strokes.way[owner] < 2.0 * OWN * half and top > z - 0.5 * height:
+        top = field.below[k]
+        if top < z - 4.0 * height:
+            return 0
+        owner = row
+    if top > (z - 0.3 * height if owner >= about.first else z + ROUGH * half):
+        return 2
+    reach = 0.6 * height if strict else 1.6 * height
+    if not strict and owner >= 0 and owner < about.first:
+        reach += half
+    if not strict and (strokes.stands_off[row] or (owner >= 0 and strokes.stands_off[owner])):
+        reach += about.gap
+    return 1 if top > z - reach else 0
+
+
+@part
+def _classify_support(
+    place: tuple[float, float, float, float], side: tuple[float, float], row: int, strokes: Strokes, about: Surroundings
+) -> int:
+    """0: a bead hangs in air, 1: lies on something, 2: overlaps others, 3: only has a neighbour; side: unit vector across."""
+    x, y, z, at = place
+    half, height, plate = strokes.half[row], strokes.height[row], about.plate
+    overlapping, carried = 0, 0
+    for k in range(-1, 2):
+        off = 2.0 * INNER * half * k
+        under = _under((x + off * side[0], y + off * side[1], z, at), row, False, strokes, about)
+        overlapping += (2 if k == 0 else 1) if under == 2 else 0
+        carried += 1 if under == 1 else 0
+    if overlapping > 2:
+        return 2
+    if carried > 0 or abs(z - height - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height:
+        return 1
+    if overlapping > 0:
+        return 3
+    off = half + 0.75 * about.field.cell + 0.1 * height
+    for k in range(-1, 2, 2):
+        if _under((x + k * off * side[0], y + k * off * side[1], z, at), row, True, strokes, about) > 0:
+            return 3
+    return 0
+
+
+@kernel
+def _replay_run(
+    rows: NDArray[np.int64],
+    ends: tuple[Floats, Floats],
+    strokes: Strokes,
+    about: Surroundings,
+    head: Head,
+    measured: Measured,
+) -> None:
+    """Try each row of a run against the field, then lay it. ends: (n, 5) starts and ends of all rows."""
+    for row in rows:
+        a, b = ends[0][row], ends[1][row]
+        extruded = strokes.height[row] > 0.0
+        slack = 2.0 * strokes.half[row] if extruded else SLACK_MM
+        measured.depth[row] = depth_of(a, b, slack, about.field, head)
+        if not extruded:
+            continue
+        dx, dy = b[0] - a[0], b[1] - a[1]
+        across = np.sqrt(dx * dx + dy * dy)
+        length = np.sqrt(across * across + (b[2] - a[2]) ** 2)
+        count = int(length / STEP_MM) + 1
+        if across > 1e-9:
+            side = (-dy / across, dx / across)
+            for k in range(count):
+                t = (k + 0.5) / count
+                at = strokes.way[row] - (1.0 - t) * length
+                carried = _classify_support(
+                    (a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]), at), side, row, strokes, about
+                )
+                if carried == 0:
+                    measured.air[row] += length / count
+                elif carried == 2:
+                    measured.overlapping[row] += length / count
+                elif carried == 3:
+                    measured.beside[row] += length / count
+        lay_bead(a, b, strokes.half[row], row, about.field)

@@ -1,0 +1,51 @@
+"""Firmwares: what each one is told, how it answers and how it is simulated; one file a firmware, one line of the table."""
+
+from machine.firmware.dialect import Dialect
+from machine.firmware.firmware import Firmware
+from machine.firmware.grblhal import GRBLHAL
+from machine.firmware.klipper import KLIPPER
+from machine.firmware.linuxcnc import LINUXCNC
+from machine.firmware.marlin import MARLIN, SIMULATED
+from machine.firmware.repetier import REPETIER
+from machine.firmware.reprapfirmware import REPRAPFIRMWARE
+from machine.firmware.simulation import SimulationRules
+from machine.firmware.smoothieware import SMOOTHIEWARE
+from profiles.machine import Machine
+
+__all__ = ["FIRMWARES", "Dialect", "Firmware", "dialect_of", "dialects", "firmware_of", "identify", "simulation_of"]
+
+FIRMWARES: tuple[Firmware, ...] = (
+    MARLIN,
+    REPETIER,
+    SMOOTHIEWARE,
+    REPRAPFIRMWARE,
+    KLIPPER,
+    LINUXCNC,
+    GRBLHAL,
+)
+
+
+def dialects() -> dict[str, Dialect]:
+    """Every dialect by its name in machine.dialect."""
+    return {name: dialect for firmware in FIRMWARES for name, dialect in firmware.dialects.items()}
+
+
+def dialect_of(machine: Machine) -> Dialect:
+    """What is written for a machine."""
+    return dialects()[machine.dialect]
+
+
+def firmware_of(machine: Machine) -> Firmware:
+    """The firmware that a machine's dialect is written for."""
+    return next(firmware for firmware in FIRMWARES if machine.dialect in firmware.dialects)
+
+
+def simulation_of(machine: Machine) -> SimulationRules:
+    """How a machine's firmware is simulated; one that opens files itself has no rules of its own and is taken for Marlin."""
+    return firmware_of(machine).simulated or SIMULATED
+
+
+def identify(identity: str) -> Firmware | None:
+    """The firmware of a FIRMWARE_NAME line, None for an unknown one; forks keep the name of what they were forked from."""
+    folded = identity.lower()
+    return next((firmware for firmware in FIRMWARES if any(sign in folded for sign in firmware.signs)), None)

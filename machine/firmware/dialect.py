@@ -1,0 +1,59 @@
+"""Dialect: what is written for a firmware and what its words mean when they are read."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+# What G90 and G91 mean for the filament: they set its mode too; nothing; G91 makes it relative while it lasts.
+FilamentMode = Literal["set", "apart", "carried"]
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """Words and rules of a firmware; an empty word means that the firmware has none and nothing is written.
+
+    {} takes the value, {name} a placeholder of the profile's blocks. A block is a tuple of lines.
+    """
+
+    firmware: str  # what people call it
+    longest_line: int  # characters the firmware keeps, line number and checksum included
+    nozzle: str  # {} deg C, without waiting
+    nozzle_wait: str  # {} deg C, waiting
+    fan_on: str  # {} 0 to fan_full
+    fan_off: str = "M107"
+    fan_full: int = 255
+    travel: str = "G0"
+    stroke: str = "G1"
+    arc_right: str = "G2"
+    arc_left: str = "G3"
+    filament: str = "E"  # the first of these letters that no rotary axis has
+    filament_relative: bool = True
+    modes: tuple[str, ...] = ("G21", "G90", "M83")  # said again after the start block, whatever that has left
+    progress: str = ""  # {} percent, {} minutes left
+    acceleration: str = ""  # {} of strokes, {} of travels, mm/s2
+    layer: str = ""  # {} layer of all layers, from 1
+    before_start: tuple[str, ...] = ()
+    after_start: tuple[str, ...] = ()
+    before_end: tuple[str, ...] = ()
+    last: str = ""
+    parts: str = ""  # {parts}: how many parts come
+    part: str = ""  # {index} from 0, {number} from 1: said before the first stroke for every part
+    part_begin: str = ""
+    part_end: str = ""
+    steppers: bool = False  # rotary axes are turned by MANUAL_STEPPER, not by words of G1
+    follow_on: str = ""  # X Y Z mean places on the table from here on (TCP)
+    follow_off: str = ""
+    follow_from_turn_axis: bool = False  # those places count from where the turn axis meets the table, else from machine zero
+    follow_persists: bool = False  # it may still follow the table from an earlier program: follow_off is written first
+    follow_keeps_coordinates: bool = False  # switching moves nothing and takes the present X Y Z for the other meaning
+    inverse_time: bool = False  # knows G93
+    largest_delta: bool = False  # F of a pure turn is the speed of the axis that goes farthest, else along sqrt(tilt^2 + turn^2)
+    rapid: bool = False  # G0 goes as fast as the axes can, whatever F says
+    filament_mode: FilamentMode = "apart"
+    bare_g92: bool = False  # a G92 without words calls every axis 0, else it does nothing
+    macros: bool = False  # knows lines of NAME KEY=VALUE
+    value_word: str = "S"  # of temperatures and fans
+    stands: tuple[str, ...] = ()  # after a restart: the axes stand at {x_mm} {y_mm} {z_mm} {tilt_deg} {turn_deg}
+    serial: bool = True  # takes numbered lines with checksums over a serial line and answers ok
+    homed_before: bool = False  # runs no program before its axes are homed by hand; G28 means another thing there
+    endstop_word: str = ""  # of G1: with 1, 3 or 4 the move ends at an end stop
+    wait_for_person: tuple[str, ...] = ("M0 {text}",)  # says {text} and waits; where it can, the tip may be jogged meanwhile

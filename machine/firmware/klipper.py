@@ -1,0 +1,111 @@
+"""Klipper: its own SET_ commands, and two ways to turn a [manual_stepper].
+
+Since Klipper3d/klipper#6888 such a stepper can be registered as a letter of G1 (GCODE_AXIS); until then, and in older
+versions for good, MANUAL_STEPPER turns it. A registered stepper cannot be homed, so the start block comes before that.
+
+N and * are stripped and ignored (klippy/gcode.py). A macro may work for minutes without a word, and the pseudo-terminal loses
+nothing: when the program behind it dies the port closes. M114 names X Y Z E only, whatever steppers turn the table.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from machine.firmware.dialect import Dialect
+from machine.firmware.firmware import Firmware
+from machine.firmware.line import LineRules
+from machine.firmware.simulation import SimulationRules
+from profiles.machine import RotaryAxis
+
+_STANDS = (
+    "SET_KINEMATIC_POSITION X={x_mm} Y={y_mm} Z={z_mm}",
+    "MANUAL_STEPPER STEPPER={tilt_stepper} SET_POSITION={tilt_deg}",
+    "MANUAL_STEPPER STEPPER={turn_stepper} SET_POSITION={turn_deg}",
+)
+
+STEPPERS = Dialect(
+    firmware="Klipper with MANUAL_STEPPER",
+    longest_line=120,  # it keeps more; the stream's checksum is made for no longer ones
+    nozzle="SET_HEATER_TEMPERATURE HEATER=extruder TARGET={}",
+    nozzle_wait="M109 S{}",
+    fan_on="M106 S{}",
+    progress="M73 P{} R{}",
+    acceleration="SET_VELOCITY_LIMIT ACCEL={}",  # M204 P T would take the lesser of the two for all moves
+    layer="SET_PRINT_STATS_INFO CURRENT_LAYER={}",
+    before_start=("SET_PRINT_STATS_INFO TOTAL_LAYER={layers}",),
+    part="EXCLUDE_OBJECT_DEFINE NAME=part_{number}",
+    part_begin="EXCLUDE_OBJECT_START NAME=part_{number}",
+    part_end="EXCLUDE_OBJECT_END NAME=part_{number}",
+    steppers=True,
+    largest_delta=True,
+    filament_mode="carried",
+    bare_g92=True,
+    macros=True,
+    stands=_STANDS,
+    wait_for_person=("M117 {text}", "PAUSE"),
+)
+
+_LETTERS = (
+    "MANUAL_STEPPER STEPPER={tilt_stepper} GCODE_AXIS={tilt} LIMIT_VELOCITY={tilt_speed} LIMIT_ACCEL={tilt_acceleration}",
+    "MANUAL_STEPPER STEPPER={turn_stepper} GCODE_AXIS={turn} LIMIT_VELOCITY={turn_speed} LIMIT_ACCEL={turn_acceleration}",
+)
+_FREE = ("MANUAL_STEPPER STEPPER={tilt_stepper} GCODE_AXIS=", "MANUAL_STEPPER STEPPER={turn_stepper} GCODE_AXIS=")
+
+AXES = replace(
+    STEPPERS,
+    firmware="Klipper with GCODE_AXIS",
+    steppers=False,
+    before_start=(*_FREE, *STEPPERS.before_start),
+    after_start=_LETTERS,
+    stands=(*_STANDS, *_LETTERS),
+    before_end=_FREE,
+)
+
+
+def stepper_name(axis: RotaryAxis) -> str:
+    """What the [manual_stepper] of a rotary axis is called."""
+    return axis.stepper or f"stepper_{axis.letter.lower()}"
+
+
+def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) -> str:
+    """`X:1.000 Y:2.000 Z:3.000 E:0.000`."""
+    del steps
+    return " ".join(f"{letter}:{coordinates[letter]:.3f}" for letter in "XYZE")
+
+
+def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, bed_target_c: float) -> str:
+    """`B:20.0 /0.0 T0:20.0 /0.0`."""
+    return f"B:{bed_c:.1f} /{bed_target_c:.1f} T0:{nozzle_c:.1f} /{nozzle_target_c:.1f}"
+
+
+SIMULATED = SimulationRules(
+    identity="FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13.0-simulated",
+    identity_in_ok=True,
+    banner=("// Klipper state: Ready",),
+    numbers="ignore",
+    queue_lines=20,
+    blocks=100,  # its toolhead looks 2 s ahead, whatever number of moves that is
+    urgent="lines",
+    unknown='// Unknown command:"{}"',
+    cold=(
+        "// Extrude below minimum temp",
+        "// See the 'min_extrude_temp' config option for details",
+        "!! Extrude below minimum temp",
+    ),
+    cold_moves=False,
+    unhomed="!! Must home axis first: {}",
+    out_of_range="!! Move out of range: {}",
+    kill=("!! Shutdown due to M112 command", "// Klipper state: Shutdown"),
+    after_kill=("!! Shutdown due to M112 command",),
+    position=position_report,
+    temperatures=temperature_report,
+    while_heating="",
+    lacks=frozenset({"M108", "M113", "M116", "M154", "M155", "M211", "M302", "M410", "M486", "M568", "M665", "M876", "G43.4"}),
+)
+
+KLIPPER = Firmware(
+    name="Klipper",
+    signs=("klipper",),
+    dialects={"klipper": AXES, "klipper_steppers": STEPPERS},
+    line=LineRules(resends=False, silence_s=1800.0),
+    simulated=SIMULATED,
+)

@@ -1,0 +1,55 @@
+"""Marlin 2.1: rotary axes are the words of AXIS4_NAME and AXIS5_NAME; M73, M486 and arcs are build options it may lack.
+
+TCP (G43.4, G49) exists in the fork DerAndere1/Marlin, branch Marlin2ForPipetBot, only. Its F on mixed moves counts X Y Z.
+Line numbers, checksums and `ok` as in gcode/queue.cpp, bugfix-2.1.x of 2024-09.
+"""
+
+from machine.firmware.dialect import Dialect
+from machine.firmware.firmware import Firmware
+from machine.firmware.line import LineRules
+from machine.firmware.simulation import SimulationRules
+
+DIALECT = Dialect(
+    firmware="Marlin",
+    longest_line=95,  # MAX_CMD_SIZE 96 with the closing zero: a longer line loses its checksum
+    nozzle="M104 S{}",
+    nozzle_wait="M109 S{}",
+    fan_on="M106 S{}",
+    progress="M73 P{} R{}",
+    acceleration="M204 P{} T{}",
+    parts="M486 T{parts}",
+    part_begin="M486 S{index}",
+    part_end="M486 S-1",
+    follow_on="G43.4",
+    follow_off="G49",
+    follow_keeps_coordinates=True,
+    filament_mode="set",
+    stands=("G92 X{x_mm} Y{y_mm} Z{z_mm} {tilt}{tilt_deg} {turn}{turn_deg}",),
+    wait_for_person=("M0 {text}",),
+)
+
+SIMULATED = SimulationRules(
+    identity="FIRMWARE_NAME:Marlin bugfix-2.1.x (simulated) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin "
+    "PROTOCOL_VERSION:1.0 MACHINE_TYPE:tiltprint EXTRUDER_COUNT:1 AXIS_COUNT:{axes} UUID:cede2a2f-41a2-4748-9b12-c55c62f367ff",
+    banner=("start", "Marlin bugfix-2.1.x (simulated)", "echo: Last Updated: 2024-09-29 | Author: (none, default config)"),
+    numbers="resend",
+    queue_lines=4,
+    blocks=15,  # of BLOCK_BUFFER_SIZE 16: one place of its ring stays empty
+    min_segment_s=0.02,  # DEFAULT_MINSEGMENTTIME
+    urgent="bytes",
+    unknown='echo:Unknown command: "{}"',
+    cold=("echo: cold extrusion prevented",),
+    unhomed="echo:Home XYZ First",
+    kill=("Error:Printer halted. kill() called!", "//action:poweroff"),
+    reports_position=True,
+    has_build_options=True,
+    lacks=frozenset({"M116", "M568"}),
+)
+
+MARLIN = Firmware(
+    name="Marlin",
+    signs=("marlin",),
+    dialects={"marlin": DIALECT},
+    line=LineRules(reports_rotary_axes=True),
+    simulated=SIMULATED,
+)

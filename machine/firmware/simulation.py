@@ -1,0 +1,62 @@
+"""SimulationRules: how the simulated printer takes lines and words its answers in the name of a firmware."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+# Coordinates and steps by letter -> the answer to M114.
+PositionReport = Callable[[Mapping[str, float], Mapping[str, int]], str]
+# Nozzle, its target, bed, its target, all deg C -> what M105 answers.
+TemperatureReport = Callable[[float, float, float, float], str]
+
+
+def position_report(coordinates: Mapping[str, float], steps: Mapping[str, int]) -> str:
+    """`X:1.00 Y:2.00 Z:3.00 E:0.00 Count X:80 Y:160 Z:1200`."""
+    named = " ".join(f"{letter}:{value:.2f}" for letter, value in coordinates.items())
+    return f"{named} Count " + " ".join(f"{letter}:{count}" for letter, count in steps.items())
+
+
+def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, bed_target_c: float) -> str:
+    """`T:19.38 /0.00 B:20.00 /0.00 @:0 B@:0`."""
+    return (
+        f"T:{nozzle_c:.2f} /{nozzle_target_c:.2f} B:{bed_c:.2f} /{bed_target_c:.2f} "
+        f"@:{127 * (nozzle_target_c > 0)} B@:{127 * (bed_target_c > 0)}"
+    )
+
+
+@dataclass(frozen=True)
+class SimulationRules:
+    """What a host sees of the firmware; {} is the command or the coordinates.
+
+    identity: the FIRMWARE_NAME line of M115, {axes}: how many; identity_in_ok: it stands behind the ok. banner: said after a
+    restart. numbers: "resend": lines are checked and asked for again; "drop": a bad checksum is dropped in silence, any number
+    is taken; "ignore": number and checksum are cut off unread. queue_lines: kept before the one at work is done; more wait.
+    blocks: planned moves. min_segment_s: shorter moves are stretched while few wait. urgent: where an M112 is seen before its
+    turn ("bytes": an emergency parser, "lines": when its line has been read). unknown, cold, unhomed, out_of_range: what is
+    said of such commands; out_of_range "": the target is clamped without a word. cold_moves: a cold move is made without
+    filament. kill: said when it stops for ever; after_kill: said, with ok, to every line from then on. has_build_options: it
+    is built with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it.
+    while_heating: behind the temperatures of a command that waits for them. lacks: commands it does not know.
+    """
+
+    identity: str
+    banner: tuple[str, ...]
+    numbers: Literal["resend", "drop", "ignore"]
+    queue_lines: int
+    urgent: Literal["bytes", "lines", ""]
+    unknown: str
+    cold: tuple[str, ...]
+    unhomed: str
+    kill: tuple[str, ...]
+    blocks: int = 15
+    min_segment_s: float = 0.0
+    cold_moves: bool = True
+    out_of_range: str = ""
+    after_kill: tuple[str, ...] = ()
+    has_build_options: bool = False
+    identity_in_ok: bool = False
+    reports_position: bool = False
+    position: PositionReport = position_report
+    temperatures: TemperatureReport = temperature_report
+    while_heating: str = " W:?"
+    lacks: frozenset[str] = frozenset()

@@ -1,0 +1,132 @@
+"""Modes: what G20, G21, G90 to G94, M82, M83 and F have set, and where the words of a move lead.
+
+The one reading of modes: the dry run's reader, the host's state and the simulated printer each keep a `Modes`. A place is a list
+X Y Z tilt turn E as its owner counts them; the program's coordinate of it is place + offset.
+
+Marlin: gcode.h, axis_is_relative: G90 and G91 go for E too, M82 and M83 for E alone. RepRapFirmware: GCodes2.cpp: G90 and G91
+leave drivesRelative alone. Klipper: gcode_move.py: E is relative under G91 or M83, and a G92 without words calls all axes 0.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from machine.firmware import dialect_of
+from machine.firmware.dialect import FilamentMode
+from machine.firmware.klipper import stepper_name
+from machine.gcode.words import Word
+from profiles.errors import GcodeError
+from profiles.machine import Machine
+
+INCH_MM = 25.4
+E_AXIS = 5
+LINEAR = (0, 1, 2, E_AXIS)  # their words count in inches after G20, degrees never do
+COMMANDS = ("G20", "G21", "G90", "G91", "G93", "G94", "M82", "M83")
+
+
+class Axes(NamedTuple):
+    """What a machine's firmware calls its axes, and how it reads their modes."""
+
+    letters: tuple[str, ...] = ("X", "Y", "Z", "A", "C", "E")  # in the order of a place
+    words: Mapping[str, int] = {"X": 0, "Y": 1, "Z": 2, "A": 3, "C": 4, "E": E_AXIS}  # those that a move may have
+    filament_mode: FilamentMode = "set"
+    bare_g92: bool = False
+    follow_on: str = "G43.4"  # X Y Z are places on the table from here on (TCP)
+    follow_off: str = "G49"
+    steppers: tuple[str, str] = ("", "")  # Klipper's names of those that tilt and turn, in capitals
+
+    def __deepcopy__(self, memo: object) -> "Axes":
+        return self
+
+
+def axes_of(machine: Machine | None) -> Axes:
+    """The axes of a machine, Marlin's A and C where none is known."""
+    if machine is None:
+        return Axes()
+    dialect = dialect_of(machine)
+    rotary = {machine.tilt.letter: 3, machine.turn.letter: 4} if machine.tilts and not dialect.steppers else {}
+    filament = next(letter for letter in dialect.filament if letter not in rotary)
+    return Axes(
+        letters=("X", "Y", "Z", machine.tilt.letter, machine.turn.letter, "E"),
+        words={"X": 0, "Y": 1, "Z": 2, **rotary, filament: E_AXIS},
+        filament_mode=dialect.filament_mode,
+        bare_g92=dialect.bare_g92,
+        follow_on=dialect.follow_on,
+        follow_off=dialect.follow_off,
+        steppers=(stepper_name(machine.tilt).upper(), stepper_name(machine.turn).upper()),
+    )
+
+
+@dataclass(slots=True)
+class Modes:
+    """feed: mm/min (deg/min), or after G93 one over minutes; 0: none given yet. strict: move() refuses what it cannot use."""
+
+    axes: Axes
+    feed: float = 0.0
+    strict: bool = False
+    inches: bool = False
+    relative: bool = False
+    filament_relative: bool = False  # told by M82 and M83, and by G90 and G91 where the firmware has it so
+    inverse_time: bool = False
+    offset: list[float] = field(default_factory=lambda: [0.0] * 6)  # of G92: program's coordinate less the place
+    units: list[float] = field(default_factory=lambda: [1.0] * 6)  # mm or deg of a word's 1
+    steps: list[bool] = field(default_factory=lambda: [False] * 6)  # whether a word is a step
+
+    def set(self, name: str) -> None:
+        """One of COMMANDS."""
+        if name in ("G20", "G21"):
+            self.inches = name == "G20"
+            for axis in LINEAR:
+                self.units[axis] = INCH_MM if self.inches else 1.0
+            return
+        if name in ("G93", "G94"):
+            self.inverse_time = name == "G93"
+            return
+        if name in ("G90", "G91"):
+            self.relative = name == "G91"
+            if self.axes.filament_mode == "set":
+                self.filament_relative = self.relative
+        else:
+            self.filament_relative = name == "M83"
+        carried = self.relative and self.axes.filament_mode == "carried"
+        self.steps[:] = [*[self.relative] * E_AXIS, self.filament_relative or carried]
+
+    @property
+    def unit_mm(self) -> float:
+        """mm of one unit of length."""
+        return self.units[0]
+
+    def move(self, place: list[Any], words: Iterable[Word]) -> bool:
+        """Take the words of a move: `place` becomes where it leads, F the feed; True when an axis is named.
+
+        A coordinate that is None is not known: a step leaves it so. Raises GcodeError, if strict, for an F that is not above 0
+        and for a word that is no axis's; else they change nothing.
+        """
+        axes, units, steps, offset = self.axes.words, self.units, self.steps, self.offset
+        moved = False
+        for letter, value in words:
+            axis = axes.get(letter)
+            if axis is None:
+                if letter == "F" and value > 0:
+                    self.feed = value if self.inverse_time else value * units[0]
+                elif self.strict:
+                    raise self._refusal(letter, value)
+                continue
+            moved = True
+            value *= units[axis]
+            if not steps[axis]:
+                place[axis] = value - offset[axis]
+            elif place[axis] is not None:
+                place[axis] += value
+        return moved
+
+    def _refusal(self, letter: str, value: float) -> GcodeError:
+        if letter == "F":
+            return GcodeError(f"F is {value:g}: a feed must be above 0")
+        return GcodeError(f"word {letter}{value:g} of a move is not known: this machine has {' '.join(self.axes.words)} F")
+
+    def named(self, words: Iterable[Word]) -> list[tuple[int, float]]:
+        """The axes and coordinates, mm or deg, of a G92."""
+        axes = self.axes.words
+        coordinates = [(axes[letter], value * self.units[axes[letter]]) for letter, value in words if letter in axes]
+        return coordinates or [(axis, 0.0) for axis in axes.values() if self.axes.bare_g92]

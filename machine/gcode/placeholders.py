@@ -1,0 +1,80 @@
+"""Placeholders: what the profile's G-code blocks may name in braces, the values, and the blocks with them filled in."""
+
+import re
+from collections.abc import Mapping
+from math import pi
+
+from machine.firmware.klipper import stepper_name
+from machine.gcode.settings import clock
+from machine.planning.moves import BeginPart
+from mdp.pose import level
+from profiles.errors import ProfileError
+from profiles.profile import Profile
+
+PLACEHOLDER = re.compile(r"\{(\w+)\}")
+FRAME = 12  # "N1234567 " and "*123": what the stream adds to a command
+
+
+def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: float, filament_mm: float) -> dict[str, object]:
+    """What the blocks may name; the part's values change from part to part."""
+    machine, material, process = profile.machine, profile.material, profile.process
+    first = parts[0] if parts else None
+    pose = first.pose if first else level(machine)
+    return {
+        "tilt": machine.tilt.letter,
+        "turn": machine.turn.letter,
+        "tilt_stepper": stepper_name(machine.tilt),
+        "turn_stepper": stepper_name(machine.turn),
+        "tilt_speed": machine.tilt.speed_deg_s,
+        "turn_speed": machine.turn.speed_deg_s,
+        "tilt_acceleration": machine.tilt.acceleration_deg_s2,
+        "turn_acceleration": machine.turn.acceleration_deg_s2,
+        "nozzle_c": material.nozzle_c,
+        "first_layer_nozzle_c": material.first_layer_nozzle_c,
+        "bed_c": material.bed_c,
+        "nozzle_mm": machine.head.nozzle_mm,
+        "layer_height_mm": process.layer_height_mm,
+        "parts": len(parts),
+        "layers": sum(part.layers for part in parts),
+        "part": first.index if first else 0,
+        "part_layers": first.layers if first else 0,
+        "tilt_deg": pose.tilt_deg,
+        "turn_deg": pose.turn_deg,
+        "z_mm": 0.0,
+        "time": clock(seconds),
+        "time_s": round(seconds),
+        "filament_mm": round(filament_mm, 2),
+        "filament_g": round(filament_mm * pi * material.diameter_mm**2 / 4000.0 * material.density_g_cm3, 2),
+        "model": "".join(c if "!" <= c <= "~" and c not in "(){};*" else "_" for c in name),
+        "material": material.name,
+        "process": process.name,
+        "machine": machine.name,
+    }
+
+
+def fill_block(block: str, name: str, values: Mapping[str, object], longest: int) -> list[str]:
+    """The block's lines with {placeholders} replaced, empty lines left out.
+
+    Raises ProfileError for an unknown placeholder and for a command too long for the firmware.
+    """
+    lines = []
+    for line in block.splitlines():
+        text = PLACEHOLDER.sub(lambda found: _value(found[1], name, values), line).strip()
+        command = text.partition(";")[0].strip()
+        if len(command) + FRAME > longest:
+            raise ProfileError(
+                f"{name}: the line {command[:40]!r}... has {len(command)} characters, "
+                f"at most {longest - FRAME} are allowed (the firmware's {longest} less line number and checksum)"
+            )
+        if text:
+            lines.append(text)
+    return lines
+
+
+def _value(word: str, name: str, values: Mapping[str, object]) -> str:
+    if word not in values:
+        raise ProfileError(f"{name}: placeholder {{{word}}} is not known: allowed are {', '.join(sorted(values))}")
+    value = values[word]
+    if isinstance(value, float):
+        return f"{value:.4f}".rstrip("0").rstrip(".") if abs(value) >= 5e-5 else "0"
+    return str(value)

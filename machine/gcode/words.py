@@ -1,0 +1,78 @@
+"""Words: one line of G-code taken apart into frame, command, words of letter and number, KEY=VALUE of a macro.
+
+The dry run's reader, the host and the simulated printer all read with these. Letters are capitals: callers make them so.
+"""
+
+import re
+from collections.abc import Callable, Iterable
+
+from profiles.errors import GcodeError
+
+Word = tuple[str, float]
+
+NUMBER = r"[-+]?(?:[0-9]{1,12}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})(?![0-9])"  # bounded: no infinity from a thousand digits
+BLOCK = re.compile(rf"(?:[A-Z] *{NUMBER} *)*")
+WORD = re.compile(rf"([A-Z]) *({NUMBER})")
+FLAGS = re.compile(rf"[GM] *[0-9]+(?:\.[0-9]+)? *(?:[A-Z] *(?:{NUMBER} *)?)*")
+FLAG = re.compile(rf"([A-Z]) *({NUMBER})?")
+MACRO = re.compile(r"(?![A-Z][-+.0-9])[A-Z_][A-Z0-9_]+(?: .*)?")
+PAREN = re.compile(r"\([^)]*\)")
+COMMAND = re.compile(r"([GMTSPR]) *0*([0-9]{1,9}(?:\.[0-9]{1,6})?)")  # S P R: Marlin's real-time orders, S000
+VALUE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*) *= *(\"[^\"]*\"|\S*)")
+_number = re.compile(NUMBER).fullmatch
+_spaced = re.compile(rf"(?: +[A-Z]{NUMBER})*\s*").fullmatch
+
+
+def read_words(text: str) -> list[Word]:
+    """The words with a number, in order; as in Marlin an E is never an exponent. A number too long to be meant is none."""
+    if _spaced(text):  # the usual line: blanks part it faster
+        return [(word[0], float(word[1:])) for word in text.split()]
+    return [(letter, float(value)) for letter, value in WORD.findall(text)]
+
+
+def read_letters(text: str) -> list[str]:
+    """The letters of the words, with a number or without: G28 X Y."""
+    return [letter for letter, _ in FLAG.findall(text)]
+
+
+def read_values(text: str) -> dict[str, str]:
+    """KEY=VALUE of a macro: keys in capitals, values as written, quotes taken off."""
+    return {key.upper(): value.strip('"') for key, value in VALUE.findall(text)}
+
+
+def read_number(text: str) -> float | None:
+    """The number that a text is; None for any other."""
+    return float(text) if _number(text) else None
+
+
+def split_command(text: str) -> tuple[str, str]:
+    """Name and rest of a command: "G1", " X5" of "G01X5"; a macro keeps its whole name."""
+    if text[2:3] == " " and text[1:2].isdigit():
+        return text[:2], text[2:]
+    head = COMMAND.match(text)
+    if head:
+        return f"{head[1]}{head[2]}", text[head.end() :]
+    name, _, rest = text.partition(" ")
+    return name, rest
+
+
+def plain_move(letters: Iterable[str]) -> Callable[[str], object]:
+    """What tells a usual G0 or G1 line, of words of these letters and F only, from any other."""
+    return re.compile(rf"G[01](?: [{''.join(letters)}F]{NUMBER})+\s*").fullmatch
+
+
+def unframe(number: int, code: str) -> str:
+    """A line without its N number and checksum; GcodeError when the checksum does not fit."""
+    body, star, given = code.partition("*")
+    if star:
+        total = 0
+        for byte in body.encode("utf-8", "replace"):
+            total ^= byte
+        if given.strip() != str(total):
+            raise GcodeError(f"line {number}: {quote(code)} has checksum {given.strip()[:8]!r}, its characters give {total}")
+    return re.sub(r"^N *[0-9]+ *", "", body.strip())
+
+
+def quote(text: str) -> str:
+    """A line as a message quotes it."""
+    return repr(text if len(text) <= 40 else text[:40] + "...")

@@ -1,0 +1,257 @@
+"""Gcode: a machine program as text in the firmware's dialect, line by line; the same program gives the same bytes."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import ceil
+
+import numpy as np
+
+from machine.firmware import dialect_of
+from machine.gcode import settings
+from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
+from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_path
+from machine.gcode.placeholders import fill_block, placeholders
+from machine.gcode.turning import turn
+from machine.planning.acceleration import travel_mm_s2
+from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Retract, Stroke, Travel, Wipe, rows
+from machine.planning.timing import move_times
+from mdp.mesh import Floats
+from mdp.pose import level
+from profiles.profile import Profile
+
+ROUNDING_MM = 0.0015  # an arc's centre is written in thousandths
+BLOCKS = ("start", "before_part", "after_part", "end")
+
+
+def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
+    """The lines of a G-code file, without line ends, in the dialect of profile.machine.
+
+    Raises ProfileError, before the first line, for a block of the profile that cannot be filled in.
+    """
+    machine = profile.machine
+    dialect = dialect_of(machine)
+    letter = next(each for each in dialect.filament if each not in (machine.tilt.letter, machine.turn.letter))
+    pen = Pen(dialect, machine, letter, level(machine))
+    parts = [move for move in program.moves if isinstance(move, BeginPart)]
+    elapsed, filament_mm = clock(program, profile)
+    pen.values = placeholders(program.name, profile, parts, float(elapsed[-1]), filament_mm)
+    for name in BLOCKS:
+        _block(name, pen)
+    return _lines(program, profile, parts, elapsed, filament_mm, pen)
+
+
+def clock(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
+    """(number of moves + 1,) seconds from the first move to the beginning of each, and to the end; filament in mm."""
+    machine = profile.machine
+    straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)
+    stop = np.zeros(len(straight.speed), dtype=np.bool_)
+    times = move_times(straight.end - straight.start, straight.speed, stop, machine, straight.acceleration)
+    each = np.bincount(straight.move, weights=times, minlength=len(program.moves))
+    elapsed: Floats = np.concatenate([[0.0], np.cumsum(each)])
+    return elapsed, float(straight.end[:, 5].max(initial=0.0))
+
+
+def _lines(
+    program: MachineProgram, profile: Profile, parts: list[BeginPart], elapsed: Floats, filament_mm: float, pen: Pen
+) -> Iterator[str]:
+    total = float(elapsed[-1])
+    coming = iter(parts)
+    following = next(coming, None)
+    last_strokes = _last_strokes(program)
+    yield from settings.head(program.name, profile)
+    yield from _start(profile, parts, pen)
+    for place, move in enumerate(program.moves):
+        if isinstance(move, Stroke):
+            yield from _stroke(move, profile, pen)
+            if place in last_strokes:
+                yield from _dialect_line(pen.dialect.part_end, pen, index=pen.part - 1, number=pen.values["part"])
+        elif isinstance(move, Travel):
+            yield from _travel(move, pen)
+        elif isinstance(move, Wipe):
+            yield ";WIPE_START"
+            yield from write_path(pen.file_coordinates(move.points_mm), -move.filament_mm, move.speed_mm_s, pen)
+            yield ";WIPE_END"
+        elif isinstance(move, Retract):
+            pen.filament_mm -= move.filament_mm
+            yield f"{pen.dialect.stroke}{pen.filament()}{pen.speed(move.speed_mm_s)}"
+        elif isinstance(move, Reorient):
+            yield from _reorient(move, following, pen)
+        elif isinstance(move, BeginPart):
+            following = next(coming, None)
+            yield from _begin_part(move, len(parts), pen)
+        else:
+            yield from _begin_layer(move, profile, pen)
+            yield from _progress(float(elapsed[place]), total, pen)
+    yield from _end(pen)
+    yield from _progress(total, total, pen)
+    yield from _dialect_line(pen.dialect.last, pen)
+    yield from settings.foot(profile, filament_mm, total)
+
+
+def _last_strokes(program: MachineProgram) -> set[int]:
+    """Places of the last stroke of each part."""
+    strokes, latest = set(), -1
+    for place, move in enumerate(program.moves):
+        if isinstance(move, Stroke):
+            latest = place
+        elif isinstance(move, BeginPart) and latest >= 0:
+            strokes.add(latest)
+    return strokes | {latest}
+
+
+def _block(name: str, pen: Pen, **values: object) -> list[str]:
+    """The lines of one of the profile's blocks."""
+    return fill_block(getattr(pen.machine.gcode, name), f"machine.gcode.{name}", pen.values | values, pen.dialect.longest_line)
+
+
+def _dialect_line(word: str, pen: Pen, **values: object) -> list[str]:
+    """A line of the dialect with its placeholders filled; nothing where the firmware has no such word."""
+    return fill_block(word, "dialect", pen.values | values, pen.dialect.longest_line)
+
+
+def _start(profile: Profile, parts: list[BeginPart], pen: Pen) -> Iterator[str]:
+    """What the firmware wants to know first, the start block, its modes, and the first layer's heat if that has not come yet."""
+    dialect, heat = pen.dialect, profile.material.first_layer_nozzle_c
+    yield ";TYPE:Custom"
+    for word in (*dialect.before_start, dialect.parts):
+        yield from _dialect_line(word, pen)
+    for index, part in enumerate(parts):
+        yield from _dialect_line(dialect.part, pen, index=index, number=part.index)
+    lines = _block("start", pen)
+    yield from lines
+    pen.nozzle_c = heat
+    hot = dialect.nozzle_wait.format(number(heat))
+    if hot not in lines:
+        yield hot
+    yield from dialect.modes
+    for word in dialect.after_start:
+        yield from _dialect_line(word, pen)
+    if pen.machine.coordinates == "workpiece":
+        yield dialect.follow_on
+    yield f"G92 {pen.filament_letter}0"
+
+
+def _end(pen: Pen) -> Iterator[str]:
+    yield ";TYPE:Custom"
+    if pen.machine.coordinates == "workpiece":
+        yield pen.dialect.follow_off
+    yield from _block("after_part", pen)
+    for word in pen.dialect.before_end:
+        yield from _dialect_line(word, pen)
+    yield from _block("end", pen)
+
+
+def _begin_part(move: BeginPart, parts: int, pen: Pen) -> Iterator[str]:
+    machine = pen.machine
+    yield f";PART:{move.index} of {parts}"
+    yield f";POSE:{machine.tilt.letter}{angle(move.pose.tilt_deg)} {machine.turn.letter}{angle(move.pose.turn_deg)}"
+    if move.unsupported_mm2 > 0:
+        yield f";UNSUPPORTED:{move.unsupported_mm2:.2f}@{move.unsupported_layer}"
+    pen.values |= {"part": move.index, "tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "part_layers": move.layers}
+    pen.kind, pen.width_mm = None, 0.0
+    pen.part += 1
+
+
+def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
+    if pen.labelled != pen.part:
+        pen.labelled = pen.part
+        yield from _dialect_line(pen.dialect.part_begin, pen, index=pen.part - 1, number=move.part)
+    yield ";LAYER_CHANGE"
+    yield f";Z:{number(move.z_mm)}"
+    yield f";HEIGHT:{number(move.height_mm)}"
+    pen.kind = None
+    pen.layers += 1
+    if pen.dialect.layer:
+        yield pen.dialect.layer.format(pen.layers)
+    material = profile.material
+    heated = min(material.nozzle_c + move.nozzle_add_c, profile.machine.nozzle_limit_c)
+    wanted = material.first_layer_nozzle_c if move.part == 1 and move.index == 1 else heated
+    if wanted != pen.nozzle_c:
+        pen.nozzle_c = wanted
+        yield pen.dialect.nozzle.format(number(wanted))
+    pen.layer_fan = move.fan
+    yield from _set_fan(move.fan, pen)
+
+
+def _set_fan(share: float, pen: Pen) -> Iterator[str]:
+    fan = round(255 * share)
+    if fan != pen.fan:
+        pen.fan = fan
+        level = fan if pen.dialect.fan_full == 255 else round(pen.dialect.fan_full * fan / 255, 3)
+        yield pen.dialect.fan_on.format(number(level)) if fan else pen.dialect.fan_off
+
+
+def _progress(seconds: float, total: float, pen: Pen) -> Iterator[str]:
+    percent = int(100.0 * seconds / total + 1e-9) if total > 0 else 100
+    if percent != pen.percent and pen.dialect.progress:
+        pen.percent = percent
+        yield pen.dialect.progress.format(percent, ceil((total - seconds) / 60.0 - 1e-9))
+
+
+def _stroke(move: Stroke, profile: Profile, pen: Pen) -> Iterator[str]:
+    """What changes before the stroke, then its lines."""
+    yield from _set_fan(pen.layer_fan if move.fan is None else move.fan, pen)
+    acceleration = move.acceleration_mm_s2
+    if acceleration is not None and round(acceleration) != pen.acceleration and pen.dialect.acceleration:
+        pen.acceleration = round(acceleration)
+        yield pen.dialect.acceleration.format(pen.acceleration, round(travel_mm_s2(profile) or pen.acceleration))
+    if move.kind is not pen.kind:
+        pen.kind = move.kind
+        yield f";TYPE:{move.kind.value}"
+    if move.width_mm != pen.width_mm:
+        pen.width_mm = move.width_mm
+        yield f";WIDTH:{number(move.width_mm)}"
+    machine, points = profile.machine, pen.file_coordinates(move.points_mm)
+    if machine.arcs and len(points) > FEWEST_CHORDS and np.ptp(points[:, 2]) < 1e-9:
+        yield from _with_arcs(replace(move, points_mm=points), machine.arc_tolerance_mm, pen)
+    else:
+        yield from write_path(points, move.filament_mm, move.speed_mm_s, pen)
+
+
+def _with_arcs(move: Stroke, tolerance_mm: float, pen: Pen) -> Iterator[str]:
+    """A stroke in one plane with arcs where they keep to it."""
+    flat = np.rint(move.points_mm[:, :2] * 1000.0) / 1000.0
+    runs, arcs = fit_arcs(flat, move.filament_mm, tolerance_mm - ROUNDING_MM)
+    done = 0
+    for (first, last), (x, y, clockwise) in zip(runs.tolist(), arcs.tolist(), strict=True):
+        if first > done:
+            yield from write_path(move.points_mm[done : first + 1], move.filament_mm[done:first], move.speed_mm_s, pen)
+        yield _arc(move, first, last, (x - flat[first, 0], y - flat[first, 1]), clockwise > 0, pen)
+        done = last
+    if done < len(flat) - 1:
+        yield from write_path(move.points_mm[done:], move.filament_mm[done:], move.speed_mm_s, pen)
+
+
+def _arc(move: Stroke, first: int, last: int, centre: tuple[float, float], clockwise: bool, pen: Pen) -> str:
+    pen.filament_mm += float(move.filament_mm[first:last].sum())
+    ((pen.x, pen.y),) = thousandths(move.points_mm[last : last + 1, :2])
+    word = pen.dialect.arc_right if clockwise else pen.dialect.arc_left
+    place = f" X{pen.x / 1000:.3f} Y{pen.y / 1000:.3f} I{centre[0]:.3f} J{centre[1]:.3f}"
+    return f"{word}{place}{pen.filament()}{pen.speed(move.speed_mm_s)}"
+
+
+def _travel(move: Travel, pen: Pen) -> Iterator[str]:
+    """One line a point; of the first travel after the start block only Z, so that the tip rises before it crosses."""
+    points = thousandths(pen.file_coordinates(move.points_mm))
+    if pen.z == UNKNOWN:
+        pen.z = points[0][2]
+        yield f"{pen.dialect.travel} Z{pen.z / 1000:.3f}{pen.speed(move.speed_mm_s)}"
+        return
+    for x, y, z in points[1:]:
+        place = pen.place(x, y, z)
+        if place:
+            yield f"{pen.dialect.travel}{place}{pen.speed(move.speed_mm_s)}"
+
+
+def _reorient(move: Reorient, following: BeginPart | None, pen: Pen) -> Iterator[str]:
+    """The blocks around a turn of the table, and the turn."""
+    yield ";TYPE:Custom"
+    pen.kind = None
+    if pen.turned and following is not None:
+        yield from _block("after_part", pen)
+    values: dict[str, object] = {"tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "z_mm": pen.z / 1000}
+    if following is not None:
+        values |= {"part": following.index, "part_layers": following.layers}
+    yield from _block("before_part", pen, **values)
+    pen.turned = True
+    yield from turn(move.pose, move.speed_deg_s, pen)

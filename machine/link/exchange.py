@@ -1,0 +1,118 @@
+"""Exchange: one conversation over an open wire; lines go out as the window allows, every event of the printer is handed on."""
+
+from collections.abc import Callable
+from math import inf
+from typing import NamedTuple
+
+from machine.link.medium import Medium, Wire
+from machine.link.protocol.connection import GREETING_STATES, Connection
+from machine.link.protocol.events import Event, Ok, Position
+from machine.link.protocol.framing import LINE_LIMIT
+from machine.link.protocol.states import State
+from machine.link.protocol.timeout import Timing
+from profiles.errors import PortError
+
+
+class Reconnection(NamedTuple):
+    """A new wire to a printer whose port was lost, and whether what was on its way has been done; None: it is to be asked."""
+
+    wire: Wire
+    done: bool | None
+
+
+class Exchange:
+    """`on_event` gets every event after the connection has seen it, `on_turn` is called once a turn with the time, s.
+
+    `on_lost` is called when the port is gone after the greeting: it finds the same printer again or raises. The
+    printer's own faults are raised as the connection reports them.
+    """
+
+    def __init__(
+        self,
+        wire: Wire,
+        medium: Medium,
+        timing: Timing,
+        on_event: Callable[[Event], None],
+        on_turn: Callable[[float], None],
+        on_lost: Callable[[PortError], Reconnection],
+        limit: int = LINE_LIMIT,
+        rx_bytes: int | None = None,
+        baud: int | None = None,
+    ) -> None:
+        self.wire, self.medium = wire, medium
+        self.connection = Connection(timing, medium.now_s(), limit, rx_bytes=rx_bytes, baud=baud)
+        self.greeted = False
+        self._on_event, self._on_turn, self._on_lost = on_event, on_turn, on_lost
+        self._position: Position | None = None
+
+    def greet(self) -> None:
+        """Agree on line numbers and learn how the printer answers."""
+        while self.connection.state in GREETING_STATES:
+            self.pump()
+        self.greeted = True
+
+    def send(self, command: str) -> int:
+        """Wait for room and send; returns the line's number, counted from the greeting on."""
+        can_send = self.connection.can_send
+        while not can_send(command):
+            self.pump()
+        return self.connection.send(command, self.medium.now_s())
+
+    def settle(self) -> None:
+        """Wait until every line sent is acknowledged."""
+        window = self.connection.window
+        while window.acknowledged < window.sent or self.connection.state is not State.OPEN:
+            self.pump()
+
+    def drain(self) -> None:
+        """The barrier: wait until every move sent so far is over. A question asked after M400 has been answered then."""
+        self.send("M400")
+        self.send("M105")
+        self.settle()
+
+    def ask_position(self) -> Position | None:
+        """Where the printer says it stands, all moves over; None when it does not report it."""
+        self.send("M400")
+        self.settle()
+        self._position = None
+        self.send("M114")
+        self.send("M105")
+        self.settle()
+        return self._position
+
+    def wait(self, seconds: float = inf, until: Callable[[], bool] = lambda: False) -> None:
+        """Keep the conversation alive, without sending, for some time or until something has come true."""
+        end_s = self.medium.now_s() + seconds
+        while not until() and self.medium.now_s() < end_s:
+            self.pump()
+
+    def pump(self) -> None:
+        """One turn: write, read, let time pass."""
+        connection = self.connection
+        try:
+            if out := connection.take():
+                self.wire.write(out)
+            data = self.wire.read()
+        except PortError as error:
+            self._reconnect(error)
+            return
+        now_s = self.medium.now_s()
+        if data:
+            for event in connection.receive(data, now_s):
+                if isinstance(event, Position):
+                    self._position = event
+                elif isinstance(event, Ok) and event.position is not None:
+                    self._position = event.position
+                self._on_event(event)
+        connection.tick(now_s)
+        if connection.fault is not None:
+            raise connection.fault
+        self._on_turn(now_s)
+
+    def _reconnect(self, error: PortError) -> None:
+        """Go on over a new wire: the printer is asked what has arrived; one that has restarted answers with its first number."""
+        if not self.greeted:
+            raise error
+        self.wire, done = self._on_lost(error)
+        self.connection.reconnect(self.medium.now_s(), done)
+        self.wire.write(self.connection.take())  # one that takes nothing over a new wire either has not been found again

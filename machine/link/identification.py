@@ -1,0 +1,147 @@
+"""Identification: what stands at the other end of a port, by its answers to M115 and M114: a printer, its axes, or what else."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from threading import Event as Flag
+from time import monotonic
+
+from machine.link.port import Port
+from machine.link.protocol.decoder import LineDecoder
+from machine.link.protocol.events import Area, Busy, Event, FirmwareFault, Identity, Ok, Position
+
+TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and as many with its start
+QUICK_S = 1.5  # at another rate: it has started by then
+ASK_S = 1.0  # between questions; those asked during the start are lost
+POSITION_S = 1.0  # a printer that names itself but not its place
+RATES = (115200, 250000, 1000000, 230400)  # what firmwares are built with, the likeliest first
+NAME = "FIRMWARE_NAME:"
+KEY = re.compile(r"\s+[A-Z_]+:")  # Marlin writes SOURCE_CODE_URL, RepRapFirmware ELECTRONICS behind the name
+VERSION = re.compile(r" FIRMWARE_VERSION: ?(\S+)")
+GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of printers have words
+
+
+class Kind(Enum):
+    """What answers."""
+
+    PRINTER = "printer"
+    BUSY = "busy printer"
+    HALTED = "halted printer"
+    STRANGER = "no printer"
+    RUBBISH = "rubbish"
+    SILENT = "silent"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What answers. words: the firmware's own line, its error, or the last words of a stranger.
+
+    letters: axes that M114 reports, the filament's left out; "" when none. limits: letter -> least and greatest
+    value, of a firmware that reports them.
+    """
+
+    kind: Kind
+    words: str = ""
+    letters: str = ""
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def firmware(self) -> str:
+        """The firmware's name and version without the rest of its line."""
+        name = KEY.split(self.words.removeprefix(NAME).strip())[0]
+        version = VERSION.search(self.words)
+        return f"{name} {version[1]}" if version else name
+
+
+def ask(port: Port, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> Answer:
+    """Ask until a printer has named itself, s at most, or until `stop` is set; raises PortError when the port is lost."""
+    inquiry = _Inquiry(port, stop or Flag())
+    inquiry.listen("M115", timeout_s, lambda: inquiry.named)
+    if inquiry.named:
+        inquiry.listen("M114", POSITION_S, lambda: inquiry.placed)
+    return inquiry.answer()
+
+
+def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: Flag | None = None) -> tuple[Answer, int]:
+    """What answers and at which rate: the given one, and where nothing sensible comes the usual others.
+
+    Where none makes a printer answer, the answer is that at the given rate, at which the port is left.
+    """
+    first = ask(port, timeout_s, stop)
+    if first.kind not in (Kind.RUBBISH, Kind.SILENT) or port.name.startswith("socket://"):
+        return first, baud
+    for rate in RATES:
+        if rate != baud:
+            port.set_baud(rate)
+            answer = ask(port, QUICK_S, stop)
+            if answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED):
+                return answer, rate
+    port.set_baud(baud)
+    return first, baud
+
+
+class _Inquiry:
+    """What one asking has brought so far."""
+
+    def __init__(self, port: Port, stop: Flag) -> None:
+        self._port, self._stop = port, stop
+        self._decoder = LineDecoder()
+        self._words = self._fault = self._letters = ""
+        self._area: Area | None = None
+        self._ok = self._busy = self.named = self.placed = False
+
+    def listen(self, question: str, timeout_s: float, until: Callable[[], bool]) -> None:
+        """Ask again and again until the answer is whole, or the time is over."""
+        end_s = next_s = monotonic()
+        end_s += timeout_s
+        self._ok = False
+        while not until() and not self._fault and not self._stop.is_set() and (now_s := monotonic()) < end_s:
+            if now_s >= next_s:
+                self._port.write(f"\n{question}\n".encode("ascii"))  # the newline ends what stood on the line before
+                next_s = now_s + ASK_S
+            if data := self._port.read():
+                for event in self._decoder.receive(data, now_s):
+                    self._read(event)
+
+    def answer(self) -> Answer:
+        """What all of it amounts to."""
+        if self._fault:
+            return Answer(Kind.STRANGER if GRBL_SAYS.fullmatch(self._fault) else Kind.HALTED, self._fault)
+        if self._words or self._ok:
+            return Answer(Kind.PRINTER, self._words, self._letters, self._limits())
+        if self._busy:
+            return Answer(Kind.BUSY)
+        if self._decoder.rubbish:
+            return Answer(Kind.RUBBISH)
+        words = self._decoder.foreign
+        return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
+
+    def _read(self, event: Event) -> None:
+        if isinstance(event, FirmwareFault):
+            self._fault = event.text
+        elif isinstance(event, Busy):
+            self._busy = True
+        elif isinstance(event, Area):
+            self._area = event
+        elif isinstance(event, Identity):
+            self._words = event.text
+        elif isinstance(event, Position):
+            self._read_position(event)
+        elif isinstance(event, Ok):
+            self._ok = True
+            if NAME in event.text:  # Klipper names itself behind its ok
+                self._words = event.text[event.text.index(NAME) :]
+            if event.position is not None:
+                self._read_position(event.position)
+            self.named = bool(self._words)
+
+    def _read_position(self, position: Position) -> None:
+        self._letters = "".join(letter for letter, _ in position.axes if letter != "E")
+        self.placed = True
+
+    def _limits(self) -> dict[str, tuple[float, float]]:
+        """The area with the letters of M114: Marlin names the axes from the fourth on I, J, K, whatever their words are."""
+        if self._area is None or len(self._letters) < len(self._area.axes):
+            return {}
+        return {letter: (low, high) for letter, (_, low, high) in zip(self._letters, self._area.axes, strict=False)}

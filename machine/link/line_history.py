@@ -1,0 +1,68 @@
+"""Line history: how far a program has come; its lines sent, acknowledged and surely executed."""
+
+from collections import deque
+from typing import NamedTuple
+
+MOST_WAITING = 4096  # moves whose end is awaited; of further ones, without any word from the planner, nothing can be known
+PLANNER_BLOCKS = 16  # Marlin's BLOCK_BUFFER_SIZE; a printer that reports more free places has more
+
+
+class SentLine(NamedTuple):
+    """A command on its way: number on the wire, line of the program, whether it moves something, and the pose after it."""
+
+    number: int
+    line: int
+    moves: bool
+    pose: tuple[float | None, ...]
+
+
+class LineHistory:
+    """Lines of the program, from 1; 0 or the line before the first one sent means none.
+
+    Acknowledged is not executed: a move may wait in the planner. What ADVANCED_OK reports of free places bounds how many do; a
+    printer that does not report them is only known after a barrier.
+    """
+
+    def __init__(self, before: int = 0) -> None:
+        self.before = self.sent = self.acknowledged = self.executed = before
+        self.number = 0  # the newest wire number that is acknowledged
+        self.commands = 0  # acknowledged commands of the program
+        self.pose: tuple[float | None, ...] = ()  # after the newest acknowledged command
+        self._flight: deque[SentLine] = deque()
+        self._planned: deque[SentLine] = deque()
+        self._blocks, self._free = PLANNER_BLOCKS, 0
+
+    @property
+    def only_unanswered(self) -> SentLine | None:
+        """The only command of the program that is not acknowledged; None when there is none, or more than one."""
+        return self._flight[0] if len(self._flight) == 1 else None
+
+    def send(self, step: SentLine) -> None:
+        """A command has gone out."""
+        self._flight.append(step)
+        self.sent = step.line
+
+    def acknowledge(self, number: int, free: int | None = None) -> None:
+        """All lines up to this number of the wire have been taken; free: places of the planner right after it."""
+        self.number = max(self.number, number)
+        flight, planned = self._flight, self._planned
+        while flight and flight[0].number <= number:
+            step = flight.popleft()
+            self.acknowledged, self.pose = step.line, step.pose
+            self.commands += 1
+            if step.moves and len(planned) < MOST_WAITING:
+                planned.append(step)
+        if free is None:
+            return
+        self._blocks = max(self._blocks, free + 1)
+        # The less of two answers counts: a damaged digit in one of them must not make a waiting move an executed one.
+        least, self._free = min(free, self._free), free
+        waiting = self._blocks - least
+        while len(planned) > waiting:
+            planned.popleft()
+        self.executed = max(self.executed, planned[0].line - 1 if planned else self.acknowledged)
+
+    def end_moves(self) -> None:
+        """Every move acknowledged so far is over."""
+        self._planned.clear()
+        self.executed = self.acknowledged

@@ -1,0 +1,90 @@
+"""Line outcome: whether the line that was on its way when the port was lost has been done, by where the printer stands.
+
+For firmwares that never ask for a line again: RepRapFirmware and Klipper cannot be asked by line number, but both report the
+place they were sent to, to a thousandth, and the filament with it.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from machine.gcode.modal_state import MOVES, SETTINGS, ModalState
+from machine.gcode.modes import E_AXIS
+from machine.link.protocol.framing import name_of
+from machine.link.status import PrinterStatus
+
+SAME = 0.01  # mm or deg: what program and firmware round
+DISTINCT = 0.004  # two places nearer to each other cannot be told apart by thousandths
+SEVERAL = 3  # coordinates that are not 0 and agree: a printer that has restarted stands at 0 0 0
+# Done twice in a row they leave what they leave when done once.
+REPEATABLE = frozenset({
+    "G4", "G20", "G21", "G90", "G91", "M73", "M82", "M83", "M104", "M105", "M106", "M107", "M109", "M114", "M116", "M117", "M140",
+    "M155", "M190", "M400", "M486", "M568", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "SET_DISPLAY_TEXT",
+    "SET_PRINT_STATS_INFO", *SETTINGS,
+})  # fmt: skip
+
+
+def line_was_done(command: str, before: Sequence[float | None], after: ModalState, status: PrinterStatus) -> bool | None:
+    """True: done; False: it may be sent once more; None: nobody can say, or the printer has restarted.
+
+    before: X Y Z tilt turn E before the command; after: what the firmware is to remember after it.
+    """
+    if status.position is None or len(before) <= E_AXIS:
+        return None
+    reported = dict(status.position.axes)
+    letters = [
+        letter
+        for letter, old, new in zip(after.axes.letters, before, after.at, strict=True)
+        if letter in reported and old is not None and new is not None
+    ]
+    start, end = (dict(zip(after.axes.letters, place, strict=True)) for place in (before, after.at))
+    if not _still_running(reported, (start, end), letters, status, after):
+        return None
+    for chosen in ([letter for letter in letters if letter != "E"], letters):  # some firmwares count filament in their own way
+        if _greatest_difference(start, end, chosen) >= DISTINCT:
+            return _reached_end(reported, start, end, chosen)
+    repeatable = name_of(command) in REPEATABLE or (
+        name_of(command) in MOVES and not (after.modes.relative or after.modes.filament_relative)
+    )
+    return False if repeatable and _greatest_difference(reported, end, letters) <= SAME else None
+
+
+def _still_running(
+    reported: Mapping[str, float],
+    places: Sequence[Mapping[str, float | None]],
+    letters: Sequence[str],
+    status: PrinterStatus,
+    after: ModalState,
+) -> bool:
+    """Whether the printer has not restarted since: it stands at one of the places, and still heats what is to be hot."""
+    heat = status.temperature
+    pairs = ((after.nozzle_c, heat.nozzle_target_c), (after.bed_c, heat.bed_target_c))
+    if any(wanted > 0 and target is not None and target <= 0 for wanted, target in pairs):
+        return False
+    at = [letter for letter in letters if letter != "E"]
+    stands = any(_greatest_difference(reported, place, at) <= SAME for place in places)
+    hot = any(wanted > 0 and target for wanted, target in pairs)
+    return stands and (hot or sum(abs(reported[letter]) > SAME for letter in letters) >= SEVERAL)
+
+
+def _reached_end(
+    reported: Mapping[str, float], start: Mapping[str, float | None], end: Mapping[str, float | None], letters: Sequence[str]
+) -> bool | None:
+    """Whether the printer stands where the command leads to; None when at neither place."""
+    from_start = _greatest_difference(reported, start, letters)
+    from_end = _greatest_difference(reported, end, letters)
+    return from_end < from_start if min(from_start, from_end) <= SAME else None
+
+
+def _greatest_difference(one: Mapping[str, float | None], other: Mapping[str, float | None], letters: Sequence[str]) -> float:
+    """The greatest difference of two places on some axes."""
+    return max((abs((one[letter] or 0.0) - (other[letter] or 0.0)) for letter in letters), default=0.0)
+
+
+def position_differences(modal: ModalState, reported: tuple[tuple[str, float], ...], near: float) -> list[str]:
+    """Axes on which the printer's own position differs by more than `near` from what the program has led to, in words."""
+    coordinates = dict(reported)
+    pairs = zip(modal.axes.letters[:E_AXIS], modal.at[:E_AXIS], strict=True)
+    return [
+        f"{letter} {coordinates[letter]:g} instead of {value:.3f}"
+        for letter, value in pairs
+        if value is not None and letter in coordinates and abs(coordinates[letter] - value) > near
+    ]

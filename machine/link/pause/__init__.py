@@ -1,0 +1,1 @@
+"""A pause: where the tip waits, and how it gets there and back."""

@@ -1,0 +1,108 @@
+"""Park moves: the commands that take the tip away from the print, and back to the very place where it stopped.
+
+Away: filament pulled back, straight up along the nozzle, aside. Back: heat, the same way in reverse, filament pushed, and
+everything the firmware is to remember. The rotary axes never move.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machine.firmware import dialect_of
+from machine.gcode.modal_state import ModalState
+from machine.gcode.pen import number
+from machine.link.pause.park_position import Park, axis_position, find_park_position, lift_words, move_words
+from machine.link.pause.printed_bounds import PrintedBounds
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+PULL_MM, PULL_MM_S = 1.0, 30.0  # where no material says otherwise
+SLOWLY = 0.25  # the last stretch down goes at this share of the Z axis' speed
+NEAR_MM = 2.0
+
+
+@dataclass(frozen=True)
+class ParkMoves:
+    """Commands away and back. park: None where the tip stays because its place is not known or no way is clear."""
+
+    away: tuple[str, ...]
+    back: tuple[str, ...]
+    park: Park | None
+
+
+def plan_park(modal: ModalState, profile: Profile | None, bounds: PrintedBounds | None) -> ParkMoves:
+    """How to leave a print that stands at modal's place, all moves over, and how to come back."""
+    pull, push = filament_commands(modal, profile)
+    up, down, park = _moves(modal, profile, bounds)
+    away = ["G21", *pull, "G90", *up]
+    standby_c = profile.material.standby_c if profile is not None else None
+    if standby_c is not None and profile is not None and pull and standby_c < modal.nozzle_c:
+        away.append(dialect_of(profile.machine).nozzle.format(number(standby_c)))
+    back = [*heat_commands(modal, profile), "G21", "G90", *down, *push, *modal.lines()]
+    return ParkMoves(tuple(away), tuple(back), park)
+
+
+def lift_move(modal: ModalState, machine: Machine) -> tuple[str, float] | None:
+    """Words and mm/min of a step that takes the tip away from the print; None where its place is not known or at the top."""
+    standing = axis_position(machine, modal.place(), modal.follows)
+    if standing is None:
+        return None
+    at, pose = standing
+    far = min(machine.lift_mm, machine.z.limits_mm[1] - float(at[2]))
+    return (lift_words(machine, pose, far, modal.follows), 60.0 * machine.z.speed_mm_s) if far > 0 else None
+
+
+def heat_commands(modal: ModalState, profile: Profile | None) -> list[str]:
+    """Wait for the temperatures the program wants: the bed first, it takes longest and the print stands on it."""
+    wait = dialect_of(profile.machine).nozzle_wait if profile is not None else "M109 S{}"
+    bed = [f"M190 S{number(modal.bed_c)}"] if modal.bed_c > 0 else []
+    return bed + ([wait.format(number(modal.nozzle_c))] if modal.nozzle_c > 0 else [])
+
+
+def filament_commands(modal: ModalState, profile: Profile | None) -> tuple[list[str], list[str]]:
+    """Commands that pull filament back before the tip leaves a place where it stood still, and that push it after."""
+    pull, speed, extra = _filament(modal, profile)
+    if not modal.nozzle_c or not pull:
+        return [], []
+    feed = f"F{60 * speed:.0f}"
+    return ["M83", f"G1 E-{pull:.5f} {feed}"], ["M83", f"G1 E{pull + extra:.5f} {feed}"]
+
+
+def _filament(modal: ModalState, profile: Profile | None) -> tuple[float, float, float]:
+    """How much to pull back (what the program has pulled already counts), mm, how fast, mm/s, and how much more to push."""
+    material = profile.material if profile is not None else None
+    whole = material.retract_mm if material is not None else PULL_MM
+    speed = material.retract_speed_mm_s if material is not None else PULL_MM_S
+    pull = max(0.0, whole - modal.pulled_mm)
+    return pull, speed, material.prime_extra_mm if material is not None else 0.0
+
+
+def _moves(modal: ModalState, profile: Profile | None, bounds: PrintedBounds | None) -> tuple[list[str], list[str], Park | None]:
+    if profile is None or bounds is None:
+        return [], [], None
+    machine, following = profile.machine, modal.follows
+    standing = axis_position(machine, modal.place(), following)
+    if standing is None:
+        return [], [], None
+    at, pose = standing
+    park = find_park_position(machine, bounds.corners(following), at, pose)
+    if park is None:
+        return [], [], None
+    rise, across = 60.0 * machine.z.speed_mm_s, 60.0 * profile.process.travel_speed_mm_s
+    speeds = [rise, across]
+    up = [f"G0 {words} F{feed:.0f}" for words, feed in zip(move_words(machine, park, pose, following), speeds, strict=False)]
+    above = np.array([at[0], at[1], min(at[2] + NEAR_MM, park.lift_mm[2])])
+    near, home = Park(tuple(above), tuple(above)), Park(tuple(at), tuple(at))
+    over = [f"G0 {_words(park.lift_mm)} F{across:.0f}"] if not following else []
+    if following:
+        over = [f"G0 {move_words(machine, Park(park.lift_mm, park.lift_mm), pose, True)[0]} F{across:.0f}"]
+    down = [
+        *over,
+        f"G0 {move_words(machine, near, pose, following)[0]} F{rise:.0f}",
+        f"G1 {move_words(machine, home, pose, following)[0]} F{SLOWLY * rise:.0f}",
+    ]
+    return up, down, park
+
+
+def _words(place: tuple[float, float, float]) -> str:
+    return f"X{place[0]:.3f} Y{place[1]:.3f}"

@@ -1,0 +1,99 @@
+"""Park position: where the tip waits during a pause, straight up along the nozzle and aside, clear of table, cradle and print.
+
+The way: up at the place where the print stopped, across at a height above which nothing stands, and back the same way.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machine.kinematics.collision import Printed, solids, sweep_gaps
+from machine.kinematics.coordinates import axis_positions, followed_places
+from mdp.head import bodies, directions
+from mdp.mesh import Floats
+from mdp.pose import UP, Pose, rotation
+from profiles.machine import Machine
+
+ASIDE_MM = 1.0  # free at the ends of the axes
+PARTS = 4  # a way is tried in so many pieces when it is not clear as a whole
+
+
+@dataclass(frozen=True)
+class Park:
+    """Axis positions, mm: the tip goes up to lift_mm and from there to stand_mm; the same place twice where it stays."""
+
+    lift_mm: tuple[float, float, float]
+    stand_mm: tuple[float, float, float]
+
+
+def find_park_position(machine: Machine, printed: Printed, at_mm: Floats, pose: Pose) -> Park | None:
+    """Where to wait when the tip stands at at_mm (axis positions X Y Z); None when no way up is proved clear."""
+    x, y, z = (float(value) for value in at_mm)
+    most = machine.z.limits_mm[1]
+    top = obstacle_top_mm(machine, printed, pose) + machine.lift_mm
+    height = min(max(top, z + min(machine.lift_mm, most - z)), most)
+    while not _path_is_clear(machine, pose, np.array([x, y, z]), np.array([x, y, height])):
+        height = z + (height - z) / 2.0
+        if height - z < min(1.0, machine.clearance_mm):
+            return None
+    lift = (x, y, height)
+    if height < min(top, most) - 1e-9:
+        return Park(lift, lift)
+    corners = sorted(_corners(machine), key=lambda corner: abs(corner[0] - x) + abs(corner[1] - y))
+    for corner in corners:
+        stand = (*corner, height)
+        if height >= top - 1e-9 or _path_is_clear(machine, pose, np.array(lift), np.array(stand), printed):
+            return Park(lift, stand)
+    return Park(lift, lift)
+
+
+def move_words(machine: Machine, park: Park, pose: Pose, following: bool) -> list[str]:
+    """G0 words of the way up and aside, as the firmware calls the places now; following: it follows the table (TCP)."""
+    stops = [park.lift_mm] if park.stand_mm == park.lift_mm else [park.lift_mm, park.stand_mm]
+    places = np.array(stops)
+    if following:
+        places = followed_places(machine, pose, places)
+        return [f"X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in places]
+    first = f"Z{places[0][2]:.3f}"
+    return [first, *(f"X{x:.3f} Y{y:.3f}" for x, y, _ in places[1:])]
+
+
+def axis_position(machine: Machine, place: tuple[float | None, ...], following: bool) -> tuple[Floats, Pose] | None:
+    """(3,) axis positions and the pose of a place as the program calls it; None where a coordinate is not known."""
+    x, y, z, tilt, turn = place[:5]
+    if x is None or y is None or z is None:
+        return None
+    pose = Pose(machine.tilt.zero_deg if tilt is None else tilt, machine.turn.zero_deg if turn is None else turn)
+    at = np.array([[x, y, z, pose.tilt_deg, pose.turn_deg]])
+    return (axis_positions(machine, at)[0] if following else at[0, :3]), pose
+
+
+def lift_words(machine: Machine, pose: Pose, far_mm: float, following: bool) -> str:
+    """Words of a step along the nozzle, for G91."""
+    step = rotation(machine, pose).T @ (far_mm * UP) if following else far_mm * UP
+    return " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", step, strict=True) if abs(value) > 5e-4)
+
+
+def obstacle_top_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
+    """Greatest Z of table, cradle and print at a pose."""
+    return max(float(reach_of(UP[None])[0]) for _, reach_of in solids(machine, pose, printed))
+
+
+def _corners(machine: Machine) -> list[tuple[float, float]]:
+    (left, right), (front, back) = machine.x.limits_mm, machine.y.limits_mm
+    return [(x, y) for x in (left + ASIDE_MM, right - ASIDE_MM) for y in (front + ASIDE_MM, back - ASIDE_MM)]
+
+
+def _path_is_clear(machine: Machine, pose: Pose, start: Floats, end: Floats, printed: Printed | None = None) -> bool:
+    """True when each body keeps what it must from the solids, piece by piece of the way."""
+    normal = rotation(machine, pose) @ UP
+    tried = np.vstack([UP, normal, directions(normal)])
+    shares = np.linspace(0.0, 1.0, PARTS + 1)
+    begins = start + shares[:-1, None] * (end - start)
+    ends = start + shares[1:, None] * (end - start)
+    for _, reach_of in solids(machine, pose, printed):
+        reach = reach_of(tried)
+        for body in bodies(machine):
+            if float(sweep_gaps(body, begins, ends, tried, reach).min()) < body.need_mm - 1e-6:
+                return False
+    return True

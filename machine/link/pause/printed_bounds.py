@@ -1,0 +1,64 @@
+"""Printed bounds: boxes around what was printed at each pose, for ways over a print that is still on the table."""
+
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from machine.gcode.modal_state import ModalState
+from machine.gcode.modes import E_AXIS
+from machine.kinematics.collision import Printed
+from machine.kinematics.coordinates import origin_mm
+from machine.kinematics.table import workpiece_points
+from mdp.pose import Pose
+from profiles.machine import Machine
+
+BEAD_MM = 1.0  # half a bead's width and more
+
+
+@dataclass
+class PrintedBounds:
+    """A box for each pose, X Y Z of the axes: a bound that costs nothing to keep up while a program is sent."""
+
+    machine: Machine
+    _boxes: dict[tuple[float, float], list[float]] = field(default_factory=dict)
+
+    def track(self, modal: ModalState, command: str) -> tuple[bool, bool]:
+        """Hand a command to `modal` and keep the boxes in step; whether it moves something, and whether it extrudes."""
+        before, pulled = modal.at[E_AXIS], modal.pulled_mm
+        if not modal.take(command):
+            return False, False
+        after = modal.at[E_AXIS]
+        stroke = command[:2] in ("G1", "G2", "G3") and not command[2:3].isdigit()
+        extrudes = stroke and not pulled and (before is None or after is None or after > before)
+        if extrudes:
+            self.extrude_to(modal.place())
+        return True, extrudes
+
+    def extrude_to(self, place: tuple[float | None, ...]) -> None:
+        """Filament was pushed on the way to a place, X Y Z tilt turn."""
+        x, y, z, tilt, turn = place[:5]
+        if x is None or y is None or z is None:
+            return
+        tilt = self.machine.tilt.zero_deg if tilt is None else tilt
+        turn = self.machine.turn.zero_deg if turn is None else turn
+        box = self._boxes.get((tilt, turn))
+        if box is None:
+            self._boxes[tilt, turn] = [x, y, z, x, y, z]
+            return
+        for axis, value in enumerate((x, y, z)):
+            if value < box[axis]:
+                box[axis] = value
+            elif value > box[axis + 3]:
+                box[axis + 3] = value
+
+    def corners(self, followed_table: bool = False) -> Printed:
+        """The corners of all boxes in the workpiece frame; followed_table: the places were those of the table already."""
+        corners = [np.zeros((0, 3))]
+        for (tilt, turn), box in self._boxes.items():
+            places = np.array(list(product(*zip(box[:3], box[3:], strict=True))))
+            if followed_table:
+                corners.append(places - origin_mm(self.machine))
+            else:
+                corners.append(workpiece_points(self.machine, Pose(tilt, turn), places))
+        return Printed(np.vstack(corners), BEAD_MM)

@@ -1,0 +1,88 @@
+"""Return path: from wherever the head stands back to a print: up, over everything, the table turned at a proved height, down."""
+
+from collections.abc import Sequence
+from math import hypot
+
+import numpy as np
+
+from machine.firmware import dialect_of
+from machine.firmware.klipper import stepper_name
+from machine.gcode.pen import Pen
+from machine.gcode.placeholders import fill_block
+from machine.gcode.turning import turn
+from machine.kinematics.collision import Printed
+from machine.link.pause.park_moves import NEAR_MM, SLOWLY
+from machine.link.pause.park_position import obstacle_top_mm
+from machine.planning.reorient import Speeds, route
+from mdp.mesh import Floats
+from mdp.pose import Pose
+from profiles.errors import JournalError
+from profiles.profile import Profile
+
+STILL_DEG = 0.01
+
+
+def return_moves(profile: Profile, printed: Printed, at: Floats, pose: Pose, goal: Floats, goal_pose: Pose) -> list[str]:
+    """G0 lines from axis positions at one pose to axis positions at another; G21 and G90 hold. Raises JournalError, MoveError."""
+    machine, process = profile.machine, profile.process
+    rise, across = 60.0 * machine.z.speed_mm_s, 60.0 * process.travel_speed_mm_s
+    near = min(float(goal[2]) + NEAR_MM, machine.z.limits_mm[1])
+    down = [f"G0 Z{near:.3f} F{rise:.0f}", f"G1 Z{goal[2]:.3f} F{SLOWLY * rise:.0f}"]
+    if hypot(goal_pose.tilt_deg - pose.tilt_deg, goal_pose.turn_deg - pose.turn_deg) > STILL_DEG:
+        path = route(machine, printed, at, goal, pose, goal_pose, Speeds(machine.z.speed_mm_s, process.travel_speed_mm_s), 0)
+        return [
+            f"G0 Z{path.z_mm:.3f} F{rise:.0f}",
+            f"G0 X{path.over_mm[0]:.3f} Y{path.over_mm[1]:.3f} F{across:.0f}",
+            *_turn_commands(profile, pose, goal_pose),
+            f"G0 Z{path.across_z_mm:.3f} F{rise:.0f}",
+            f"G0 X{goal[0]:.3f} Y{goal[1]:.3f} F{across:.0f}",
+            *down,
+        ]
+    height = max(_clear_z_mm(profile, printed, goal_pose), float(at[2]))
+    return [f"G0 Z{height:.3f} F{rise:.0f}", f"G0 X{goal[0]:.3f} Y{goal[1]:.3f} F{across:.0f}", *down]
+
+
+def homed_return_moves(
+    profile: Profile, printed: Printed, at: Floats, pose: Pose, goal: Floats, goal_pose: Pose, heat: Sequence[str]
+) -> list[str]:
+    """The same for a firmware that has forgotten where its axes stand: they are set, `heat` is done, the tip rises, X and Y are
+    homed.
+
+    machine.gcode.resume takes the place of that where the profile has it. Raises JournalError, MoveError, ProfileError.
+    """
+    machine, dialect = profile.machine, dialect_of(profile.machine)
+    height = _clear_z_mm(profile, printed, pose)
+    values = {
+        "x_mm": float(at[0]), "y_mm": float(at[1]), "z_mm": float(at[2]), "tilt_deg": pose.tilt_deg, "turn_deg": pose.turn_deg,
+        "clear_z_mm": height, "tilt": machine.tilt.letter, "turn": machine.turn.letter,
+        "tilt_stepper": stepper_name(machine.tilt), "turn_stepper": stepper_name(machine.turn),
+        "tilt_speed": machine.tilt.speed_deg_s, "turn_speed": machine.turn.speed_deg_s,
+        "tilt_acceleration": machine.tilt.acceleration_deg_s2, "turn_acceleration": machine.turn.acceleration_deg_s2,
+    }  # fmt: skip
+    named = "machine.gcode.resume"
+    if machine.gcode.resume:
+        homing = fill_block(machine.gcode.resume, named, values, dialect.longest_line)
+    else:
+        rise = f"G0 Z{{clear_z_mm}} F{60.0 * machine.z.speed_mm_s:.0f}"
+        homing = fill_block("\n".join((*dialect.stands, *heat, rise, "G28 X Y")), named, values, dialect.longest_line)
+    raised = np.array([at[0], at[1], height])
+    after = heat if machine.gcode.resume else ()
+    return ["G21", "G90", *homing, *after, *return_moves(profile, printed, raised, pose, goal, goal_pose)]
+
+
+def _clear_z_mm(profile: Profile, printed: Printed, pose: Pose) -> float:
+    """Z above which the head may cross anywhere at a pose; raises JournalError where the axis does not reach it."""
+    machine = profile.machine
+    height = obstacle_top_mm(machine, printed, pose) + machine.lift_mm
+    if height > machine.z.limits_mm[1]:
+        raise JournalError(
+            f"to cross the print the tip must rise to Z {height:.1f} mm, {machine.name} allows {machine.z.limits_mm[1]:g} mm"
+        )
+    return height
+
+
+def _turn_commands(profile: Profile, pose: Pose, goal_pose: Pose) -> list[str]:
+    machine = profile.machine
+    pen = Pen(dialect_of(machine), machine, "E", pose)
+    pen.values = {"tilt_stepper": stepper_name(machine.tilt), "turn_stepper": stepper_name(machine.turn)}
+    return list(turn(goal_pose, min(machine.tilt.speed_deg_s, machine.turn.speed_deg_s), pen))

@@ -1,0 +1,189 @@
+"""Pending commands: what a person or the printer has asked of a running print, and what of it is still to be done.
+
+Requests come from any thread through a Control; PendingCommands, in the thread that owns the port, refuses or holds them.
+"""
+
+import re
+from collections import deque
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from threading import Event as Flag
+
+from machine.firmware import dialects
+from machine.gcode.modes import Axes
+from machine.gcode.words import read_words
+from machine.link.protocol.framing import LINE_LIMIT, REFUSED, command_of, name_of
+from profiles.errors import LocalProtocolError
+
+MOST_AT_ONCE = 16  # requests taken in a turn: what asks without end must not hold up the print
+AWAY = ("pausing", "paused")
+# Marlin takes 10 to 999 per cent. Beyond 300 the planner starves, beyond 200 the extruder slips.
+FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
+# Commands that would make the rest of the program mean something else.
+CHANGES = {
+    "G20", "G21", "G90", "G91", "G92", "G93", "G94", "M82", "M83", "G53", "G54", "M206", "M500", "M501", "M502", "T0", "T1",
+    *(word for dialect in dialects().values() for word in (dialect.follow_on, dialect.follow_off) if word),
+}  # fmt: skip
+MOTORS = {"M17", "M18", "M84", "M85"}
+MOVES = {"G0", "G1", "G2", "G3", "G5", "G10", "G11", "G12", "G27", "G29", "G30", "G60", "G61", "M600", "M701", "M702"}
+
+
+class Command(Enum):
+    """What may be asked of a running print."""
+
+    PAUSE = auto()
+    RESUME = auto()
+    CANCEL = auto()
+    EMERGENCY_STOP = auto()
+    FEED = auto()  # value: per cent of the programmed feed rates
+    FLOW = auto()  # value: per cent of the programmed filament
+    LINE = auto()  # text: a line of the person's own
+
+
+@dataclass(frozen=True)
+class PendingCommand:
+    """One of them with its value or text."""
+
+    command: Command
+    value: float = 100.0
+    text: str = ""
+
+
+class Control:
+    """Requests in the order they were made. ask() from any thread, take() from the stream's."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[PendingCommand] = deque()
+
+    def ask(self, command: Command, value: float = 100.0, text: str = "") -> None:
+        """Add a request."""
+        self._waiting.append(PendingCommand(command, value, text))
+
+    def take(self) -> PendingCommand | None:
+        """The oldest request, None when there is none."""
+        return self._waiting.popleft() if self._waiting else None
+
+
+class CancelledError(Exception):
+    """The stop flag was set, or a person or the printer asked for the end."""
+
+
+class EmergencyError(Exception):
+    """A person asked for the emergency stop."""
+
+
+@dataclass
+class PendingCommands:
+    """pause_s: since when a pause is wanted; resume: the print is to go on; lines: commands to be sent between those of the
+    program; message: why the newest request cannot be granted.
+    """
+
+    axes: Axes
+    limit: int = LINE_LIMIT
+    control: Control | None = None
+    stop: Flag | None = None
+    pause_s: float | None = None
+    resume: bool = False
+    lines: deque[str] = field(default_factory=deque)
+    feed_percent: float = 100.0
+    flow_percent: float = 100.0
+    message: str = ""
+
+    def poll(self, state: str, now_s: float) -> None:
+        """Take what was asked since. Raises CancelledError, EmergencyError."""
+        if self.stop is not None and self.stop.is_set():
+            raise CancelledError
+        for _ in range(MOST_AT_ONCE):
+            request = None if self.control is None else self.control.take()
+            if request is None:
+                return
+            self.accept(request, state, now_s)
+
+    def accept(self, request: PendingCommand, state: str, now_s: float) -> None:
+        """Take one request. Raises CancelledError, EmergencyError."""
+        command = request.command
+        if command is Command.EMERGENCY_STOP:
+            raise EmergencyError
+        if command is Command.CANCEL:
+            raise CancelledError
+        if command is Command.PAUSE:
+            self.pause_s = now_s if self.pause_s is None else self.pause_s
+        elif command is Command.RESUME and state in AWAY:
+            self.resume = True
+        elif command is Command.RESUME:
+            self.pause_s = None
+        elif command is Command.LINE:
+            self._queue_line(request.text, state)
+        else:
+            self._override(command, request.value)
+
+    def end_pause(self) -> None:
+        """The pause is over."""
+        self.pause_s, self.resume = None, False
+
+    def note_override(self, command: str) -> None:
+        """Take note of an M220 or M221 of the program itself; no firmware goes down to 0."""
+        value = dict(read_words(command)).get("S", 0.0)
+        if value > 0 and command.startswith("M220"):
+            self.feed_percent = value
+        elif value > 0:
+            self.flow_percent = value
+
+    def undo_overrides(self) -> list[str]:
+        """Commands that take the overrides back: the firmware would keep them for the next print."""
+        pairs = (("M220", self.feed_percent), ("M221", self.flow_percent))
+        return [f"{name} S100" for name, value in pairs if value != 100.0]
+
+    def _queue_line(self, text: str, state: str) -> None:
+        why = line_refusal(text, self.axes, state == "paused", self.limit)
+        self.message = "" if why is None else f"not sent: {text.strip()[:40]!r}: {why}"
+        if why is None:
+            self.lines.append(text.partition(";")[0].strip())
+
+    def _override(self, command: Command, value: float) -> None:
+        feed = command is Command.FEED
+        self.message = percent_refusal(value, FEED_PERCENT if feed else FLOW_PERCENT) or ""
+        if self.message:
+            return
+        if feed:
+            self.feed_percent = value
+        else:
+            self.flow_percent = value
+        self.lines.append(f"{'M220' if feed else 'M221'} S{value:g}")
+
+
+def percent_refusal(value: float, bounds: tuple[float, float]) -> str | None:
+    """Why a per cent value cannot be had, None when it can."""
+    low, high = bounds
+    return None if low <= value <= high else f"{value:g} % is not possible: {low:g} to {high:g} % are allowed"
+
+
+def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
+    """Why a person's command may not be sent now, None when it may.
+
+    During a pause filament may be pushed and pulled, so that it can be changed; nothing else moves under the sender's hands.
+    """
+    try:
+        command = command_of(text, 0, limit)
+    except LocalProtocolError as error:
+        return str(error).replace("line 0", "the command")
+    if not command:
+        return "there is no command in it"
+    name = name_of(command.upper())
+    if name in REFUSED:
+        return f"{name} {REFUSED[name]}"
+    if name in ("G28", "G34", "MANUAL_STEPPER") or name.startswith("HOME"):
+        return f"{name} homes or turns an axis: the tip may stand inside the print"
+    if name in MOTORS:
+        return f"{name} lets the motors go: the print would lose its place"
+    if name in CHANGES or re.fullmatch(r"T\d+", name):
+        return f"{name} changes what the rest of the program means"
+    if name in MOVES and not (paused and _filament_only(command, axes)):
+        return f"{name} moves the machine: during a pause filament alone may move, else nothing"
+    return None
+
+
+def _filament_only(command: str, axes: Axes) -> bool:
+    """Whether a move has no word of an axis."""
+    words = set(re.findall(r"[A-Z]", command.upper()[2:]))
+    return name_of(command.upper()) in ("G0", "G1") and "E" in words and words <= {"E", "F"}

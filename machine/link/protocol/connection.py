@@ -1,0 +1,285 @@
+"""The sender's side of the serial protocol without I/O: received bytes go in, events and bytes to send come out.
+
+The caller owns port and clock: it writes what take() gives, hands what it reads to receive() and calls tick() now and then.
+"""
+
+from machine.firmware import Firmware
+from machine.firmware.marlin import MARLIN
+from machine.link.protocol import verdict
+from machine.link.protocol.acknowledgement import Acknowledgement
+from machine.link.protocol.decoder import LineDecoder
+from machine.link.protocol.events import (
+    Area,
+    Banner,
+    Busy,
+    Capability,
+    Echo,
+    Event,
+    FirmwareFault,
+    Identity,
+    LineError,
+    Ok,
+    Resend,
+    Start,
+    Wait,
+)
+from machine.link.protocol.flow_control import FlowControl
+from machine.link.protocol.framing import LINE_LIMIT, frame
+from machine.link.protocol.greeting import GREETING, Greeting
+from machine.link.protocol.questions import QUESTION, QUESTIONS_MOST, Questions
+from machine.link.protocol.resends import Resends
+from machine.link.protocol.states import TABLE, Signal, State
+from machine.link.protocol.timeout import Timeouts, Timing
+from machine.link.protocol.window import FIRST_NUMBER_AGAIN, GREETING_LINES, Window
+from profiles.errors import LocalProtocolError, PrinterError
+
+GREETING_STATES = (State.DRAIN, State.SYNC, State.HELLO)
+
+
+class Connection:
+    """One conversation with a printer. `fault` is the error that ended it, None while it lasts: look at it after receive() and
+    tick(). `greeting` is what the printer answered to M115, `window` counts the lines, `resends` those that were repeated.
+
+    firmware: taken for one of unknown name; rx_bytes: what the machine's receive buffer holds, None: as its firmware's;
+    baud: for messages.
+    """
+
+    def __init__(
+        self,
+        timing: Timing | None = None,
+        now_s: float = 0.0,
+        limit: int = LINE_LIMIT,
+        firmware: Firmware = MARLIN,
+        rx_bytes: int | None = None,
+        baud: int | None = None,
+    ) -> None:
+        self.state = State.DRAIN
+        self.fault: PrinterError | None = None
+        self.greeting = Greeting(firmware, rx_bytes, baud)
+        self.window = Window(limit, self.greeting.rx_bytes)
+        self.resends = Resends()
+        self._decoder, self._flow, self._oks, self._questions = LineDecoder(), FlowControl(), Acknowledgement(), Questions()
+        self._timeouts = Timeouts(timing or Timing(), now_s)
+        self._out = bytearray()
+        self._last_number_used = False
+
+    @property
+    def advanced(self) -> bool:
+        """Whether the printer's answers name the line they belong to."""
+        return self._flow.numbered
+
+    def can_send(self, command: str) -> bool:
+        """Whether this command may be sent now."""
+        if self.state is not State.OPEN or self._last_number_used or self._decoder.incomplete:
+            return False
+        return self.window.has_space(command, self._flow.lines(self.greeting.firmware.line, self.greeting.emergency_parser))
+
+    def send(self, command: str, now_s: float) -> int:
+        """Number a command, keep it for repeats and queue its bytes; returns its line number, counted from the greeting on."""
+        if not self.can_send(command):
+            raise LocalProtocolError(f"{command!r} was to be sent while the printer has no room for it")
+        self._send(command, now_s)
+        self._last_number_used = self.window.wire_number(self.window.sent) >= self.greeting.firmware.line.last_number
+        return self.window.sent
+
+    def take(self) -> bytes:
+        """The bytes to write to the port now."""
+        out = bytes(self._out)
+        self._out.clear()
+        return out
+
+    def receive(self, data: bytes, now_s: float) -> list[Event]:
+        """The events of received bytes, in any portions."""
+        self._timeouts.heard_s = now_s
+        events = self._decoder.receive(data, now_s)
+        for event in events:
+            self._handle(event, now_s)
+        return events
+
+    def tick(self, now_s: float) -> None:
+        """Let time pass: drains, pauses before a repeat, stalls."""
+        for event in self._decoder.flush(now_s):
+            self._handle(event, now_s)
+        signal = self._timeouts.signal(self.state, self.window, self.greeting.firmware.line, self._questions.unanswered, now_s)
+        if signal is None and self._last_number_used and not self.window.flight:
+            signal = Signal.LAST_NUMBER
+        if signal is not None:
+            self._follow(signal, now_s)
+
+    def reconnect(self, now_s: float, done: bool | None = None) -> None:
+        """The port was lost and is there again: the printer is asked what has arrived; one that restarted betrays itself.
+
+        done: what is known otherwise of the lines on their way: they have been done, or are to be sent once more.
+        """
+        self._out[:] = b"\n"  # ends a half line
+        self._decoder.discard_partial()
+        self._questions.unanswered = 0
+        if done:
+            self.window.acknowledge(self.window.sent)
+        elif done is False:
+            unanswered = [line.number for line in self.window.flight if not line.asks_temperature]
+            self.window.clear_flight()
+            for number in unanswered:
+                self._out += self.window.repeat(number, now_s)
+        self._follow(Signal.RECONNECTED, now_s)
+
+    def _send(self, command: str, now_s: float) -> None:
+        if not self.window.flight:
+            self._timeouts.progress_s = now_s
+        self._out += self.window.send(command, now_s)
+
+    def _handle(self, event: Event, now_s: float) -> None:
+        match event:
+            case Ok():
+                self._handle_ok(event, now_s)
+            case Resend() if self.state is not State.SYNC:
+                self._handle_resend(event, now_s)
+            case LineError():
+                self._oks.expect_resend_ok(self._timeouts.hear_line_error(now_s))
+            case Busy():
+                self._timeouts.hear_busy(now_s)
+            case Start():
+                self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))
+            case Banner() if self.state not in GREETING_STATES:  # there it follows a `start` that was heeded
+                self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))
+            case FirmwareFault():
+                self._follow(Signal.FAULT, now_s, verdict.firmware_fault(event.text))
+            case Wait():
+                if self._questions.hear_idle(bool(self.window.flight)):
+                    self._follow(Signal.STALL, now_s)
+            case Echo():
+                self._oks.hear_echo(event.text)
+            case Identity() | Capability() | Area():
+                self.greeting.learn(event)
+                self.window.rx_bytes = self.greeting.rx_bytes
+
+    def _handle_ok(self, ok: Ok, now_s: float) -> None:
+        """What an `ok` answers depends on the state: M110, a Resend, or a line in flight."""
+        unknown = self._oks.take_unknown()
+        if ok.line is not None:
+            self._flow.learn(ok.rx_free)
+        elif ok.planner_free is not None and self.advanced and not unknown:
+            self._follow(Signal.UNCHECKED, now_s, verdict.torn_line(self.window.last_acknowledged))
+            return
+        if self.state is State.SYNC:
+            if ok.line is not None or ok.planner_free is None:  # else it belongs to the rest of a line torn by a restart
+                self._follow(Signal.SYNCED, now_s)
+        elif self.state is State.QUIET:
+            if self.resends.alone and ok.line is None and ok.temperature is None:
+                self._follow(Signal.HUSH, now_s)  # the ok that belongs to the Resend, and nothing else is on its way
+        elif self.state is State.RENUMBER:
+            if self._oks.answers_m110(ok, self.advanced, unknown, now_s):
+                self.window.restart_numbers()
+                self._last_number_used = False
+                self._follow(Signal.SYNCED, now_s)
+        else:
+            self._acknowledge(self._oks.line(ok, self.window, self.advanced, now_s), ok.temperature is not None, now_s)
+
+    def _acknowledge(self, number: int | None, to_question: bool, now_s: float) -> None:
+        """This line and all before it have arrived; a line that is not in flight makes the answer a stray.
+
+        to_question: it answers an M105. Nothing but questions follows the first one asked in trouble.
+        """
+        window = self.window
+        if number is None or not window.flight:
+            return
+        oldest = window.flight[0]
+        if to_question and self.state is State.PROBING and number >= self._questions.first:
+            if not self.greeting.firmware.line.resends and not oldest.asks_temperature:
+                lost, command = window.wire_number(oldest.number), window.command(oldest.number)
+                self._follow(Signal.UNCHECKED, now_s, verdict.lost_answer(lost, command, self.greeting.firmware.name))
+                return
+            number = window.sent
+        count = window.acknowledge(number)
+        if not count:
+            return
+        self._flow.acknowledge(count)
+        self.resends.acknowledge(number)
+        self._timeouts.acknowledge(oldest, now_s)
+        self._questions.acknowledge()
+        if self.state is State.HELLO and number < GREETING_LINES:
+            self._send(QUESTION, now_s)
+        elif self.state is State.HELLO:
+            self._follow(Signal.GREETED, now_s)
+        elif (self.state is State.PROBING and number >= self._questions.first) or (
+            self.state is State.REPEAT and not window.flight
+        ):
+            self._follow(Signal.ANSWERED, now_s)
+
+    def _handle_resend(self, resend: Resend, now_s: float) -> None:
+        ok_until_s = self._timeouts.hear_resend(now_s, self.state is State.RENUMBER)
+        if self.greeting.firmware.line.resend_ok:
+            self._oks.expect_resend_ok(ok_until_s)
+        if self.state is State.RENUMBER:
+            return
+        window = self.window
+        number = window.line_number(resend.line)
+        plausible = window.can_mean(number)
+        if self.state is State.HELLO or (plausible and self.state is not State.QUIET):
+            if too_much := self.resends.request(number):
+                self._follow(Signal.IMPOSSIBLE, now_s, verdict.noise(resend.line, too_much))
+                return
+            window.acknowledged = number - 1
+            self._follow(Signal.RESEND, now_s)
+        elif plausible:
+            self.resends.next_line = number
+        elif self.state is State.PROBING and self._questions.implausible == number:
+            error = verdict.implausible_resend(resend.line, window.wire_number(window.sent), window.last_acknowledged)
+            self._follow(Signal.IMPOSSIBLE, now_s, error)
+        else:
+            self._questions.implausible = number
+            self._follow(Signal.IMPLAUSIBLE, now_s)
+
+    def _follow(self, signal: Signal, now_s: float, error: PrinterError | None = None) -> None:
+        """Follow the table, then do what belongs to entering the state."""
+        state = TABLE[self.state].get(signal)
+        if state is None:
+            return
+        self.state = state
+        self._timeouts.enter(now_s)
+        if state in (State.HALTED, State.LOST):
+            self.fault = error or verdict.silence(self.window.last_acknowledged, self._questions.unanswered)
+            self._out.clear()
+        elif state in (State.PROBING, State.RENUMBER):
+            self._ask(now_s)
+        else:
+            self._enter(signal, now_s)
+
+    def _enter(self, signal: Signal, now_s: float) -> None:
+        """What is said on entering a state, and what is known from then on."""
+        match self.state:
+            case State.SYNC:
+                error = self.greeting.give_up(self._decoder)
+                if error is not None:
+                    self._follow(Signal.SILENT, now_s, error)
+                    return
+                self.window.reset()
+                self._out += GREETING
+            case State.HELLO:
+                self._send("M115", now_s)
+            case State.OPEN:
+                self._questions.end()
+            case State.QUIET:
+                self._questions.end()
+                self._flow.back_off()
+                self.resends.alone = self.window.sent <= self.resends.next_line
+                self.window.clear_flight()
+            case State.REPEAT:
+                if signal is Signal.HUSH:
+                    self._oks.expect_resend_ok(now_s)  # it has come, or will not
+                if framed := self.resends.repeat(self.window, now_s):
+                    self._out += framed
+                else:
+                    self._follow(Signal.CAUGHT_UP, now_s)
+
+    def _ask(self, now_s: float) -> None:
+        """Ask what has arrived, or give M110, which is not checked for sequence, once more; not without end."""
+        if self.state is State.PROBING:
+            self._flow.slow_down()
+        if not self._questions.ask():
+            self._follow(Signal.SILENT, now_s, verdict.silence(self.window.last_acknowledged + 1, QUESTIONS_MOST))
+        elif self.state is State.PROBING:
+            self._send(QUESTION, now_s)
+            self._questions.first = self._questions.first or self.window.sent
+        else:  # both N are read by one firmware or another
+            self._out += frame(FIRST_NUMBER_AGAIN, f"M110 N{FIRST_NUMBER_AGAIN}")

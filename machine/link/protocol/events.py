@@ -1,0 +1,230 @@
+"""What a printer says: one frozen event for each kind of line, and the reading of a line into an event."""
+
+import re
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Temperature:
+    """Degrees C now and wanted; None where the line does not report it."""
+
+    nozzle_c: float | None = None
+    nozzle_target_c: float | None = None
+    bed_c: float | None = None
+    bed_target_c: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Answer to M114 or an autoreport: (letter, value) pairs, rotary letters included."""
+
+    axes: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Ok:
+    """A line was accepted. Number and free places come with Marlin's ADVANCED_OK, a temperature after M105.
+
+    position: Smoothie puts the answer to M114 behind its ok.
+    """
+
+    line: int | None = None
+    planner_free: int | None = None
+    rx_free: int | None = None
+    temperature: Temperature | None = None
+    text: str = ""
+    position: Position | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Resend:
+    """The printer wants this line and all after it again; one `ok` that acknowledges nothing follows."""
+
+    line: int
+
+
+@dataclass(frozen=True, slots=True)
+class Busy:
+    """The printer lives but has no time for more lines."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class LineError:
+    """An error of the transmission only (checksum, line number); a Resend follows."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class FirmwareFault:
+    """Any other error: the printer has stopped or must be stopped."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Capability:
+    """A `Cap:NAME:1` line of the answer to M115."""
+
+    name: str
+    present: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """The FIRMWARE_NAME line of the answer to M115."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """The geometry report of M115: (letter, least, greatest) of each axis. Marlin calls the fourth to sixth axis I, J, K."""
+
+    axes: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """`//action:NAME`: the printer asks the sender for something (pause, resume, cancel, disconnect, poweroff, ...)."""
+
+    name: str
+    words: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """Words for people: `echo:`, `//`, `Warning:`."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """The printer has just started: counters, position and temperatures are gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Banner:
+    """Words that a firmware says only while it starts; they betray a restart whose `start` was lost."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """The printer has nothing to do (Repetier says so every second)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """Anything else, rubbish included."""
+
+    text: str
+
+
+Report = Temperature | Position | Capability | Identity | Area | Action | Echo | Unknown
+Event = Ok | Resend | Busy | LineError | FirmwareFault | Start | Banner | Wait | Report
+
+OK = re.compile(r"ok(?: N?(\d{1,10}))?(?: P(\d{1,4}))?(?: B(\d{1,4}))?")
+RESEND = re.compile(r"(?:resend:|rs)\s*N?(\d{1,10})", re.IGNORECASE)
+NOZZLE = re.compile(r"(?:^|\s)T0?:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
+BED = re.compile(r"(?:^|\s)B:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
+AXIS = re.compile(r"([A-Z]):\s*(-?\d+\.?\d*)")
+CAPABILITY = re.compile(r"Cap:(\w+):([01])")
+AREA = re.compile(r"area:.*?full:\{min:\{([^}]*)\},?max:\{([^}]*)\}")
+REACH = re.compile(r"([a-z]):(-?\d+\.?\d*)")
+ACTION = re.compile(r"//\s*action:\s*(\w+)\s*(.*)")
+# A boot loader at another rate, and the jerk of a reset line, put rubbish in front of the word.
+START = re.compile(r"(?:.*[^ -~])?start")
+GREETS = re.compile(r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: .*")
+# Words by which transmission errors are known even when a byte of them is damaged.
+OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
+OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
+# Said by firmwares that stop, whatever became of the `Error:` before them.
+DEADLY = ("printer halted", "kill() called", "thermal runaway", "heating failed", "system stopped", "mintemp", "maxtemp")
+
+
+def read_event(raw: bytes) -> Event:
+    """The event of one received line (without its newline). Never raises: rubbish is Unknown."""
+    text = raw.decode("ascii", "replace").strip()
+    if text.startswith("ok"):
+        return _ok(text)
+    folded = text.lower()
+    if resend := RESEND.fullmatch(text):
+        return Resend(int(resend[1]))
+    if folded.startswith(("error:", "!!", "fatal:", "alarm:")) or any(word in folded for word in DEADLY):
+        return _error(text, folded)
+    if folded.startswith(("echo:busy:", "busy:")):
+        return Busy(text)
+    return _read_report(text)
+
+
+def _error(text: str, folded: str) -> Event:
+    if any(word in folded for word in OF_THE_LINE):
+        return LineError(text)
+    return Echo(text) if any(word in folded for word in OF_THE_CARD) else FirmwareFault(text)
+
+
+def _read_report(text: str) -> Event:
+    """What is no answer to a line."""
+    if text.startswith("X:"):
+        return _position(text)
+    if text == "wait":
+        return Wait()
+    if START.fullmatch(text):
+        return Start()
+    if action := ACTION.fullmatch(text):
+        return Action(action[1].lower(), action[2])
+    if GREETS.fullmatch(text):
+        return Banner(text)
+    if text.startswith(("echo:", "//", "Warning:")):  # the last is RepRapFirmware's
+        return Echo(text.removeprefix("echo:").removeprefix("//").strip())
+    if text.startswith("FIRMWARE_NAME:"):
+        return Identity(text)
+    if capability := CAPABILITY.fullmatch(text):
+        return Capability(capability[1], capability[2] == "1")
+    return _area(text) or _temperature(text) or Unknown(text)
+
+
+def _ok(text: str) -> Event:
+    if ok := OK.fullmatch(text):
+        line, planner, rx = ok.groups()
+        return Ok(_whole(line), _whole(planner), _whole(rx), None, text)
+    if not text.isascii() or not text.startswith("ok "):
+        return Unknown(text)
+    if text.startswith(("ok T", "ok B:")):  # Klipper reports the bed first
+        return Ok(temperature=_temperature(text), text=text)
+    return Ok(text=text, position=_position(text) if " X:" in text else None)
+
+
+def _whole(digits: str | None) -> int | None:
+    return None if digits is None else int(digits)
+
+
+def _position(text: str) -> Position:
+    """The axes' places; what follows Count (steps) and Machine (RepRapFirmware, before the table's map) is left out."""
+    text = text[text.index("X:") :].partition(" Count")[0].partition(" Machine")[0]
+    return Position(tuple((letter, float(value)) for letter, value in AXIS.findall(text)))
+
+
+def _temperature(text: str) -> Temperature | None:
+    nozzle, bed = _pair(NOZZLE, text), _pair(BED, text)
+    return None if nozzle[0] is None and bed[0] is None else Temperature(*nozzle, *bed)
+
+
+def _pair(pattern: re.Pattern[str], text: str) -> tuple[float | None, float | None]:
+    match = pattern.search(text)
+    if match is None:
+        return None, None
+    return float(match[1]), None if match[2] is None else float(match[2])
+
+
+def _area(text: str) -> Area | None:
+    match = AREA.match(text)
+    if match is None:
+        return None
+    least, most = dict(REACH.findall(match[1])), dict(REACH.findall(match[2]))
+    return Area(tuple((letter.upper(), float(least[letter]), float(most[letter])) for letter in least if letter in most))

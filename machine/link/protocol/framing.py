@@ -1,0 +1,78 @@
+"""Framing: a command becomes `N<number> <command>*<checksum>`; what may not be sent is refused."""
+
+from profiles.errors import LocalProtocolError
+
+FRAME = 11  # N, five digits (numbers begin anew in time), blank, *, three digits of the checksum
+LINE_LIMIT = 95  # Marlin keeps MAX_CMD_SIZE - 1 characters; a longer line loses its checksum and is asked for again for ever
+REFUSED = {
+    "M0": "waits for a person at the printer's own buttons",
+    "M1": "waits for a person at the printer's own buttons",
+    "M108": "is an order of the sender",
+    "M110": "would break the line numbers",
+    "M112": "is an order of the sender",
+    "M410": "is an order of the sender",
+}
+
+
+def checksum(body: bytes) -> int:
+    """XOR of all bytes, folded as one big integer (seven shifts serve up to 128 bytes)."""
+    if len(body) > 128:
+        raise ValueError(f"{len(body)} bytes to check: at most 128 are allowed")
+    x = int.from_bytes(body, "little")
+    for shift in (512, 256, 128, 64, 32, 16, 8):
+        x ^= x >> shift
+    return x & 0xFF
+
+
+def frame(number: int, command: str, limit: int = LINE_LIMIT) -> bytes:
+    """The bytes of one numbered line, newline included. LocalProtocolError when it is longer than the firmware keeps."""
+    body = b"N%d %s" % (number, command.encode("ascii"))
+    if len(body) > limit:
+        raise too_long(command, limit)
+    framed = b"%s*%d\n" % (body, checksum(body))
+    if len(framed) > limit + 1:
+        raise too_long(command, limit)
+    return framed
+
+
+def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
+    """The error for a command that does not fit in a line."""
+    return LocalProtocolError(
+        f"the command {command[:40]!r}... is {len(command)} characters long: with number and checksum at most {limit} are allowed"
+    )
+
+
+def command_of(line: str, line_number: int, limit: int = LINE_LIMIT) -> str:
+    """The command in a line of a program, without comment and blanks; "" when there is none.
+
+    line_number is the line's number in the program, for messages. Raises LocalProtocolError for a character outside printable
+    ASCII, for a `*`, and for commands that only the sender itself may give.
+    """
+    command = line.partition(";")[0].strip()
+    if not command:
+        return ""
+    if not (command.isascii() and command.isprintable()):
+        command = command.replace("\t", " ")
+        bad = next((c for c in command if not (c.isascii() and c.isprintable())), None)
+        if bad is not None:
+            raise LocalProtocolError(f"line {line_number} holds the character {bad!r}: only printable ASCII can be sent")
+    if "*" in command:
+        raise LocalProtocolError(f"line {line_number} ({command[:40]!r}) holds a '*': checksums are added by the sender")
+    if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
+        raise LocalProtocolError(f"line {line_number} holds {name_of(command)}, which {reason}: remove it from the program")
+    if len(command) > limit - FRAME:
+        raise LocalProtocolError(
+            f"line {line_number} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
+            f"{limit} are allowed, {limit - FRAME} without"
+        )
+    return command
+
+
+def name_of(command: str) -> str:
+    """The letter and number a command begins with, "M109" of "M109 S210"; of a Klipper macro its first word."""
+    if command[1:2].isalpha():
+        return command.partition(" ")[0].upper()
+    end = 1
+    while end < len(command) and (command[end].isdigit() or command[end] == "."):
+        end += 1
+    return command[:end].upper()

@@ -1,0 +1,46 @@
+"""The greeting: what a printer answers to M115, and how often it has been greeted in vain."""
+
+from machine.firmware import Firmware, identify
+from machine.firmware.marlin import MARLIN
+from machine.link.protocol.decoder import LineDecoder
+from machine.link.protocol.events import Area, Capability, Identity
+from machine.link.protocol.verdict import failed_greeting
+from profiles.errors import PrinterError
+
+GREETING = b"\nN0 M110 N0*125\n"  # the newline ends a half line of an earlier session
+
+
+class Greeting:
+    """identity: the FIRMWARE_NAME line; firmware: the one it names; area: limits of its axes, where it reports them."""
+
+    def __init__(self, firmware: Firmware = MARLIN, rx_bytes: int | None = None, baud: int | None = None) -> None:
+        self.firmware, self.identity = firmware, ""
+        self.capabilities: dict[str, bool] = {}
+        self.area: Area | None = None
+        self._rx_bytes, self._baud, self._tries = rx_bytes, baud, 0
+
+    @property
+    def rx_bytes(self) -> int:
+        """What the receive buffer holds: the machine's own, else as usual with its firmware."""
+        return self._rx_bytes or self.firmware.line.rx_bytes
+
+    @property
+    def emergency_parser(self) -> bool:
+        """Whether an M112 is read from the raw bytes."""
+        return self.capabilities.get("EMERGENCY_PARSER", False)
+
+    def learn(self, answer: Identity | Capability | Area) -> None:
+        """A line of the answer to M115."""
+        if isinstance(answer, Identity):
+            self.identity, self.firmware = answer.text, identify(answer.text) or self.firmware
+        elif isinstance(answer, Capability):
+            self.capabilities[answer.name] = answer.present
+        else:
+            self.area = answer
+
+    def give_up(self, decoder: LineDecoder) -> PrinterError | None:
+        """Why there is no sense in one more greeting; None when there is, and it counts as given."""
+        error = failed_greeting(decoder, self._tries, self._baud)
+        if error is None:
+            self._tries += 1
+        return error

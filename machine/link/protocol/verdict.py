@@ -1,0 +1,66 @@
+"""Verdicts: the sentences with which a connection ends, one function for each reason."""
+
+from machine.link.protocol.decoder import LineDecoder
+from machine.link.protocol.window import GREETING_LINES
+from profiles.errors import FirmwareError, PrinterError, RemoteProtocolError, SilenceError
+
+SYNC_TRIES = 6  # a board that resets on opening spends one or two of them in its boot loader
+RUBBISH_TRIES = 2  # boot loaders speak at rates of their own; what comes after that is the firmware's
+BAUDS = (115200, 250000, 230400, 500000, 1000000, 57600)  # what firmwares are built with, the usual ones first
+LOST = "position and temperatures are lost, the print cannot go on"
+
+
+def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None) -> PrinterError | None:
+    """Why there is no sense in another greeting after so many; None when there is."""
+    at = "this baud rate" if baud is None else f"{baud} baud"
+    if tries >= RUBBISH_TRIES and decoder.rubbish:
+        others = ", ".join(str(rate) for rate in BAUDS if rate != baud)
+        return RemoteProtocolError(f"what comes at {at} is rubbish: the printer speaks at another rate, try --baud {others}")
+    if tries < SYNC_TRIES:
+        return None
+    if decoder.foreign:
+        text = f"what answers there is no printer that this program knows: to {tries} greetings it said {decoder.foreign[:60]!r}"
+        return RemoteProtocolError(text)
+    return SilenceError(f"the printer did not answer {tries} greetings: it may be off, or speak at another rate than {at}")
+
+
+def silence(line: int, questions: int) -> PrinterError:
+    """Neither line nor questions were answered."""
+    return SilenceError(f"the printer has been silent: line {line} and {questions} questions remained without answer")
+
+
+def restart(line: int, how: str = "in the middle of the print") -> PrinterError:
+    """The printer began anew."""
+    return FirmwareError(f"the printer restarted {how}, after line {line}: {LOST}")
+
+
+def firmware_fault(text: str) -> PrinterError:
+    """The printer's own words for an error of its own."""
+    return FirmwareError(f"the printer reported: {text}")
+
+
+def torn_line(line: int) -> PrinterError:
+    """A piece of a line was run without number and checksum."""
+    return RemoteProtocolError(f"the printer ran part of a torn line after line {line}: what it did is not known")
+
+
+def lost_answer(line: int, command: str, firmware: str) -> PrinterError:
+    """A line without answer, to a firmware that does not say which line it wants."""
+    return RemoteProtocolError(
+        f"line {line} ({command}) was not answered, and {firmware} never asks for a lost line again: "
+        "whether it was done is not known"
+    )
+
+
+def noise(line: int, too_much: str) -> PrinterError:
+    """Too many lines had to be repeated."""
+    return RemoteProtocolError(f"the printer asked for {too_much} again, now for {line}: the cable or the adapter is too noisy")
+
+
+def implausible_resend(line: int, sent: int, acknowledged: int) -> PrinterError:
+    """The printer insists on a line that it cannot mean; on one of the greeting, because its numbers have begun again."""
+    if line <= GREETING_LINES:
+        return restart(acknowledged, "without a word")
+    return RemoteProtocolError(
+        f"the printer asks for line {line}, although line {sent} is the last one sent and {acknowledged} are acknowledged"
+    )

@@ -1,0 +1,134 @@
+"""The lines between sender and printer: which are in flight, which were acknowledged, which can be repeated."""
+
+from collections import deque
+from dataclasses import dataclass
+
+from machine.link.protocol.framing import LINE_LIMIT, frame
+from machine.link.protocol.slow_commands import slow_timeout_s
+
+GREETING_LINES = 2  # M115 and M105 are lines 1 and 2; a later Resend for one of them means that the printer restarted
+HISTORY = 512  # lines kept for a repeat: far more than any printer's buffers hold
+FIRST_NUMBER_AGAIN = 1000  # numbers begin here when they begin anew: a printer that asks for line 1 or 2 has restarted
+NEAR = 8  # one acknowledgement too many or few is usual after noise; a Resend for a line further back is asked about
+
+
+@dataclass(frozen=True, slots=True)
+class LineInFlight:
+    """A line that was sent and is not acknowledged yet. slow_timeout_s: 0 of a quick command."""
+
+    number: int
+    size: int
+    asks_temperature: bool
+    slow_timeout_s: float
+    sent_s: float
+
+
+class Window:
+    """Lines are counted from 1; `sent` is the last one given, `acknowledged` the last one known to have arrived.
+
+    The numbers on the wire are these counts until they begin anew, then less by a constant. limit: characters of a line
+    that the firmware keeps; rx_bytes: what its receive buffer holds.
+    """
+
+    def __init__(self, limit: int = LINE_LIMIT, rx_bytes: int = 127) -> None:
+        self._limit = limit
+        self.rx_bytes = rx_bytes
+        self.sent = 0
+        self.acknowledged = 0
+        self.flight: deque[LineInFlight] = deque()
+        self._bytes = 0
+        self._before = 0
+        self._history: dict[int, bytes] = {}
+
+    def reset(self) -> None:
+        """Nothing was sent yet."""
+        self.clear_flight()
+        self.sent = self.acknowledged = self._before = 0
+        self._history.clear()
+
+    def wire_number(self, number: int) -> int:
+        """The number on the wire of a line."""
+        return number - self._before
+
+    def line_number(self, wire_number: int) -> int:
+        """The line that has this number on the wire."""
+        return wire_number + self._before
+
+    @property
+    def last_acknowledged(self) -> int:
+        """The last acknowledged line as the printer counts."""
+        return self.wire_number(self.acknowledged)
+
+    def restart_numbers(self) -> None:
+        """The next line has number FIRST_NUMBER_AGAIN + 1 on the wire. Nothing may be in flight."""
+        self._before = self.sent - FIRST_NUMBER_AGAIN
+        self._history.clear()
+
+    def can_mean(self, number: int) -> bool:
+        """Whether a Resend can mean this line: it is kept or the next one, and neither far back nor of the greeting."""
+        known = number in self._history or number == self.sent + 1
+        return known and number > self.acknowledged - NEAR and self.wire_number(number) > GREETING_LINES
+
+    def has_space(self, command: str, lines: int) -> bool:
+        """Whether a command may follow what is in flight, at most `lines` of them together."""
+        flight = self.flight
+        if not flight:
+            return True
+        if len(flight) >= lines or flight[-1].slow_timeout_s or not self.fits_buffer(command):
+            return False
+        return not slow_timeout_s(command)
+
+    def fits_buffer(self, command: str) -> bool:
+        """Whether the receive buffer has a place for it even if nothing of what is in flight has left the buffer yet."""
+        # N, number, blank, *, three digits of the checksum, newline
+        return self._bytes + len(command) + 7 + len(str(self.sent + 1 - self._before)) <= self.rx_bytes
+
+    def send(self, command: str, now_s: float = 0.0) -> bytes:
+        """Give a command the next number, keep it for repeats; its bytes."""
+        framed = frame(self.sent + 1 - self._before, command, self._limit)
+        self.sent += 1
+        self._history[self.sent] = framed
+        self._history.pop(self.sent - HISTORY, None)
+        self._add_in_flight(self.sent, framed, command, now_s)
+        return framed
+
+    def repeat(self, number: int, now_s: float = 0.0) -> bytes:
+        """The bytes of an earlier line, in flight again."""
+        framed = self._history[number]
+        self._add_in_flight(number, framed, command_in(framed), now_s)
+        return framed
+
+    def acknowledge(self, number: int | None) -> int:
+        """This line and all before it have arrived; how many that were, 0 when it is not in flight."""
+        flight = self.flight
+        if number is None or not flight or not flight[0].number <= number <= flight[-1].number:
+            return 0
+        count = 0
+        while flight and flight[0].number <= number:
+            self._bytes -= flight.popleft().size
+            count += 1
+        self.acknowledged = max(self.acknowledged, number)
+        return count
+
+    def clear_flight(self) -> None:
+        """Nothing is in flight any more."""
+        self.flight.clear()
+        self._bytes = 0
+
+    def oldest_question(self) -> int | None:
+        """The oldest M105 in flight."""
+        return next((line.number for line in self.flight if line.asks_temperature), None)
+
+    def command(self, number: int) -> str:
+        """The command of a line that is still kept, else ""."""
+        framed = self._history.get(number)
+        return "" if framed is None else command_in(framed)
+
+    def _add_in_flight(self, number: int, framed: bytes, command: str, now_s: float) -> None:
+        self.flight.append(LineInFlight(number, len(framed), command == "M105", slow_timeout_s(command), now_s))
+        self._bytes += len(framed)
+
+
+def command_in(framed: bytes) -> str:
+    """The command of a framed line."""
+    return framed[framed.index(b" ") + 1 : framed.rindex(b"*")].decode("ascii")

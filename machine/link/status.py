@@ -1,0 +1,73 @@
+"""Status: what a printer reports about itself before it is greeted; the greeting sets its line numbers back.
+
+Nothing is changed by it: its one numbered line has a number that no line of a print has, which a firmware that checks numbers
+refuses with the last one it has taken.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from machine.link.medium import Medium, Wire
+from machine.link.protocol.events import Ok, Position, Temperature, read_event
+from machine.link.protocol.framing import frame
+from machine.link.shutdown import Listener
+
+LAST_LINE = re.compile(rb"Last Line: (\d{1,10})")
+FAR_NUMBER = 999_999
+TRIES, ANSWER_S = 3, 4.0  # a board that restarts when its port is opened spends two seconds in its boot loader
+STILL_S = 300.0  # a printer that still works on its queue answers when that is empty
+
+
+@dataclass(frozen=True)
+class PrinterStatus:
+    """The number of the last line the printer has taken, where it says it stands, its temperatures; None: not reported."""
+
+    last_number: int | None
+    position: Position | None
+    temperature: Temperature
+
+
+@dataclass
+class _StatusAnswers:
+    """What has come so far."""
+
+    number: int | None = None
+    position: Position | None = None
+    temperature: Temperature = field(default_factory=Temperature)
+
+    def read_number(self, line: bytes) -> bool:
+        """Whether the far number was answered, by a refusal or, where numbers are not checked, by what M105 is answered with."""
+        event = read_event(line)
+        if last_line := LAST_LINE.search(line):
+            self.number = int(last_line[1])
+        return last_line is not None or (isinstance(event, Ok) and event.temperature is not None)
+
+    def read_position(self, line: bytes) -> bool:
+        """Take a position; whether the temperature that is asked for after it has come."""
+        event = read_event(line)
+        if isinstance(event, Position):
+            self.position = event
+        elif isinstance(event, Ok):
+            self.position = event.position or self.position
+            self.temperature = event.temperature or self.temperature
+            return event.temperature is not None
+        return False
+
+
+def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> PrinterStatus:
+    """Ask; a printer that answers nothing gives a status without anything known.
+
+    Raises PortError, and what on_turn(), called meanwhile, raises to end the asking.
+    """
+    answers, listener = _StatusAnswers(), Listener(wire, medium, on_turn)
+    for _ in range(TRIES):
+        wire.write(b"\n" + frame(FAR_NUMBER, "M105"))
+        if listener.wait_for(answers.read_number, medium.now_s() + ANSWER_S):
+            break
+    else:
+        return PrinterStatus(None, None, Temperature())
+    listener.wait_for(lambda line: False, medium.now_s() + 0.5)  # the rest of the refusal
+    wire.write(b"M400\nM114\nM105\n")
+    listener.wait_for(answers.read_position, medium.now_s() + STILL_S)
+    return PrinterStatus(answers.number, answers.position, answers.temperature)

@@ -1,0 +1,93 @@
+"""Limits: what every axis allows; a program outside is refused before any text is written, a speed is lowered to fit."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from machine.kinematics.table import machine_points
+from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Rows
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from profiles.errors import MoveError
+from profiles.machine import Limits, Machine
+from profiles.profile import Profile
+
+ROUNDING = 5e-4
+
+
+def axis_limits(machine: Machine) -> dict[str, Limits]:
+    """Least and greatest value of X, Y, Z and the two rotary letters, mm and deg, as limits and cables allow."""
+    return {
+        "X": machine.x.limits_mm,
+        "Y": machine.y.limits_mm,
+        "Z": machine.z.limits_mm,
+        machine.tilt.letter: machine.tilt.reach_deg,
+        machine.turn.letter: machine.turn.reach_deg,
+    }
+
+
+def check(program: MachineProgram, rows: Rows, machine: Machine) -> None:
+    """Raise MoveError when an end of a straight move lies outside an axis's limits; the first one in print order is named."""
+    limits = axis_limits(machine)
+    least, most = (np.array([pair[k] for pair in limits.values()]) for k in (0, 1))
+    outside = (rows.end[:, :5] < least - ROUNDING) | (rows.end[:, :5] > most + ROUNDING)
+    if not outside.any():
+        return
+    row, axis = (int(k) for k in np.argwhere(outside)[0])
+    letter = list(limits)[axis]
+    worst = rows.end[row, axis]
+    unit = "mm" if axis < 3 else "deg"
+    raise MoveError(
+        f"{place(program, int(rows.move[row]))}: {letter} would go to {worst:.3f} {unit}, "
+        f"allowed is {least[axis]:g} to {most[axis]:g} {unit} on {machine.name}"
+    )
+
+
+def check_parts(parts: Sequence[Part], profile: Profile) -> None:
+    """Raise MoveError when a part, standing as its pose has it, reaches outside X, Y or Z: known before anything is sliced.
+
+    Half a line is left at the sides, for the tip stays so far inside what it prints.
+    """
+    machine, inset = profile.machine, 0.5 * profile.process.line_width_mm * np.array([1.0, 1.0, 0.0])
+    for part in parts:
+        reached = machine_points(machine, part.pose, part.mesh.vertices)
+        low, high = reached.min(axis=0) + inset, reached.max(axis=0) - inset
+        for axis, (letter, limits) in enumerate(list(axis_limits(machine).items())[:3]):
+            for value in (low[axis], high[axis]):
+                if not limits[0] - ROUNDING <= value <= limits[1] + ROUNDING:
+                    where = f"{machine.tilt.letter}{part.pose.tilt_deg:.1f} {machine.turn.letter}{part.pose.turn_deg:.1f}"
+                    raise MoveError(
+                        f"part {part.index} reaches {letter} {value:.1f} mm at {where}, {letter} goes from {limits[0]:g} to "
+                        f"{limits[1]:g} mm on {machine.name}: process.scale makes the model smaller"
+                    )
+
+
+def place(program: MachineProgram, index: int) -> str:
+    """Where a move stands in the print: "part 2, layer 14", or how it gets there."""
+    part = next((m for m in reversed(program.moves[: index + 1]) if isinstance(m, BeginPart)), None)
+    layer = next((m for m in reversed(program.moves[: index + 1]) if isinstance(m, BeginLayer)), None)
+    if part is None:
+        return "before the first part"
+    if layer is None or layer.part != part.index:
+        return f"part {part.index}, before its first layer"
+    return f"part {part.index}, layer {layer.index}"
+
+
+def travel_speed(points_mm: Floats, speed_mm_s: float, machine: Machine) -> float:
+    """The speed along (n, 3) machine points lowered to what X, Y and Z allow."""
+    most = np.array([machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s])
+    if speed_mm_s <= most.min():
+        return speed_mm_s
+    steps = np.diff(points_mm, axis=0)
+    length = np.linalg.norm(steps, axis=1)
+    steps = np.abs(steps[length > 1e-9]) / length[length > 1e-9, None]
+    with np.errstate(divide="ignore"):
+        return float(min(speed_mm_s, (most / steps).min(initial=np.inf)))
+
+
+def turn_speed(tilt_deg: float, turn_deg: float, machine: Machine) -> float:
+    """deg/s along a turn of both rotary axes at once (sqrt of the sum of squares), the slower axis at its greatest speed."""
+    seconds = max(abs(tilt_deg) / machine.tilt.speed_deg_s, abs(turn_deg) / machine.turn.speed_deg_s)
+    if seconds == 0.0:
+        return min(machine.tilt.speed_deg_s, machine.turn.speed_deg_s)
+    return float(np.hypot(tilt_deg, turn_deg)) / seconds

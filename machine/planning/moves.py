@@ -1,0 +1,161 @@
+"""Moves: the machine program between the slicer and the G-code text, in machine coordinates, and its straight moves as arrays."""
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats
+from mdp.pose import Pose
+from slicer.paths import Kind
+
+
+@dataclass(frozen=True)
+class BeginPart:
+    """The moves after this print part `index` at `pose`; turn and tilt have been reached by a Reorient.
+
+    unsupported_mm2: area of its risky faces that no support could be given; unsupported_layer: the layer with most of it.
+    """
+
+    index: int
+    pose: Pose
+    layers: int
+    unsupported_mm2: float = 0.0
+    unsupported_layer: int = 0
+
+
+@dataclass(frozen=True)
+class BeginLayer:
+    """The strokes after this lie in one layer; z_mm is measured from the part's base plane, nozzle_add_c from the material's."""
+
+    part: int
+    index: int
+    z_mm: float
+    height_mm: float
+    fan: float
+    nozzle_add_c: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """Extruding: points_mm (n, 3) machine coordinates, the first is where the tip already stands; filament_mm (n - 1,).
+
+    fan: 0..1 where it differs from the layer's. acceleration_mm_s2: where it differs from what the axes allow.
+    """
+
+    kind: Kind
+    points_mm: Floats
+    filament_mm: Floats
+    speed_mm_s: float
+    width_mm: float
+    fan: float | None = None
+    acceleration_mm_s2: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """Moving without extruding through points_mm (n, 3), machine coordinates, the first is where the tip stands."""
+
+    points_mm: Floats
+    speed_mm_s: float
+    acceleration_mm_s2: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Wipe:
+    """Moving over what was just printed while filament is pulled back: points_mm (n, 3), filament_mm (n - 1,) above 0."""
+
+    points_mm: Floats
+    filament_mm: Floats
+    speed_mm_s: float
+
+
+@dataclass(frozen=True)
+class Retract:
+    """Pull filament back (positive) or push it forward again (negative): a prime."""
+
+    filament_mm: float
+    speed_mm_s: float
+
+
+@dataclass(frozen=True)
+class Reorient:
+    """Turn the table to `pose` at the slowest axis's pace; the tip stands still at a safe place."""
+
+    pose: Pose
+    speed_deg_s: float
+
+
+Move = BeginPart | BeginLayer | Stroke | Travel | Wipe | Retract | Reorient
+
+
+@dataclass(frozen=True, eq=False)
+class MachineProgram:
+    """All moves of a print in order, and the model's name for the file's head."""
+
+    name: str
+    moves: tuple[Move, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """start, end: (n, 6) X Y Z tilt turn E of each straight move (mm, deg, mm); speed: (n,) mm/s, deg/s for pure turns.
+
+    move: (n,) place in program.moves of the Move a row belongs to. acceleration: (n,) mm/s2, inf where the axes decide.
+    """
+
+    start: Floats
+    end: Floats
+    speed: Floats
+    move: NDArray[np.int64]
+    acceleration: Floats
+
+
+def rows(program: MachineProgram, tilt_deg: float, turn_deg: float) -> Rows:
+    """All straight moves of a program that begins with the table at (tilt_deg, turn_deg)."""
+    blocks: list[Floats] = []
+    speeds: list[float] = []
+    places: list[int] = []
+    accelerations: list[float] = []
+    at = np.array([0.0, 0.0, 0.0, tilt_deg, turn_deg])
+    filament = 0.0
+    for place, move in enumerate(program.moves):
+        if isinstance(move, Stroke | Travel | Wipe):
+            block = np.empty((len(move.points_mm), 6))
+            block[:, :3], block[:, 3:5], block[:, 5] = move.points_mm, at[3:], filament
+            if not isinstance(move, Travel):
+                block[1:, 5] += np.cumsum(move.filament_mm if isinstance(move, Stroke) else -move.filament_mm)
+                filament = float(block[-1, 5])
+            at[:3] = move.points_mm[-1]
+            speed = move.speed_mm_s
+        elif isinstance(move, Retract):
+            block = np.array([[*at, filament], [*at, filament - move.filament_mm]])
+            filament -= move.filament_mm
+            speed = move.speed_mm_s
+        elif isinstance(move, Reorient):
+            before = [*at, filament]
+            at[3:] = move.pose.tilt_deg, move.pose.turn_deg
+            block = np.array([before, [*at, filament]])
+            speed = move.speed_deg_s
+        else:
+            continue
+        blocks.append(block)
+        speeds.append(speed)
+        places.append(place)
+        accelerations.append(_acceleration(move))
+    if not blocks:
+        return Rows(np.zeros((0, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros(0))
+    counts = [len(block) - 1 for block in blocks]
+    return Rows(
+        np.concatenate([block[:-1] for block in blocks]),
+        np.concatenate([block[1:] for block in blocks]),
+        np.repeat(speeds, counts),
+        np.repeat(np.array(places, dtype=np.int64), counts),
+        np.repeat(accelerations, counts),
+    )
+
+
+def _acceleration(move: Move) -> float:
+    acceleration = move.acceleration_mm_s2 if isinstance(move, Stroke | Travel) else None
+    return inf if acceleration is None else acceleration

@@ -1,0 +1,159 @@
+"""Plan: sliced parts in order become one program of strokes, travels and reorientations in machine coordinates."""
+
+from collections.abc import Iterator, Sequence
+from math import inf, pi
+
+import numpy as np
+
+from machine.kinematics.collision import Printed, hull, join_hulls
+from machine.kinematics.table import part_shift, workpiece_points
+from machine.planning import limits
+from machine.planning.acceleration import stroke_accelerations
+from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel, rows
+from machine.planning.reorient import Route, Speeds, route, top_z
+from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, travel_speed, wipe_trail
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Floats
+from mdp.pose import Pose, level
+from profiles.profile import Profile
+from slicer.paths import Kind, Layer, Path, SlicedPart, bead_area_mm2
+
+MOST_COASTED = 0.25  # a path coasts over this share of its length at most
+
+
+def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile) -> MachineProgram:
+    """The machine program of a decomposition's sliced parts, in print order; parts without a path are left out.
+
+    After the last part the table goes back to level, so that the next print's homing finds it level.
+    Raises MoveError: a point outside the axis limits, or no safe place for the head while the table turns.
+    """
+    parts = {part.index: part for part in decomposition.parts}
+    pieces = [piece for piece in sliced if any(layer.paths for layer in piece.layers)]
+    machine = profile.machine
+    tip = Tip(np.zeros(3), level(machine))
+    moves: list[Move] = []
+    printed: list[Printed] = []
+    for piece in pieces:
+        part = parts[piece.index]
+        shift = part_shift(machine, part.pose, part.base.offset_mm)
+        begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported_mm2, piece.unsupported_layer)
+        moves += _reach(tip, begin, _first_point(piece) + shift, join_hulls(printed), profile, first=not printed)
+        for number, layer in enumerate(piece.layers, start=1):
+            if layer.paths:
+                moves += _layer(tip, part.index, number, layer, shift, profile)
+        printed.append(_printed(piece, part, shift, profile))
+    if pieces:
+        moves += _finish(tip, pieces[-1].index, join_hulls(printed), profile)
+    program = MachineProgram(decomposition.name, tuple(moves))
+    limits.check(program, rows(program, machine.tilt.zero_deg, machine.turn.zero_deg), machine)
+    return program
+
+
+def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile: Profile, first: bool) -> Iterator[Move]:
+    """Retract, lift, turn the table, cross over to above the target, go down.
+
+    Where the start block leaves the tip is not known: the first two travels stand for going up, then across.
+    """
+    if first:
+        tip.at_mm = np.array([*target[:2], min(top_z(profile.machine, tip.pose), profile.machine.z.limits_mm[1])])
+    else:
+        yield from retract(tip, profile)
+    way = route(profile.machine, printed, tip.at_mm, target, tip.pose, part.pose, _speeds(profile), part.index)
+    if first:
+        tip.at_mm = np.array([*way.over_mm, way.z_mm])
+        for speed in (lift_speed(profile), travel_speed(profile)):
+            yield Travel(np.array([tip.at_mm, tip.at_mm]), speed)
+    yield from _to_stand(tip, way, profile)
+    if first or tip.pose != part.pose:
+        yield _reorient(tip, part.pose, profile)
+        tip.prime_extra_mm = 0.0 if first else profile.material.prime_extra_mm
+    yield part
+    yield from go(tip, [*tip.at_mm[:2], way.across_z_mm], profile)
+    yield from go(tip, [*target[:2], way.across_z_mm], profile)
+    yield from go(tip, list(target), profile)
+
+
+def _to_stand(tip: Tip, way: Route, profile: Profile) -> Iterator[Move]:
+    """Straight up, then across to where the tip stands while the table turns."""
+    yield from go(tip, [*tip.at_mm[:2], way.z_mm], profile)
+    yield from go(tip, [*way.over_mm, way.z_mm], profile)
+
+
+def _speeds(profile: Profile) -> Speeds:
+    return Speeds(lift_speed(profile), travel_speed(profile))
+
+
+def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
+    speed = limits.turn_speed(pose.tilt_deg - tip.pose.tilt_deg, pose.turn_deg - tip.pose.turn_deg, profile.machine)
+    tip.pose, tip.trail = pose, tip.trail[:0]
+    return Reorient(pose, speed)
+
+
+def _layer(tip: Tip, part: int, number: int, layer: Layer, shift: Floats, profile: Profile) -> Iterator[Move]:
+    accelerations = stroke_accelerations(profile, part == 1 and number == 1)
+    yield BeginLayer(part, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c)
+    z = layer.z_mm + float(shift[2])
+    for path, following in zip(layer.paths, [*layer.paths[1:], None], strict=True):
+        points = np.column_stack([path.points + shift[:2], np.full(len(path.points), z)])
+        yield from to_path(tip, path, points[0], shift, profile)
+        yield from prime(tip, profile)
+        coast = profile.material.coast_mm if following is not None and following.retract else 0.0
+        yield _stroke(path, layer.height_mm, points, profile, accelerations, coast)
+        tip.at_mm, tip.trail = points[-1], wipe_trail(points, path.width_mm)
+
+
+def _stroke(
+    path: Path, height_mm: float, points: Floats, profile: Profile, accelerations: dict[Kind, float] | None, coast_mm: float
+) -> Stroke:
+    """Filament by volume (the path's flow holds the material's); the speed lowered to what axes, extruder and hot end can do."""
+    machine, material = profile.machine, profile.material
+    area = bead_area_mm2(path.width_mm, height_mm) * path.flow
+    filament_area = pi * material.diameter_mm**2 / 4.0
+    length = np.hypot(*np.diff(path.points, axis=0).T)
+    pushing = length
+    if 0.0 < coast_mm < MOST_COASTED * float(length.sum()):
+        points, length, pushing = _coasted(points, length, coast_mm)
+    fastest = min(material.volumetric_limit_mm3_s, machine.extruder_speed_mm_s * filament_area) / area if area > 0 else inf
+    speed = limits.travel_speed(points, min(path.speed_mm_s, fastest), machine)
+    acceleration = None if accelerations is None else accelerations[path.kind]
+    return Stroke(path.kind, points, pushing * area / filament_area, speed, path.width_mm, path.fan, acceleration)
+
+
+def _coasted(points: Floats, length: Floats, coast_mm: float) -> tuple[Floats, Floats, Floats]:
+    """Points, lengths and pushed lengths of a stroke whose last coast_mm push nothing; a step is cut where that begins."""
+    done = np.cumsum(length)
+    until = float(done[-1]) - coast_mm
+    k = int(np.searchsorted(done, until))
+    share = 1.0 - (done[k] - until) / length[k] if length[k] > 0.0 else 1.0
+    points = np.insert(points, k + 1, points[k] + share * (points[k + 1] - points[k]), axis=0)
+    length = np.insert(length, k, share * length[k])
+    length[k + 1] *= 1.0 - share
+    return points, length, np.where(np.arange(len(length)) <= k, length, 0.0)
+
+
+def _finish(tip: Tip, part: int, printed: Printed, profile: Profile) -> Iterator[Move]:
+    """Retract, lift, bring the table back to level."""
+    yield from retract(tip, profile)
+    home = level(profile.machine)
+    if tip.pose == home:
+        z = min(float(tip.at_mm[2]) + profile.machine.lift_mm, profile.machine.z.limits_mm[1])
+        yield from go(tip, [*tip.at_mm[:2], z], profile)
+        return
+    way = route(profile.machine, printed, tip.at_mm, None, tip.pose, home, _speeds(profile), part)
+    yield from _to_stand(tip, way, profile)
+    yield _reorient(tip, home, profile)
+
+
+def _first_point(piece: SlicedPart) -> Floats:
+    """(3,) part frame: where the first path begins."""
+    layer = next(layer for layer in piece.layers if layer.paths)
+    return np.array([*layer.paths[0].points[0], layer.z_mm])
+
+
+def _printed(piece: SlicedPart, part: Part, shift: Floats, profile: Profile) -> Printed:
+    """What a finished part covers, in the workpiece frame."""
+    points = [
+        np.column_stack([path.points, np.full(len(path.points), layer.z_mm)]) for layer in piece.layers for path in layer.paths
+    ]
+    widest = max(path.width_mm for layer in piece.layers for path in layer.paths)
+    return hull(workpiece_points(profile.machine, part.pose, np.vstack(points) + shift), 0.5 * widest)

@@ -1,0 +1,198 @@
+"""Reorient: where the tip stands while the table turns, how high, and the quickest way there and on to the next part.
+
+A route: straight up, across to the stand, the table turns, across to above the next part's first point, straight down. For every
+stand the least safe height follows from separating directions in closed form; the stand with the quickest route is taken.
+Safe means that through the whole turn every body of the head keeps lift_mm (or clearance_mm, where that is more) from plate,
+cradle and print, swept: between two poses that are tried each direction's reach is bounded by its greater end and the sagitta.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil, hypot, inf, radians
+
+import numpy as np
+
+from machine.kinematics.collision import Printed, solids, sweep_gaps, swing_mm
+from machine.planning.timing import move_times
+from mdp.head import bodies, directions, spread
+from mdp.mesh import Floats
+from mdp.pose import UP, Pose, rotation
+from profiles.errors import MoveError
+from profiles.machine import Machine
+
+STEP_DEG = 0.5
+MOST_STEPS = 1500
+STANDS = 7
+FIELD = 60
+TRIED = 12
+COARSE = 16
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """mm/s that the process asks for: straight up and down, and across."""
+
+    lift_mm_s: float
+    travel_mm_s: float
+
+
+@dataclass(frozen=True)
+class Route:
+    """The tip stands at X, Y of over_mm and at z_mm while the table turns, and crosses to the next part at across_z_mm.
+
+    seconds: for all moves of the way, the turn itself left out.
+    """
+
+    over_mm: tuple[float, float]
+    z_mm: float
+    across_z_mm: float
+    seconds: float
+
+
+def poses_between(start: Pose, end: Pose, step_deg: float = STEP_DEG) -> list[Pose]:
+    """Poses from start to end, both included, both axes in proportion, step_deg apart (farther when they would be too many)."""
+    tilt, turn = end.tilt_deg - start.tilt_deg, end.turn_deg - start.turn_deg
+    count = min(max(1, ceil(hypot(tilt, turn) / step_deg)), MOST_STEPS)
+    return [Pose(start.tilt_deg + tilt * k / count, start.turn_deg + turn * k / count) for k in range(count + 1)]
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What turns under the head during a whole turn: (p, s, k) reaches of s solids along k directions, in p short turns."""
+
+    machine: Machine
+    tried: Floats
+    reach: Floats
+
+    def least_z(self, x: float, y: float, every: int = 1) -> float:
+        """Least Z from which on upward the tip may stand at X, Y through the whole turn; infinite when there is none.
+
+        Along a direction d that leans upward the gap grows with Z, so each direction gives a least Z of its own.
+        every: only so many of the short turns are looked at, which gives a lower bound.
+        """
+        need = max(self.machine.lift_mm, self.machine.clearance_mm)
+        across, up = self.tried[:, :2] @ np.array([x, y]), self.tried[:, 2]
+        highest = -inf
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for body in bodies(self.machine):
+                missing = self.reach[::every] + need - (body.least(self.tried) + across)
+                z = np.where(up > 1e-9, missing / up, np.where(missing <= 0.0, -inf, inf))
+                highest = max(highest, float(z.min(axis=-1).max()))
+        return highest
+
+
+def sweep(machine: Machine, printed: Printed, start: Pose, end: Pose) -> Sweep:
+    """All that turns between two poses, print included."""
+    turning = poses_between(start, end)
+    tried = _upward(machine, turning)
+    reach = np.array([[reach_of(tried) for _, reach_of in solids(machine, pose, printed)] for pose in turning])
+    step = radians(hypot(turning[1].tilt_deg - turning[0].tilt_deg, turning[1].turn_deg - turning[0].turn_deg))
+    # d . x changes along the turn with a second derivative of at most 2 r a^2, a the angle of both axes together
+    sagitta = swing_mm(machine, printed) * step**2 / 4.0
+    return Sweep(machine, tried, np.maximum(reach[:-1], reach[1:]) + sagitta)
+
+
+def _upward(machine: Machine, turning: list[Pose]) -> Floats:
+    """(k, 3) directions to try: those of some poses' normals and a field, as far as they do not point down."""
+    chosen = turning[:: max(1, len(turning) // TRIED)]
+    fans = [directions(rotation(machine, pose) @ UP)[:27] for pose in chosen]
+    tried = np.vstack([UP[None], *fans, spread(2 * FIELD)])
+    around = np.radians(np.arange(0.0, 360.0, 15.0))
+    tried = np.vstack([tried, np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])])
+    kept: Floats = tried[tried[:, 2] >= -1e-12]
+    return np.unique(np.round(kept, 12), axis=0)
+
+
+def route(
+    machine: Machine, printed: Printed, at_mm: Floats, target_mm: Floats | None, start: Pose, end: Pose, speeds: Speeds, part: int
+) -> Route:
+    """The quickest safe route from at_mm (machine X Y Z) at one pose to target_mm at another; None: the turn is the end of it.
+
+    Raises MoveError when no stand is safe inside the axis limits.
+    """
+    swept = sweep(machine, printed, start, end)
+    best: Route | None = None
+    lowest = inf
+    for x, y in stands(machine, at_mm, target_mm):
+        for every in (COARSE, 1):
+            least = swept.least_z(x, y, every)
+            candidate = _at(machine, (x, y), least, at_mm, target_mm, speeds)
+            if candidate.across_z_mm > machine.z.limits_mm[1] or (best is not None and candidate.seconds >= best.seconds):
+                break
+        else:
+            best = candidate if _ways_clear(machine, at_mm, candidate, target_mm, start, end) else best
+        lowest = min(lowest, least)
+    if best is not None:
+        return best
+    where = f"{machine.tilt.letter}{end.tilt_deg:.3f} {machine.turn.letter}{end.turn_deg:.3f}"
+    raise MoveError(
+        f"part {part}: turning the table to {where} needs the tip at Z {lowest:.1f} mm, "
+        f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm, and no way aside is clear"
+    )
+
+
+def _at(machine: Machine, over: tuple[float, float], least_z: float, at: Floats, target: Floats | None, speeds: Speeds) -> Route:
+    """The route that stands at a place as low as it may; the print just left and the one to come are crossed with clearance."""
+    z = max(least_z, min(float(at[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
+    across = z if target is None else max(z, min(float(target[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
+    seconds = way_s(machine, at, over, (z, across), target, speeds) if across < inf else inf
+    return Route(over, z, across, seconds)
+
+
+def stands(machine: Machine, at_mm: Floats, target_mm: Floats | None) -> Iterator[tuple[float, float]]:
+    """Places to stand: where the tip is, above the next first point, half way, then a lattice over X and Y."""
+    here = at_mm[:2]
+    there = here if target_mm is None else target_mm[:2]
+    for place in (here, there, 0.5 * (here + there)):
+        yield float(place[0]), float(place[1])
+    xs, ys = (np.linspace(*axis.limits_mm, STANDS) for axis in (machine.x, machine.y))
+    for x in xs:
+        for y in ys:
+            yield float(x), float(y)
+
+
+def way_s(
+    machine: Machine, at: Floats, over: tuple[float, float], z_mm: tuple[float, float], target: Floats | None, speeds: Speeds
+) -> float:
+    """Seconds of a route: up to the first of z_mm, to `over`, (turn,) at the second across, down; it stops between its moves."""
+    turning, across = z_mm
+    places = [at, [*at[:2], turning], [*over, turning]]
+    if target is not None:
+        places += [[*over, across], [*target[:2], across], target]
+    steps = np.zeros((len(places) - 1, 6))
+    steps[:, :3] = np.diff(np.array(places), axis=0)
+    upright = np.hypot(steps[:, 0], steps[:, 1]) < 1e-9
+    speed = np.where(upright, speeds.lift_mm_s, speeds.travel_mm_s)
+    return float(move_times(steps, speed, np.ones(len(steps), dtype=np.bool_), machine).sum())
+
+
+def _ways_clear(machine: Machine, at: Floats, candidate: Route, target: Floats | None, start: Pose, end: Pose) -> bool:
+    """True when the ways to the stand, at the first pose, and from it, at the second, keep off table and cradle.
+
+    Of what is printed nothing stands higher than the tip in either pose, so the ways need not be tried against it.
+    """
+    stand = np.array([*candidate.over_mm, candidate.z_mm])
+    ways = [(start, at, np.array([*at[:2], candidate.z_mm])), (start, np.array([*at[:2], candidate.z_mm]), stand)]
+    if target is not None:
+        raised, over = np.array([*candidate.over_mm, candidate.across_z_mm]), np.array([*target[:2], candidate.across_z_mm])
+        ways += [(end, stand, raised), (end, raised, over), (end, over, target)]
+    return all(_clear(machine, pose, a, b) for pose, a, b in ways if float(np.linalg.norm(b - a)) > 1e-9)
+
+
+def _clear(machine: Machine, pose: Pose, start: Floats, end: Floats) -> bool:
+    """True when each body keeps what it must from table and cradle while the tip goes from start to end."""
+    normal = rotation(machine, pose) @ UP
+    for tried in (np.array([UP, normal]), directions(normal)):
+        reaches = [reach_of(tried) for _, reach_of in solids(machine, pose)]
+        if all(
+            float(sweep_gaps(body, start[None], end[None], tried, reach)[0]) >= body.need_mm - 1e-6
+            for body in bodies(machine)
+            for reach in reaches
+        ):
+            return True
+    return False
+
+
+def top_z(machine: Machine, pose: Pose) -> float:
+    """Machine Z at which the tip is lift_mm above all of table and cradle at a pose, wherever it stands."""
+    return max(float(reach_of(UP[None])[0]) for _, reach_of in solids(machine, pose)) + machine.lift_mm

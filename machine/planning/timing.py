@@ -1,0 +1,119 @@
+"""Timing: how long every straight move takes, with acceleration and look-ahead at the corners.
+
+The model of classic Marlin: constant acceleration along the move, at a corner every axis may change its speed at once by at
+most the junction speed, and the speeds at the corners are the greatest from which the machine can still stop.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.arrays import floats
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+from profiles.machine import Machine
+
+TINY = 1e-9
+
+
+class Blocks(NamedTuple):
+    """Moves as a planner takes them, (m,) each: direction (m, 6) of X Y Z tilt turn E, length, cruise speed, acceleration, by
+    what F measures it, and whether all before it must be over.
+    """
+
+    direction: Floats
+    length: Floats
+    cruise: Floats
+    acceleration: Floats
+    measure: NDArray[np.int8]
+    halts: NDArray[np.bool_]
+
+
+def axis_speeds(machine: Machine) -> Floats:
+    """(6,) greatest speeds of X Y Z tilt turn E, mm/s and deg/s."""
+    linear = [machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s]
+    return np.array([*linear, machine.tilt.speed_deg_s, machine.turn.speed_deg_s, machine.extruder_speed_mm_s])
+
+
+def axis_accelerations(machine: Machine) -> Floats:
+    """(6,) accelerations of X Y Z tilt turn E, mm/s2 and deg/s2."""
+    linear = [machine.x.acceleration_mm_s2, machine.y.acceleration_mm_s2, machine.z.acceleration_mm_s2]
+    rotary = [machine.tilt.acceleration_deg_s2, machine.turn.acceleration_deg_s2]
+    return np.array([*linear, *rotary, machine.extruder_acceleration_mm_s2])
+
+
+def lengths(deltas: Floats) -> tuple[Floats, NDArray[np.int8]]:
+    """What F measures for (n, 6) deltas of X Y Z tilt turn E, and by which measure (0 X Y Z, 1 rotary, 2 filament, 3 none).
+
+    The rule of NIST's RS274: the path of X Y Z; when they stand still the rotary axes; when they stand still too, filament.
+    """
+    travel = np.sqrt((deltas[:, :3] ** 2).sum(axis=1))
+    turned = np.hypot(deltas[:, 3], deltas[:, 4])
+    pushed = np.abs(deltas[:, 5])
+    measure = np.select([travel > TINY, turned > TINY, pushed > TINY], [0, 1, 2], 3).astype(np.int8)
+    length: Floats = np.choose(measure, [travel, turned, pushed, np.zeros_like(travel)])
+    return length, measure
+
+
+def move_times(
+    deltas: Floats, speed: Floats, stop: NDArray[np.bool_], machine: Machine, most_mm_s2: Floats | None = None
+) -> Floats:
+    """(n,) seconds for (n, 6) deltas of X Y Z tilt turn E at (n,) speeds (mm/s or deg/s along what F measures).
+
+    stop: (n,) True where the machine stands still before the move. most_mm_s2: (n,) acceleration told for X Y Z. Axes that
+    would be too fast slow the move down.
+    """
+    length, measure = lengths(deltas)
+    share = np.abs(deltas) / np.maximum(length, TINY)[:, None]
+    with np.errstate(divide="ignore"):
+        cruise = np.minimum(speed, (axis_speeds(machine) / share).min(axis=1))
+        acceleration = (axis_accelerations(machine) / share).min(axis=1)
+    if most_mm_s2 is not None:
+        acceleration = np.where(measure == 0, np.minimum(acceleration, most_mm_s2), acceleration)
+    moving = measure < 3
+    times = np.zeros(len(deltas))
+    if moving.any():
+        halts = np.diff(np.cumsum(stop)[moving], prepend=0) > 0
+        direction = deltas[moving] / length[moving][:, None]
+        blocks = Blocks(direction, length[moving], cruise[moving], acceleration[moving], measure[moving], halts)
+        times[moving] = _block_times(blocks, machine.junction_speed_mm_s)
+    return times
+
+
+@part
+def corner_speed(blocks: Blocks, before: int, after: int, junction_speed: float) -> float:
+    """The greatest speed at a corner: no axis changes its speed by more than the junction speed; 0 where the measure changes."""
+    if blocks.measure[before] != blocks.measure[after]:
+        return 0.0
+    v = min(blocks.cruise[before], blocks.cruise[after])
+    for k in range(6):
+        change = abs(blocks.direction[after, k] - blocks.direction[before, k])
+        if change * v > junction_speed:
+            v = junction_speed / change
+    return float(v)
+
+
+@part
+def block_time(blocks: Blocks, i: int, v0: float, v1: float) -> float:
+    """Seconds of a block from one speed to another: a trapezoid of speeds, or a triangle where it does not reach its own."""
+    a, length = blocks.acceleration[i], blocks.length[i]
+    peak = min(blocks.cruise[i], np.sqrt(0.5 * (v0 * v0 + v1 * v1) + a * length))
+    ramps = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * a)
+    return float((2.0 * peak - v0 - v1) / a + max(0.0, length - ramps) / peak)
+
+
+@kernel
+def _block_times(blocks: Blocks, junction_speed: float) -> Floats:
+    """Seconds of each block: corner speeds, backward and forward pass, trapezoids."""
+    n = len(blocks.length)
+    corner, times = floats(n + 1, 0.0), floats(n, 0.0)
+    for i in range(1, n):
+        corner[i] = 0.0 if blocks.halts[i] else corner_speed(blocks, i - 1, i, junction_speed)
+    for i in range(n - 1, -1, -1):
+        corner[i] = min(corner[i], np.sqrt(corner[i + 1] ** 2 + 2.0 * blocks.acceleration[i] * blocks.length[i]))
+    for i in range(n):
+        fastest = np.sqrt(corner[i] * corner[i] + 2.0 * blocks.acceleration[i] * blocks.length[i])
+        corner[i + 1] = min(corner[i + 1], fastest)
+        times[i] = block_time(blocks, i, corner[i], corner[i + 1])
+    return times

@@ -1,0 +1,126 @@
+"""Travel: how the tip gets from one stroke to the next: pulling back with a wipe, lifting, crossing, priming."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from machine.planning import limits
+from machine.planning.acceleration import travel_mm_s2
+from machine.planning.moves import Move, Retract, Travel, Wipe
+from mdp.mesh import Floats
+from mdp.pose import Pose
+from profiles.profile import Profile
+from slicer.bead import length_mm
+from slicer.paths import Path
+
+STANDING_MM = 1e-6
+RING = 4.0  # a path whose ends lie nearer than its width, and that is longer than so many widths, runs round
+
+
+@dataclass
+class Tip:
+    """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back.
+
+    trail: (n, 3) the stroke just printed, in the sense in which a wipe goes over it.
+    """
+
+    at_mm: Floats
+    pose: Pose
+    retracted_mm: float = 0.0
+    prime_extra_mm: float = 0.0
+    trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+
+
+def to_path(tip: Tip, path: Path, start: Floats, shift: Floats, profile: Profile) -> Iterator[Move]:
+    """To a path's start: up to the layer first, then along the approach; or pulled back and lifted, straight."""
+    if float(np.linalg.norm(start - tip.at_mm)) <= STANDING_MM:
+        return
+    if path.retract:
+        yield from retract(tip, profile)
+    lift = profile.process.lift_mm if path.retract else 0.0
+    over = max(float(start[2]), min(float(start[2]) + lift, profile.machine.z.limits_mm[1]))
+    if abs(over - float(tip.at_mm[2])) > STANDING_MM:
+        yield from go(tip, [*tip.at_mm[:2], over], profile)
+    between = np.column_stack([path.approach.reshape(-1, 2) + shift[:2], np.full(len(path.approach), over)])
+    points = np.vstack([tip.at_mm, between, [*start[:2], over]])
+    keep = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > STANDING_MM])
+    if keep.sum() > 1:
+        tip.at_mm = points[keep][-1]
+        yield Travel(points[keep], travel_speed(profile), travel_mm_s2(profile))
+    yield from go(tip, list(start), profile)
+    tip.at_mm = start
+
+
+def go(tip: Tip, target: list[float], profile: Profile) -> Iterator[Move]:
+    """A straight travel; straight up and down at the lift speed."""
+    points = np.array([tip.at_mm, target], dtype=np.float64)
+    if float(np.linalg.norm(points[1] - points[0])) > STANDING_MM:
+        upright = bool(np.all(np.abs(points[1, :2] - points[0, :2]) <= STANDING_MM))
+        speed = lift_speed(profile) if upright else travel_speed(profile)
+        speed = limits.travel_speed(points, speed, profile.machine)
+        yield Travel(points, speed, travel_mm_s2(profile))
+        tip.at_mm = points[1]
+
+
+def travel_speed(profile: Profile) -> float:
+    """mm/s that a travel across may have."""
+    return min(profile.process.travel_speed_mm_s, profile.machine.x.speed_mm_s, profile.machine.y.speed_mm_s)
+
+
+def lift_speed(profile: Profile) -> float:
+    """mm/s that a travel straight up or down may have."""
+    return min(profile.process.lift_speed_mm_s, profile.machine.z.speed_mm_s)
+
+
+def retract(tip: Tip, profile: Profile) -> Iterator[Move]:
+    """Pull back what is not yet pulled back, moving over what was just printed where there is any."""
+    amount = profile.material.retract_mm - tip.retracted_mm
+    if amount <= 0:
+        return
+    tip.retracted_mm += amount
+    tip.prime_extra_mm = max(tip.prime_extra_mm, profile.material.retract_prime_extra_mm)
+    way = first_length(tip.trail, profile.material.wipe_mm)
+    tip.trail = tip.trail[:0]
+    length = np.linalg.norm(np.diff(way, axis=0), axis=1)
+    if len(way) < 2 or float(np.linalg.norm(way[0] - tip.at_mm)) > STANDING_MM:
+        yield Retract(amount, filament_speed(profile))
+        return
+    speed = min(travel_speed(profile), float(length.sum()) * filament_speed(profile) / amount)
+    yield Wipe(way, length * (amount / length.sum()), limits.travel_speed(way, speed, profile.machine))
+    tip.at_mm = way[-1]
+
+
+def prime(tip: Tip, profile: Profile) -> Iterator[Move]:
+    """Push forward what was pulled back, and what is to be pushed beyond it."""
+    amount = tip.retracted_mm + tip.prime_extra_mm
+    if amount > 0:
+        tip.retracted_mm = tip.prime_extra_mm = 0.0
+        yield Retract(-amount, filament_speed(profile))
+
+
+def filament_speed(profile: Profile) -> float:
+    """mm/s at which filament is pulled back and pushed forward."""
+    return min(profile.material.retract_speed_mm_s, profile.machine.extruder_speed_mm_s)
+
+
+def wipe_trail(points: Floats, width_mm: float) -> Floats:
+    """The way of a wipe after a stroke (n, 3): on along a ring, over its seam; back along a line."""
+    gap = float(np.linalg.norm(points[-1] - points[0]))
+    if gap <= width_mm and length_mm(points) > RING * width_mm:
+        return np.vstack([points[-1:], points]) if gap > STANDING_MM else points
+    return points[::-1]
+
+
+def first_length(way: Floats, length: float) -> Floats:
+    """The first `length` mm of a polyline (n, 3), or all of it; without points that repeat."""
+    if len(way) < 2 or length <= 0.0:
+        return way[:0]
+    steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
+    way, steps = way[np.concatenate([[True], steps > STANDING_MM])], steps[steps > STANDING_MM]
+    done = np.cumsum(steps)
+    last = int(np.searchsorted(done, length))
+    if last >= len(steps):
+        return way
+    share = 1.0 - (done[last] - length) / steps[last]
+    return np.vstack([way[: last + 1], way[last] + share * (way[last + 1] - way[last])])

@@ -1,0 +1,84 @@
+"""Parsed: what a G-code text holds, as arrays with one row per move."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats
+from mdp.pose import Pose
+
+OWN = "macro"  # the code of an Event that is a macro the machine defines for itself, its name in letters
+
+
+class MoveKind(IntEnum):
+    """What a straight move does; RETRACT: filament alone, back or forth; ROTATE: the table turns."""
+
+    TRAVEL = 0
+    EXTRUDE = 1
+    RETRACT = 2
+    ROTATE = 3
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that is not a move: code as written ("M104"), its S (or P) value, letters named; before row `row`."""
+
+    line: int
+    code: str
+    value: float
+    letters: str
+    row: int
+
+
+@dataclass(frozen=True, eq=False)
+class ParsedProgram:
+    """A G-code text as arrays with one row per move (n rows).
+
+    line: number in the text, from 1. start, end: (n, 5) X Y Z tilt turn, absolute, mm and deg; start differs from the row
+    before where G28 or G92 set a position. e_mm: filament pushed by the move. filament_mm: running sum of e_mm. feed:
+    F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
+    type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
+    acceleration: mm/s2 told by M204, inf where the axes decide. layers: number of layer changes. parts: numbers of the parts
+    in order. unsupported: (line, part, mm2, layer).
+    """
+
+    line: NDArray[np.int64]
+    start: Floats
+    end: Floats
+    e_mm: Floats
+    filament_mm: Floats
+    feed: Floats
+    kind: NDArray[np.int8]
+    part: NDArray[np.int64]
+    layer: NDArray[np.int64]
+    type: NDArray[np.int64]
+    types: tuple[str, ...]
+    width_mm: Floats
+    height_mm: Floats
+    acceleration: Floats
+    events: tuple[Event, ...]
+    ignored: dict[str, tuple[int, int]]
+    layers: int
+    parts: tuple[int, ...]
+    unsupported: tuple[tuple[int, int, float, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRun:
+    """Consecutive rows of straight moves at one pose."""
+
+    rows: NDArray[np.int64]
+    pose: Pose
+
+
+def pose_runs(program: ParsedProgram) -> list[PoseRun]:
+    """The straight moves between turns of the table."""
+    turned = np.any(np.diff(program.end[:, 3:], axis=0, prepend=program.start[:1, 3:]) != 0, axis=1)
+    runs = []
+    for rows in np.split(np.arange(len(turned)), np.flatnonzero(turned)):
+        straight = rows[program.kind[rows] != MoveKind.ROTATE]
+        if len(straight):
+            runs.append(PoseRun(straight, Pose(*(float(v) for v in program.end[straight[0], 3:]))))
+    return runs

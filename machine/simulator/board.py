@@ -1,0 +1,170 @@
+"""The board of a simulated printer: its build options, clock, motion, heaters and fan, and the words its commands read."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import exp, inf, log
+
+from machine.firmware import simulation_of
+from machine.simulator.motion import Motion
+from profiles.machine import Machine
+
+Words = Mapping[str, float]
+# None: done, answered with ok; a text: its own ok; else the virtual times at which a slow command wants to look again.
+Work = Iterator[float] | str | None
+Command = Callable[["Board", Words, str], Work]
+
+NOZZLE_S, BED_S = 60.0, 240.0  # time constants of a 40 W hot end and a 300 W plate
+EVENTS = 10000  # kept where the moves are not all kept either
+ROOM_C = 20.0
+GUARD_S, GUARD_C = 40.0, 4.0  # Marlin's THERMAL_PROTECTION_PERIOD and _HYSTERESIS
+WATCH_S = 40.0  # Marlin's WATCH_TEMP_PERIOD: a heater that has a target must have become warmer by then
+CALM_C = 1.0  # as near to its target a heater counts as there
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """Build options. rx_ring: bytes of a UART's receive ring that overflows; None: USB, which waits. queue: Marlin's BUFSIZE,
+    lines kept before the one at work is done; None: its default.
+
+    realtime: Marlin's REALTIME_REPORTING_COMMANDS; geometry: its M115_GEOMETRY_REPORT; waits: its NO_TIMEOUTS, `wait` every
+    second when idle; resend_ok: an `ok` follows each Resend (Smoothieware has none); must_home: X Y Z are not moved before they
+    are homed (Klipper, RepRapFirmware, Marlin's NO_MOTION_BEFORE_HOMING).
+    """
+
+    advanced_ok: bool = True
+    emergency_parser: bool = True
+    busy: bool = True
+    autoreport: bool = True
+    rx_ring: int | None = None
+    realtime: bool = False
+    geometry: bool = True
+    waits: bool = False
+    resend_ok: bool = True
+    must_home: bool = False
+    queue: int | None = None
+
+
+def build_options(machine: Machine, baud: int | None) -> BuildOptions:
+    """The usual build: USB without a baud rate, with one a UART whose ring is machine.receive_bytes."""
+    return BuildOptions(rx_ring=machine.receive_bytes if baud else None)
+
+
+class Heater:
+    """Temperature as a closed formula of time since the last order."""
+
+    def __init__(self, name: str, limit_c: float, time_constant_s: float) -> None:
+        self.name = name
+        self.target_c = 0.0
+        self._limit_c = limit_c
+        self._ceiling_c = 1.3 * limit_c + 50.0  # where full power would end: the limit is reached in finite time
+        self._time_constant_s = time_constant_s
+        self._from_c, self._since_s = ROOM_C, 0.0
+        self._failed = False
+        self.trip_s = inf  # when the firmware's guard will see that it does not heat
+        self.trip = ""
+
+    def set(self, target_c: float, now_s: float) -> None:
+        """A new target, deg C, kept between 0 and the limit as the firmware does."""
+        self._from_c, self._since_s = self.at(now_s), now_s
+        self.target_c = min(max(target_c, 0.0), self._limit_c)
+        self._guard(now_s)
+
+    def fail(self, now_s: float) -> None:
+        """From now on it gives no heat whatever its target: a cartridge that fell out."""
+        self._from_c, self._since_s = self.at(now_s), now_s
+        self._failed = True
+        self._guard(now_s)
+
+    def at(self, now_s: float) -> float:
+        """Temperature at a time, deg C."""
+        goal, stop = self._goal()
+        free = goal + (self._from_c - goal) * exp(-(now_s - self._since_s) / self._time_constant_s)
+        return min(free, stop) if goal > self._from_c else max(free, stop)
+
+    def reaches(self, value_c: float) -> float:
+        """The time at which the temperature passes value_c on its way, s; inf when it never does."""
+        goal, stop = self._goal()
+        low, high = sorted((self._from_c, stop))
+        if not low <= value_c <= high or value_c == goal:
+            return inf
+        return self._since_s + self._time_constant_s * log((self._from_c - goal) / (value_c - goal))
+
+    def _goal(self) -> tuple[float, float]:
+        """Where it would go without a thermostat, and where the thermostat stops it."""
+        stop = ROOM_C if self._failed else max(self.target_c, ROOM_C)
+        return (self._ceiling_c if stop > self._from_c else ROOM_C), stop
+
+    def _guard(self, now_s: float) -> None:
+        """When Marlin's thermal protection would stop a heater that gives no heat, and with which words."""
+        self.trip_s, self.trip = inf, ""
+        if not self._failed or self.target_c <= ROOM_C:
+            return
+        if self._from_c >= self.target_c - CALM_C:
+            self.trip_s, self.trip = self.reaches(self.target_c - GUARD_C) + GUARD_S, "Thermal Runaway"
+        else:
+            self.trip_s, self.trip = now_s + WATCH_S, "Heating failed"
+
+
+class Board:
+    """now_s is virtual; say() adds a line to what the host will read. kept: moves kept on record, None: all."""
+
+    def __init__(self, machine: Machine, build: BuildOptions, say: Callable[[str], None], kept: int | None = None) -> None:
+        self.machine, self.build, self.say = machine, build, say
+        self.rules = simulation_of(machine)
+        self.now_s = 0.0
+        self.motion = Motion(machine, self.note, kept)
+        self.nozzle = Heater("nozzle", machine.nozzle_limit_c, NOZZLE_S)
+        self.bed = Heater("bed", machine.bed_limit_c, BED_S)
+        self.events: list[tuple[float, str]] = []
+        self._most_events = None if kept is None else EVENTS
+        self.unknown = 0
+        self.turning: dict[int, tuple[float, float]] = {}
+        self.busy_every_s = 0.0
+        self.number: int | None = None  # set by M110, for the firmware to take over
+        self.fan = 0.0
+        self.forget()
+
+    def forget(self) -> None:
+        """The board restarts."""
+        self.powered = True
+        self.waits_for_heat = self.waits_for_person = self.impatient = self.cold_allowed = False
+        self.report_every_s = self.place_every_s = 0.0
+        self.report_s = self.place_s = inf
+
+    def note(self, what: str) -> None:
+        """Put an event on record."""
+        self.events.append((self.now_s, what))
+        if self._most_events is not None and len(self.events) > 2 * self._most_events:
+            del self.events[: self._most_events]
+
+    def temperatures(self) -> str:
+        """Nozzle and bed as the firmware reports them."""
+        nozzle, bed = self.nozzle, self.bed
+        return self.rules.temperatures(nozzle.at(self.now_s), nozzle.target_c, bed.at(self.now_s), bed.target_c)
+
+    def position(self) -> str:
+        """The answer to M114 as the firmware writes it."""
+        motion = self.motion
+        coordinates = dict(zip(motion.letters, motion.coordinates(), strict=True))
+        steps = dict(zip(motion.letters, motion.counts(self.now_s), strict=False))
+        if not self.machine.tilts:
+            for letter in motion.letters[3:5]:
+                del coordinates[letter], steps[letter]
+        return self.rules.position(coordinates, steps)
+
+    def off(self) -> None:
+        """Heaters and fan off, motion stopped: kill, reset."""
+        self.nozzle.set(0.0, self.now_s)
+        self.bed.set(0.0, self.now_s)
+        self.fan = 0.0
+        self.motion.halt(self.now_s)
+
+
+def wait_for_moves(board: Board) -> Iterator[float]:
+    """Until all planned moves are over."""
+    planner = board.motion.planner
+    while (next_s := planner.next_s()) < inf:
+        if next_s > board.now_s:
+            yield next_s
+        planner.run(board.now_s)
+    planner.barrier(board.now_s)

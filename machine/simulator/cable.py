@@ -1,0 +1,236 @@
+"""The cable between host and simulated printer: carries bytes both ways and lets the faults of a script happen to them."""
+
+import random
+from collections import deque
+from collections.abc import Iterator
+from heapq import heapify, heappop, heapreplace
+from math import inf
+
+from machine.simulator.faults import OK_KINDS, Fault, FaultScript
+from machine.simulator.firmware import SimulatedFirmware
+
+ERROR = "Error:Heating failed, system stopped! Heater_ID: 0"
+GARBAGE_BYTES = 20
+LATE_S = 1e-9  # the firmware is looked at that much late, for a clock in another unit is rounded
+
+
+class _FaultQueue:
+    """Where faults strike that count the same thing, in order."""
+
+    def __init__(self, script: FaultScript, indices: list[int]) -> None:
+        self._script = script
+        self._heap: list[tuple[int, int, Iterator[int]]] = []
+        for index in indices:
+            places = script.places(index)
+            self._heap.append((next(places), index, places))
+        heapify(self._heap)
+
+    def __bool__(self) -> bool:
+        return bool(self._heap)
+
+    def before(self, end: int) -> Iterator[tuple[int, Fault]]:
+        """Places below `end` with their faults; they are used up."""
+        heap = self._heap
+        while heap and heap[0][0] < end:
+            place, index, places = heap[0]
+            following = next(places, None)
+            if following is None:
+                heappop(heap)
+            else:
+                heapreplace(heap, (following, index, places))
+            yield place, self._script.faults[index]
+
+
+class _Direction:
+    """One direction of the cable: bytes carried so far, the faults to come, and what is held back until a time."""
+
+    def __init__(self, places: _FaultQueue) -> None:
+        self.places = places
+        self.carried = 0
+        self.open_s = -inf
+        self._held: deque[tuple[float, bytes]] = deque()
+
+    def put(self, data: bytes) -> None:
+        if data:
+            self._held.append((self.open_s, data))
+
+    def take(self, now_s: float) -> bytes:
+        """What has arrived by now; order is kept, so one late byte holds up all behind it."""
+        out = []
+        while self._held and self._held[0][0] <= now_s:
+            out.append(self._held.popleft()[1])
+        return b"".join(out)
+
+    def due_s(self) -> float:
+        return self._held[0][0] if self._held else inf
+
+    def clear(self) -> None:
+        self._held.clear()
+        self.open_s = -inf
+
+
+class Cable:
+    """exchange() is one turn: the host's bytes travel to the firmware, it works, its answers travel back.
+
+    now_s is the cable's own clock, in which delays, stalls and disconnections are counted; speed: how many seconds pass for the
+    firmware in one of it, inf: its clock jumps over every wait.
+    """
+
+    def __init__(self, firmware: SimulatedFirmware, script: FaultScript | None = None, speed: float = inf) -> None:
+        script = script or FaultScript()
+        self._speed = speed
+        self._firmware = firmware
+        self._in = _Direction(_fault_queue(script, "byte", False))
+        self._out = _Direction(_fault_queue(script, "byte", True))
+        self._answers, self._lines = _fault_queue(script, "answer"), _fault_queue(script, "line")
+        self._clean = not script.faults
+        self._rng = random.Random(script.seed)
+        self._answered = 0
+        self._ok_faults: deque[Fault] = deque()  # faults that wait for the next `ok`
+        self._struck: list[Fault] = []
+        self._blocked_s = self._back_s = -inf
+        if self._lines:
+            firmware.watch = self._watch
+
+    def connected(self, now_s: float) -> bool:
+        """False while the cable is out."""
+        return now_s >= self._back_s
+
+    def blocked(self, now_s: float) -> bool:
+        """Whether the printer reads nothing, so that the host's writing comes to a halt."""
+        return now_s < self._blocked_s
+
+    def due_s(self, now_s: float) -> float:
+        """When something happens without further bytes, on the cable's clock; inf: never."""
+        firmware_s = inf if self._speed == inf else self._firmware.next_s() / self._speed + LATE_S
+        times = (self._in.due_s(), self._out.due_s(), self._blocked_s, self._back_s, firmware_s)
+        return min((t for t in times if t > now_s), default=inf)
+
+    def exchange(self, data: bytes, now_s: float = 0.0, until_s: float | None = None) -> bytes:
+        """What the host hears after these bytes; until_s: how far the firmware's clock may run, if not as speed says."""
+        until_s = until_s if until_s is not None else inf if self._speed == inf else now_s * self._speed
+        if self._clean:
+            answers = self._firmware.advance(until_s) if until_s < inf else b""
+            self._firmware.receive(data)
+            return answers + self._firmware.advance(until_s)
+        if self.connected(now_s):
+            self._carry(data, self._in, now_s, until_s)
+        self._work(now_s, until_s)
+        return self._out.take(now_s) if self.connected(now_s) else b""
+
+    def _work(self, now_s: float, until_s: float) -> None:
+        """Let the firmware work, then on what has arrived; while it is blocked its ring fills, if it has one."""
+        if self.blocked(now_s):
+            if self._firmware.has_ring:
+                self._firmware.receive(self._in.take(now_s))
+            return
+        if until_s < inf:
+            self._advance(now_s, until_s)
+        if received := self._in.take(now_s):
+            self._firmware.receive(received)
+        self._advance(now_s, until_s)
+
+    def _advance(self, now_s: float, until_s: float) -> None:
+        """A fault at a line strikes before the line begins."""
+        while True:
+            answers = self._firmware.advance(until_s)
+            if self.connected(now_s):
+                self._answer(answers, now_s)
+            if not self._struck:
+                return
+            struck, self._struck = self._struck, []
+            for fault in struck:
+                self._strike(fault, now_s)
+            if self.blocked(now_s):
+                return
+
+    def _watch(self, line: int) -> bool:
+        self._struck += [fault for _, fault in self._lines.before(line + 1)]
+        return bool(self._struck)
+
+    def _carry(self, data: bytes, direction: _Direction, now_s: float, until_s: float = inf) -> None:
+        """Hand bytes to a direction, damaged where a fault is due."""
+        begin, direction.carried, done = direction.carried, direction.carried + len(data), 0
+        for place, fault in direction.places.before(direction.carried):
+            at = max(place - begin, 0)
+            if at < done:
+                continue
+            direction.put(data[done:at])
+            done = at
+            if fault.kind == "drop":
+                done = at + 1
+            elif fault.kind == "duplicate":
+                direction.put(data[at : at + 1])
+            elif fault.kind == "flip":
+                bit = self._rng.randrange(8) if fault.value is None else fault.value
+                direction.put(bytes([data[at] ^ 1 << bit]))
+                done = at + 1
+            elif fault.kind == "delay":
+                direction.open_s = max(direction.open_s, now_s + fault.seconds)
+            elif fault.kind == "garbage":
+                direction.put(self._spurious_bytes(fault))
+            else:
+                if direction is self._in:
+                    self._work(now_s, until_s)
+                self._strike(fault, now_s)
+                if not self.connected(now_s):
+                    return
+        direction.put(data[done:])
+
+    def _answer(self, answers: bytes, now_s: float) -> None:
+        """Carry the firmware's whole lines to the host."""
+        if not (self._answers or self._ok_faults):
+            self._carry(answers, self._out, now_s)
+            return
+        for line in answers.splitlines(keepends=True):
+            self._answered += 1
+            for _, fault in self._answers.before(self._answered + 1):
+                if fault.kind in OK_KINDS:
+                    self._ok_faults.append(fault)
+                else:
+                    self._strike(fault, now_s)
+            if not self.connected(now_s):
+                return
+            wanted = self._ok_faults.popleft() if self._ok_faults and line.startswith(b"ok") else None
+            self._carry(line if wanted is None else _damaged_ok(wanted, line), self._out, now_s)
+
+    def _strike(self, fault: Fault, now_s: float) -> None:
+        """Let a fault happen that is no damage to passing bytes."""
+        kind, until_s = fault.kind, now_s + fault.seconds
+        if kind in ("reset", "silent reset"):
+            self._firmware.reset(kind == "reset")
+        elif kind == "thermal runaway":
+            self._firmware.kill("Thermal Runaway, system stopped! Heater_ID: 0")
+        elif kind == "heater failure":
+            self._firmware.board.nozzle.fail(self._firmware.board.now_s)
+        elif kind == "disconnect":
+            self._back_s = until_s
+            self._in.clear()
+            self._out.clear()
+        elif kind == "stall":
+            self._out.open_s = max(self._out.open_s, until_s)
+        elif kind == "block":
+            self._blocked_s = until_s
+            if not self._firmware.has_ring:
+                self._in.open_s = max(self._in.open_s, until_s)
+        else:
+            self._out.put(self._spurious_bytes(fault))
+
+    def _spurious_bytes(self, fault: Fault) -> bytes:
+        """What comes to the host although no answer of the firmware says it."""
+        if fault.kind == "spurious resend":
+            number = max(1, self._firmware.last_number - self._rng.randint(0, 8)) if fault.value is None else fault.value
+            return b"Resend: %d\nok\n" % number
+        if fault.kind == "error":
+            return f"{fault.text or ERROR}\n".encode("latin-1")
+        return fault.text.encode("latin-1") or bytes(self._rng.choice(range(128, 256)) for _ in range(GARBAGE_BYTES))
+
+
+def _fault_queue(script: FaultScript, unit: str, to_host: bool | None = None) -> _FaultQueue:
+    chosen = [k for k, fault in enumerate(script.faults) if fault.counted == unit and to_host in (None, fault.to_host)]
+    return _FaultQueue(script, chosen)
+
+
+def _damaged_ok(fault: Fault, line: bytes) -> bytes:
+    """What arrives of an `ok`."""
+    return {"swallow ok": b"", "truncate ok": b"o\n", "double ok": line + line}[fault.kind]

@@ -1,0 +1,228 @@
+"""The commands that the simulated printer of each firmware knows: heat, fan, power supply, reports, messages."""
+
+from collections.abc import Iterator
+from math import inf
+
+from machine.firmware import dialect_of
+from machine.firmware.simulation import SimulationRules
+from machine.simulator.board import Board, Command, Words, Work
+from machine.simulator.motion_commands import MOVING
+
+NEAR_C = 1.0  # Marlin's TEMP_WINDOW: a heater within it has arrived
+REPORT_S = 1.0  # Marlin reports temperatures so often while it waits for heat
+CAPABILITIES = {
+    "SERIAL_XON_XOFF": 0,
+    "BINARY_FILE_TRANSFER": 0,
+    "EEPROM": 0,
+    "VOLUMETRIC": 0,
+    "AUTOREPORT_POS": 1,
+    "AUTOREPORT_TEMP": 1,
+    "PROGRESS": 0,
+    "PRINT_JOB": 1,
+    "AUTOLEVEL": 0,
+    "Z_PROBE": 0,
+    "SOFTWARE_POWER": 1,
+    "EMERGENCY_PARSER": 1,
+    "HOST_ACTION_COMMANDS": 1,
+    "SDCARD": 0,
+    "REPORTING": 0,
+    "MOTION_MODES": 0,
+    "ARCS": 1,
+    "BABYSTEPPING": 0,
+    "CHAMBER_TEMPERATURE": 0,
+}
+ENDSTOP_MM = 0.01
+TEXTS = ("M117", "M118")  # what follows them are no words
+
+
+def heat(board: Board, words: Words, text: str) -> Work:
+    """Give a heater its target: M104, M109, M568 the nozzle, others the bed."""
+    heater = board.nozzle if text.startswith(("M104", "M109", "M568")) else board.bed
+    wanted = words.get("S", words.get("R"))
+    if wanted is not None and board.powered:
+        heater.set(wanted, board.now_s)
+        board.note(f"{heater.name} {heater.target_c:g}")
+    return None
+
+
+def heat_and_wait(board: Board, words: Words, text: str) -> Iterator[float]:
+    """The same, and wait until it is there; R: also for a hotter one to cool."""
+    heat(board, words, text)
+    heater = board.nozzle if text.startswith("M109") else board.bed
+    rising = heater.target_c > heater.at(board.now_s)
+    if not rising and "R" not in words:
+        return
+    arrived_s = heater.reaches(heater.target_c - NEAR_C if rising else heater.target_c + NEAR_C)
+    if arrived_s == inf and heater.trip_s == inf:
+        return
+    board.waits_for_heat, board.impatient = True, False
+    while board.now_s < arrived_s and not board.impatient:
+        yield min(arrived_s, board.now_s + REPORT_S)
+        board.say(f"{board.temperatures()}{board.rules.while_heating}")
+    board.waits_for_heat = False
+
+
+def _wait_for_all(board: Board, words: Words, text: str) -> Iterator[float]:
+    """M116 (RepRapFirmware)."""
+    yield from heat_and_wait(board, {"S": board.bed.target_c}, "M190")
+    yield from heat_and_wait(board, {"S": board.nozzle.target_c}, "M109")
+
+
+def _fan(board: Board, words: Words, text: str) -> Work:
+    full = 1.0 if words.get("S", 255.0) <= dialect_of(board.machine).fan_full == 1 else 255.0
+    board.fan = min(max(words.get("S", full), 0.0), full) / full if text.startswith("M106") else 0.0
+    board.note(f"fan {board.fan:.2f}")
+    return None
+
+
+def _allow_cold(board: Board, words: Words, text: str) -> Work:
+    """M302."""
+    if "P" in words:
+        board.cold_allowed = words["P"] != 0
+    elif "S" in words:
+        board.cold_allowed = words["S"] <= 0
+    return None
+
+
+def _stop_waiting(board: Board, words: Words, text: str) -> Work:
+    board.impatient = True
+    return None
+
+
+def _power(board: Board, words: Words, text: str) -> Work:
+    """M80, M81: without the power supply nothing heats; what moves is planned and does not matter."""
+    if text.startswith("M81"):
+        board.off()
+    board.powered = not text.startswith("M81")
+    board.note(f"power {'on' if board.powered else 'off'}")
+    return None
+
+
+def _identify_firmware(board: Board, words: Words, text: str) -> Work:
+    """M115: name, capabilities, and the axes' reach, the fourth axis on named i, j whatever their words are."""
+    rules, build = board.rules, board.build
+    name = rules.identity.format(axes=5 if board.machine.tilts else 3)
+    if rules.identity_in_ok:
+        return f"ok {name}"
+    board.say(name)
+    if rules.has_build_options:
+        known = CAPABILITIES | {
+            "AUTOREPORT_POS": build.autoreport,
+            "AUTOREPORT_TEMP": build.autoreport,
+            "EMERGENCY_PARSER": build.emergency_parser,
+            "REPORTING": build.realtime,
+        }
+        for capability, there in known.items():
+            board.say(f"Cap:{capability}:{int(there)}")
+        if build.geometry:
+            board.say(_area(board))
+    return None
+
+
+def _area(board: Board) -> str:
+    limits = board.motion.limits[: 5 if board.machine.tilts else 3]
+    least, most = (",".join(f"{a}:{b[side]:.2f}" for a, b in zip("xyzij", limits, strict=False)) for side in (0, 1))
+    reach = f"min:{{{least}}},max:{{{most}}}"
+    return f"area:{{full:{{{reach}}},work:{{{reach}}}}}"
+
+
+def _report_temperatures(board: Board, words: Words, text: str) -> Work:
+    return f"ok {board.temperatures()}"
+
+
+def _report_position(board: Board, words: Words, text: str) -> Work:
+    board.say(board.position())
+    return None
+
+
+def _autoreport_temperatures(board: Board, words: Words, text: str) -> Work:
+    board.report_every_s = max(0.0, words.get("S", 0.0))
+    board.report_s = board.now_s + board.report_every_s if board.report_every_s else inf
+    return None
+
+
+def _autoreport_position(board: Board, words: Words, text: str) -> Work:
+    board.place_every_s = max(0.0, words.get("S", 0.0))
+    board.place_s = board.now_s + board.place_every_s if board.place_every_s else inf
+    return None
+
+
+def _keep_alive(board: Board, words: Words, text: str) -> Work:
+    """M113: seconds between `busy:`, 0 for none."""
+    if "S" in words:
+        board.busy_every_s = max(0.0, words["S"])
+    else:
+        board.say(f"echo:M113 S{board.busy_every_s:g}")
+    return None
+
+
+def _number_lines(board: Board, words: Words, text: str) -> Work:
+    """A bare M110: its N is the number of the last line."""
+    if "N" in words:
+        board.number = int(words["N"])
+    return None
+
+
+def _send_to_host(board: Board, words: Words, text: str) -> Work:
+    """M118: A1 makes it an action of the host, with the line end of another system; E1 an echo."""
+    message, action, echo = text[4:].strip(), False, False
+    while message[:2] in ("A0", "A1", "E0", "E1", "P0") and message[2:3] in ("", " "):
+        action, echo = action or message[:2] == "A1", echo or message[:2] == "E1"
+        message = message[2:].lstrip()
+    board.say(f"{'echo:' if echo else ''}{'//' if action else ''}{message}" + ("\r" if action else ""))
+    return None
+
+
+def _report_endstops(board: Board, words: Words, text: str) -> Work:
+    """M119: X and Y end at their least, Z at its greatest."""
+    board.say("Reporting endstop status")
+    real = board.motion.at(board.now_s)
+    for axis, (letter, side) in enumerate((("x", 0), ("y", 0), ("z", 1))):
+        limit = board.motion.limits[axis][side]
+        touched = real[axis] <= limit + ENDSTOP_MM if side == 0 else real[axis] >= limit - ENDSTOP_MM
+        board.say(f"{letter}_{('min', 'max')[side]}: {'TRIGGERED' if touched else 'open'}")
+    return None
+
+
+def _nothing(board: Board, words: Words, text: str) -> Work:
+    return None
+
+
+HEAT: dict[str, Command] = {
+    "M80": _power,
+    "M81": _power,
+    "M104": heat,
+    "M106": _fan,
+    "M107": _fan,
+    "M108": _stop_waiting,
+    "M109": heat_and_wait,
+    "M116": _wait_for_all,
+    "M140": heat,
+    "M190": heat_and_wait,
+    "M302": _allow_cold,
+    "M568": heat,
+}
+REPORTS: dict[str, Command] = {
+    "M17": _nothing,
+    "M73": _nothing,
+    "M105": _report_temperatures,
+    "M110": _number_lines,
+    "M113": _keep_alive,
+    "M115": _identify_firmware,
+    "M114": _report_position,
+    "M117": _nothing,
+    "M118": _send_to_host,
+    "M119": _report_endstops,
+    "M154": _autoreport_position,
+    "M155": _autoreport_temperatures,
+    "M486": _nothing,
+    "M665": _nothing,
+    "M876": _nothing,
+    "T0": _nothing,
+}
+COMMANDS: dict[str, Command] = {**MOVING, **HEAT, **REPORTS}
+
+
+def commands_of(rules: SimulationRules) -> dict[str, Command]:
+    """What a firmware knows."""
+    return {name: command for name, command in COMMANDS.items() if name not in rules.lacks}

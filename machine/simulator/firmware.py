@@ -1,0 +1,316 @@
+"""A firmware without I/O: bytes in, bytes out, time is virtual and handed in.
+
+Its rules are those of the machine's dialect (machine.firmware), Marlin's awkward ones above all: line numbers and
+checksums with its exact words, a repeat of the last line swallowed in silence, `ok` = taken, withheld while the planner is full.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from math import inf
+
+from machine.firmware import dialect_of
+from machine.gcode.words import read_values, read_words, split_command
+from machine.simulator.board import Board, BuildOptions, Work
+from machine.simulator.commands import TEXTS, commands_of
+from machine.simulator.macros import command_of
+from machine.simulator.motion_commands import move
+from machine.simulator.receiver import EmergencyParser, Receiver
+from machine.simulator.record import Record, record_of
+from profiles.machine import Machine
+
+BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
+UNREAD_LINES = 20
+CHATTER_S = 3600.0  # of a longer wait only the last hour is talked through: a jump over years must not fill the memory
+EARLY = ("M108", "M112", "M410")
+IDLE_S = 1.0  # Marlin's NO_TIMEOUTS: `wait` is said so often
+MOVES = ("G0", "G1", "G2", "G3")
+MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_IDLE
+
+
+class SimulatedFirmware:
+    """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile.
+
+    kept: how many moves stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
+    """
+
+    def __init__(
+        self, machine: Machine, build: BuildOptions | None = None, busy_s: float = BUSY_S, kept: int | None = None
+    ) -> None:
+        self._build = build or BuildOptions()
+        self._said: list[str] = []
+        self.board = Board(machine, self._build, self._said.append, kept)
+        self._rules = self.board.rules
+        self._commands, self._macros = commands_of(self._rules), dialect_of(machine).macros
+        self.board.busy_every_s = self._busy_default_s = busy_s if self._build.busy and self._rules.has_build_options else 0.0
+        self._receiver = Receiver(self._rules, dialect_of(machine).longest_line, self._build.rx_ring)
+        self._room = (self._build.queue if self._rules.has_build_options else None) or self._rules.queue_lines
+        self._emergency = EmergencyParser(self._build.realtime) if self._reads_bytes() else None
+        self._busy_s = self._wait_s = inf
+        self._queue: deque[tuple[str, str]] = deque()
+        self._wake_s: float | None = None
+        self._work: Iterator[float] | None = None
+        self._waits = False  # the program itself waits for the command at work
+        self._taken = self._watched = 0
+        self.watch: Callable[[int], bool] | None = None
+        self.dead = False
+
+    def _reads_bytes(self) -> bool:
+        return self._rules.urgent == "bytes" and (self._build.emergency_parser or self._build.realtime)
+
+    def receive(self, data: bytes) -> None:
+        """Bytes arrive on the line."""
+        if self.dead and not self._rules.after_kill:
+            return
+        if self._emergency is not None:
+            for order in self._emergency.read(data):
+                self._do_urgent(order)
+            if self.dead:
+                return
+        lines = self._receiver.receive(data)
+        if self._rules.urgent == "lines" and any(line.strip() == b"M112" for line in lines):
+            self._shut_down("M112", ())
+
+    @property
+    def has_ring(self) -> bool:
+        """Whether bytes arrive in a ring that overflows; over USB the host waits instead."""
+        return self._build.rx_ring is not None
+
+    @property
+    def full(self) -> bool:
+        """Over USB: nothing more is read until there is room again."""
+        return not self.has_ring and len(self._receiver) >= UNREAD_LINES
+
+    def advance(self, until_s: float = inf) -> bytes:
+        """Work until a virtual time; with inf until there is nothing to do, the clock jumping over all waits."""
+        board = self.board
+        while not self.dead:
+            self._fetch()
+            if self._wake_s is not None:
+                if self._wake_s > until_s:
+                    self._pass(until_s)
+                    break
+                self._pass(self._wake_s)
+                self._wake_s = None
+            elif self._queue:
+                if self.watch is not None and self._work is None and self._watched == self._taken:
+                    self._watched += 1
+                    if self.watch(self._watched):
+                        break
+                self._run()
+            else:
+                if until_s < inf:
+                    self._pass(until_s)
+                break
+        if until_s < inf:
+            board.now_s = max(board.now_s, until_s)
+        if self.dead:
+            self._answer_dead()
+        said = "".join([f"{line}\n" for line in self._said])
+        self._said.clear()
+        return said.encode("ascii", "replace")
+
+    def next_s(self) -> float:
+        """The virtual time at which something happens without further bytes; inf when nothing will."""
+        if self.dead:
+            return inf
+        board = self.board
+        due_s = min(board.report_s, board.place_s, board.nozzle.trip_s, board.bed.trip_s)
+        if self._wake_s is None:
+            return board.now_s if self._queue or len(self._receiver) else min(due_s, self._wait_s)
+        return min(self._wake_s, due_s, inf if board.waits_for_heat else self._busy_s)  # no busy while it tells temperatures
+
+    def reset(self, banner: bool = True) -> None:
+        """The board restarts: counter, queues, position and temperatures are lost."""
+        board = self.board
+        board.note("reset")
+        board.off()
+        board.forget()
+        board.motion.forget()
+        board.busy_every_s = self._busy_default_s
+        self._forget()
+        self._receiver.last, self.dead = 0, False
+        if banner:
+            self._said += self._rules.banner
+
+    @property
+    def last_number(self) -> int:
+        """Number of the last numbered line that was taken."""
+        return self._receiver.last
+
+    @property
+    def taken(self) -> int:
+        """How many lines were executed."""
+        return self._taken
+
+    def record(self) -> Record:
+        """What was done so far."""
+        return record_of(self.board, self._taken, self._receiver.lost_bytes)
+
+    def kill(self, error: str) -> None:
+        """The firmware stops for ever with its own words, heaters off."""
+        self._shut_down(error, (f"Error:{error}",))
+
+    def _shut_down(self, event: str, report: tuple[str, ...]) -> None:
+        self.board.note(event)
+        self.board.off()
+        self._said += [*report, *self._rules.kill]
+        self._forget()
+        self.dead = True
+
+    def _forget(self) -> None:
+        self._receiver.forget()
+        self._queue.clear()
+        if self._emergency is not None:
+            self._emergency.forget()
+        self._wake_s = self._work = None
+        self._busy_s = self._wait_s = inf
+        self._watched = self._taken
+
+    def _answer_dead(self) -> None:
+        """A firmware on a computer of its own still answers when it has stopped the machine: no, and ok."""
+        while len(self._receiver):
+            if self._receiver.take() is not None:
+                self._said += [*self._rules.after_kill, "ok"]
+
+    def _do_urgent(self, order: str) -> None:
+        board = self.board
+        if order in ("S000", "P000", "R000"):
+            if self._build.realtime:
+                self._said += [MACHINE_STATE[board.motion.planner.next_s() < inf], board.position()]
+        elif self._build.emergency_parser:
+            self._act_at_once(order)
+
+    def _act_at_once(self, order: str) -> None:
+        board = self.board
+        if order == "M112":
+            self._shut_down("M112", ("echo:M112 Shutdown",))
+        elif order == "M108":
+            board.impatient = True
+            if board.waits_for_heat or board.waits_for_person:
+                self._wake_s = board.now_s
+        elif order == "M410":
+            board.motion.halt(board.now_s)
+            board.note("M410")
+            if self._wake_s is not None:
+                self._wake_s = board.now_s
+
+    def _fetch(self) -> None:
+        """Move lines from the receive ring into the queue while it has room.
+
+        Without an emergency parser Marlin looks for its orders here: a line is seen when it enters the queue.
+        """
+        receiver, room = self._receiver, self._room
+        while len(receiver) and len(self._queue) < room:
+            taken = receiver.take()
+            if isinstance(taken, str):
+                self._said += receiver.ask_again(taken, self._build.resend_ok)
+                break
+            if taken is not None:
+                self._queue.append(taken)
+                if self._emergency is None and self._rules.urgent == "bytes" and taken[1] in EARLY:
+                    self._act_at_once(taken[1])
+        if not len(receiver) and len(self._queue) < room:
+            receiver.idle()
+
+    def _run(self) -> None:
+        """Begin or go on with the oldest line of the queue."""
+        board = self.board
+        label, text = self._queue[0]
+        if self._work is None:
+            name, rest = split_command(text)
+            if name in MOVES[:2]:
+                if not board.motion.planner.free(board.now_s):
+                    self._sleep(board.motion.planner.next_s())
+                    return
+                answer = move(board, dict(read_words(rest)), text)
+            else:
+                answer = self._begin(text, name, rest)
+                if self.dead:
+                    return
+            if answer is None or isinstance(answer, str):
+                self._finish(label, answer)
+                return
+            self._work, self._waits = answer, name not in MOVES
+        wake_s = next(self._work, None)
+        if wake_s is None:
+            self._work = None
+            if self._waits:
+                board.motion.planner.barrier(board.now_s)
+            self._finish(label)
+        else:
+            self._sleep(wake_s)
+
+    def _begin(self, text: str, name: str, rest: str) -> Work:
+        if name == "M112":
+            self._shut_down("M112", ("echo:M112 Shutdown",))
+            return None
+        if self._macros:
+            macro = command_of(name.upper())
+            if macro is not None:
+                return macro(self.board, read_values(rest))
+        command = self._commands.get(name)
+        if command is None:
+            if not (self._build.realtime and name in ("S0", "P0", "R0")):
+                self.board.unknown += 1
+                self._said.append(self._rules.unknown.format(text))
+            return None
+        answer = command(self.board, {} if name in TEXTS else dict(read_words(rest)), name + rest)
+        if self.board.number is not None:
+            self._receiver.last, self.board.number = self.board.number, None
+        return answer
+
+    def _finish(self, label: str, answer: str | None = None) -> None:
+        """Answer the oldest line of the queue; B counts it as still there, so it is one too low (TFT #2819)."""
+        self._queue.popleft()
+        self._taken += 1
+        self._busy_s = inf
+        if self._build.waits:
+            self._wait_s = self.board.now_s + IDLE_S
+        if answer is not None:
+            self._said.append(answer)
+        elif self._build.advanced_ok and self._rules.has_build_options:
+            free = self.board.motion.planner.free(self.board.now_s)
+            self._said.append(f"ok{label} P{free} B{self._room - 1 - len(self._queue)}")
+        else:
+            self._said.append("ok")
+
+    def _sleep(self, wake_s: float) -> None:
+        if self._busy_s == inf and self.board.busy_every_s > 0:
+            self._busy_s = self.board.now_s + self.board.busy_every_s
+        if self._wake_s is None:
+            self._wake_s = wake_s
+
+    def _pass(self, to_s: float) -> None:
+        """Let the clock run, saying on the way what is due."""
+        board = self.board
+        while not self.dead:
+            busy_s = self._busy_s if self._wake_s is not None and not board.waits_for_heat else inf
+            trip_s = min(board.nozzle.trip_s, board.bed.trip_s)
+            wait_s = self._wait_s if self._wake_s is None and not self._queue else inf
+            due_s = min(busy_s, wait_s, board.report_s, board.place_s, trip_s)
+            if due_s > to_s or due_s == inf:
+                break
+            board.now_s = max(board.now_s, due_s, min(to_s - CHATTER_S, trip_s))
+            self._report_due(due_s, busy_s, trip_s)
+        if to_s < inf and not self.dead:
+            board.now_s = max(board.now_s, to_s)
+
+    def _report_due(self, due_s: float, busy_s: float, trip_s: float) -> None:
+        """Say what is due now."""
+        board = self.board
+        if due_s == trip_s:
+            heater, index = (board.nozzle, "0") if board.nozzle.trip_s == trip_s else (board.bed, "bed")
+            heater.trip_s = inf
+            self.kill(f"{heater.trip}, system stopped! Heater_ID: {index}")
+        elif due_s == self._wait_s:
+            self._said.append("wait")
+            self._wait_s = board.now_s + IDLE_S
+        elif due_s == busy_s:
+            self._said.append(f"echo:busy: {'paused for user' if board.waits_for_person else 'processing'}")
+            self._busy_s = board.now_s + board.busy_every_s
+        elif due_s == board.report_s:
+            self._said.append(f" {board.temperatures()}")
+            board.report_s = board.now_s + board.report_every_s
+        else:
+            self._said.append(board.position())
+            board.place_s = board.now_s + board.place_every_s

@@ -1,0 +1,292 @@
+"""The moving half of a simulated printer: coordinates and their modes, limits, the kinematics, moves for the planner."""
+
+from collections.abc import Callable, Mapping, Sequence
+from math import ceil, hypot, inf, pi, sqrt
+
+from machine.firmware import simulation_of
+from machine.gcode.arcs import centre_of, chords, sweep_rad
+from machine.gcode.modes import Modes, axes_of
+from machine.kinematics.coordinates import origin_mm
+from machine.simulator.planner import ExecutedMoves, Planner, block_of
+from mdp.pose import Pose, rotation, shift
+from profiles.machine import Machine
+
+FIRST_FEED = 25.0  # mm/s until a program gives an F: Marlin's 1500 mm/min
+TINY_MM = 1e-9
+SLACK = 1e-6  # a coordinate printed with few decimals may stand this far outside a limit
+HARD_MM = 2.0  # from a soft limit to where the axis meets its end
+ARC_MM, CIRCLE_CHORDS = 1.0, 72  # Marlin's MAX_ARC_SEGMENT_MM and MIN_CIRCLE_SEGMENTS
+SEGMENTS_PER_S = 200.0  # into which the firmware cuts a turn that it follows
+STEPS = (80.0, 80.0, 400.0, 80.0, 80.0)  # a mm or degree, for M114's Count
+
+Words = Mapping[str, float]
+Place = Sequence[float]
+
+
+class TcpKinematics:
+    """X Y Z tilt turn either way; the rotation of the pose asked for last is kept, for most moves stay at theirs."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._machine = machine
+        self._origin: list[float] = origin_mm(machine).tolist()
+        self._pose: tuple[float, float] | None = None
+
+    def positions(self, place: Place) -> list[float]:
+        """Where the axes stand when the tip is at a place: R (place - origin) + shift."""
+        self._turn(place[3], place[4])
+        x, y, z = (p - o for p, o in zip(place[:3], self._origin, strict=True))
+        return [a * x + b * y + c * z + s for (a, b, c), s in zip(self._rotation, self._shift, strict=True)] + list(place[3:5])
+
+    def place(self, positions: Place) -> list[float]:
+        """Where the tip is on the table when the axes stand so."""
+        self._turn(positions[3], positions[4])
+        x, y, z = (p - s for p, s in zip(positions[:3], self._shift, strict=True))
+        columns = zip(*self._rotation, strict=True)
+        return [a * x + b * y + c * z + o for (a, b, c), o in zip(columns, self._origin, strict=True)] + list(positions[3:5])
+
+    def _turn(self, tilt_deg: float, turn_deg: float) -> None:
+        if self._pose != (tilt_deg, turn_deg):
+            pose = Pose(tilt_deg, turn_deg)
+            self._pose = (tilt_deg, turn_deg)
+            self._rotation: list[list[float]] = rotation(self._machine, pose).tolist()
+            self._shift: list[float] = shift(self._machine, pose).tolist()
+
+
+class Motion:
+    """Axes X Y Z tilt turn E. place: what the firmware believes, in its own coordinates; place + modes.offset: the program's.
+
+    While the firmware follows the table (TCP) place is on the table, else it is the axes' positions. What the axes really do
+    differs by an offset after a reset, or when following is switched at a turned table; `executed` has the real moves.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        note: Callable[[str], None] = lambda what: None,
+        kept: int | None = None,
+    ) -> None:
+        rules = simulation_of(machine)
+        axes = (machine.x, machine.y, machine.z)
+        self._axes = axes_of(machine)
+        self.letters = self._axes.letters
+        self.limits = [a.limits_mm for a in axes] + [machine.tilt.limits_deg, machine.turn.limits_deg]
+        self._home = [machine.x.limits_mm[0], machine.y.limits_mm[0], machine.z.limits_mm[1]]
+        self._home += [machine.tilt.zero_deg, machine.turn.zero_deg]
+        self.executed = ExecutedMoves(kept)
+        self.planner = Planner(self.executed.add, rules.blocks, rules.min_segment_s)
+        self._machine, self._note = machine, note
+        self._tcp = TcpKinematics(machine)
+        self._real = [0.0] * 6  # where the axes stand when all planned blocks are over, filament as a running total
+        self._offset = [0.0] * 5
+        self.clamped = self.halts = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """The board restarts: the axes stay where they are, the firmware believes them at zero and knows its defaults."""
+        machine = self._machine
+        self.place = [0.0] * 6
+        self.modes = Modes(self._axes, feed=60.0 * FIRST_FEED)
+        self._offset = self._real[:5]
+        self.follows = False
+        self.soft_limits = True
+        self.homed: set[int] = set()
+        self.feed_share = self.flow_share = 1.0
+        axes = (machine.x, machine.y, machine.z)
+        self.speeds = [a.speed_mm_s for a in axes]
+        self.speeds += [machine.tilt.speed_deg_s, machine.turn.speed_deg_s, machine.extruder_speed_mm_s]
+        self.accelerations = [a.acceleration_mm_s2 for a in axes]
+        self.accelerations += [machine.tilt.acceleration_deg_s2, machine.turn.acceleration_deg_s2]
+        self.accelerations += [machine.extruder_acceleration_mm_s2]
+        self.jerk_mm_s = machine.junction_speed_mm_s
+        self._printing = self._travelling = inf  # mm/s2 set by M204 for X Y Z; inf: what the axes allow
+
+    def target(self, words: Words, extrude: bool = True) -> list[float]:
+        """Where a G0 or G1 leads, its F taken over; without `extrude` (cold nozzle) the filament stands still."""
+        place = self._wanted(words)
+        if self.soft_limits:
+            self._clamp(place)
+        if not extrude:
+            self.modes.offset[5] += place[5] - self.place[5]
+            place[5] = self.place[5]
+        return place
+
+    def _clamp(self, place: list[float]) -> None:
+        """Marlin stops at its soft limits without a word."""
+        for axis, (low, high) in enumerate(self.limits):
+            if not low - SLACK <= place[axis] <= high + SLACK:
+                self.clamped += 1
+                place[axis] = min(max(place[axis], low), high)
+
+    def turned(self, angles_deg: Mapping[int, float]) -> list[float]:
+        """Where a turn of single axes to the program's coordinates leads."""
+        place = self.place[:]
+        for axis, angle in angles_deg.items():
+            place[axis] = angle - self.modes.offset[axis]
+        if self.soft_limits:
+            self._clamp(place)
+        return place
+
+    def pushes(self, words: Words) -> bool:
+        """Whether a move turns the extruder."""
+        return abs(self._wanted(words)[5] - self.place[5]) > TINY_MM
+
+    def unhomed(self, words: Words) -> list[float] | None:
+        """The program's coordinates of a target that moves X, Y or Z before they are homed; None for any other."""
+        wanted = [axis for axis, letter in enumerate(self.letters[:3]) if letter in words and axis not in self.homed]
+        return [p + s for p, s in zip(self._wanted(words), self.modes.offset, strict=True)] if wanted else None
+
+    def beyond(self, words: Words) -> list[float] | None:
+        """The program's coordinates of a target outside the soft limits; None for one inside."""
+        place = self._wanted(words)
+        inside = all(low - SLACK <= p <= high + SLACK for p, (low, high) in zip(place, self.limits, strict=False))
+        return None if inside else [p + s for p, s in zip(place, self.modes.offset, strict=True)]
+
+    def _wanted(self, words: Words) -> list[float]:
+        place = self.place[:]
+        self.modes.move(place, words.items())
+        return place
+
+    @property
+    def feed_mm_s(self) -> float:
+        """What F asks for, before M220; deg/s where only the table turns."""
+        return self.modes.feed / 60.0
+
+    def pieces(self, target: Sequence[float]) -> list[list[float]]:
+        """Where the straight moves to a target end: one, but many when the firmware follows the turning table."""
+        here = self.place
+        if not self.follows or target[3:5] == here[3:5]:
+            return [list(target)]
+        return _evenly(here, target, max(1, ceil(self._seconds(here, target) * SEGMENTS_PER_S)))
+
+    def arc(self, words: Words, clockwise: bool, extrude: bool) -> list[list[float]]:
+        """Where the chords of a G2 or G3 end; [] for what Marlin answers with "Bad arc parameters"."""
+        scale = self.modes.unit_mm
+        start, end = self.place, self.target(words, extrude)
+        begin, finish = (start[0], start[1]), (end[0], end[1])
+        if "R" in words:
+            centre = centre_of(begin, finish, words["R"] * scale, clockwise)
+        else:
+            centre = (start[0] + words.get("I", 0.0) * scale, start[1] + words.get("J", 0.0) * scale)
+        if centre is None or centre == begin:
+            return []
+        sweep = sweep_rad(begin, finish, centre, clockwise)
+        radius = hypot(start[0] - centre[0], start[1] - centre[1])
+        count = max(1, ceil(abs(sweep) * radius / ARC_MM), ceil(abs(sweep) / (2.0 * pi) * CIRCLE_CHORDS))
+        rest = _evenly(start[2:], end[2:], count)
+        return [[x, y, *others] for (x, y), others in zip(chords(begin, finish, centre, sweep, count), rest, strict=True)]
+
+    def reach(self, place: Sequence[float], now_s: float, feed_mm_s: float | None = None) -> None:
+        """Plan one straight move, at the speed that F asks for or at a given one."""
+        here, real = self.place, self._real
+        positions = self._tcp.positions(place) if self.follows else place[:5]
+        end = [p + o for p, o in zip(positions, self._offset, strict=True)]
+        self._meet_ends(end)
+        end.append(real[5] + (place[5] - here[5]) * self.flow_share)
+        feed = self.feed_mm_s * self.feed_share if feed_mm_s is None else feed_mm_s
+        if self.follows and place[:5] != here[:5] and (seconds := self._seconds(here, place)) > 0.0:
+            feed = _length(real, end) / seconds
+        strokes = end[5] != real[5]
+        most_mm_s2 = self._printing if strokes else self._travelling
+        block = block_of(real, end, feed, self.speeds, self.accelerations, most_mm_s2)
+        self.place, self._real = list(place), end
+        if block is not None:
+            block.feed = self.feed_mm_s if feed_mm_s is None else feed_mm_s / self.feed_share
+            self.planner.add(block, self.jerk_mm_s, now_s)
+
+    def _seconds(self, here: Sequence[float], place: Sequence[float]) -> float:
+        """How long F makes a followed move last."""
+        return _length(here, place) / (self.feed_mm_s * self.feed_share)
+
+    def _meet_ends(self, end: list[float]) -> None:
+        """An axis that is driven against its end stays there, and the firmware does not know."""
+        for axis, (low, high) in enumerate(self.limits):
+            if not low - HARD_MM <= end[axis] <= high + HARD_MM:
+                stopped = min(max(end[axis], low - HARD_MM), high + HARD_MM)
+                self._offset[axis] += stopped - end[axis]
+                end[axis] = stopped
+                self._note(f"{self.letters[axis]} driven against its end")
+
+    def home(self, axes: Sequence[int]) -> float:
+        """Put axes at their home positions (X Y least, Z greatest, table level); returns how long it takes, s."""
+        self.homed.update(axes)
+        travel_s = max((abs(self._home[a] - self._real[a]) / self.speeds[a] for a in axes), default=0.0)
+        real = self._real[:]
+        for axis in axes:
+            real[axis], self._offset[axis], self.modes.offset[axis] = self._home[axis], 0.0, 0.0
+        self._real = real
+        self._believe()
+        return 2.0 * travel_s + 1.0
+
+    def follow(self, on: bool) -> None:
+        """G43.4, G49: the place stays, as in the firmware that knows them; a turned table is believed elsewhere then."""
+        if on != self.follows:
+            self.follows = on
+            positions = self._tcp.positions(self.place) if on else self.place[:5]
+            self._offset = [r - p for r, p in zip(self._real, positions, strict=False)]
+
+    def accelerate(self, words: Words) -> None:
+        """M204: P for moves that push filament, T for those that do not, S for both; what is not above 0 changes nothing."""
+        scale = self.modes.unit_mm
+        for letter, value in words.items():
+            if value > 0 and letter in "PS":
+                self._printing = value * scale
+            if value > 0 and letter in "TS":
+                self._travelling = value * scale
+
+    def bound(self, words: Words, bounds: list[float]) -> None:
+        """M201, M203: greatest accelerations or speeds of single axes."""
+        for axis, most in self.modes.named(words.items()):
+            if most > 0:
+                bounds[axis] = most
+
+    def rename(self, words: Words) -> None:
+        """G92: the place where the axes stand gets these coordinates."""
+        for axis, coordinate in self.modes.named(words.items()):
+            self.set_coordinate(axis, coordinate)
+
+    def set_coordinate(self, axis: int, coordinate: float) -> None:
+        """Call the place where one axis stands by another coordinate."""
+        self.modes.offset[axis] = coordinate - self.place[axis]
+
+    def halt(self, now_s: float) -> None:
+        """Stop at once: later blocks never happen, the one under way ends where it is."""
+        self.planner.run(now_s)
+        cut = self.planner.under_way()
+        planned, planned_s = (cut.end, cut.duration_s) if cut is not None else ((), 0.0)
+        stopped = self.planner.halt(now_s)
+        self.halts += 1
+        if cut is not None:
+            self.executed.cut(cut, planned, planned_s)
+        if stopped is not None:
+            self.place[5] += (stopped[5] - self._real[5]) / (self.flow_share or 1.0)
+            self._real = list(stopped)
+            self._believe()
+
+    def _believe(self) -> None:
+        """Work out the place from where the axes stand."""
+        positions = [r - o for r, o in zip(self._real, self._offset, strict=False)]
+        self.place[:5] = self._tcp.place(positions) if self.follows else positions
+
+    def at(self, now_s: float) -> list[float]:
+        """Where the axes really are now, X Y Z tilt turn."""
+        self.planner.run(now_s)
+        return list(self.planner.at(now_s, self._real))[:5]
+
+    def counts(self, now_s: float) -> list[int]:
+        """Steps of the axes as the firmware counts them, at this moment."""
+        now = zip(self.at(now_s), self._offset, STEPS, strict=True)
+        return [round((position - offset) * steps) for position, offset, steps in now]
+
+    def coordinates(self) -> list[float]:
+        """Where the program believes to be when all planned moves are over."""
+        return [p + s for p, s in zip(self.place, self.modes.offset, strict=True)]
+
+
+def _evenly(here: Sequence[float], target: Sequence[float], count: int) -> list[list[float]]:
+    return [[a + k / count * (b - a) for a, b in zip(here, target, strict=True)] for k in range(1, count + 1)]
+
+
+def _length(a: Sequence[float], b: Sequence[float]) -> float:
+    """What F measures: the way of X Y Z; when they stand still that of the rotary axes; else the filament."""
+    x, y, z, tilt, turn, filament = (q - p for p, q in zip(a, b, strict=True))
+    return sqrt(x * x + y * y + z * z) or hypot(tilt, turn) or abs(filament)

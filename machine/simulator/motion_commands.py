@@ -1,0 +1,203 @@
+"""What the commands that move do in a simulated printer: moves, arcs, dwelling, homing, modes, limits, overrides."""
+
+from collections.abc import Iterator, Sequence
+
+from machine.gcode.words import read_letters, split_command
+from machine.simulator.board import Board, Command, Words, Work, wait_for_moves
+
+COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP
+
+
+def move(board: Board, words: Words, text: str) -> Work:
+    """G0, G1; the caller has made sure of a free block."""
+    motion, pushes = board.motion, True
+    if board.build.must_home and (unhomed := motion.unhomed(words)) is not None:
+        board.say(board.rules.unhomed.format(_coordinates(unhomed)))
+        return None
+    if "E" in words and not board.cold_allowed and board.nozzle.at(board.now_s) < COLD_C:
+        pushes = not motion.pushes(words)
+        if not pushes:
+            for line in board.rules.cold:
+                board.say(line)
+            if not board.rules.cold_moves:
+                return None
+    if board.rules.out_of_range and (beyond := motion.beyond(words)) is not None:
+        board.say(board.rules.out_of_range.format(_coordinates(beyond)))
+        return None
+    pieces = motion.pieces(motion.target(words, pushes))
+    if len(pieces) > 1:
+        return _run(board, pieces)
+    motion.reach(pieces[0], board.now_s)
+    return None
+
+
+def _coordinates(place: Sequence[float]) -> str:
+    """Coordinates as Klipper writes them: x y z [filament]."""
+    x, y, z, *_, filament = place
+    return f"{x:.3f} {y:.3f} {z:.3f} [{filament:.3f}]"
+
+
+def _run(board: Board, pieces: Sequence[Sequence[float]]) -> Iterator[float]:
+    """Piece after piece, each waiting for a free block."""
+    motion, halts = board.motion, board.motion.halts
+    for piece in pieces:
+        while not motion.planner.free(board.now_s):
+            yield motion.planner.next_s()
+        if motion.halts != halts:
+            return
+        motion.reach(piece, board.now_s)
+
+
+def _arc(board: Board, words: Words, text: str) -> Work:
+    pushes = "E" not in words or board.cold_allowed or board.nozzle.at(board.now_s) >= COLD_C or not board.motion.pushes(words)
+    if not pushes:
+        for line in board.rules.cold:
+            board.say(line)
+    pieces = board.motion.arc(words, text.startswith("G2"), pushes)
+    if not pieces:
+        board.say("echo: Bad arc parameters")
+    return _run(board, pieces)
+
+
+def _dwell(board: Board, words: Words, text: str) -> Iterator[float]:
+    yield from wait_for_moves(board)
+    until_s = board.now_s + max(0.0, words.get("S", words.get("P", 0.0) / 1000.0))
+    while board.now_s < until_s:
+        yield until_s
+
+
+def _drain(board: Board, words: Words, text: str) -> Iterator[float]:
+    yield from wait_for_moves(board)
+
+
+def _home(board: Board, words: Words, text: str) -> Iterator[float]:
+    letters = read_letters(split_command(text)[1])
+    axes = [axis for axis, letter in enumerate(board.motion.letters[:5]) if letter in letters] or list(range(5))
+    yield from seek_endstops(board, axes)
+    if board.rules.reports_position:
+        board.say(board.position())
+
+
+def seek_endstops(board: Board, axes: Sequence[int]) -> Iterator[float]:
+    """Seek the endstops of axes."""
+    yield from wait_for_moves(board)
+    until_s = board.now_s + board.motion.home(axes)
+    while board.now_s < until_s:
+        yield until_s
+    board.note("homed " + "".join(board.motion.letters[axis] for axis in axes))
+
+
+def _wait_for_person(board: Board, words: Words, text: str) -> Iterator[float]:
+    """M0, M1: until M108, or for P milliseconds or S seconds."""
+    yield from wait_for_moves(board)
+    seconds = words.get("S", words.get("P", 0.0) / 1000.0)
+    until_s = board.now_s + seconds if seconds > 0 else float("inf")
+    board.waits_for_person, board.impatient = True, False
+    while board.now_s < until_s and not board.impatient:
+        yield until_s
+    board.waits_for_person = False
+
+
+def _mode(board: Board, words: Words, text: str) -> Work:
+    board.motion.modes.set(split_command(text)[0])
+    return None
+
+
+def _follow(board: Board, words: Words, text: str) -> Iterator[float]:
+    yield from wait_for_moves(board)
+    board.motion.follow(text.startswith("G43"))
+
+
+def _accelerate(board: Board, words: Words, text: str) -> Work:
+    board.motion.accelerate(words)
+    return None
+
+
+def _bound_accelerations(board: Board, words: Words, text: str) -> Work:
+    board.motion.bound(words, board.motion.accelerations)
+    return None
+
+
+def _bound_speeds(board: Board, words: Words, text: str) -> Work:
+    board.motion.bound(words, board.motion.speeds)
+    return None
+
+
+def _corner(board: Board, words: Words, text: str) -> Work:
+    if words.get("X", -1.0) >= 0:
+        board.motion.jerk_mm_s = words["X"]
+    return None
+
+
+def _override_feed(board: Board, words: Words, text: str) -> Work:
+    if words.get("S", 0.0) > 0:
+        board.motion.feed_share = words["S"] / 100.0
+    elif "S" not in words:
+        board.say(f"FR:{100 * board.motion.feed_share:.0f}%")
+    return None
+
+
+def _override_flow(board: Board, words: Words, text: str) -> Work:
+    if words.get("S", -1.0) >= 0:
+        board.motion.flow_share = words["S"] / 100.0
+    elif "S" not in words:
+        board.say(f"echo:E0 Flow: {100 * board.motion.flow_share:.0f}%")
+    return None
+
+
+def _limit(board: Board, words: Words, text: str) -> Work:
+    """M211: soft limits on, off, reported."""
+    motion = board.motion
+    if "S" in words:
+        motion.soft_limits = words["S"] != 0
+        return None
+    least, most = ("".join(f" {a}:{b[side]:.2f}" for a, b in zip(motion.letters, motion.limits, strict=False)) for side in (0, 1))
+    board.say(f"echo:Soft endstops: {'On' if motion.soft_limits else 'Off'}  Min: {least}   Max: {most}")
+    return None
+
+
+def _rename(board: Board, words: Words, text: str) -> Work:
+    board.motion.rename(words)
+    if board.rules.reports_position:
+        board.say(board.position())
+    return None
+
+
+def _rest(board: Board, words: Words, text: str) -> Iterator[float]:
+    yield from wait_for_moves(board)
+    board.motion.homed.clear()
+    board.note("motors off")
+
+
+def _stop(board: Board, words: Words, text: str) -> Work:
+    board.motion.halt(board.now_s)
+    board.note("M410")
+    return None
+
+
+MODES = ("G20", "G21", "G90", "G91", "M82", "M83")
+MOVING: dict[str, Command] = {
+    **dict.fromkeys(MODES, _mode),
+    "G0": move,
+    "G1": move,
+    "G2": _arc,
+    "G3": _arc,
+    "G4": _dwell,
+    "G28": _home,
+    "G43.4": _follow,
+    "G49": _follow,
+    "G92": _rename,
+    "M0": _wait_for_person,
+    "M1": _wait_for_person,
+    "M18": _rest,
+    "M84": _rest,
+    "M201": _bound_accelerations,
+    "M203": _bound_speeds,
+    "M204": _accelerate,
+    "M205": _corner,
+    "M211": _limit,
+    "M220": _override_feed,
+    "M221": _override_flow,
+    "M400": _drain,
+    "M410": _stop,
+}

@@ -1,0 +1,264 @@
+"""The planner of a simulated printer: blocks that wait for their turn, each as fast as those behind it let the machine stop.
+
+The rules are those of the dry run's timeline (constant acceleration, a speed change at corners that no axis exceeds), but the
+planner knows only the blocks that have come: a block that begins without a successor ends at a standstill, as in Marlin.
+"""
+
+from array import array
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import inf, sqrt
+
+DELIVER_S, DELIVER_BLOCKS = 0.1, 3  # the first block of an idle machine waits so long for others (BLOCK_DELAY_FOR_1ST_MOVE)
+TINY = 1e-9
+
+Place = Sequence[float]
+ROW = 15  # numbers of a move: 6 where it begins, 6 where it ends, feed, begin, duration
+EXTRUDES_MM = 1e-9  # differences of running filament totals below this are rounding
+
+
+@dataclass(slots=True)
+class Block:
+    """A straight move of six axes; speeds along what F measures (0: X Y Z, 1: rotary, 2: filament)."""
+
+    start: Place
+    end: Place
+    direction: Place
+    feed: float
+    length: float
+    measure: int
+    cruise: float
+    acceleration: float
+    corner2: float = 0.0  # squares of the greatest speed at its begin, and of the planned one
+    entry2: float = 0.0
+    v0: float = 0.0
+    v1: float = 0.0
+    peak: float = 0.0
+    begin_s: float = 0.0
+    duration_s: float = 0.0
+
+    def settle(self, begin_s: float, v0: float, next2: float) -> None:
+        """Fix the block's speeds when it begins; next2: square of the speed at which its successor may begin."""
+        a, length = self.acceleration, self.length
+        v1 = sqrt(min(next2, v0 * v0 + 2.0 * a * length))
+        peak = min(self.cruise, sqrt(0.5 * (v0 * v0 + v1 * v1) + a * length))
+        ramps = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * a)
+        self.v0, self.v1, self.peak, self.begin_s = v0, v1, peak, begin_s
+        self.duration_s = (2.0 * peak - v0 - v1) / a + max(0.0, length - ramps) / peak
+
+    def share(self, now_s: float) -> float:
+        """How much of the way lies behind it, 0 to 1."""
+        t, a, length = now_s - self.begin_s, self.acceleration, self.length
+        if t >= self.duration_s:
+            return 1.0
+        rising_s, falling_s = (self.peak - self.v0) / a, (self.peak - self.v1) / a
+        if t < rising_s:
+            return max(0.0, (self.v0 + 0.5 * a * t) * t / length)
+        left_s = self.duration_s - t
+        if left_s < falling_s:
+            return 1.0 - (self.v1 + 0.5 * a * left_s) * left_s / length
+        return ((self.v0 + self.peak) * 0.5 * rising_s + self.peak * (t - rising_s)) / length
+
+    def at(self, now_s: float) -> list[float]:
+        """Where the axes are on it."""
+        share = self.share(now_s)
+        return [a + share * (b - a) for a, b in zip(self.start, self.end, strict=True)]
+
+
+class ExecutedMoves:
+    """kept: how many moves stay in `rows` at least (twice as many at most); None: all.
+
+    moves, strokes, pushed_mm, moving_s: sums over all of them; strokes push filament while another axis moves.
+    """
+
+    def __init__(self, kept: int | None = None) -> None:
+        self.rows = array("d")
+        self._most = None if kept is None else max(1, 2 * kept) * ROW
+        self.moves = self.strokes = 0
+        self.pushed_mm = self.moving_s = 0.0
+
+    def add(self, block: Block) -> None:
+        """A block begins."""
+        rows = self.rows
+        rows.extend((*block.start, *block.end, block.feed, block.begin_s, block.duration_s))
+        self._count(block.start, block.end, block.duration_s, 1)
+        if self._most is not None and len(rows) >= self._most:
+            del rows[: -self._most // 2]
+
+    def cut(self, block: Block, planned: Sequence[float], planned_s: float) -> None:
+        """The block that began last ends early: it has its new end and duration; planned: those it had before."""
+        base = len(self.rows) - ROW
+        self._count(block.start, planned, planned_s, -1)
+        if list(block.start) == list(block.end):  # it had only just begun
+            del self.rows[base:]
+            return
+        self._count(block.start, block.end, block.duration_s, 1)
+        for axis in range(6):
+            self.rows[base + 6 + axis] = block.end[axis]
+        self.rows[-1] = block.duration_s
+
+    def _count(self, start: Sequence[float], end: Sequence[float], duration_s: float, times: int) -> None:
+        self.moves += times
+        self.moving_s += times * duration_s
+        pushed = end[5] - start[5]
+        if pushed > EXTRUDES_MM and any(a != b for a, b in zip(start[:5], end[:5], strict=True)):
+            self.strokes += times
+            self.pushed_mm += times * pushed
+
+
+class Planner:
+    """Blocks come with add(); run() begins those whose time has come and hands them to `begun`.
+
+    underruns: how often it ran dry although the machine need not have stopped; slowed: blocks made slower since few waited.
+    """
+
+    def __init__(self, begun: Callable[[Block], None], blocks: int, min_segment_s: float) -> None:
+        self._begun, self._blocks, self._min_segment_s = begun, blocks, min_segment_s
+        self._waiting: deque[Block] = deque()
+        self._current: Block | None = None
+        self._last: Block | None = None  # the one that ended last, while nothing has made the machine wait
+        self._gate_s = 0.0
+        self.underruns = self.slowed = 0
+
+    def free(self, now_s: float) -> int:
+        """Free places."""
+        self.run(now_s)
+        return self._blocks - len(self._waiting) - (self._current is not None)
+
+    def next_s(self) -> float:
+        """When the block under way ends or the first one begins; inf: nothing is planned."""
+        if self._current is not None:
+            return self._current.begin_s + self._current.duration_s
+        return self._gate_s if self._waiting else inf
+
+    def run(self, now_s: float) -> None:
+        """Begin and end what begins and ends until a time."""
+        while True:
+            current = self._current
+            if current is not None:
+                end_s = current.begin_s + current.duration_s
+                if end_s > now_s:
+                    return
+                self._last, self._current = current, None
+                begin_s, v0 = end_s, current.v1
+            else:
+                begin_s, v0 = self._gate_s, 0.0
+            if not self._waiting or begin_s > now_s:
+                return
+            block = self._waiting.popleft()
+            block.settle(begin_s, v0, self._waiting[0].entry2 if self._waiting else 0.0)
+            self._current = block
+            self._begun(block)
+
+    def add(self, block: Block, jerk: float, now_s: float) -> None:
+        """Queue a block; jerk: the speed an axis may change at once at a corner, mm/s."""
+        self.run(now_s)
+        waiting = self._waiting
+        queued = len(waiting) + (self._current is not None)
+        if 2 <= queued < self._blocks // 2 + 1:
+            self._slow_down(block, queued)
+        if waiting:
+            block.corner2 = corner2(waiting[-1], block, jerk)
+        elif self._current is None:
+            if self._last is not None and corner2(self._last, block, jerk) > 0.0:
+                self.underruns += 1
+            self._gate_s = now_s + DELIVER_S
+        waiting.append(block)
+        if len(waiting) >= DELIVER_BLOCKS:
+            self._gate_s = min(self._gate_s, now_s)
+        self._look_back()
+
+    def barrier(self, now_s: float) -> None:
+        """The program itself waits here: a machine that stands still now has not run dry."""
+        self.run(now_s)
+        self._last = None
+
+    def ahead(self) -> list[Block]:
+        """Blocks that have not begun, timed as if nothing more came; they stay as they are."""
+        begin_s, v0 = self._gate_s, 0.0
+        if self._current is not None:
+            begin_s, v0 = self._current.begin_s + self._current.duration_s, self._current.v1
+        timed = []
+        for place, block in enumerate(self._waiting):
+            block.settle(begin_s, v0, self._waiting[place + 1].entry2 if place + 1 < len(self._waiting) else 0.0)
+            begin_s, v0 = begin_s + block.duration_s, block.v1
+            timed.append(block)
+        return timed
+
+    def under_way(self) -> Block | None:
+        """The block that has begun and not ended."""
+        return self._current
+
+    def halt(self, now_s: float) -> Place | None:
+        """Stop at once, forget what waits; where the axes are then, None when nothing was planned.
+
+        The block under way is cut short: its end and duration are changed.
+        """
+        self.run(now_s)
+        cut, self._current, self._last = self._current, None, None
+        place = self._waiting[0].start if self._waiting else None
+        self._waiting.clear()
+        if cut is not None:
+            cut.end = place = cut.at(now_s)
+            cut.duration_s = now_s - cut.begin_s
+        return place
+
+    def at(self, now_s: float, idle: Place) -> Place:
+        """Where the axes are; idle: where they are when nothing is planned."""
+        if self._current is not None:
+            return self._current.at(now_s)
+        return self._waiting[0].start if self._waiting else idle
+
+    def _slow_down(self, block: Block, queued: int) -> None:
+        """Marlin's SLOWDOWN: time for the host to send more."""
+        seconds = block.length / block.cruise
+        if seconds < self._min_segment_s:
+            block.cruise = block.length / (seconds + 2.0 * (self._min_segment_s - seconds) / queued)
+            self.slowed += 1
+
+    def _look_back(self) -> None:
+        """Raise the entry speeds of waiting blocks from the newest back, as far as that changes anything."""
+        following2 = 0.0
+        for block in reversed(self._waiting):
+            entry2 = min(block.corner2, following2 + 2.0 * block.acceleration * block.length)
+            if entry2 == block.entry2:
+                return
+            block.entry2 = following2 = entry2
+
+
+def corner2(before: Block, after: Block, jerk: float) -> float:
+    """Square of the greatest speed at a corner: no axis changes its speed by more than `jerk`."""
+    if before.measure != after.measure:
+        return 0.0
+    v = min(before.cruise, after.cruise)
+    for a, b in zip(before.direction, after.direction, strict=True):
+        change = abs(a - b)
+        if change * v > jerk:
+            v = jerk / change
+    return v * v
+
+
+def block_of(start: Place, end: Place, feed: float, speeds: Place, accelerations: Place, most_mm_s2: float) -> Block | None:
+    """A block from place to place; None when nothing moves. most_mm_s2: acceleration set for moves of X Y Z."""
+    deltas = [b - a for a, b in zip(start, end, strict=True)]
+    x, y, z, tilt, turn, filament = deltas
+    length, measure = sqrt(x * x + y * y + z * z), 0
+    if length <= TINY:
+        length, measure = sqrt(tilt * tilt + turn * turn), 1
+        if length <= TINY:
+            length, measure = abs(filament), 2
+            if length <= TINY:
+                return None
+    direction = [delta / length for delta in deltas]
+    cruise, acceleration = feed, inf
+    for share, speed, most in zip(direction, speeds, accelerations, strict=True):
+        if share:
+            share = abs(share)
+            if cruise * share > speed:
+                cruise = speed / share
+            if acceleration * share > most:
+                acceleration = most / share
+    if measure == 0 and most_mm_s2 < acceleration:
+        acceleration = most_mm_s2
+    return Block(start, end, direction, feed, length, measure, cruise, acceleration)

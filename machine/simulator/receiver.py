@@ -1,0 +1,130 @@
+"""The receiving half of a simulated firmware: bytes become commands by line numbers and checksums, or urgent orders at once."""
+
+import re
+from collections import deque
+
+from machine.firmware.simulation import SimulationRules
+from machine.link.protocol.framing import checksum
+
+HALF_BYTES = 1024
+CHECKSUM_BYTES = 128  # bytes that the checksum is folded from at once
+DIGITS = re.compile(rb"\s*([-+]?\d+)")
+ORDER_BYTES = 96  # of a line more is not looked at
+ORDER = re.compile(rb"\s*(?:N-?\d+\s*)?(?:(M(?:108|112|410|876)|[SPR]000)(?!\d))")
+SIGNS = (b"M1", b"M4", b"M8", b"000")
+
+
+class Receiver:
+    """rx_ring: bytes of a receive ring that overflows, None: whatever comes is kept. longest: characters kept of a line.
+
+    last: number of the last numbered line that was taken.
+    """
+
+    def __init__(self, rules: SimulationRules, longest: int, rx_ring: int | None) -> None:
+        self._rules, self._longest, self._rx_ring = rules, longest, rx_ring
+        self.last = self.lost_bytes = 0
+        self._lines: deque[bytes] = deque()
+        self._half = b""
+        self._read = 0  # bytes of the oldest line that have left the ring
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def receive(self, data: bytes) -> list[bytes]:
+        """Bytes arrive; the lines that they end."""
+        if self._rx_ring is not None:
+            waiting = len(self._half) + sum(len(line) + 1 for line in self._lines) - self._read
+            fitting = data[: max(0, self._rx_ring - 1 - waiting)]
+            self.lost_bytes += len(data) - len(fitting)
+            data = fitting
+        *lines, self._half = (self._half + data.replace(b"\r", b"\n")).split(b"\n")
+        self._lines.extend(lines)
+        if len(self._half) > HALF_BYTES:  # a line without end: what is too long for a command is not kept
+            self._half = self._half[:CHECKSUM_BYTES]
+        return lines
+
+    def forget(self) -> None:
+        """What has come is thrown away."""
+        self._lines.clear()
+        self._half = b""
+        self._read = 0
+
+    def idle(self) -> None:
+        """The main loop has taken what there is: the half line is put together elsewhere, the ring is empty."""
+        self._read = len(self._half)
+
+    def take(self) -> tuple[str, str] | str | None:
+        """The oldest line: its label for ADVANCED_OK and its command, or what is wrong with it; None: nothing to do."""
+        self._read = 0
+        line = self._lines.popleft().partition(b";")[0][: self._longest].lstrip(b" ")
+        if not line:
+            return None
+        label = ""
+        if line[:1] == b"N":
+            if self._rules.numbers != "resend":
+                line = self._strip_number(line)
+                return ("", line.decode("ascii", "replace").rstrip()) if line else None
+            complaint = self._complaint(line)
+            if complaint is not None:
+                return complaint or None
+            label = f" N{self.last}"
+            line = line[1 : line.rindex(b"*")].lstrip(b"-+0123456789").lstrip(b" ")
+        elif b"*" in line:
+            line = line[: line.rindex(b"*")]
+        return label, line.decode("ascii", "replace").rstrip()
+
+    def ask_again(self, complaint: str, ok: bool) -> list[str]:
+        """The answer to a bad line; all that has come behind it is thrown away."""
+        self.forget()
+        return [f"Error:{complaint}, Last Line: {self.last}", f"Resend: {self.last + 1}", *(["ok"] if ok else [])]
+
+    def _strip_number(self, line: bytes) -> bytes:
+        """The command of a numbered line where nothing is asked for again; b"": it is dropped without a word."""
+        star = line.rfind(b"*")
+        if self._rules.numbers == "drop" and (b"\x7f" in line or (star >= 0 and not _checksum_matches(line, star))):
+            return b""
+        return (line[1:star] if star >= 0 else line[1:]).lstrip(b"-+0123456789").lstrip(b" ")
+
+    def _complaint(self, line: bytes) -> str | None:
+        """What is wrong with a numbered line; "" for a repeat that Marlin drops in silence, None when it is taken."""
+        star = line.rfind(b"*")
+        renumbers = b"M110" in line
+        second = line.find(b"N", line.find(b"M110")) if renumbers else -1
+        digits = DIGITS.match(line, 1 + max(second, 0))
+        number = int(digits[1]) if digits else 0
+        if not renumbers and number != self.last + 1:
+            return "" if self.last - 1 <= number <= self.last else "Line Number is not Last Line Number+1"
+        if star < 0:
+            return "No Checksum with line number"
+        if not _checksum_matches(line, star):
+            return "checksum mismatch"
+        self.last = number
+        return None
+
+
+def _checksum_matches(line: bytes, star: int) -> bool:
+    """Whether the checksum behind the star is right; a CRC of five digits (RepRapFirmware) is believed."""
+    digits = DIGITS.match(line, star + 1)
+    return (0 if digits is None else int(digits[1])) == checksum(line[:star]) or (digits is not None and len(digits[1]) == 5)
+
+
+class EmergencyParser:
+    """realtime: S000, P000 and R000 too (REALTIME_REPORTING_COMMANDS)."""
+
+    def __init__(self, realtime: bool = False) -> None:
+        self._realtime = realtime
+        self._half = b""
+
+    def read(self, data: bytes) -> list[str]:
+        """The orders that stand at the begin of lines which end in these bytes; numbers and checksums are not looked at."""
+        scanned = self._half + data
+        end = scanned.rfind(b"\n") + 1
+        self._half = scanned[end:][:ORDER_BYTES]
+        if not any(sign in scanned for sign in SIGNS):
+            return []
+        orders = [order[1].decode() for line in scanned[:end].splitlines() if (order := ORDER.match(line))]
+        return [order for order in orders if order[0] == "M" or self._realtime]
+
+    def forget(self) -> None:
+        """The board restarts."""
+        self._half = b""

@@ -1,0 +1,99 @@
+"""The record of a simulated print: every executed move, what the heaters did, and the plastic laid on the workpiece."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from machine.kinematics.table import workpiece_path
+from machine.simulator.board import Board
+from machine.simulator.planner import EXTRUDES_MM, ROW
+from mdp.mesh import Floats
+from profiles.machine import Machine
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """n executed moves in order, those still planned included; homing is an event, no move.
+
+    start, end: (n, 6) machine X Y Z mm, tilt turn deg, filament mm (running total); feed (n,) mm/s as programmed;
+    begin_s, duration_s (n,) of the virtual clock; first: how many moves before these are not kept; moves, strokes,
+    pushed_mm, moving_s: count of all moves and strokes, filament of the strokes, time of all moves; events (virtual s, what);
+    targets and fan at the end; clamped: coordinates outside the soft limits; unknown: commands not understood; underruns: how
+    often the planner ran dry in mid-motion; slowed: moves slowed down since the host sent too few; lost_bytes: what a full
+    receive ring dropped.
+    """
+
+    machine: Machine
+    start: Floats
+    end: Floats
+    feed_mm_s: Floats
+    begin_s: Floats
+    duration_s: Floats
+    first: int
+    moves: int
+    strokes: int
+    pushed_mm: float
+    moving_s: float
+    events: tuple[tuple[float, str], ...]
+    nozzle_target_c: float
+    bed_target_c: float
+    fan: float
+    clamped: int
+    unknown: int
+    lines: int
+    lost_bytes: int
+    underruns: int
+    slowed: int
+
+    def happened(self, what: str) -> bool:
+        """Whether an event that begins so is on record."""
+        return any(text.startswith(what) for _, text in self.events)
+
+    def paths(self) -> Floats:
+        """(n, 2, 3) every move in the workpiece frame, mm; a move that turns the table is a curve there, these are its ends."""
+        ends = [workpiece_path(self.machine, points[:, :5]) for points in (self.start, self.end)]
+        return np.stack(ends, axis=1)
+
+    def deposited(self, filament_diameter_mm: float = 1.75) -> tuple[Floats, Floats]:
+        """Strokes: (n, 2, 3) segments in the workpiece frame and (n,) volumes mm3, of moves that push filament while moving."""
+        pushed = self.end[:, 5] - self.start[:, 5]
+        strokes = (pushed > EXTRUDES_MM) & (self.start[:, :5] != self.end[:, :5]).any(axis=1)
+        begin, end = (workpiece_path(self.machine, points[strokes, :5]) for points in (self.start, self.end))
+        volumes: Floats = pi / 4.0 * filament_diameter_mm**2 * pushed[strokes]
+        return np.stack([begin, end], axis=1), volumes
+
+
+def record_of(board: Board, lines: int, lost_bytes: int) -> Record:
+    """The record of a printer's board as it stands."""
+    executed, planner = board.motion.executed, board.motion.planner
+    rows = np.array(executed.rows, dtype=np.float64).reshape(-1, ROW)
+    ahead = [(*b.start, *b.end, b.feed, b.begin_s, b.duration_s) for b in planner.ahead()]
+    table = np.vstack([rows, np.array(ahead, dtype=np.float64).reshape(-1, ROW)])
+    pushed = table[len(rows) :, 11] - table[len(rows) :, 5]
+    strokes = (pushed > EXTRUDES_MM) & (table[len(rows) :, :5] != table[len(rows) :, 6:11]).any(axis=1)
+    return Record(
+        machine=board.machine,
+        start=table[:, :6],
+        end=table[:, 6:12],
+        feed_mm_s=table[:, 12],
+        begin_s=table[:, 13],
+        duration_s=table[:, 14],
+        first=executed.moves - len(rows),
+        moves=executed.moves + len(ahead),
+        strokes=executed.strokes + int(strokes.sum()),
+        pushed_mm=executed.pushed_mm + float(pushed[strokes].sum()),
+        moving_s=executed.moving_s + float(table[len(rows) :, 14].sum()),
+        events=tuple(board.events),
+        nozzle_target_c=board.nozzle.target_c,
+        bed_target_c=board.bed.target_c,
+        fan=board.fan,
+        clamped=board.motion.clamped,
+        unknown=board.unknown,
+        lines=lines,
+        lost_bytes=lost_bytes,
+        underruns=planner.underruns,
+        slowed=planner.slowed,
+    )

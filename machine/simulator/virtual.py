@@ -1,0 +1,124 @@
+"""A simulated printer in memory on a clock of its own: a print of hours takes seconds and is the same at every run."""
+
+from math import inf
+
+from machine.link.medium import Medium
+from machine.link.port import READ_S, WRITE_S
+from machine.simulator.board import BuildOptions, build_options
+from machine.simulator.cable import Cable
+from machine.simulator.faults import FaultScript
+from machine.simulator.firmware import SimulatedFirmware
+from machine.simulator.record import Record
+from machine.simulator.uart import Uart
+from profiles.errors import PortError
+from profiles.machine import Machine
+
+TURN_S = 1e-4  # what a turn of the host takes: time passes even where an answer is always there
+PATH = "virtual"
+
+
+class EndlessError(Exception):
+    """More virtual time has passed than was given."""
+
+
+class VirtualPrinter:
+    """`print_lines(lines, PATH, medium=printer.medium)`: the host's time is this printer's, and passes only while the host waits.
+
+    faults, baud: as of SimulatedPrinter. Beyond most_s the host is stopped with EndlessError: it hangs.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        build: BuildOptions | None = None,
+        faults: FaultScript | None = None,
+        baud: int | None = None,
+        most_s: float = inf,
+    ) -> None:
+        self.firmware = SimulatedFirmware(machine, build or build_options(machine, baud))
+        self.now_s = 0.0
+        self._most_s = most_s
+        self._cable = Cable(self.firmware, faults, speed=1.0)
+        self._line = self._cable if baud is None else Uart(self._cable, baud)
+        self.medium = Medium(self._open, lambda: self.now_s, self._wait)
+
+    @property
+    def record(self) -> Record:
+        """What has been executed so far."""
+        return self.firmware.record()
+
+    def _open(self, name: str, baud: int) -> "_Line":
+        del baud
+        if not self._cable.connected(self.now_s):
+            self._pass(READ_S)
+            raise PortError(f"port {name} does not exist: no serial port was found")
+        return _Line(self, name)
+
+    def _wait(self, seconds: float) -> None:
+        self._pass(seconds)
+
+    def _pass(self, seconds: float) -> None:
+        self.now_s += seconds
+        if self.now_s > self._most_s:
+            raise EndlessError(f"{self._most_s:g} s of virtual time are over")
+
+    def exchange(self, data: bytes, seconds: float) -> bytes:
+        """Hand bytes over and let at most so much time pass until something comes; OSError while the cable is out."""
+        end_s = self.now_s + seconds
+        self._pass(TURN_S)
+        received = self._exchange_now(data)
+        while not received and self.now_s < end_s:
+            self._pass(max(min(self._line.due_s(self.now_s), end_s) - self.now_s, TURN_S))
+            received = self._exchange_now(b"")
+        return received
+
+    @property
+    def blocked(self) -> bool:
+        """Whether the printer reads nothing, so that writing comes to a halt."""
+        return self._cable.blocked(self.now_s) and not self.firmware.has_ring
+
+    def _exchange_now(self, data: bytes) -> bytes:
+        if not self._cable.connected(self.now_s):
+            if isinstance(self._line, Uart):
+                self._line.clear()
+            raise OSError
+        return self._line.exchange(data, self.now_s)
+
+
+class _Line:
+    """One opening of the port."""
+
+    def __init__(self, printer: VirtualPrinter, name: str) -> None:
+        self.name = name
+        self._printer = printer
+        self._received = b""
+        self._gone = False
+
+    def write(self, data: bytes) -> None:
+        """Send all bytes."""
+        if self._printer.blocked:
+            self._exchange(b"", WRITE_S)
+            if self._printer.blocked:
+                raise PortError(f"the printer at {self.name} has stopped reading: it took no bytes for {WRITE_S:g} s")
+        self._received += self._exchange(data, 0.0)
+
+    def read(self) -> bytes:
+        """The bytes that have come; waits up to READ_S for the first."""
+        received, self._received = self._received, b""
+        return received or self._exchange(b"", READ_S)
+
+    def discard(self) -> None:
+        """Nothing is held back."""
+
+    def close(self) -> None:
+        """Bytes that come while the port is closed are lost."""
+        self._gone = True
+
+    def _exchange(self, data: bytes, seconds: float) -> bytes:
+        try:
+            if self._gone:
+                raise OSError
+            return self._printer.exchange(data, seconds)
+        except OSError:
+            self._gone = True
+            raise PortError(f"the connection at {self.name} was lost: is the cable or the printer unplugged?") from None

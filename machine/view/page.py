@@ -1,0 +1,65 @@
+"""Page: the template, its scripts and a packed block put together into one HTML file that fetches nothing."""
+
+import base64
+import re
+from collections.abc import Sequence
+from hashlib import sha256
+from html import escape
+from importlib import resources
+
+from machine.view.comparison import Alternative
+from machine.view.contents import of_parts, of_print
+from machine.view.program import Program
+from mdp.decomposition import Decomposition
+from profiles.profile import Profile
+
+MARKER = re.compile(r"<!--(?:TITLE|CSP|DATA)-->|/\*(?:STYLE|SCRIPT)\*/")
+DATA = b'<script type="application/octet-stream" id="tiltprint">'
+
+
+def parts_page(decomposition: Decomposition, profile: Profile) -> bytes:
+    """The page of parts alone."""
+    return page(decomposition.name, of_parts(decomposition, profile))
+
+
+def print_page(
+    name: str,
+    program: Program,
+    profile: Profile,
+    known: bool = True,
+    alternatives: Sequence[Alternative] = (),
+    live: bool = False,
+) -> bytes:
+    """The page of a whole print; arguments as of_print takes them."""
+    return page(name, of_print(name, program, profile, known, alternatives, live), live)
+
+
+def page(title: str, block: bytes, live: bool = False) -> bytes:
+    """The HTML file. title: any text; block: from machine.view.contents; live: it may ask its own server for the state."""
+    style, script, body = _template()
+    put = {
+        "<!--TITLE-->": escape(title),
+        "<!--CSP-->": f'<meta http-equiv="Content-Security-Policy" content="{policy(style, script, live)}">',
+        "<!--DATA-->": f"{DATA.decode()}{base64.b64encode(block).decode()}</script>",
+        "/*STYLE*/": style,
+        "/*SCRIPT*/": script,
+    }
+    return MARKER.sub(lambda match: put[match[0]], body).encode(errors="replace")
+
+
+def policy(style: str, script: str, live: bool) -> str:
+    """What the page may do: run its own script, use its own style, draw pictures that it has made itself."""
+    asks = "; connect-src 'self'" if live else ""
+    pictures = "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    return f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; {pictures}{asks}"
+
+
+def _hash(text: str) -> str:
+    return "sha256-" + base64.b64encode(sha256(text.encode()).digest()).decode()
+
+
+def _template() -> tuple[str, str, str]:
+    """Style, scripts in the order of their names, and the page around them."""
+    files = {file.name: file for file in resources.files("machine.view").joinpath("template").iterdir()}
+    scripts = "\n".join(files[name].read_text(encoding="utf-8") for name in sorted(files) if name.endswith(".js"))
+    return files["style.css"].read_text(encoding="utf-8"), scripts, files["page.html"].read_text(encoding="utf-8")

@@ -1,0 +1,38 @@
+"""Parts: how pictures and pages show them: their colours, and which of their faces are risky before and after the cuts."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.decomposition import ORDER_TOLERANCE_MM, Part
+from mdp.mesh import Floats
+from mdp.overhang import risky_above, risky_upright
+from profiles.profile import Profile
+
+# Okabe and Ito's colours for all kinds of colour vision, without vermilion, which is too near to the red of risky faces.
+PALETTE = np.array([[86, 180, 233], [230, 159, 0], [0, 158, 115], [204, 121, 167], [240, 228, 66], [0, 114, 178]], dtype=float)
+
+
+def part_colours(count: int) -> Floats:
+    """(count, 3) colours of parts 1, 2, ..., 0 to 255; from the seventh on the palette returns paler."""
+    places = np.arange(count)
+    paler = np.minimum(places // len(PALETTE), 2)[:, None] * 0.38
+    colours: Floats = PALETTE[places % len(PALETTE)] * (1.0 - paler) + 255.0 * paler
+    return colours
+
+
+def residual_faces(part: Part, profile: Profile) -> NDArray[np.bool_]:
+    """(m,) faces of a part that need support although it is printed in its own direction."""
+    angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
+    return risky_upright(part.mesh, angle, counted) if part.index == 1 else risky_above(part.mesh, part.base, angle)
+
+
+def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> NDArray[np.bool_]:
+    """(m,) what is risky of a part's own faces, the cut below it left out, when the model is printed straight up."""
+    down = risky_upright(part.mesh, angle_deg, count_platform_faces)
+    cut = np.all(np.abs(part.base.heights_mm(part.mesh.vertices))[part.mesh.faces] <= ORDER_TOLERANCE_MM, axis=1)
+    return down & ~cut if part.index > 1 else down
+
+
+def risky_before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -> float:
+    """The area of those faces."""
+    return float(part.mesh.areas_mm2[risky_before(part, angle_deg, count_platform_faces)].sum())

@@ -1,0 +1,120 @@
+"""Paths: the rows of a dry run as the page's columns, one row a straight move."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun.dryrun import DryRun
+from machine.dryrun.replay import beads_of
+from machine.firmware import dialect_of
+from machine.kinematics.table import workpiece_path
+from machine.reader.parsed import MoveKind, ParsedProgram
+from machine.view.encoding import Column
+from machine.view.layers import Layers
+from mdp.mesh import Floats
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+WIPE, PRIME = 4, 5  # kinds of the page beside those of MoveKind
+REACH = 1e6  # mm and deg: what lies beyond is no place of a machine
+STILL = 1e-9
+NONE: dict[str, Column] = {
+    "end": Column(np.zeros((0, 5)), "i32", 0.001, delta=True),
+    "jump_row": Column(np.zeros(0), "i32"),
+    "jump_start": Column(np.zeros((0, 5)), "i32", 0.001),
+    **{name: Column(np.zeros(0), "f64", 0.001, delta=True) for name in ("time", "filament")},
+    **{name: Column(np.zeros(0), "i32", delta=True) for name in ("line", "part", "layer", "speed")},
+    **{name: Column(np.zeros(0), "u16") for name in ("type", "width", "height", "nozzle", "bed")},
+    **{name: Column(np.zeros(0), "u8") for name in ("kind", "fan")},
+}  # of a page without paths
+
+
+def end_times_s(run: DryRun) -> Floats:
+    """(n,) seconds from the start to the end of each row, the waiting that G4 tells before it included."""
+    waits = np.zeros(len(run.times_s) + 1)
+    for event in run.program.events:
+        if event.code == "G4":
+            waits[min(event.row, len(run.times_s))] += event.value
+    ends: Floats = np.cumsum(run.times_s + waits[:-1])
+    return ends
+
+
+def page_kinds(program: ParsedProgram) -> NDArray[np.int8]:
+    """(n,) kinds as the page tells them: wipes and primes apart, beads laid while the table turns are beads."""
+    kind = program.kind.copy()
+    kind[turning_strokes(program)] = MoveKind.EXTRUDE
+    kind[(kind == MoveKind.TRAVEL) & (program.e_mm < -STILL)] = WIPE
+    kind[(kind == MoveKind.RETRACT) & (program.e_mm > 0)] = PRIME
+    return kind
+
+
+def turning_strokes(program: ParsedProgram) -> NDArray[np.bool_]:
+    """(n,) moves that lay a bead while the table turns, as programs of curved layers do."""
+    mask: NDArray[np.bool_] = (program.kind == MoveKind.ROTATE) & (program.e_mm > STILL)
+    return mask
+
+
+def columns(run: DryRun, profile: Profile, layers: Layers, ends_s: Floats, shown: NDArray[np.int64]) -> dict[str, Column]:
+    """The page's arrays for the shown rows of a dry run. layers, ends_s (seconds): of all rows."""
+    program = run.program
+    jumps = _jumps(program, shown)
+    width, height = _bead_sizes(run, profile)
+    table = {
+        "end": Column(np.clip(program.end, -REACH, REACH), "i32", 0.001, delta=True),
+        "time": Column(ends_s, "f64", 0.001, delta=True),
+        "filament": Column(program.filament_mm, "f64", 0.00001, delta=True),
+        "line": Column(program.line, "i32", delta=True),
+        "part": Column(program.part, "i32", delta=True),
+        "layer": Column(layers.number, "i32", delta=True),
+        "speed": Column(np.minimum(program.feed / 60.0, REACH), "i32", 0.001, delta=True),
+        "kind": Column(page_kinds(program), "u8"),
+        "type": Column(program.type, "u16"),
+        "width": Column(width, "u16", 0.001),
+        "height": Column(height, "u16", 0.001),
+        "fan": Column(_fan(program, profile.machine), "u8", 1 / 255),
+        "nozzle": Column(_following(program, ("M104", "M109")), "u16", 0.1),
+        "bed": Column(_following(program, ("M140", "M190")), "u16", 0.1),
+    }
+    rows = {name: Column(column.values[shown], column.type, column.scale, column.delta) for name, column in table.items()}
+    start = np.clip(program.start[shown[jumps]], -REACH, REACH)
+    return rows | {"jump_row": Column(jumps, "i32"), "jump_start": Column(start, "i32", 0.001)}
+
+
+def _jumps(program: ParsedProgram, shown: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Places in shown of the rows that do not begin where the row before ends, the first among them."""
+    apart = np.abs(program.start[1:] - program.end[:-1]).max(axis=1, initial=0.0) > STILL
+    begins: NDArray[np.bool_] = np.concatenate([[True], apart])[: len(program.line)]
+    return np.flatnonzero(begins[shown])
+
+
+def _bead_sizes(run: DryRun, profile: Profile) -> tuple[Floats, Floats]:
+    """(n,) width and height of the beads, mm, as the file tells or as the filament makes them; 0 where none is laid."""
+    program, width, height = run.program, np.zeros(len(run.times_s)), np.zeros(len(run.times_s))
+    turning = np.flatnonzero(turning_strokes(program))
+    ways = np.stack([workpiece_path(profile.machine, side[turning]) for side in (program.start, program.end)], axis=1)
+    for segments, rows in ((run.segments_mm, run.segment_row), (ways, turning)):
+        beads = beads_of(program, segments, rows, profile)
+        width[rows], height[rows] = beads.width_mm, beads.height_mm
+    return width, height
+
+
+def _following(program: ParsedProgram, codes: tuple[str, ...]) -> Floats:
+    """(n,) the value that the last of the events before each row has set; 0 before the first."""
+    events = [event for event in program.events if event.code in codes]
+    place = np.searchsorted([event.row for event in events], np.arange(len(program.line)), side="right")
+    followed: Floats = np.array([0.0, *(event.value for event in events)])[place]
+    return followed
+
+
+def _fan(program: ParsedProgram, machine: Machine) -> Floats:
+    """(n,) 0..1; M106 without a value means full, and full is 255 also where the firmware knows 0 to 1 as well."""
+    dialect = dialect_of(machine)
+    shares = []
+    for event in program.events:
+        if event.code == "M106":
+            value = event.value if dialect.value_word in event.letters else dialect.fan_full
+            shares.append(replace(event, value=min(1.0, value / (dialect.fan_full if value <= dialect.fan_full else 255))))
+        elif event.code == "M107":
+            shares.append(replace(event, value=0.0))
+    return _following(replace(program, events=tuple(shares)), ("M106", "M107"))

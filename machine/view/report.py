@@ -1,0 +1,183 @@
+"""Report: what stands beside the picture: figures of the print, its parts, its kinds of line, its alternatives.
+
+All values are texts ready to show, so that the page has nothing to work out.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun.dryrun import DryRun, summary
+from machine.reader.parsed import MoveKind
+from machine.view.comparison import Alternative
+from machine.view.layers import Layers
+from machine.view.parts import risky_before_mm2
+from machine.view.paths import PRIME, WIPE, page_kinds
+from machine.view.program import Program
+from machine.view.quantities import duration, filament_g
+from machine.view.settings import settings_tables
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Floats
+from mdp.search.orientation import best_orientation, in_words
+from profiles.profile import Profile
+
+Table = dict[str, Any]
+Row = list[str]
+MOVES = {
+    MoveKind.TRAVEL: "travel", MoveKind.RETRACT: "retraction", PRIME: "prime", WIPE: "wipe", MoveKind.ROTATE: "turning the table",
+}  # fmt: skip
+UNTOLD = "not told"
+RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
+
+
+def parts_report(decomposition: Decomposition, profile: Profile) -> dict[str, Any]:
+    """The report of a page of parts alone."""
+    facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
+    rows = [_solid(part, profile) for part in decomposition.parts]
+    tables = [_table("Parts", SOLID, rows, [RISKY]), _areas(decomposition, profile), *settings_tables(profile)]
+    return {"facts": facts, "tables": tables}
+
+
+def print_report(
+    program: Program,
+    profile: Profile,
+    layers: Layers,
+    ends_s: Floats,
+    alternatives: Sequence[Alternative] = (),
+    known: bool = True,
+    ours: bool = True,
+) -> dict[str, Any]:
+    """The report of a whole print. ends_s: (n,) when each row ends; alternatives: the same model printed in one part.
+
+    known: the machine is no guess; ours: the file was made with this profile, else its settings are not told.
+    """
+    tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile, "" if known else profile.machine.name)]
+    if program.decomposition is not None:
+        tables.append(_alternatives(alternatives) if alternatives else _areas(program.decomposition, profile))
+    names = _names(profile) if ours else _assumptions(profile, known)
+    facts = [*_figures(program.run, profile, layers), *names]
+    return {"facts": facts, "tables": tables + (settings_tables(profile) if ours else [])}
+
+
+def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), folded: bool = False) -> Table:
+    return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": folded}
+
+
+SOLID = ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²"]
+
+
+def _solid(part: Part, profile: Profile) -> Row:
+    """A part's shape: pose, volume, and the faces that would and will need support."""
+    before = risky_before_mm2(part, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
+    angles = [f"{part.pose.tilt_deg:.1f}°", f"{part.pose.turn_deg:.1f}°"]
+    areas = [f"{max(area, 0.0):.1f}" for area in (before, part.risky_area_mm2)]
+    return [str(part.index), *angles, f"{part.volume_mm3 / 1000.0:.2f}", *areas]
+
+
+def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -> Table:
+    """Each part with its layers, time and material; what its solid is where the program came from a model."""
+    parsed, seconds = program.run.program, np.diff(ends_s, prepend=0.0)
+    decomposition = program.decomposition
+    solids = {part.index: _solid(part, profile) for part in decomposition.parts} if decomposition is not None else {}
+    rows = []
+    for index in parsed.parts or (0,):
+        mine = parsed.part == index
+        count = int((parsed.part[layers.first] == index).sum())
+        figures = [str(count), duration(float(seconds[mine].sum())), f"{filament_g(parsed.e_mm[mine], profile.material):.1f}"]
+        rows.append([*solids.get(index, [str(index) if index else "all"]), *figures])
+    head = SOLID if solids else SOLID[:1]
+    return _table("Parts", [*head, "layers", "time", "g"], rows, [RISKY] if solids else [])
+
+
+def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
+    """Time and material by what is printed, then the ways between, then waiting; they add up to the whole print.
+
+    guess: name of the machine whose speeds were taken where the file tells none.
+    """
+    program, kind = run.program, page_kinds(run.program)
+    groups: list[tuple[str, NDArray[np.bool_]]] = [
+        (name or UNTOLD, (kind == MoveKind.EXTRUDE) & (program.type == place)) for place, name in enumerate(program.types)
+    ]
+    groups += [(name, kind == number) for number, name in MOVES.items()]
+    spent = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]
+    if run.dwell_s > 0:
+        spent.append(("waiting", run.dwell_s, 0.0))
+    rows = [
+        [
+            name,
+            duration(s),
+            _share(s, run.time_s),
+            _format_fixed(e_mm / 1000, 2),
+            _format_fixed(filament_g(e_mm, profile.material), 1),
+        ]
+        for name, s, e_mm in spent
+    ]
+    notes = ["heating and homing are not counted", *([f"times as on {guess}"] if guess else [])]
+    return _table("Time and material", ["kind", "time", "share", "m", "g"], rows, notes)
+
+
+def _areas(decomposition: Decomposition, profile: Profile) -> Table:
+    """Risky area straight up, in the best single orientation, in parts."""
+    best = best_orientation(decomposition.mesh, profile.process.self_supporting_angle_deg)
+    single = best.risky_mm2 + (best.base_mm2 if profile.search.count_platform_faces else 0.0)
+    risky_mm2 = [
+        ("straight up", decomposition.risky_area_mm2),
+        ("best single orientation", single),
+        (f"in {len(decomposition.parts)} part{'s' * (len(decomposition.parts) != 1)}", decomposition.residual_area_mm2),
+    ]
+    whole = decomposition.risky_area_mm2
+    rows = [[name, f"{max(area, 0.0):.1f}", _share(whole - area, whole)] for name, area in risky_mm2]
+    rows[0][2] = ""
+    notes = [f"best single orientation: {in_words(best)}", "--compare tells time and material too"]
+    return _table("Compared", ["print", "risky mm²", "less"], rows, notes)
+
+
+def _alternatives(alternatives: Sequence[Alternative]) -> Table:
+    """This print beside the model in one part: time, filament, support, risky area."""
+    rows = []
+    for each in alternatives:
+        costs = ["-"] * 4
+        if each.time_s is not None:
+            filament_mm, mass_g, support_mm3 = each.filament_mm or 0.0, each.filament_g or 0.0, each.support_mm3 or 0.0
+            costs = [duration(each.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", f"{support_mm3 / 1000:.2f}"]
+        rows.append([each.name, *costs, f"{max(each.risky_mm2, 0.0):.1f}"])
+    notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
+    return _table("Compared", ["print", "time", "m", "g", "support cm³", "risky mm²"], rows, notes)
+
+
+def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
+    values = summary(run)
+    count = str(len(layers.first)) if layers.by == "comments" else f"{len(layers.first)}, by their heights"
+    return [
+        ["time", duration(values["time_s"])],
+        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {filament_g(run.program.e_mm, profile.material):.1f} g"],
+        *([["parts", str(values["parts"])]] if values["parts"] else []),
+        ["layers", count],
+        *[[key, str(values[key])] for key in ("reorientations", "retractions")],
+        ["travel", f"{values['travel_mm'] / 1000:.2f} m"],
+    ]
+
+
+def _names(profile: Profile) -> list[Row]:
+    return [["machine", profile.machine.name], ["material", profile.material.name], ["process", profile.process.name]]
+
+
+def _assumptions(profile: Profile, known: bool) -> list[Row]:
+    """The same of a file that does not tell them."""
+    machine = profile.machine.name if known else f"{UNTOLD}: limits, clearance and the plate were not judged"
+    return [["machine", machine], ["material", f"{UNTOLD}: weights as of {profile.material.name}"]]
+
+
+def _format_fixed(value: float, digits: int) -> str:
+    """The value with so many digits, without a sign where they are all 0."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _share(part: float, whole: float) -> str:
+    return f"{_format_fixed(100.0 * part / whole if whole > 0 else 0.0, 1)} %"
+
+
+def _cm3(volume_mm3: float) -> str:
+    return f"{volume_mm3 / 1000.0:.2f} cm³"

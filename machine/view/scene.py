@@ -1,0 +1,108 @@
+"""Scene: the solids of the page: surfaces of the parts, and the machine's bodies and axes."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.view.encoding import Column
+from machine.view.parts import part_colours, residual_faces, risky_before, risky_before_mm2
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Floats
+from mdp.pose import unit
+from profiles.machine import Machine, RotaryAxis
+from profiles.profile import Profile
+
+RESIDUAL, UPRIGHT = 1, 2  # bits of face_marks
+FOOT_MM = 1e-3
+
+
+def colours(count: int) -> list[str]:
+    """Colours of parts 1, 2, ... as #rrggbb, those of the pictures."""
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(part_colours(count)).astype(int).tolist()]
+
+
+def surfaces(decomposition: Decomposition | None, profile: Profile) -> dict[str, Column]:
+    """Vertices, faces and marks of all parts in print order; empty arrays for a G-code file."""
+    parts = decomposition.parts if decomposition is not None else ()
+    first = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
+    vertices = [part.mesh.vertices for part in parts]
+    faces = [part.mesh.faces.astype(np.int64) + begin for part, begin in zip(parts, first, strict=False)]
+    marks = [_marks(part, profile) for part in parts]
+    return {
+        "vertices": Column(np.concatenate([np.zeros((0, 3)), *vertices]), "i32", 0.001, delta=True),
+        "faces": Column(np.concatenate([np.zeros((0, 3), dtype=np.int64), *faces]), "i32", delta=True),
+        "face_marks": Column(np.concatenate([np.zeros(0), *marks]), "u8"),
+    }
+
+
+def _marks(part: Part, profile: Profile) -> NDArray[np.int64]:
+    upright = risky_before(part, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
+    marks: NDArray[np.int64] = RESIDUAL * residual_faces(part, profile) + UPRIGHT * upright
+    return marks
+
+
+def solids(decomposition: Decomposition, profile: Profile) -> list[dict[str, Any]]:
+    """What the header tells of each part's pose, base plane and place in the surfaces."""
+    angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
+    records, vertex, face = [], 0, 0
+    for part in decomposition.parts:
+        ends = vertex + len(part.mesh.vertices), face + len(part.mesh.faces)
+        centre, radius = _foot(part)
+        base = {
+            "normal": part.base.normal.tolist(), "offset_mm": part.base.offset_mm,
+            "centre_mm": centre.tolist(), "radius_mm": radius,
+        }  # fmt: skip
+        records.append(
+            {
+                "index": part.index,
+                "tilt_deg": part.pose.tilt_deg,
+                "turn_deg": part.pose.turn_deg,
+                "direction": part.direction.tolist(),
+                "base": base,
+                "volume_mm3": part.volume_mm3,
+                "risky_before_mm2": risky_before_mm2(part, angle, counted),
+                "risky_after_mm2": part.risky_area_mm2,
+                "mesh": {"vertices": [vertex, ends[0]], "faces": [face, ends[1]]},
+            }
+        )
+        vertex, face = ends
+    return records
+
+
+def _foot(part: Part) -> tuple[Floats, float]:
+    """Centre and radius of a disc in the base plane that covers what lies in it; the whole part's shadow where nothing does."""
+    heights = part.base.heights_mm(part.mesh.vertices)
+    low = heights <= max(float(heights.min()), 0.0) + FOOT_MM
+    flat = part.mesh.vertices[low] - heights[low, None] * part.base.normal
+    centre: Floats = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+    return centre, float(np.linalg.norm(flat - centre, axis=1).max())
+
+
+def machine_bodies(machine: Machine, known: bool) -> dict[str, Any]:
+    """The machine as the page moves it."""
+    return {
+        "name": machine.name,
+        "known": known,
+        "shape": machine.shape,
+        **{
+            letter: {"limits_mm": list(axis.limits_mm)} for letter, axis in (("x", machine.x), ("y", machine.y), ("z", machine.z))
+        },
+        "tilt": _axis(machine.tilt),
+        "turn": _axis(machine.turn),
+        "tool_mm": list(machine.tool_mm),
+        "table": machine.table.model_dump(mode="json"),
+        "cradle": [box.model_dump(mode="json") for box in machine.cradle],
+        "head": machine.head.model_dump(mode="json"),
+    }
+
+
+def _axis(axis: RotaryAxis) -> dict[str, Any]:
+    return {
+        "letter": axis.letter,
+        "axis": unit(axis.axis).tolist(),
+        "point_mm": list(axis.point_mm),
+        "sign": axis.sign,
+        "zero_deg": axis.zero_deg,
+        "limits_deg": list(axis.limits_deg),
+    }

@@ -1,0 +1,86 @@
+"""Surface: triangles as a file gives them, with indices and coordinates checked and nothing else promised."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats
+from profiles.errors import MeshError
+
+Indices = NDArray[np.int64]
+# What a file may place by reference: doubled at every level, a small file would place more than any memory holds.
+MOST_PLACED = 20_000  # objects, components and nodes
+MOST_PLACED_FACES = 20_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """vertices: (n, 3) float64 in the file's coordinates; faces: (m, 3) int64, as wound in the file, maybe open or crossing."""
+
+    vertices: Floats
+    faces: Indices
+
+
+def check_surface(path: Path, vertices: Any, faces: Any) -> Surface:
+    """A surface with finite coordinates and indices in range.
+
+    Raises MeshError for no faces, a coordinate that is not a number and an index out of range.
+    """
+    with np.errstate(invalid="ignore"):  # a signalling NaN of the file is reported below
+        positions = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
+    surface = Surface(positions, np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3))
+    if not len(surface.faces):
+        raise MeshError(f"{path}: holds no faces")
+    check_vertices(path, positions)
+    inside = np.atleast_1d(((surface.faces >= 0) & (surface.faces < len(positions))).all(axis=1))
+    if not inside.all():
+        worst = int(np.flatnonzero(~inside)[0])
+        raise MeshError(
+            f"{path}: face {worst + 1} of {len(inside)} names vertex {surface.faces[worst].tolist()} (counted from 0), "
+            f"but there are {len(positions)} vertices"
+        )
+    return surface
+
+
+def check_vertices(path: Path, vertices: Floats) -> None:
+    """Raises MeshError when a coordinate of (n, 3) vertices is not a finite number."""
+    finite = np.atleast_1d(np.isfinite(vertices).all(axis=1))
+    if not finite.all():
+        worst = int(np.flatnonzero(~finite)[0])
+        raise MeshError(f"{path}: vertex {worst + 1} of {len(finite)} has a coordinate that is not a finite number")
+
+
+def parse_floats(path: Path, rows: Iterable[Iterable[str | bytes]], what: str) -> Floats:
+    """The words of all rows as flat float64; raises MeshError when one is not a number."""
+    try:
+        return np.fromiter(map(float, chain.from_iterable(rows)), np.float64)
+    except ValueError as error:
+        raise MeshError(f"{path}: {what} holds something that is not a number ({error})") from None
+
+
+def parse_integers(path: Path, rows: Iterable[Iterable[str | bytes]], what: str) -> Indices:
+    """The words of all rows as flat int64; raises MeshError when one is not a whole number."""
+    try:
+        return np.fromiter(map(int, chain.from_iterable(rows)), np.int64)
+    except (ValueError, OverflowError) as error:
+        raise MeshError(f"{path}: {what} holds something that is not a whole number ({error})") from None
+
+
+def concatenate(pieces: list[Surface]) -> Surface:
+    """The surfaces as one, each with its own vertices."""
+    if len(pieces) == 1:
+        return pieces[0]
+    shifts = np.cumsum([0] + [len(piece.vertices) for piece in pieces[:-1]])
+    faces = [piece.faces + shift for piece, shift in zip(pieces, shifts, strict=True)]
+    return Surface(np.concatenate([piece.vertices for piece in pieces]), np.concatenate(faces))
+
+
+def check_placed(path: Path, placed: int, faces: int) -> None:
+    """Raises MeshError when a file places more objects, or more faces with them, than a program can hold."""
+    if placed > MOST_PLACED or faces > MOST_PLACED_FACES:
+        raise MeshError(f"{path}: places more than {MOST_PLACED} objects or {MOST_PLACED_FACES} faces by reference")

@@ -1,0 +1,43 @@
+"""Kernel: how a kernel and its parts are compiled: numba's own ways cost seconds of the first run.
+
+A kernel is called from Python and cached on disk. Parts are called by kernels only, so they need no entry from Python and no
+place on disk of their own. numba compiles an allocation again at every place and every function again for every literal
+argument: arrays come from mdp.kernels.arrays, flags from variables. Its sorts, searches and assignments of whole rows bring
+their own Python along, a second or more for the first of each: numbers are moved one by one and sorted by mdp.kernels.sorting.
+Arguments that would be more than six go together in a NamedTuple.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import ParamSpec, Protocol, TypeVar
+
+from numba import config, njit
+
+from mdp.kernels.cache import folder
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Compile(Protocol):
+    """A decorator that compiles a function: the same to its callers, which are compiled as well."""
+
+    def __call__(self, function: Callable[P, R], /) -> Callable[P, R]: ...
+
+
+KERNEL = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+part: Compile = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+# No flag allows the compiler to change a result, so all processors and numbers of threads give the same numbers.
+vector_part: Compile = njit(error_model="numpy", fastmath={"nnan", "ninf", "nsz"}, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+inlined: Compile = njit(error_model="numpy", inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function for calls from Python and cache it, in a folder below the one that NUMBA_CACHE_DIR names or our own."""
+    given = config.CACHE_DIR
+    config.CACHE_DIR = str(folder(Path(function.__code__.co_filename)))
+    try:
+        compiled: Callable[P, R] = njit(**KERNEL)(function)
+        return compiled
+    finally:
+        config.CACHE_DIR = given

@@ -1,0 +1,159 @@
+"""Repair: surfaces as files give them into one closed, outward-wound solid, or a sentence why that cannot be."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdp.formats.surface import Surface, concatenate
+from mdp.mesh import Floats
+from mdp.repair.edges import edges_of
+from mdp.repair.holes import fill_holes
+from mdp.repair.overlap import overlaps_itself, resolve_overlap
+from mdp.repair.sheets import cancel_opposite_faces, drop_duplicate_faces, drop_loose_sheets
+from mdp.repair.shells import drop_specks, orient_outward, shells_of, solid_of, surface_of, unite, volume_of
+from mdp.repair.weld import drop_collapsed_faces, drop_unused_vertices, merge_rim_vertices, merge_vertices
+from mdp.repair.winding import format_point, orient_faces, split_shared_edges, split_touching_fans
+from profiles.errors import MeshError
+
+if TYPE_CHECKING:
+    import manifold3d as m3
+
+WELD_SHARES = (1e-6, 1e-5, 1e-4)  # of the model's size: the rounding of ASCII files first, gaps of 0.01 mm in 100 mm last
+SHRINK = 0.01  # of the model's size: what a repair may take off its box
+SAME_VOLUME = 1e-5
+SHARED = 0.5  # of the volume: a body that counts half of itself twice is not understood
+
+
+def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
+    """One closed solid of all surfaces, and a short sentence for every repair; a sound surface comes back as it is.
+
+    Raises MeshError (a predicate without the file's name) when that cannot be, or only by changing the shape.
+    """
+    before = _bounds(concatenate(surfaces))
+    size = float((before[1] - before[0]).max())
+    if size == 0.0:
+        raise MeshError(
+            f"encloses no volume: all {sum(len(s.faces) for s in surfaces)} faces lie in one point {format_point(before[0])}"
+        )
+    tidy = [_tidy(surface) for surface in surfaces]
+    open_ones = [surface for surface in tidy if not _is_closed(surface)]
+    # One body is often spread over several objects of a file, one for each material.
+    pieces = [surface for surface in tidy if _is_closed(surface)] + (
+        [merge_vertices(concatenate(open_ones))] if len(open_ones) > 1 else open_ones
+    )
+    notes: list[str] = []
+    _note(
+        notes, sum(len(s.faces) for s in surfaces) - sum(len(s.faces) for s in tidy), "left out {} face{} with coinciding corners"
+    )
+    closed = [_mend(piece, size, notes) for piece in pieces]
+    solid = _unite_shells([split_touching_fans(piece) for piece in closed if len(piece.faces)], size, notes)
+    lost = np.abs(_bounds(solid) - before).max()
+    if lost > SHRINK * size:
+        raise MeshError(f"cannot be made a valid solid: the closed part of it lacks {lost:.3g} mm of its extent of {size:.4g} mm")
+    solid, whole = _read_as_solid(solid, notes)
+    if whole.volume() <= 0:
+        raise MeshError("encloses no volume")
+    return (_count_once(solid, whole, notes) if overlaps_itself(whole) else solid), notes
+
+
+def _read_as_solid(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manifold"]:
+    """The surface and its manifold3d solid, which must enclose the same volume.
+
+    An edge of four faces leaves open which of them go on in which; where manifold3d pairs them otherwise, the edge is made two.
+    """
+    for change in (lambda surface: surface, split_shared_edges):
+        tried = change(solid)
+        whole = solid_of(tried)
+        if abs(whole.volume() - volume_of(tried)) <= SAME_VOLUME * abs(whole.volume()):
+            _note(notes, (len(tried.faces) - len(solid.faces)) // 2, "parted {} edge{} that four faces share")
+            return tried, whole
+    raise MeshError(f"cannot be made a valid solid: its volume is {volume_of(solid):.5g} mm3 or {whole.volume():.5g} mm3")
+
+
+def _count_once(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> Surface:
+    """The solid without what it counts twice; as it is when that cannot be told apart."""
+    mended = resolve_overlap(whole)
+    left = any(overlaps_itself(piece) for piece in mended.decompose())
+    shared_mm3 = whole.volume() - mended.volume()
+    if left or not 0 < shared_mm3 < SHARED * whole.volume():
+        notes.append("left a body that passes through itself as it is: some of its volume may count twice")
+        return solid
+    notes.append(f"united a body that passes through itself with itself: {shared_mm3:.3g} mm3 counted twice")
+    return surface_of(mended)
+
+
+def _bounds(surface: Surface) -> Floats:
+    used = surface.vertices[surface.faces.ravel()]
+    return np.stack([used.min(axis=0), used.max(axis=0)])
+
+
+def _is_closed(surface: Surface) -> bool:
+    return not len(edges_of(surface.faces).unbalanced)
+
+
+def _tidy(surface: Surface) -> Surface:
+    """The surface as it is when it is closed so, else with its coincident vertices merged, as STL files need it."""
+    given = drop_unused_vertices(Surface(surface.vertices, drop_collapsed_faces(surface.faces)))
+    return given if _is_closed(given) and len(given.faces) else merge_vertices(given)
+
+
+def _mend(surface: Surface, size: float, notes: list[str]) -> Surface:
+    """The surface closed and wound consistently; appends to the notes. Raises MeshError when it stays open."""
+    faces = len(surface.faces)
+    surface = _drop_repeats(surface)
+    _note(notes, faces - len(surface.faces), "left out {} duplicate face{}")
+    if _is_closed(surface):
+        return surface
+    surface = _close_seams(surface, size, notes)
+    faces = len(surface.faces)
+    surface = drop_loose_sheets(surface)
+    _note(notes, faces - len(surface.faces), "left out {} face{} of loose sheets")
+    turned = orient_faces(surface)
+    _note(notes, int((turned.faces != surface.faces).any(axis=1).sum()), "turned {} face{} over to match their neighbours")
+    surface, filled = fill_holes(turned)
+    notes += filled
+    edges = edges_of(surface.faces)
+    if len(edges.unbalanced):
+        where = surface.vertices[edges.starts[np.flatnonzero(edges.edge == edges.unbalanced[0])[0]]]
+        raise MeshError(f"is not closed: {len(edges.unbalanced)} open edges that cannot be mended, one at {format_point(where)}")
+    return surface
+
+
+def _drop_repeats(surface: Surface) -> Surface:
+    """Every face once, unless that opens a closed surface which opposite pairs alone leave closed."""
+    once = drop_duplicate_faces(surface)
+    if len(once.faces) == len(surface.faces) or _is_closed(once) or not _is_closed(surface):
+        return once
+    paired_off = cancel_opposite_faces(surface)
+    return paired_off if 2 * len(paired_off.faces) > len(surface.faces) else once
+
+
+def _close_seams(surface: Surface, size: float, notes: list[str]) -> Surface:
+    for share in WELD_SHARES:
+        if not (edges_of(surface.faces).counts % 2).any():
+            break
+        vertices = len(surface.vertices)
+        surface = drop_duplicate_faces(merge_rim_vertices(surface, share * size))
+        _note(
+            notes,
+            vertices - len(surface.vertices),
+            f"merged {{}} vert{{}} within {share * size:.2g} mm of another",
+            ("ex", "ices"),
+        )
+    return surface
+
+
+def _unite_shells(closed: list[Surface], size: float, notes: list[str]) -> Surface:
+    """The shells of closed surfaces turned outwards and united; the surfaces as they are when nothing of that is needed."""
+    shells = [shell for surface in closed for shell in shells_of(surface)]
+    shells, specks = drop_specks(shells)
+    shells, turned = orient_outward(shells)
+    solid, fused = unite(shells, WELD_SHARES[0] * size)
+    repairs = [*specks, *turned, *fused]
+    notes += repairs
+    return solid if repairs else concatenate(closed)
+
+
+def _note(notes: list[str], count: int, text: str, endings: tuple[str, str] = ("", "s")) -> None:
+    if count:
+        notes.append(text.format(count, endings[count != 1]))

@@ -1,0 +1,1 @@
+"""Search: from a mesh to its ordered parts, by a beam of cuts."""

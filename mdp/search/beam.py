@@ -1,0 +1,164 @@
+"""Beam: the nodes that a search follows, one in each slot.
+
+The first slot follows the classic ranking, large parts first. Every further slot follows a trade-off of its own between what
+is made safe and what is left risky for ever, and takes its node from the children of its own and all lower slots. So a wider
+beam holds the narrower ones and never ends worse, and the slots do not fill with what one ranking finds nearly equal.
+"""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from itertools import islice
+from math import isqrt
+
+from mdp.kernels.threads import ahead
+from mdp.plane import Plane
+from mdp.search.front import Front
+from mdp.search.node import Node
+from mdp.search.problem import Problem
+from mdp.search.ranker import Ranker
+from mdp.search.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
+from mdp.search.record import Child, Offer, Trace
+
+# Area left for ever counts as so many times the area made safe; None: the classic ranking. Many models, one greedy search
+# each: 4 is best on average, no value is best on most models.
+TRADE_OFFS = (None, 4.0, 1.0, 8.0, 2.0, 0.5, 16.0, 0.0)
+RECORDED = 50  # candidates of a stage that are put on record, the B of the 2020 paper
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A node that is followed, and the candidates for its next cut, worked out while other slots are still picking."""
+
+    node: Node
+    coming: Future[CandidateTable]
+
+    @property
+    def table(self) -> CandidateTable:
+        """The candidates, waited for."""
+        return self.coming.result()
+
+
+@dataclass(frozen=True, eq=False)
+class Pick:
+    """A candidate that a slot of the beam took, and the node it leads to."""
+
+    candidate: RankedCandidate
+    node: Node
+
+
+class Beam:
+    """A beam of search.beam_width slots; bests holds the best node that each slot ever had."""
+
+    def __init__(self, problem: Problem, ranker: Ranker, trace: Trace | None) -> None:
+        self.problem, self.ranker, self.trace = problem, ranker, trace
+        width = problem.settings.beam_width
+        self.nodes: list[Node | None] = [problem.start] + [None] * (width - 1)
+        self.bests = [problem.start] * width
+        self.front = Front(problem.start)
+        self._branches: list[Branch | None] = [self._branch(problem.start, 0)]
+        self._seen = {problem.start.signature: 0}  # solids and the lowest slot that had them
+        self._children: dict[tuple[int, int], Node | None] = {}
+        self._taken: dict[int, list[Plane]] = {}
+
+    @property
+    def best(self) -> Node:
+        """The best node ever held."""
+        return min(self.bests, key=lambda node: node.cost_mm2)
+
+    def advance(self) -> None:
+        """One more cut in every slot; slots that find none stay empty."""
+        if self.trace is not None:
+            self.trace.begin_stage([node.signature for node in self.nodes if node is not None])
+        branches, self._branches = self._branches, []
+        self._children.clear()
+        self._taken.clear()
+        picks: list[Pick | None] = []
+        for slot in range(len(self.nodes)):
+            pick = self._pick([branch for branch in branches[: slot + 1] if branch is not None], slot)
+            picks.append(pick)
+            self._branches.append(None if pick is None or self.problem.full(pick.node) else self._branch(pick.node, slot))
+        if self.trace is not None:
+            self._record(self.trace, [branch for branch in branches if branch is not None], picks)
+        self.nodes = [None if pick is None else pick.node for pick in picks]
+        for slot, node in enumerate(self.nodes):
+            if node is not None:
+                self.front.offer(node)
+            if node is not None and node.cost_mm2 < self.bests[slot].cost_mm2:
+                self.bests[slot] = node
+
+    def close(self) -> None:
+        """Leave off what was begun for a next cut."""
+        for branch in self._branches:
+            if branch is not None:
+                branch.coming.cancel()
+
+    def _branch(self, node: Node, slot: int) -> Branch:
+        return Branch(node, ahead(self.problem.table, node, TRADE_OFFS[slot % len(TRADE_OFFS)] is None))
+
+    def finalists(self) -> list[Node]:
+        """The nodes to polish: of the second slot and of every slot with a square number the best one that it or a lower one
+        ever held and that is no finalist yet."""
+        finalists: list[Node] = []
+        for count in range(2, len(self.bests) + 1):
+            if count == 2 or isqrt(count) ** 2 == count:
+                others = [node for node in self.bests[:count] if node.cuts and node not in finalists]
+                finalists += [min(others, key=lambda node: node.cost_mm2)] if others else []
+        return finalists
+
+    def _pick(self, branches: Sequence[Branch], slot: int) -> Pick | None:
+        """What a slot takes of the children of some branches: no solid twice, no two near-equal cuts of one node."""
+        for candidate in self._rank(branches, slot):
+            branch = branches[candidate.table]
+            plane, taken = branch.table.plane(candidate.row), self._taken.setdefault(candidate.table, [])
+            if any(nearly_equal(plane, other) for other in taken):
+                continue
+            child = self._child(branch, candidate)
+            if child is not None and self._seen.get(child.signature, slot + 1) > slot:
+                self._seen[child.signature] = slot
+                taken.append(plane)
+                return Pick(candidate, child)
+        return None
+
+    def _rank(self, branches: Sequence[Branch], slot: int) -> Iterator[RankedCandidate]:
+        if not branches:
+            return iter(())
+        tables = [branch.table for branch in branches]
+        bound_mm2 = min(node.cost_mm2 for node in self.bests[: slot + 1])
+        trade_off = TRADE_OFFS[slot % len(TRADE_OFFS)]
+        if trade_off is not None:
+            return rank_by_trade_off(tables, trade_off, bound_mm2)
+        classic = rank_classic(tables, self.problem.model.risky_mm2, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
+        return self.ranker.rank(classic, lambda each: tables[each.table].measures(each.row), self.problem.model)
+
+    def _child(self, branch: Branch, candidate: RankedCandidate) -> Node | None:
+        key, row = (candidate.table, candidate.row), candidate.row
+        if key not in self._children:
+            residual_mm2 = float(branch.table.scored.residual_mm2[row])
+            self._children[key] = self.problem.cut(branch.node, branch.table.plane(row), residual_mm2)
+        return self._children[key]
+
+    def _record(self, trace: Trace, branches: Sequence[Branch], picks: Sequence[Pick | None]) -> None:
+        """Put the stage on record: the first candidates of the classic ranking, and what the slots took."""
+        tables = [branch.table for branch in branches]
+        risky_mm2 = self.problem.model.risky_mm2
+        bound_mm2, preferred_mm3 = self.best.cost_mm2, self.problem.preferred_mm3
+        classic = rank_classic(tables, risky_mm2, bound_mm2, preferred_mm3=preferred_mm3) if tables else iter(())
+        offered = list(islice(classic, max(RECORDED, 2 * len(self.nodes))))
+        number_of = {(candidate.table, candidate.row): number for number, candidate in enumerate(offered)}
+        children = []
+        for pick in picks:
+            if pick is None:
+                continue
+            table, row = pick.candidate.table, pick.candidate.row
+            if (table, row) not in number_of:
+                number_of[table, row] = len(offered)
+                residual_mm2 = float(tables[table].scored.residual_mm2[row])
+                offered.append(RankedCandidate(table, row, relaxation_round(residual_mm2 / risky_mm2)))
+            children.append(Child(number_of[table, row], pick.node.signature, pick.node.cost_mm2))
+        trace.add([_offer(branches[candidate.table], candidate) for candidate in offered], children)
+
+
+def _offer(branch: Branch, candidate: RankedCandidate) -> Offer:
+    row = candidate.row
+    return Offer(branch.node.signature, branch.table.plane(row), branch.table.measures(row), candidate.round)

@@ -1,0 +1,153 @@
+"""Planes by hand: a person's cuts made in turn, completed by the search where they are left open, or refused with the reason.
+
+Only what cannot be printed forbids a person's plane: it misses the model, cuts the platform, lets something float, is out of
+the machine's reach, lets the head meet the table, leaves a sliver or passes through a zone that stays whole. That a cut gains
+little, makes a small part or a long seam is the person's to judge.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from mdp.clearance import find_obstacle, lowest_body
+from mdp.cut import above, mesh_of
+from mdp.mesh import Floats, Mesh
+from mdp.overhang import threshold
+from mdp.plan_file import PlanFile, PlannedPart, mesh_sha256
+from mdp.plane import Plane
+from mdp.pose import poses
+from mdp.search.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, residual_mm2
+from mdp.search.node import Node
+from mdp.search.problem import FINEST, Problem
+from mdp.sweep.sweep import gains
+from profiles.errors import PlanError
+
+EQUAL_MM2 = 1e-6
+
+
+def check_model(plan: PlanFile, mesh: Mesh, name: str) -> None:
+    """Raise PlanError where a plan was made of another model."""
+    if plan.sha256 and plan.sha256 != mesh_sha256(mesh):
+        raise PlanError(
+            f"plan {plan.name} was made of another model: {plan.model or 'its model'} is not {name} as it is read now "
+            "(the file has changed, or process.scale, process.rotate_deg or search.pedestal_mm; without the line sha256 the "
+            "planes are tried all the same)"
+        )
+
+
+def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
+    """The node after the cuts of all planned parts, the last one in print order first. Raises PlanError."""
+    node = problem.root
+    for number in range(len(plan.parts) + 1, 1, -1):
+        planned, label = plan.parts[number - 2], f"plan {plan.name}: part {number}"
+        _check_offset(problem, planned, label)
+        plane = planned.plane or _complete(problem, node, planned, label)
+        why = _refusal(problem, node, plane)
+        following = problem.cut(node, plane) if why is None else None
+        if following is None:
+            raise PlanError(f"{label} cannot be cut off: {why or _find_hindrance(problem, node, plane)}")
+        node = following
+    return node
+
+
+def _check_offset(problem: Problem, planned: PlannedPart, label: str) -> None:
+    """A grid of offsets through a plane next to the origin would have too many planes."""
+    least_mm = FINEST * problem.settings.offset_step_mm
+    if planned.offset_mm is not None and 0.0 < abs(planned.offset_mm) < least_mm:
+        raise PlanError(f"{label}: offset_mm is {planned.offset_mm:g}: 0 or at least {least_mm:g} is allowed")
+
+
+def _limits(problem: Problem, directions: Floats) -> Bounds:
+    """The bounds of (k, 3) directions without those that are no physical law."""
+    return replace(problem.bounds_along(directions), least_volume_mm3=0.0, least_interface_mm2=0.0)
+
+
+def _refusal(problem: Problem, node: Node, plane: Plane) -> str | None:
+    """Why a person's plane may not cut a node; None: the sweep finds nothing against it."""
+    missed = _miss(problem, node, plane)
+    if missed is not None:
+        return missed
+    limits = _limits(problem, plane.normal[None])
+    checked = problem.check_plane(node, plane, limits)
+    return _explain(problem, plane, limits, Reason(int(checked.reason[0])), float(checked.fragile_mm[0]))
+
+
+def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:
+    """Why a plane cuts nothing: it misses the model, or later parts took what it would cut."""
+    heights = plane.heights_mm(node.remainder.mesh.vertices)
+    if heights.min() < -COPLANAR_MM and heights.max() > COPLANAR_MM:
+        return None
+    whole = plane.heights_mm(problem.mesh.vertices) + plane.offset_mm
+    if whole.min() < plane.offset_mm - COPLANAR_MM and whole.max() > plane.offset_mm + COPLANAR_MM:
+        side = "above" if heights.max() <= COPLANAR_MM else "below"
+        return f"nothing is left {side} its plane, the parts printed after it took it: the order is impossible"
+    return (
+        f"its plane misses the model: along its normal the model lies between {whole.min():.2f} and {whole.max():.2f} mm, "
+        f"offset_mm is {plane.offset_mm:.6g}"
+    )
+
+
+def _explain(problem: Problem, plane: Plane, limits: Bounds, reason: Reason, fragile_mm: float) -> str | None:
+    """A reason as a sentence with its numbers; None for a feasible plane."""
+    match reason:
+        case Reason.FEASIBLE:
+            return None
+        case Reason.PLATFORM:
+            least_mm = limits.least_offset_mm[0]
+            return f"{REASONS[reason]}: along its normal offset_mm must be at least {least_mm:.2f}, it is {plane.offset_mm:.6g}"
+        case Reason.REACH:
+            return f"{REASONS[reason]} of its normal on {problem.machine.name}"
+        case Reason.CLEARANCE:
+            needed, body = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
+            return f"the head's {body} would meet the table: what is cut off must begin at least {needed:.1f} mm above it"
+        case Reason.INTERFACE:
+            return "a piece of it would hang in the air: it stands on nothing that is printed before"
+        case Reason.FRAGILE:
+            least_mm = max(problem.settings.fragile_mm, COPLANAR_MM)
+            return f"its plane would leave a sliver {fragile_mm:.2g} mm thin: {least_mm:g} is the least (search.fragile_mm)"
+        case Reason.KEEP:
+            spans = limits.keep_mm[0]
+            number = int(np.argmax((spans[:, 0] < plane.offset_mm) & (plane.offset_mm < spans[:, 1]))) + 1
+            return f"its plane would pass through box {number} of [[keep]], which stays whole"
+    return REASONS[reason]
+
+
+def _find_hindrance(problem: Problem, node: Node, plane: Plane) -> str:
+    """Why no pose serves a part that the sweep found nothing against."""
+    points, machine = mesh_of(above(node.solid, plane)).vertices, problem.machine
+    if len(points) == 0:
+        return "nothing lies above its plane"
+    obstacles = [find_obstacle(machine, pose, points) for pose in poses(machine, plane.normal)]
+    return "; the other way round ".join(obstacle for obstacle in obstacles if obstacle) or "what it stands on is out of reach"
+
+
+def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) -> Plane:
+    """The plane of a part whose normal or offset is left open: the feasible one that makes the most safe, among equals the one
+    with the largest part. Raises PlanError where there is none."""
+    if planned.normal is None and planned.offset_mm is None:
+        raise PlanError(f"{label} has neither normal nor offset_mm: leave it out, the search adds parts by itself")
+    directions = problem.limits.directions if planned.normal is None else np.array([planned.normal])
+    limits, step_mm = _limits(problem, directions), problem.step_mm(planned.offset_mm or 0.0)
+    swept = gains(node.remainder, directions, step_mm, threshold(problem.terms.angle_deg))
+    number = swept.first[:, None] + np.arange(swept.up_mm2.shape[1])
+    wanted = np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None]
+    if planned.offset_mm is not None:
+        wanted &= number == round(planned.offset_mm / step_mm)
+    direction, column = np.nonzero(wanted)
+    missing = "normal" if planned.normal is None else "offset_mm"
+    if len(direction) == 0:
+        raise PlanError(f"{label}: no {missing} can be found for it, every such plane misses what is left of the model")
+    offset_mm: Floats = number[direction, column] * np.float64(step_mm)
+    gain_mm2 = (swept.up_mm2 - residual_mm2(swept, problem.terms))[direction, column]
+    own = problem.settings.model_copy(update={"offset_step_mm": step_mm})
+    reason = check(node.remainder, limits, own, direction.astype(np.int32), offset_mm).reason
+    for row in np.lexsort((offset_mm, -directions[direction, 2], -np.round(gain_mm2 / EQUAL_MM2))):
+        if reason[row] == Reason.FEASIBLE:
+            offset = float(offset_mm[row]) if planned.offset_mm is None else planned.offset_mm
+            plane = Plane(directions[direction[row]], offset)
+            if _refusal(problem, node, plane) is None and problem.cut(node, plane) is not None:
+                return plane
+    counts = [(int((reason == why).sum()), text) for why, text in REASONS.items()]
+    shares = "; ".join(f"{count} because {text}" for count, text in counts if count)
+    feasible = f"{int((reason == Reason.FEASIBLE).sum())} because no pose serves them"
+    raise PlanError(f"{label}: no {missing} can be found for it among {len(reason)}: {shares or feasible}")

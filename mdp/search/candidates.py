@@ -1,0 +1,208 @@
+"""Candidates: directions times offsets, and what the criteria, the axes and the head leave of them.
+
+Criteria of the 2020 paper: I (self-supported above the plane) is the search's relaxed goal, II (what remains stands on the
+platform), III (the platform lies below the plane), IV (a large volume above the plane).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from math import pi, radians, sin, sqrt
+
+import numpy as np
+
+from mdp.clearance import least_height_mm
+from mdp.mesh import Floats, Ints, Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
+from mdp.search.cost import CostTerms
+from mdp.sweep.sweep import Gains, Remainder, gains, sweep
+from mdp.zone import Zone, spans_mm
+from profiles.machine import Machine
+from profiles.search import Search
+
+# A plane is never laid into a face that overhangs along its direction: that would look like resting on the cut, over air.
+COPLANAR_MM = 1e-4
+LEAST_CONTACT_AREA_MM2 = 1e-6  # a piece that stands on less floats in the air, whatever interface is asked for
+
+
+class Reason(IntEnum):
+    """Why a candidate is out; FEASIBLE: it is not. The first reason that holds is counted."""
+
+    FEASIBLE = 0
+    PLATFORM = 1
+    FLOATING = 2
+    REACH = 3
+    CLEARANCE = 4
+    VOLUME = 5
+    INTERFACE = 6
+    FRAGILE = 7
+    GAIN = 8
+    KEEP = 9
+
+
+REASONS = {
+    Reason.PLATFORM: "the plane would cut the platform (criterion III)",
+    Reason.FLOATING: "what remains would not stand on the platform (criterion II)",
+    Reason.REACH: "the axes do not reach the direction",
+    Reason.CLEARANCE: "the head would meet the table",
+    Reason.VOLUME: "the part would be too small (search.least_volume_share)",
+    Reason.INTERFACE: "the part or a piece of it would hang on too small an area (search.least_interface_mm2)",
+    Reason.FRAGILE: "the plane would leave a sliver (search.fragile_mm)",
+    Reason.GAIN: "it would make too little safe for the seam it leaves (search.seam_mm, search.least_gain)",
+    Reason.KEEP: "the plane would pass through a box that stays whole ([[keep]])",
+}
+
+
+def directions(search: Search) -> Floats:
+    """(k, 3) unit directions spread evenly over the sphere's cap above the least elevation (a Fibonacci lattice)."""
+    index = np.arange(search.directions) + 0.5
+    z = 1.0 - (1.0 - sin(radians(search.least_elevation_deg))) * index / search.directions
+    angle = index * pi * (3.0 - sqrt(5.0))
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """What every direction must respect, worked out once a search: (k,) arrays. keep_mm: (k, zones, 2) offsets between which a
+    plane passes through a zone; crumb_mm: a piece that is lower is a crumb."""
+
+    directions: Floats
+    least_offset_mm: Floats
+    least_height_mm: Floats
+    least_volume_mm3: float
+    least_interface_mm2: float
+    keep_mm: Floats
+    crumb_mm: float
+
+
+def bounds(mesh: Mesh, machine: Machine, search: Search, fixed: Floats | None = None, keep: Sequence[Zone] = ()) -> Bounds:
+    """Bounds of a model's search for the sampled directions, or for `fixed` ones."""
+    chosen = directions(search) if fixed is None else fixed
+    return bounds_of(chosen, platform_disc(mesh, search), mesh.volume_mm3, machine, search, keep)
+
+
+def bounds_of(
+    chosen: Floats,
+    disc: tuple[Floats, float],
+    volume_mm3: float,
+    machine: Machine,
+    search: Search,
+    keep: Sequence[Zone] = (),
+) -> Bounds:
+    """Bounds for (k, 3) directions, a disc that every plane must clear, a model's volume and the zones that stay whole."""
+    centre, radius = disc
+    tilt = np.hypot(chosen[:, 0], chosen[:, 1])
+    heights = np.zeros(len(chosen))
+    if search.clearance:
+        heights = np.array([least_height_mm(machine, direction) for direction in chosen])
+    return Bounds(
+        directions=chosen,
+        least_offset_mm=chosen[:, :2] @ centre + radius * tilt,
+        least_height_mm=heights,
+        least_volume_mm3=search.least_volume_share * volume_mm3,
+        least_interface_mm2=search.least_interface_mm2,
+        keep_mm=spans_mm(chosen, keep),
+        crumb_mm=sqrt(search.least_interface_mm2),
+    )
+
+
+def platform_disc(mesh: Mesh, search: Search) -> tuple[Floats, float]:
+    """Centre and radius of the disc of criterion III: the one that is asked for, or the model's footprint."""
+    return footprint(mesh) if search.platform_radius_mm is None else (np.zeros(2), search.platform_radius_mm)
+
+
+def footprint(mesh: Mesh) -> tuple[Floats, float]:
+    """Centre (2,) and radius of a nearly least disc around what stands on the platform (Badoiu and Clarkson)."""
+    points = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM][:, :2]
+    if len(points) == 0:
+        return np.zeros(2), 0.0
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    for step in range(1, 200):
+        farthest = points[np.argmax(((points - centre) ** 2).sum(axis=1))]
+        centre = centre + (farthest - centre) / (step + 1)
+    return centre, float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))
+
+
+@dataclass(frozen=True, eq=False)
+class ScoredCandidates:
+    """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be
+    cut is not known yet. direction is a row of Bounds.directions; evaluated counts all planes looked at."""
+
+    remainder: Remainder
+    direction: Ints
+    offset_mm: Floats
+    gain_mm2: Floats
+    residual_mm2: Floats
+    evaluated: int
+
+
+@dataclass(frozen=True, eq=False)
+class Feasibility:
+    """What the sweep gives for some candidates, one array row each; reason is FEASIBLE or why not.
+
+    fragile_mm is the distance to the nearest surface that the plane would cut into a sliver. contact_area_mm2 is the least area
+    that a piece of the part stands on. A piece lower than the side of a square of least_interface_mm2 is a crumb and may stand
+    on less.
+    """
+
+    reason: Ints
+    volume_mm3: Floats
+    section_mm2: Floats
+    fragile_mm: Floats
+    contact_area_mm2: Floats
+
+
+def score_candidates(
+    remainder: Remainder, limits: Bounds, step_mm: float, terms: CostTerms, least_gain_mm2: float
+) -> ScoredCandidates:
+    """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe, less its seam."""
+    swept = gains(remainder, limits.directions, step_mm, threshold(terms.angle_deg))
+    used = np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None]
+    residual = residual_mm2(swept, terms)
+    gain = swept.up_mm2 - residual
+    offset: Floats = (swept.first[:, None] + np.arange(gain.shape[1])) * np.float64(step_mm)
+    above = (offset >= limits.least_offset_mm[:, None]) & np.isfinite(limits.least_height_mm)[:, None]
+    scored = used & above & (gain >= least_gain_mm2)
+    for low, high in np.moveaxis(limits.keep_mm, 0, 2):
+        scored &= (offset <= low[:, None]) | (offset >= high[:, None])
+    direction = np.nonzero(scored)[0].astype(np.int32)
+    return ScoredCandidates(remainder, direction, offset[scored], gain[scored], residual[scored], int(swept.columns.sum()))
+
+
+def residual_mm2(swept: Gains, terms: CostTerms) -> Floats:
+    """What each cut costs for ever: what stays risky on its part, and the scar of its seam."""
+    return swept.residual_mm2 + terms.seam_mm * swept.rim_mm if terms.seam_mm > 0.0 else swept.residual_mm2
+
+
+def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Feasibility:
+    """Which of the planes (rows of Bounds.directions, offsets on the grid) can be cut."""
+    rows, inverse = np.unique(direction, return_inverse=True)
+    swept = sweep(remainder, limits.directions[rows], search.offset_step_mm, limits.least_height_mm[rows], limits.crumb_mm)
+    at = (inverse, np.rint(offset_mm / search.offset_step_mm).astype(np.int64) - swept.first[inverse])
+    reason, keep_mm = np.zeros(len(direction), np.int32), limits.keep_mm[direction]
+    checks = {
+        Reason.PLATFORM: offset_mm < limits.least_offset_mm[direction],
+        Reason.FLOATING: swept.pieces[at] > 0,
+        Reason.REACH: ~np.isfinite(limits.least_height_mm[direction]),
+        Reason.CLEARANCE: swept.lowest_mm[at] < limits.least_height_mm[direction],
+        Reason.VOLUME: swept.volume_mm3[at] < limits.least_volume_mm3,
+        Reason.INTERFACE: swept.contact_area_mm2[at] < max(limits.least_interface_mm2, LEAST_CONTACT_AREA_MM2),
+        Reason.FRAGILE: swept.fragile_mm[at] < max(search.fragile_mm, COPLANAR_MM),
+        Reason.KEEP: ((keep_mm[..., 0] < offset_mm[:, None]) & (offset_mm[:, None] < keep_mm[..., 1])).any(axis=1),
+    }
+    for why, out in checks.items():
+        reason[out & (reason == 0)] = why
+    columns = (swept.volume_mm3, swept.section_mm2, swept.fragile_mm, swept.contact_area_mm2)
+    return Feasibility(reason, *(column[at] for column in columns))
+
+
+def refusals(remainder: Remainder, limits: Bounds, search: Search, terms: CostTerms, least_gain_mm2: float) -> dict[Reason, int]:
+    """How many of all candidates of a solid each reason takes, to report why nothing can be cut."""
+    swept = gains(remainder, limits.directions, search.offset_step_mm, threshold(terms.angle_deg))
+    direction, column = np.nonzero(np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None])
+    offset: Floats = (swept.first[direction] + column) * np.float64(search.offset_step_mm)
+    reason = check(remainder, limits, search, direction.astype(np.int32), offset).reason
+    gain = (swept.up_mm2 - residual_mm2(swept, terms))[direction, column]
+    reason[(reason == Reason.FEASIBLE) & (gain < least_gain_mm2)] = Reason.GAIN
+    return {why: int((reason == why).sum()) for why in Reason}

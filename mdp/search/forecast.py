@@ -1,0 +1,157 @@
+"""Forecast: what a sequence of planes would cost, summed over a solid's surface without cutting it.
+
+A piece of the surface belongs to the first part whose plane it lies above, what lies above none to the part on the platform.
+The faces that these cuts lay open are not in the sum, though later ones may turn them into overhangs. A rim runs over what the
+planes before its own have left.
+"""
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import floats, table
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+from mdp.overhang import Mask, threshold
+from mdp.plane import Plane
+from mdp.search.cost import ROUNDING_MM, CostTerms
+from mdp.sweep.rims import COT_30
+from mdp.sweep.sweep import Remainder
+
+STEEPEST_COT = 100.0  # a chord along a face parallel to the plane has no length of its own
+
+
+class Surface(NamedTuple):
+    """A solid's surface: (m, 3, 3) corners, (m, 3) normals, (m,) areas, which faces are risky upright, the cosine of normal and
+    direction below which a face is risky along that direction; (m,) mm2 that a mm of rim costs on each face, (0,) where
+    seams cost nothing, and by how much more on a feather edge."""
+
+    corners: Floats
+    normals: Floats
+    areas_mm2: Floats
+    risky: Mask
+    risky_below: float
+    seam_mm: Floats
+    feather: float
+
+    @classmethod
+    def of(cls, remainder: Remainder, terms: CostTerms) -> "Surface":
+        """The surface of what remains. Where seams cost nothing, faces that no direction above the horizon finds risky are left
+        out."""
+        mesh, risky, least = remainder.mesh, remainder.risky, threshold(terms.angle_deg)
+        counted = risky | (mesh.normals[:, 2] < sqrt(max(0.0, 1.0 - least * least)))
+        seam_mm = np.zeros(0)
+        if remainder.seam_weights is not None:
+            counted = np.ones(len(risky), dtype=np.bool_)
+            seam_mm = terms.seam_mm * remainder.seam_weights
+        corners = mesh.vertices[mesh.faces[counted]]
+        return cls(corners, mesh.normals[counted], mesh.areas_mm2[counted], risky[counted], least, seam_mm, terms.feather)
+
+    def left_mm2(self, planes: Sequence[Plane]) -> float:
+        """What cuts along the planes, in this order, would cost: the risky area left, and the seams."""
+        normals = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
+        offsets = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
+        return _sum_left(self, normals, offsets)
+
+
+@kernel
+def _sum_left(surface: Surface, directions: Floats, offsets: Floats) -> float:
+    """Risky area and seams of the planes (directions, offsets), cut in their order."""
+    corners, normals, areas, risky = surface.corners, surface.normals, surface.areas_mm2, surface.risky
+    polygon, spare = table(len(offsets) + 4, 3), table(len(offsets) + 4, 3)
+    heights = floats(len(offsets) + 4, 0.0)
+    total = 0.0
+    for face in range(len(areas)):
+        size, area = 3, areas[face]
+        for corner in range(3):
+            for axis in range(3):
+                polygon[corner, axis] = corners[face, corner, axis]
+        for cut in range(len(offsets)):
+            lowest, highest = np.inf, -np.inf
+            for i in range(size):
+                heights[i] = _along(polygon, i, directions, cut) - offsets[cut]
+                lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
+            if highest <= 0.0:
+                continue
+            below = 0.0
+            if lowest < 0.0:
+                if len(surface.seam_mm) > 0 and highest > ROUNDING_MM and lowest < -ROUNDING_MM:
+                    facing = abs(_along(normals, face, directions, cut))
+                    total += surface.seam_mm[face] * _rim(polygon, heights, size) * _feather_factor(facing, surface.feather)
+                size = _clip_below(polygon, spare, heights, size)
+                polygon, spare = spare, polygon
+                below = _flat_area(polygon, size, normals, face)
+            if _along(normals, face, directions, cut) < surface.risky_below:
+                total += area - below
+            area = below
+            if lowest >= 0.0:
+                break
+        if risky[face]:
+            total += area
+    return total
+
+
+@part
+def _along(points: Floats, row: int, directions: Floats, other: int) -> float:
+    """Product of a row with a row of another array."""
+    product: float = points[row, 0] * directions[other, 0] + points[row, 1] * directions[other, 1]
+    product += points[row, 2] * directions[other, 2]
+    return product
+
+
+@part
+def _rim(polygon: Floats, heights: Floats, size: int) -> float:
+    """Length of a convex polygon's chord at height 0; it reaches to both sides."""
+    first, last = floats(3, 0.0), floats(3, 0.0)
+    count = 0
+    for i in range(size):
+        j = i + 1 if i + 1 < size else 0
+        crosses = heights[i] * heights[j] < 0.0
+        if crosses or heights[i] == 0.0:
+            share = heights[i] / (heights[i] - heights[j]) if crosses else 0.0
+            for axis in range(3):
+                last[axis] = polygon[i, axis] + share * (polygon[j, axis] - polygon[i, axis])
+                if count == 0:
+                    first[axis] = last[axis]
+            count += 1
+    return float(np.sqrt((last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2 + (last[2] - first[2]) ** 2))
+
+
+@part
+def _feather_factor(cosine: float, feather: float) -> float:
+    """How much a rim counts where a face's normal has that cosine with the plane's; see rims._weigh_rims."""
+    sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
+    cotangent = cosine / sine if cosine < STEEPEST_COT * sine else STEEPEST_COT
+    return float(1.0 + feather * max(cotangent - COT_30, 0.0))
+
+
+@part
+def _clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> int:
+    """Put into `below` what of a convex polygon lies below height 0; the number of its corners."""
+    count = 0
+    for i in range(size):
+        j = i + 1 if i + 1 < size else 0
+        if heights[i] <= 0.0:
+            for axis in range(3):
+                below[count, axis] = polygon[i, axis]
+            count += 1
+        if heights[i] * heights[j] < 0.0:
+            share = heights[i] / (heights[i] - heights[j])
+            for axis in range(3):
+                below[count, axis] = polygon[i, axis] + share * (polygon[j, axis] - polygon[i, axis])
+            count += 1
+    return count
+
+
+@part
+def _flat_area(polygon: Floats, size: int, normals: Floats, face: int) -> float:
+    """Area of a flat convex polygon with a known unit normal."""
+    twice = 0.0
+    for i in range(1, size - 1):
+        a0, a1, a2 = polygon[i, 0] - polygon[0, 0], polygon[i, 1] - polygon[0, 1], polygon[i, 2] - polygon[0, 2]
+        b0, b1, b2 = polygon[i + 1, 0] - polygon[0, 0], polygon[i + 1, 1] - polygon[0, 1], polygon[i + 1, 2] - polygon[0, 2]
+        across = normals[face, 0] * (a1 * b2 - a2 * b1) + normals[face, 1] * (a2 * b0 - a0 * b2)
+        twice += across + normals[face, 2] * (a0 * b1 - a1 * b0)
+    return 0.5 * twice

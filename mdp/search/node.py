@@ -1,0 +1,62 @@
+"""Node: what remains of a model after some cuts, the unit of the search."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from mdp.cut import Solid, above, mesh_of
+from mdp.overhang import risky_upright
+from mdp.plane import Plane
+from mdp.search.cost import CostTerms
+from mdp.sweep.sweep import Remainder
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A part cut off: its base plane, the solid it is cut off, and what it costs for ever: the area that stays risky on it and
+    the scar of its seam."""
+
+    base: Plane
+    whole: Solid
+    residual_mm2: float
+
+    @cached_property
+    def solid(self) -> Solid:
+        """The part. Most of what a search cuts off is never looked at, so it is made when it is asked for."""
+        return above(self.whole, self.base)
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """What remains after some cuts, and how good that is; parent: the node before the last cut, None for the whole model."""
+
+    solid: Solid
+    cuts: tuple[Cut, ...]
+    terms: CostTerms
+    parent: "Node | None" = None
+
+    @cached_property
+    def remainder(self) -> Remainder:
+        """The remaining solid for the sweep."""
+        mesh, terms = mesh_of(self.solid), self.terms
+        risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
+        return Remainder(mesh, risky, terms.seam_weights(mesh, [cut.base for cut in self.cuts]), terms.feather)
+
+    @cached_property
+    def risky_mm2(self) -> float:
+        """Risky area of what remains when it is printed straight up."""
+        return float(self.remainder.mesh.areas_mm2[self.remainder.risky].sum())
+
+    @cached_property
+    def residual_mm2(self) -> float:
+        """What the parts cut off so far cost for ever: a lower bound of the cost of every descendant."""
+        return sum(c.residual_mm2 for c in self.cuts)
+
+    @property
+    def cost_mm2(self) -> float:
+        """What it costs when the search stops here; the paper's J where seams cost nothing."""
+        return self.risky_mm2 + self.residual_mm2
+
+    @cached_property
+    def signature(self) -> tuple[float, ...]:
+        """Equal for two orders of the same cuts."""
+        return (round(self.solid.volume(), 3), round(self.risky_mm2, 3), round(self.residual_mm2, 3))

@@ -1,0 +1,171 @@
+"""Orientation: how a whole model prints best in one piece, the rival of every decomposition.
+
+Two kinds of orientation are looked at: those in which the model rests on a facet of its convex hull without tipping over, and
+directions spread over the whole sphere, in most of which only a raft could hold it. A cube balanced on a corner has no
+risky face at all, so areas of the second kind are a lower bound rather than an advice: `best_orientation` takes what rests
+unless it is asked for the other.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import atan2, cos, degrees, hypot, pi, radians, sin, sqrt, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.cut import convex_hull
+from mdp.mesh import Floats, Mesh, dot
+from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
+
+LEAN_DEG = 5.0  # a model that rests may be leaned by this much before it tips over
+SAME_FACET_DEG = 0.5
+SPREAD = 1000
+MOST_FACETS = 1000
+EQUAL_MM2 = 1e-6  # areas that differ less are equal but for rounding
+SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 32)])
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """A model turned as a whole: rotation (3, 3), what is risky then, whether it rests without tipping over, and the area
+    of its faces that stand on the platform."""
+
+    rotation: Floats
+    risky_mm2: float
+    stable: bool
+    base_mm2: float
+
+    @property
+    def turns_deg(self) -> tuple[float, float]:
+        """The rotation as turns about x, then y (process.rotate_deg takes them), degrees."""
+        return _turns(self.rotation[2])
+
+
+@lru_cache(maxsize=2)
+def best_orientation(mesh: Mesh, angle_deg: float, resting: bool = True) -> Orientation:
+    """The orientation with the least risky area (mm2); resting=False: also those that only a raft could hold.
+
+    As the model stands counts as well, so the result is never worse than printing it straight up. Among equal areas one that
+    rests is taken, then the least turned. A model that rests nowhere (a ball) is taken as it comes.
+    """
+    candidates = _measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)]))
+    resting_ones = [orientation for orientation in candidates if orientation.stable]
+    if resting and resting_ones:
+        return min(resting_ones, key=_rank)
+    return min([*candidates, *_measure(mesh, angle_deg, spread(SPREAD))], key=_rank)
+
+
+def resting_orientations(mesh: Mesh, angle_deg: float, most: int) -> list[Orientation]:
+    """Up to `most` orientations in which the model rests on a facet of its hull, least risky first; the present one is
+    among those looked at when it rests."""
+    candidates = _measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)]))
+    return sorted((orientation for orientation in candidates if orientation.stable), key=_rank)[:most]
+
+
+def spread(count: int) -> Floats:
+    """(count, 3) unit directions spread evenly over the whole sphere (a Fibonacci lattice)."""
+    index = np.arange(count) + 0.5
+    z = 1.0 - 2.0 * index / count
+    angle = index * pi * (3.0 - sqrt(5.0))
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+
+
+def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> tuple[Floats, Floats]:
+    """(k,) risky and standing areas, mm2, of the model printed as a whole along (k, 3) unit directions."""
+    facing_down, standing = np.zeros(len(directions)), np.zeros(len(directions))
+    limit, areas = threshold(angle_deg), mesh.areas_mm2
+    normals, points = np.ascontiguousarray(mesh.normals.T), np.ascontiguousarray(mesh.vertices.T)
+    order = np.argsort(mesh.faces[:, 0], kind="stable")
+    starts = np.searchsorted(mesh.faces[order, 0], np.arange(len(mesh.vertices) + 1))
+    for k, direction in enumerate(directions):
+        down, heights = np.less(dot(normals.T, direction), limit), dot(points.T, direction)
+        low = np.less_equal(heights, heights.min() + PLATFORM_TOLERANCE_MM)
+        # Few faces stand: they are found from the few vertices that are low.
+        faces = np.concatenate([order[starts[v] : starts[v + 1]] for v in np.flatnonzero(low)])
+        stands = faces[low[mesh.faces[faces]].all(axis=1) & down[faces]]
+        facing_down[k], standing[k] = areas[down].sum(), areas[stands].sum()
+    return np.maximum(facing_down - standing, 0.0), standing
+
+
+def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:
+    risky, standing = risky_areas(mesh, directions, angle_deg)
+    rests = _rests(mesh, directions)
+    return [
+        Orientation(_rotation(direction), float(risky[k]), bool(rests[k]), float(standing[k]))
+        for k, direction in enumerate(directions)
+    ]
+
+
+def _rank(orientation: Orientation) -> tuple[float, bool, float, tuple[float, float]]:
+    x_deg, y_deg = orientation.turns_deg
+    area = round(orientation.risky_mm2 / EQUAL_MM2) * EQUAL_MM2
+    return area, not orientation.stable, round(abs(x_deg) + abs(y_deg), 6), (-round(x_deg, 6), -round(y_deg, 6))
+
+
+def _facets(mesh: Mesh) -> Floats:
+    """(k, 3) printing directions in which the model lies on a facet of its convex hull, each once, largest facets first."""
+    hull = convex_hull(mesh.vertices)
+    order = np.lexsort((*hull.normals.T, -np.round(hull.areas_mm2, 6)))
+    same = cos(radians(SAME_FACET_DEG))
+    directions = np.zeros((0, 3))
+    for direction in -hull.normals[order[hull.areas_mm2[order] > 0]]:
+        if len(directions) == MOST_FACETS:
+            break
+        if direction @ UP < same and not np.any(directions @ direction > same):
+            directions = np.concatenate([directions, direction[None]])
+    return directions
+
+
+def _rests(mesh: Mesh, directions: Floats) -> NDArray[np.bool_]:
+    """(k,) whether the centre of mass stays over the base when the model is leaned by LEAN_DEG to any side.
+
+    The base reaches as far to each of 64 sides as its vertices within the platform's tolerance do.
+    """
+    hull = convex_hull(mesh.vertices)
+    centre = _centre_of_mass(mesh)
+    stable = np.zeros(len(directions), np.bool_)
+    for k, direction in enumerate(directions):
+        heights = hull.vertices @ direction
+        lowest = float(heights.min())
+        base = hull.vertices[heights <= lowest + PLATFORM_TOLERANCE_MM] - centre
+        reach = (base @ _rotation(direction)[:2].T @ SIDES).max(axis=0)
+        stable[k] = bool(reach.min() >= tan(radians(LEAN_DEG)) * (float(centre @ direction) - lowest))
+    return stable
+
+
+def _centre_of_mass(mesh: Mesh) -> Floats:
+    """(3,) by the divergence theorem: tetrahedra from the box's centre to every face."""
+    middle = 0.5 * (mesh.bounds_mm[0] + mesh.bounds_mm[1])
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] - middle for k in range(3))
+    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    centre: Floats = middle + volumes @ (a + b + c) / (4.0 * volumes.sum())
+    return centre
+
+
+def _turns(direction: Floats) -> tuple[float, float]:
+    """Turns about x, then y, degrees, that bring a unit direction upright."""
+    x, y, z = (float(value) for value in direction)
+    across = hypot(y, z)
+    about_x = atan2(y, z) if across > 1e-6 else 0.0
+    return degrees(about_x), degrees(atan2(-x, across))
+
+
+def _rotation(direction: Floats) -> Floats:
+    """(3, 3) rotation that brings a unit direction upright, made of those turns."""
+    x, y = (radians(value) for value in _turns(direction))
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cos(x), -sin(x)], [0.0, sin(x), cos(x)]])
+    about_y = np.array([[cos(y), 0.0, sin(y)], [0.0, 1.0, 0.0], [-sin(y), 0.0, cos(y)]])
+    rotation: Floats = about_y @ about_x
+    return rotation
+
+
+def in_words(orientation: Orientation) -> str:
+    """How the model is turned, in the order process.rotate_deg takes, and whether it needs holding."""
+    turns = [(_angle(angle), axis) for angle, axis in zip(orientation.turns_deg, "xy", strict=True)]
+    words = ", then ".join(f"{angle} about {axis}" for angle, axis in turns if angle != "0")
+    return (f"turned {words}" if words else "as it stands") + ("" if orientation.stable else ", rests nowhere without a raft")
+
+
+def _angle(value_deg: float) -> str:
+    return f"{round(value_deg, 1) + 0.0:g}"

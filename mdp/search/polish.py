@@ -1,0 +1,158 @@
+"""Polish: the sequence of cuts that a search ends with, made shorter and better, off the grid of candidates; never worse.
+
+Cuts that save nothing any more are left out, every plane is moved as long as the forecast of what stays risky falls and the
+plane may still be cut, and where that made room further cuts are added. What counts is the cost after cutting it all again.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import cos, radians, sin
+
+import numpy as np
+
+from mdp.mesh import Floats
+from mdp.overhang import BASE_TOLERANCE_MM
+from mdp.plane import Plane
+from mdp.search.forecast import Surface
+from mdp.search.node import Node
+from mdp.search.problem import Problem
+from mdp.search.ranking import rank_by_trade_off
+
+STEPS = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))  # of the offset step, and degrees: the grid's are about 4.5 apart
+ROUNDS = 4  # moves by one step before the next smaller one
+TRIES = 2  # moved planes that are cut before one stays where it is
+ENOUGH = 1e-3  # a move that saves a smaller share of the risky area is not worth a cut
+SAME_MM2 = 1e-6
+TRADE_OFF = 4.0  # of further cuts, as the beam's second slot
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A sequence of cuts: the nodes from the uncut model to the last one."""
+
+    nodes: list[Node]
+
+    @classmethod
+    def to(cls, node: Node) -> "Chain":
+        """The sequence that leads to a node."""
+        nodes = [node]
+        while nodes[-1].parent is not None:
+            nodes.append(nodes[-1].parent)
+        return cls(nodes[::-1])
+
+    @property
+    def planes(self) -> list[Plane]:
+        """The planes of the cuts in the order in which they are made."""
+        return [cut.base for cut in self.nodes[-1].cuts]
+
+    @property
+    def cost_mm2(self) -> float:
+        """Risky area that the parts leave."""
+        return self.nodes[-1].cost_mm2
+
+
+def polish(problem: Problem, node: Node) -> Node:
+    """The node with its cuts polished and, where there is room, further ones."""
+    best = _move_planes(problem, _drop_cuts(problem, Chain.to(node)))
+    longer = _add_cuts(problem, best)
+    if len(longer.nodes) > len(best.nodes):
+        longer = _move_planes(problem, _drop_cuts(problem, longer))
+    return min((node, best.nodes[-1], longer.nodes[-1]), key=lambda last: (last.cost_mm2, len(last.cuts)))
+
+
+def _drop_cuts(problem: Problem, best: Chain) -> Chain:
+    """The chain without the cuts that save nothing, the one made first tried first."""
+    position = len(problem.start.cuts)
+    while position < len(best.planes) and not problem.late():
+        surface, planes = _surface(best.nodes[position]), best.planes[position:]
+        shorter = None
+        if surface.left_mm2(planes[1:]) <= surface.left_mm2(planes) + SAME_MM2:
+            shorter = _recut(problem, best, position, planes[1:])
+        if shorter is not None and shorter.cost_mm2 <= best.cost_mm2 + SAME_MM2:
+            best = shorter
+        else:
+            position += 1
+    return best
+
+
+def _move_planes(problem: Problem, best: Chain) -> Chain:
+    """The chain with every plane moved to where less stays risky, the one cut first moved first."""
+    enough_mm2 = ENOUGH * problem.model.risky_mm2
+    for position in range(len(problem.start.cuts), len(best.planes)):
+        if problem.late():
+            break
+        node = best.nodes[position]
+        surface = _surface(node)
+        ever_better = list(_climb(problem, surface, best, position))
+        for planes in ever_better[: -TRIES - 1 : -1]:
+            if problem.late() or node.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
+                break
+            moved = _recut(problem, best, position, planes)
+            if moved is not None and moved.cost_mm2 < best.cost_mm2:
+                best = moved
+                break
+    return best
+
+
+def _add_cuts(problem: Problem, chain: Chain) -> Chain:
+    """The chain with further cuts, the best one at a time, while they save something."""
+    nodes = list(chain.nodes)
+    while not problem.full(nodes[-1]) and not problem.late():
+        node, table = nodes[-1], problem.table(nodes[-1])
+        cuts = (
+            problem.cut(node, table.plane(candidate.row), float(table.scored.residual_mm2[candidate.row]))
+            for candidate in rank_by_trade_off([table], TRADE_OFF, node.cost_mm2)
+        )
+        following = next((child for child in cuts if child is not None), None)
+        if following is None or following.cost_mm2 >= node.cost_mm2:
+            break
+        nodes.append(following)
+    return Chain(nodes)
+
+
+def _recut(problem: Problem, chain: Chain, position: int, planes: Sequence[Plane]) -> Chain | None:
+    """The chain with other planes from a position on; None when they cannot be cut."""
+    rest = problem.replay(chain.nodes[position], planes)
+    return None if rest is None else Chain([*chain.nodes[:position], *rest])
+
+
+def _surface(node: Node) -> Surface:
+    return Surface.of(node.remainder, node.terms)
+
+
+def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> Iterator[list[Plane]]:
+    """Ever better planes from a position on, the first of them moved, the best ones last. surface: before the cut there."""
+    here, *later = chain.planes[position:]
+    least_mm2 = surface.left_mm2([here, *later])
+    pivot = _middle(chain.nodes[position + 1])
+    for share, turn_deg in STEPS:
+        for _ in range(ROUNDS):
+            before_mm2 = least_mm2
+            for plane in _neighbours(here, pivot, share * problem.settings.offset_step_mm, turn_deg):
+                left_mm2 = surface.left_mm2([plane, *later])
+                if left_mm2 < least_mm2 - SAME_MM2 and problem.allowed(chain.nodes[position], plane):
+                    here, least_mm2 = plane, left_mm2
+                    yield [here, *later]
+            if least_mm2 == before_mm2 or problem.late():
+                break
+
+
+def _neighbours(plane: Plane, pivot: Floats, step_mm: float, turn_deg: float) -> Iterator[Plane]:
+    """The planes next to one: shifted both ways, and leaning four ways about a point with and without a shift."""
+    yield from (Plane(plane.normal, plane.offset_mm + shift) for shift in (-step_mm, step_mm))
+    side = np.cross(plane.normal, np.eye(3)[int(np.argmin(np.abs(plane.normal)))])
+    side = side / np.linalg.norm(side)
+    other = np.cross(plane.normal, side)
+    height_mm = plane.offset_mm - float(plane.normal @ pivot)
+    for lean in (side, -side, other, -other):
+        normal = cos(radians(turn_deg)) * plane.normal + sin(radians(turn_deg)) * lean
+        offset_mm = float(normal @ pivot) + height_mm
+        yield from (Plane(normal, offset_mm + shift) for shift in (0.0, -step_mm, step_mm))
+
+
+def _middle(node: Node) -> Floats:
+    """(3,) middle of the corners of a node's last cut face."""
+    base, points = node.cuts[-1].base, node.remainder.mesh.vertices
+    heights = base.heights_mm(points)
+    middle: Floats = points[heights >= heights.max() - BASE_TOLERANCE_MM].mean(axis=0)
+    return middle

@@ -1,0 +1,162 @@
+"""Problem: what one search holds fixed, which planes may cut a node, and what a cut makes of it."""
+
+from collections.abc import Sequence
+from time import perf_counter
+
+import numpy as np
+
+from mdp.clearance import allowed_poses
+from mdp.cut import below, solid_of
+from mdp.mesh import Floats, Ints, Mesh
+from mdp.overhang import BASE_TOLERANCE_MM, standing, threshold
+from mdp.plane import Plane
+from mdp.search.candidates import Bounds, Feasibility, Reason, bounds, bounds_of, check, platform_disc, refusals, score_candidates
+from mdp.search.cost import cost_terms
+from mdp.search.features import Model
+from mdp.search.node import Cut, Node
+from mdp.search.ranking import CandidateTable
+from mdp.sweep.sweep import gains
+from mdp.zone import NO_ZONES, Zones
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4, "objective": "risky"}
+
+FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the origin would have too many planes
+
+
+class Problem:
+    """Settings, machine and bounds of a search, its root, and how many candidates were looked at.
+
+    start: the node that the search goes on from, the root unless a person's planes have cut that already.
+    """
+
+    def __init__(self, mesh: Mesh, profile: Profile, zones: Zones = NO_ZONES) -> None:
+        settings = profile.search
+        if settings.method == "published":
+            settings = settings.model_copy(update=PUBLISHED)
+        self.settings = settings
+        self.machine = profile.machine if settings.clearance else without_limits(profile.machine)
+        self.mesh, self.zones = mesh, zones
+        self.terms = cost_terms(profile, settings, zones.no_seam)
+        self.root = self.start = Node(solid_of(mesh), (), self.terms)
+        radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
+        self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
+        self.platform_disc = platform_disc(mesh, settings)
+        self.limits: Bounds = bounds(mesh, self.machine, settings, keep=zones.keep)
+        self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
+        savable_mm2 = self._savable_mm2()
+        self.least_gain_mm2 = settings.least_gain * savable_mm2
+        self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
+        self._evaluated: list[int] = []  # appended to by several threads
+        self._began = perf_counter()
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Have everything that asks whether it is late leave off."""
+        self._stopped = True
+
+    @property
+    def evaluated(self) -> int:
+        """How many candidates were looked at."""
+        return sum(self._evaluated)
+
+    def late(self) -> bool:
+        """Whether the time limit is reached."""
+        limit = self.settings.time_limit_s
+        return self._stopped or (limit is not None and perf_counter() - self._began >= limit)
+
+    def _savable_mm2(self) -> float:
+        """The risky area that a gain is a share of: without the faces on the platform, which no cut can save, but as published
+        with them."""
+        mesh, risky = self.root.remainder.mesh, self.root.remainder.risky
+        counted = risky if self.settings.method == "published" else risky & ~standing(mesh)
+        return float(mesh.areas_mm2[counted].sum())
+
+    def full(self, node: Node) -> bool:
+        """Whether a node has as many parts as are allowed."""
+        return len(node.cuts) >= self.settings.most_parts - 1
+
+    def table(self, node: Node, large: bool = False) -> CandidateTable:
+        """The scored candidates of a node; large: also those that gain enough only for a part of the preferred volume."""
+        least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
+        scored = score_candidates(node.remainder, self.limits, self.settings.offset_step_mm, self.terms, least_mm2)
+        self._evaluated.append(scored.evaluated)
+
+        def check_planes(direction: Ints, offset_mm: Floats) -> Feasibility:
+            return check(node.remainder, self.limits, self.settings, direction, offset_mm)
+
+        saved_mm2 = self.model.risky_mm2 - node.cost_mm2
+        return CandidateTable(scored, self.limits, saved_mm2, node.residual_mm2, check_planes, self.least_gain_mm2)
+
+    def refusals(self) -> dict[Reason, int]:
+        """How many of the root's candidates each reason takes."""
+        return refusals(self.root.remainder, self.limits, self.settings, self.terms, self.least_gain_mm2)
+
+    def allowed(self, node: Node, plane: Plane) -> bool:
+        """Whether a plane, on the grid of candidates or off it, may cut a node."""
+        if 0.0 < abs(plane.offset_mm) < FINEST * self.settings.offset_step_mm:
+            return False
+        return bool(self.check_plane(node, plane, self.bounds_along(plane.normal[None])).reason[0] == Reason.FEASIBLE)
+
+    def bounds_along(self, directions: Floats) -> Bounds:
+        """The bounds of (k, 3) directions that are not sampled."""
+        volume_mm3, keep = self.model.volume_mm3, self.zones.keep
+        return bounds_of(directions, self.platform_disc, volume_mm3, self.machine, self.settings, keep)
+
+    def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
+        """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""
+        own = self.settings.model_copy(update={"offset_step_mm": self.step_mm(plane.offset_mm)})
+        return check(node.remainder, limits, own, np.zeros(1, np.int32), np.array([plane.offset_mm]))
+
+    def cut(self, node: Node, plane: Plane, residual_mm2: float | None = None) -> Node | None:
+        """The node after a cut; None when nothing is cut off or no pose serves the part.
+
+        residual_mm2: what the cut costs for ever, where that is known.
+        """
+        vertices = node.remainder.mesh.vertices
+        upper, rest = vertices[plane.heights_mm(vertices) > 0.0], below(node.solid, plane)
+        if len(upper) == 0 or rest.is_empty():
+            return None
+        if residual_mm2 is None:
+            residual_mm2 = self._residual_mm2(node, plane)
+        cuts = (*node.cuts, Cut(plane, node.solid, residual_mm2))
+        following = Node(rest, cuts, self.terms, node)
+        if self.settings.clearance:
+            lower = following.remainder.mesh.vertices
+            corners = np.vstack([upper, lower[plane.heights_mm(lower) >= -BASE_TOLERANCE_MM]])
+            if not allowed_poses(self.machine, plane.normal, corners):
+                return None
+        return following
+
+    def _residual_mm2(self, node: Node, plane: Plane) -> float:
+        """What a cut costs for ever: what stays risky on the part, and its seam."""
+        step_mm = self.step_mm(plane.offset_mm)
+        swept = gains(node.remainder, plane.normal[None], step_mm, threshold(self.terms.angle_deg))
+        column = round(plane.offset_mm / step_mm) - int(swept.first[0])
+        return float(swept.residual_mm2[0, column] + self.terms.seam_mm * swept.rim_mm[0, column])
+
+    def step_mm(self, offset_mm: float) -> float:
+        """Step of a grid of offsets that an offset lies on, near that of the candidates' grid."""
+        step_mm, size_mm = self.settings.offset_step_mm, abs(offset_mm)
+        return size_mm / max(1, round(size_mm / step_mm)) or step_mm
+
+    def replay(self, node: Node, planes: Sequence[Plane]) -> list[Node] | None:
+        """The nodes after cutting with the planes in turn, the given one first; None when one of them may not or cannot be
+        cut."""
+        nodes = [node]
+        for plane in planes:
+            following = self.cut(nodes[-1], plane) if self.allowed(nodes[-1], plane) else None
+            if following is None:
+                return None
+            nodes.append(following)
+        return nodes
+
+
+def without_limits(machine: Machine) -> Machine:
+    """A machine whose rotary axes, if it has any, turn as far as one likes."""
+    if not machine.tilts:
+        return machine
+    wide = {"limits_deg": (-1e6, 1e6), "budget_deg": None}
+    tilt, turn = machine.tilt.model_copy(update=wide), machine.turn.model_copy(update=wide)
+    return machine.model_copy(update={"tilt": tilt, "turn": turn})

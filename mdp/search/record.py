@@ -1,0 +1,183 @@
+"""Record: everything a search looked at and what became of it, as arrays to train a ranker on.
+
+One row a candidate that was ranked in a stage, cut or not; one row a node (the model is node 0). A node's outcome is the least
+final cost over all decompositions that go through it, those that stop there included, as share of the model's risky area.
+A node that the beam left behind was never followed: its outcome is its own cost, and `node_expanded` tells it apart.
+"""
+
+import io
+import zipfile
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats, Ints
+from mdp.plane import Plane
+from mdp.search.features import COLUMNS, Measures, Model, features
+
+NO_NODE = -1
+FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file can carry; the clock would change the bytes
+
+Arrays = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Offer:
+    """A ranked candidate. parent: signature of the node it would cut; round: the one whose residual threshold let it in."""
+
+    parent: Hashable
+    plane: Plane
+    measures: Measures
+    round: int
+
+
+@dataclass(frozen=True)
+class Child:
+    """What an offer led to. row: the offer's number; signature: equal for equal solids, so that a twin is known again;
+    cost_mm2: the risky area when the search stops there."""
+
+    row: int
+    signature: Hashable
+    cost_mm2: float
+
+
+@dataclass(eq=False)
+class _Candidate:
+    stage: int
+    parent: int
+    offer: Offer
+    features: Floats
+    chosen: bool = False
+    child: int = NO_NODE
+
+
+@dataclass(eq=False)
+class _Node:
+    cost: float
+    stage: int
+    parent: int
+    features: Floats = field(default_factory=lambda: np.full(len(COLUMNS), np.nan))
+    expanded: bool = False
+
+
+class Trace:
+    """Collects a search: `begin_stage`, then `add` for every ranking of that stage, at the end `arrays` or `to_bytes`."""
+
+    def __init__(self, name: str, model: Model, root: Hashable) -> None:
+        """root: signature of the uncut model, whose risky area is the measure of all shares."""
+        self.name, self.model = name, model
+        self._number: dict[Hashable, int] = {root: 0}
+        self._nodes = [_Node(1.0 if model.risky_mm2 > 0 else 0.0, 0, NO_NODE)]
+        self._candidates: list[_Candidate] = []
+        self._stage = 0
+        self._known: dict[tuple[int, bytes, float], _Candidate] = {}
+
+    def begin_stage(self, beam: Sequence[Hashable]) -> None:
+        """The next stage begins: the nodes with these signatures are the ones that are cut."""
+        self._stage += 1
+        self._known.clear()
+        for signature in beam:
+            self._nodes[self._number[signature]].expanded = True
+
+    def add(self, offers: Sequence[Offer], children: Sequence[Child]) -> None:
+        """Candidates that competed in this stage, and the cuts that were made of them, twins of known solids included.
+
+        What is added several times in a stage is one row.
+        """
+        rows = features([offer.measures for offer in offers], self.model)
+        candidates = [self._candidate(offer, row) for offer, row in zip(offers, rows, strict=True)]
+        for child in children:
+            candidate = candidates[child.row]
+            if candidate.child == NO_NODE:
+                candidate.chosen = child.signature not in self._number
+                candidate.child = self._node(child, candidate)
+
+    def outcomes(self) -> Floats:
+        """(nodes,) outcome of every node as share of the model's risky area."""
+        best = np.array([node.cost for node in self._nodes])
+        links = [(candidate.parent, candidate.child) for candidate in self._candidates if candidate.child != NO_NODE]
+        changed = True
+        while changed:  # a twin can link a node to one made earlier, so one pass from the last node to the first may not do
+            changed = False
+            for parent, child in reversed(links):
+                if best[child] < best[parent]:
+                    best[parent], changed = best[child], True
+        return best
+
+    def arrays(self) -> Arrays:
+        """All that was collected.
+
+        Candidates (n rows): features, parent_features (NaN where the parent is the model), stage (1, 2, ...), round, parent,
+        normal, offset_mm, chosen (it made a new node), child (its node or that of its twin; -1: not cut), outcome (the
+        child's; NaN: not cut). Nodes (k rows): node_cost and node_outcome (shares), node_stage, node_parent, node_expanded.
+        And columns, model, risky_mm2, volume_mm3, radius_mm.
+        """
+        outcomes = self.outcomes()
+        rows, nodes = self._candidates, self._nodes
+        child = _integers(row.child for row in rows)
+        return {
+            "features": _table([row.features for row in rows], len(COLUMNS)),
+            "parent_features": _table([nodes[row.parent].features for row in rows], len(COLUMNS)),
+            "stage": _integers(row.stage for row in rows),
+            "round": _integers(row.offer.round for row in rows),
+            "parent": _integers(row.parent for row in rows),
+            "normal": _table([row.offer.plane.normal for row in rows], 3),
+            "offset_mm": np.array([row.offer.plane.offset_mm for row in rows], dtype=np.float64),
+            "chosen": np.array([row.chosen for row in rows], dtype=np.bool_),
+            "child": child,
+            "outcome": np.where(child == NO_NODE, np.nan, outcomes[child]),
+            "node_cost": np.array([node.cost for node in nodes]),
+            "node_outcome": outcomes,
+            "node_stage": _integers(node.stage for node in nodes),
+            "node_parent": _integers(node.parent for node in nodes),
+            "node_expanded": np.array([node.expanded for node in nodes]),
+            "columns": np.array(COLUMNS),
+            "model": np.array(self.name),
+            "risky_mm2": np.array(self.model.risky_mm2),
+            "volume_mm3": np.array(self.model.volume_mm3),
+            "radius_mm": np.array(self.model.radius_mm),
+        }
+
+    def to_bytes(self) -> bytes:
+        """The arrays as the content of an .npz file; the same search gives the same bytes."""
+        return npz(self.arrays())
+
+    def _candidate(self, offer: Offer, row: Floats) -> _Candidate:
+        parent = self._number[offer.parent]
+        key = (parent, offer.plane.normal.tobytes(), offer.plane.offset_mm)
+        if key not in self._known:
+            self._known[key] = _Candidate(self._stage, parent, offer, row)
+            self._candidates.append(self._known[key])
+        return self._known[key]
+
+    def _node(self, child: Child, candidate: _Candidate) -> int:
+        """The number of a child, a new one unless it is a twin."""
+        number = self._number.setdefault(child.signature, len(self._nodes))
+        if number == len(self._nodes):
+            cost = child.cost_mm2 / self.model.risky_mm2
+            self._nodes.append(_Node(cost, self._stage, candidate.parent, candidate.features))
+        return number
+
+
+def npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Arrays as a compressed .npz that numpy.load reads, without a date in it."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, array, allow_pickle=False)
+            entry = zipfile.ZipInfo(f"{name}.npy", date_time=FIRST_DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, member.getvalue())
+    return content.getvalue()
+
+
+def _integers(values: Iterable[int]) -> Ints:
+    return np.fromiter(values, np.int32)
+
+
+def _table(rows: Sequence[Floats], columns: int) -> Floats:
+    return np.array(rows, dtype=np.float64).reshape(-1, columns)

@@ -1,0 +1,291 @@
+"""Search: from a mesh to its ordered parts, by a beam of cuts that is polished or as published in 2020.
+
+Otherwise than published: the best node ever seen is the result, the search goes on while any node has a useful child, a
+candidate that can no longer beat it is dropped (what a cut leaves risky above its plane is never repaired later, so that sum
+bounds all descendants), two orders of the same cuts take one slot, the slots of the beam differ in what they look for
+(beam), and the best results are polished off the grid of candidates (polish).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from mdp.clearance import allowed_poses
+from mdp.cut import mesh_of
+from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
+from mdp.kernels.threads import ahead
+from mdp.mesh import Mesh
+from mdp.overhang import risky_above
+from mdp.pedestal import on_pedestal
+from mdp.plan_file import MOST_PARTS, PlanFile
+from mdp.plane import PLATFORM
+from mdp.pose import Pose, level, poses, rotation
+from mdp.pose_sequence import least_rotation
+from mdp.search.beam import Beam
+from mdp.search.by_hand import check_model, cut_by_hand
+from mdp.search.candidates import REASONS
+from mdp.search.front import Front, front_row
+from mdp.search.node import Node
+from mdp.search.polish import polish
+from mdp.search.problem import Problem
+from mdp.search.ranker import RANKERS
+from mdp.search.ranking import rank_classic
+from mdp.search.record import Trace
+from profiles.errors import PlanError
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where the search stands."""
+
+    stage: int
+    beam: int
+    best_share: float
+
+
+def decompose(
+    mesh: Mesh,
+    name: str,
+    profile: Profile,
+    ranker: str = "classic",
+    on_stage: Callable[[Progress], None] | None = None,
+    on_record: Callable[[bytes], None] | None = None,
+    by_hand: PlanFile | None = None,
+    parts: int | None = None,
+) -> Decomposition:
+    """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible.
+
+    on_record is given what the search looked at and what became of it, as the content of an .npz file. by_hand: planes that are
+    cut first and stay, and zones; parts: so many at most, instead of as many as pay. Raises PlanError for a plane by hand that
+    cannot be cut.
+    """
+    began = perf_counter()
+    if parts is not None:
+        check_part_count(parts)
+        most = max(parts, profile.search.most_parts)
+        profile = profile.model_copy(update={"search": profile.search.model_copy(update={"most_parts": most})})
+    mesh = on_pedestal(mesh, profile.search.pedestal_mm)
+    planned = PlanFile("") if by_hand is None else by_hand
+    check_model(planned, mesh, name)
+    problem = Problem(mesh, profile, planned.zones)
+    problem.start = cut_by_hand(problem, planned)
+    if parts is not None and parts <= len(problem.start.cuts):
+        raise PlanError(f"--parts {parts}: the planes by hand of {planned.name} alone make {len(problem.start.cuts) + 1} parts")
+    trace = None if on_record is None else Trace(name, problem.model, problem.start.signature)
+    report = on_stage or (lambda progress: None)
+    if profile.search.method == "published":
+        best, rounds = _search_as_published(problem, report)
+        front = Front(problem.start)
+        front.offer(best)
+    else:
+        best, front, rounds = _search_beam(problem, ranker, trace, report)
+    if on_record is not None and trace is not None:
+        on_record(trace.to_bytes())
+    if parts is not None:
+        best = front.choose(parts)
+    rows = tuple(front_row(node, problem.terms, node is best) for node in front.nodes)
+    notes = (*_notes(problem, best, parts), *_no_seam_note(problem))
+    return _decomposition(problem, best, profile, Outcome(name, ranker, rounds, perf_counter() - began, rows, notes))
+
+
+def cut_by_plan(
+    mesh: Mesh, name: str, profile: Profile, plan: PlanFile, ranker: str = "classic", parts: int | None = None
+) -> Decomposition:
+    """The parts of a closed mesh by the planes of a plan, without a search; parts: of its row with at most so many.
+
+    The rows of the front are those of the plan, the one that is cut measured anew. Raises PlanError for a plan of another model
+    and for a plane that cannot be cut.
+    """
+    began = perf_counter()
+    if parts is not None:
+        check_part_count(parts)
+        plan = replace(plan, parts=plan.row(parts))
+    for number, part in enumerate(plan.parts, start=2):
+        if part.plane is None:
+            missing = "normal" if part.normal is None else "offset_mm"
+            raise PlanError(f"plan {plan.name}: part {number} has no {missing}: decompose --planes {plan.name} has it found")
+    mesh = on_pedestal(mesh, profile.search.pedestal_mm)
+    check_model(plan, mesh, name)
+    problem = Problem(mesh, profile, plan.zones)
+    node = cut_by_hand(problem, plan)
+    others = {len(row.parts): row for row in plan.front}
+    rows = {count: FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2) for count, row in others.items()}
+    rows[len(node.cuts)] = front_row(node, problem.terms, chosen=True)
+    front = tuple(rows[count] for count in sorted(rows))
+    notes = _fewer_parts(parts, len(plan.parts) + 1, f"the plan {plan.name} holds")
+    return _decomposition(problem, node, profile, Outcome(name, ranker, 0, perf_counter() - began, front, notes))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a search, or a plan in its place, leaves beside the parts."""
+
+    name: str
+    ranker: str
+    rounds: int
+    search_s: float
+    front: tuple[FrontRow, ...]
+    notes: tuple[str, ...]
+
+
+def _decomposition(problem: Problem, node: Node, profile: Profile, outcome: Outcome) -> Decomposition:
+    mesh = problem.mesh
+    parts = _parts(node, problem.machine, profile.process.self_supporting_angle_deg, profile.search.clearance)
+    folded = folded_mm3(mesh, parts)
+    return Decomposition(
+        name=outcome.name,
+        mesh=mesh,
+        parts=parts,
+        beam_width=profile.search.beam_width,
+        ranker=outcome.ranker,
+        risky_area_mm2=problem.root.risky_mm2,
+        residual_area_mm2=sum(part.risky_area_mm2 for part in parts),
+        candidates_evaluated=problem.evaluated,
+        rounds=outcome.rounds,
+        search_s=outcome.search_s,
+        notes=(*_folded_note(folded), *outcome.notes),
+        folded_mm3=folded,
+        front=outcome.front,
+    )
+
+
+def check_part_count(parts: int) -> None:
+    """Raise PlanError for a number of parts that cannot be."""
+    if not 1 <= parts <= MOST_PARTS:
+        raise PlanError(f"--parts is {parts}: 1 to {MOST_PARTS} is allowed")
+
+
+def folded_mm3(mesh: Mesh, parts: Sequence[Part]) -> float:
+    """Volume by which the parts differ from a mesh whose surface passes through itself a little, 0 for others.
+
+    A mesh's volume counts a place as often as the surface winds around it, inside out places less than once; a cut counts it
+    once or not at all.
+    """
+    difference = abs(mesh.volume_mm3 - sum(part.volume_mm3 for part in parts))
+    return difference if VOLUME_TOLERANCE * mesh.volume_mm3 < difference <= MOST_FOLDED * mesh.volume_mm3 else 0.0
+
+
+def _folded_note(folded: float) -> tuple[str, ...]:
+    text = f"the surface passes through itself: {folded:.3g} mm3 that it winds around twice or inside out are counted once"
+    return (text,) if folded > 0 else ()
+
+
+def _search_beam(
+    problem: Problem, ranker: str, trace: Trace | None, report: Callable[[Progress], None]
+) -> tuple[Node, Front, int]:
+    """The node to take of a beam, the finalists polished, the best for every number of parts, and after how many stages."""
+    beam = Beam(problem, RANKERS[ranker], trace)
+    stage = 0
+    try:
+        while any(beam.nodes) and _continues(problem, stage):
+            stage += 1
+            beam.advance()
+            held = sum(node is not None for node in beam.nodes)
+            report(Progress(stage, held, beam.best.cost_mm2 / problem.model.risky_mm2))
+        best = _polish_finalists(problem, beam, stage, report)
+        return best if problem.terms.seam_mm <= 0.0 else beam.front.choose(), beam.front, stage
+    except KeyboardInterrupt:
+        problem.stop()
+        raise
+    finally:
+        beam.close()
+
+
+def _polish_finalists(problem: Problem, beam: Beam, stage: int, report: Callable[[Progress], None]) -> Node:
+    """The best of a beam and of its polished finalists."""
+    best = beam.best
+    finalists = beam.finalists() if problem.settings.polish and problem.model.risky_mm2 > 0 else []
+    for coming in [ahead(polish, problem, node) for node in finalists]:
+        polished = coming.result()
+        beam.front.offer(polished)
+        best = min(best, polished, key=lambda node: (node.cost_mm2, len(node.cuts)))
+        report(Progress(stage, 1, best.cost_mm2 / problem.model.risky_mm2))
+    return best
+
+
+def _search_as_published(problem: Problem, report: Callable[[Progress], None]) -> tuple[Node, int]:
+    """The best node of the authors' loop, and after how many stages.
+
+    It ends as soon as the beam's best does not rise, keeps twins, and stops looking at candidates once one of a good parent
+    is useless.
+    """
+    best, beam, stage = problem.start, [problem.start], 0
+    while _continues(problem, stage):
+        stage += 1
+        tables = [problem.table(node) for node in beam]
+        useless = max(table.saved_mm2 for table in tables) / problem.model.risky_mm2
+        children: list[Node] = []
+        for candidate in rank_classic(tables, problem.model.risky_mm2, np.inf, useless):
+            table, row = tables[candidate.table], candidate.row
+            child = problem.cut(beam[candidate.table], table.plane(row), float(table.scored.residual_mm2[row]))
+            children += [child] if child is not None else []
+            if len(children) == problem.settings.beam_width:
+                break
+        highest = min(children, key=lambda node: node.cost_mm2, default=best)
+        if highest.cost_mm2 >= best.cost_mm2:
+            break
+        best, beam = highest, children
+        report(Progress(stage, len(beam), best.cost_mm2 / problem.model.risky_mm2))
+    return best, stage
+
+
+def _continues(problem: Problem, stage: int) -> bool:
+    cuts = len(problem.start.cuts) + stage
+    return problem.model.risky_mm2 > 0 and cuts < problem.settings.most_parts - 1 and not problem.late()
+
+
+def _notes(problem: Problem, best: Node, wanted: int | None) -> tuple[str, ...]:
+    """What a person should know of the outcome."""
+    parts = len(best.cuts) + 1
+    if problem.model.risky_mm2 <= 0 and parts == 1:
+        return ("no face needs support: the model is printed straight up as one part",)
+    if problem.late():
+        return (f"search.time_limit_s = {problem.settings.time_limit_s:g} ended the search; the best so far is used",)
+    if parts > 1 or wanted == 1:
+        return _fewer_parts(wanted, parts, "the search found")
+    counts = problem.refusals()
+    shares = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
+    return (f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(shares)}",)
+
+
+def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
+    return (f"--parts {wanted}: {where} no more than {parts}",) if wanted is not None and parts < wanted else ()
+
+
+def _no_seam_note(problem: Problem) -> tuple[str, ...]:
+    free = problem.zones.no_seam and problem.terms.seam_mm <= 0.0
+    return ("[[no_seam]] changes nothing where seams cost nothing (search.objective, search.seam_mm)",) if free else ()
+
+
+def _parts(node: Node, machine: Machine, angle_deg: float, clearance: bool) -> tuple[Part, ...]:
+    """Parts in print order: what remains first, then the cuts, last one first."""
+    solids = [(PLATFORM, node.remainder.mesh), *((c.base, mesh_of(c.solid)) for c in reversed(node.cuts))]
+    options = [[level(machine)]]
+    for base, mesh in solids[1:]:
+        options.append(allowed_poses(machine, base.normal, mesh.vertices) if clearance else poses(machine, base.normal))
+
+    def fits(position: int, pose: Pose) -> bool:
+        base, mesh = solids[position]
+        return not clearance or pose in allowed_poses(machine, base.normal, mesh.vertices, pose.turn_deg)
+
+    parts = []
+    for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options, fits), strict=True)):
+        risky = risky_above(mesh, base, angle_deg) if position else node.remainder.risky
+        parts.append(
+            Part(
+                index=position + 1,
+                mesh=mesh,
+                base=base,
+                pose=pose,
+                rotation=rotation(machine, pose),
+                volume_mm3=mesh.volume_mm3,
+                risky_area_mm2=float(mesh.areas_mm2[risky].sum()),
+            )
+        )
+    return tuple(parts)

@@ -1,0 +1,1 @@
+"""Sweep: all offsets of one direction evaluated in one pass over the faces."""

@@ -1,0 +1,268 @@
+"""Components: whether the solid below each offset of a direction hangs together with the platform.
+
+The surface below a rising plane gains a component at a vertex without a lower neighbour and components join only at a vertex
+whose lower neighbours form several runs around it (PL Morse theory, ties of height broken by number); all other vertices are
+regular and need no look. So the components form a merge tree: its leaves are the lowest vertices, and a vertex belongs to the
+leaf that walking down from it leads to. A lowest vertex around which solid lies beneath is the floor of a void or bowl, not a
+floating piece: it is joined to its anchor, the surface that a ray into the solid meets, which lies lower. Solids join only where
+surfaces join, so the count of pieces is exact for the solid, closed voids and handles included.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import int_table, ints
+from mdp.kernels.kernel import inlined, part
+from mdp.kernels.sorting import counting_sort
+from mdp.mesh import Floats, Ints
+from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.sweep.facets import Rings
+from mdp.sweep.integrals import OffsetGrid, column_over
+from mdp.sweep.rays import TriangleTree, first_hit
+
+UNKNOWN = -2
+
+
+class Topology(NamedTuple):
+    """What the components need of a solid: its triangles, (n, 3) normals of the vertices and the rings around them, the vertices
+    on the platform, (n,) the face that a ray from each vertex into the solid meets (-1: none, UNKNOWN: not looked up)."""
+
+    triangles: TriangleTree
+    vertex_normals: Floats
+    rings: Rings
+    standing: Ints
+    anchors: Ints
+
+
+class View(NamedTuple):
+    """A solid seen along one direction: offsets, (n,) cosines of the vertex normals, and the vertices that are not regular."""
+
+    grid: OffsetGrid
+    cosines: Floats
+    critical: Ints
+
+
+class MergeTree(NamedTuple):
+    """A merge tree under construction, from below or from above (up): heights of the vertices and the rings around them, the
+    vertices that are not regular, (n,) the leaf that each vertex belongs to (-1: not known), and (n,) room for a path."""
+
+    heights: Floats
+    rings: Rings
+    critical: Ints
+    leaf: Ints
+    path: Ints
+    up: bool
+
+
+@part
+def find_critical(cosines: Floats, flatness: Floats, heights: Floats, rings: Rings, critical: Ints) -> int:
+    """Vertices that are not regular, or have no single ring of neighbours; returns how many. cosines: of vertex normals and d."""
+    starts, neighbours = rings.starts, rings.neighbours
+    many = 0
+    for v in range(len(heights)):
+        if abs(cosines[v]) >= flatness[v]:
+            turns = 0
+            last = before(heights, neighbours[starts[v + 1] - 1], v, False) if starts[v] < starts[v + 1] else False
+            for at in range(starts[v], starts[v + 1]):
+                lower = before(heights, neighbours[at], v, False)
+                turns += int(lower != last)
+                last = lower
+            if turns != 2 or flatness[v] < 0.0:
+                critical[many] = v
+                many += 1
+    return many
+
+
+@inlined
+def before(heights: Floats, a: int, b: int, up: bool) -> bool:
+    """Whether a comes before b: strictly lower, ties by number; the reverse for a sweep from the top (up)."""
+    lower: bool = heights[a] < heights[b] or (heights[a] == heights[b] and a < b)
+    return lower != up
+
+
+@part
+def grow_tree(view: View, rings: Rings, up: bool) -> MergeTree:
+    """A merge tree of which nothing is known yet."""
+    heights = view.grid.heights
+    return MergeTree(heights, rings, view.critical, ints(len(heights), -1), ints(len(heights), 0), up)
+
+
+@part
+def find_leaf(tree: MergeTree, v: int) -> int:
+    """The leaf of a vertex; labels all vertices on the way. The vertices that are leaves are labelled already."""
+    heights, starts, neighbours = tree.heights, tree.rings.starts, tree.rings.neighbours
+    leaf, path, up = tree.leaf, tree.path, tree.up
+    length = 0
+    while leaf[v] < 0:
+        path[length] = v
+        length += 1
+        for at in range(starts[v], starts[v + 1]):
+            if before(heights, neighbours[at], v, up):
+                v = int(neighbours[at])
+                break
+    for k in range(length):
+        leaf[path[k]] = leaf[v]
+    return int(leaf[v])
+
+
+@part
+def number_leaves(tree: MergeTree) -> Ints:
+    """Number the vertices at which components begin; returns them."""
+    starts, neighbours = tree.rings.starts, tree.rings.neighbours
+    leaves = ints(len(tree.critical), 0)
+    size = 0
+    for v in tree.critical:
+        first = starts[v] < starts[v + 1]
+        for at in range(starts[v], starts[v + 1]):
+            first = first and not before(tree.heights, neighbours[at], v, tree.up)
+        if first:
+            tree.leaf[v], leaves[size] = size, v
+            size += 1
+    return leaves[:size]
+
+
+@part
+def join_at_saddles(tree: MergeTree) -> Ints:
+    """(j, 3): two leaves whose components meet, and the vertex at which they do."""
+    starts, neighbours = tree.rings.starts, tree.rings.neighbours
+    most = 0
+    for v in tree.critical:
+        most += starts[v + 1] - starts[v]
+    joins = int_table(most, 3)
+    size = 0
+    for v in tree.critical:
+        last = -1
+        for at in range(starts[v], starts[v + 1]):
+            if before(tree.heights, neighbours[at], v, tree.up):
+                leaf = find_leaf(tree, int(neighbours[at]))
+                if last >= 0 and leaf != last:
+                    joins[size, 0], joins[size, 1], joins[size, 2] = last, leaf, v
+                    size += 1
+                last = leaf
+    return joins[:size]
+
+
+@part
+def join_to_anchors(tree: MergeTree, leaves: Ints, topology: Topology, cosines: Floats) -> Ints:
+    """(j, 3): the leaf at a void's first vertex, that of the surface which the ray from it meets, and the vertex."""
+    heights, anchors, faces, up = tree.heights, topology.anchors, topology.triangles.faces, tree.up
+    joins = int_table(len(leaves), 3)
+    size = 0
+    for leaf in range(len(leaves)):
+        v = leaves[leaf]
+        if cosines[v] == 0.0 or (cosines[v] < 0.0) != up:
+            continue
+        if anchors[v] == UNKNOWN:
+            # Threads may look up the same vertex twice; the answer does not depend on the direction.
+            inward = -topology.vertex_normals[v]
+            anchors[v] = first_hit(topology.triangles, topology.triangles.vertices[v], inward, np.inf, v, -2.0)
+        if anchors[v] < 0:
+            continue
+        w = faces[anchors[v], 0]
+        for corner in (1, 2):
+            if before(heights, faces[anchors[v], corner], w, up):
+                w = faces[anchors[v], corner]
+        if before(heights, w, v, up):
+            joins[size, 0], joins[size, 2] = leaf, v
+            joins[size, 1] = find_leaf(tree, int(w))
+            size += 1
+    return joins[:size]
+
+
+@part
+def join_leaves(tree: MergeTree, leaves: Ints, topology: Topology, cosines: Floats) -> Ints:
+    """(j, 3): two leaves whose components join, at a saddle or through solid, and the vertex at which they do."""
+    saddles, anchored = join_at_saddles(tree), join_to_anchors(tree, leaves, topology, cosines)
+    joins = int_table(len(saddles) + len(anchored), 3)
+    for k in range(len(saddles)):
+        for which in range(3):
+            joins[k, which] = saddles[k, which]
+    for k in range(len(anchored)):
+        for which in range(3):
+            joins[len(saddles) + k, which] = anchored[k, which]
+    return joins
+
+
+@part
+def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
+    """The first column that is not below each join."""
+    columns = ints(len(joins), 0)
+    for k in range(len(joins)):
+        columns[k] = min(column_over(grid.heights[joins[k, 2]]), grid.columns)
+    return columns
+
+
+@part
+def singletons(size: int) -> Ints:
+    """The parents of a union-find in which nothing has been joined."""
+    parent = ints(size, 0)
+    for leaf in range(size):
+        parent[leaf] = leaf
+    return parent
+
+
+@inlined
+def root(parent: Ints, v: int) -> int:
+    """The leaf that stands for all that v has been joined with (union-find, paths halved)."""
+    while parent[v] != v:
+        parent[v] = parent[parent[v]]
+        v = parent[v]
+    return v
+
+
+@part
+def _stands_on(tree: MergeTree, v: int, vertices: Floats) -> bool:
+    """Whether a neighbour further down stands on the platform too: then v's component stands there already."""
+    starts, neighbours = tree.rings.starts, tree.rings.neighbours
+    for at in range(starts[v], starts[v + 1]):
+        w = neighbours[at]
+        if vertices[w, 2] <= PLATFORM_TOLERANCE_MM and before(tree.heights, w, v, False):
+            return True
+    return False
+
+
+@part
+def count_pieces(topology: Topology, view: View, pieces: Ints) -> None:
+    """Components below each offset that do not reach the platform."""
+    heights, n = view.grid.heights, view.grid.columns
+    tree = grow_tree(view, topology.rings, n < 0)  # a constant would have all these functions compiled once for every value of it
+    leaves = number_leaves(tree)
+    joins = join_leaves(tree, leaves, topology, view.cosines)
+    size = len(leaves)
+    begun, grounded_at = ints(size, 0), ints(size, n + 1)
+    for leaf in range(size):
+        begun[leaf] = min(column_over(heights[leaves[leaf]]), n)
+    for k in range(len(topology.standing)):
+        v = int(topology.standing[k])
+        if not _stands_on(tree, v, topology.triangles.vertices):
+            leaf = find_leaf(tree, v)
+            grounded_at[leaf] = min(grounded_at[leaf], min(column_over(heights[v]), n))
+    _count(begun, grounded_at, joins, join_columns(joins, view.grid), pieces[:n])
+
+
+@part
+def _count(begun: Ints, grounded_at: Ints, joins: Ints, columns: Ints, pieces: Ints) -> None:
+    """Join leaves in the order of the offsets and count the components that hang free."""
+    size, n = len(begun), len(pieces)
+    parent, grounded = singletons(size), ints(size, 0)
+    birth, _ = counting_sort(begun, n + 2)
+    landing, landed = counting_sort(grounded_at, n + 2)
+    joining, joined = counting_sort(columns, n + 2)
+    floating = 0
+    for b in range(n):
+        floating += birth[b + 1] - birth[b]
+        for at in range(joining[b], joining[b + 1]):
+            k = joined[at]
+            p, q = root(parent, joins[k, 0]), root(parent, joins[k, 1])
+            if p != q:
+                if grounded[p] == 0 or grounded[q] == 0:
+                    floating -= 1
+                parent[max(p, q)] = min(p, q)
+                grounded[min(p, q)] = max(grounded[p], grounded[q])
+        for at in range(landing[b], landing[b + 1]):
+            here = root(parent, landed[at])
+            if grounded[here] == 0:
+                grounded[here] = 1
+                floating -= 1
+        pieces[b] = floating

@@ -1,0 +1,301 @@
+"""Integrals: what the faces add up to above each offset plane of a direction (numba kernels of the sweep).
+
+Heights are in steps above the direction's first offset: offset column c lies at height c, column c is below a vertex at height t
+when c < t. Faces are taken in blocks: what every face needs is worked out in plain loops over the block, which the compiler turns
+into vector instructions, then added to the columns one face after the other.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import floats, int_table, table
+from mdp.kernels.kernel import inlined, part, vector_part
+from mdp.mesh import Floats, Ints
+from mdp.overhang import Mask
+from mdp.sweep.facets import Indices, Rows
+
+BLOCK = 128
+AHEAD = 3  # columns of a face that are worked out for the whole block; the few faces that cross more are finished singly
+THIRD = 1.0 / 3.0
+
+
+class OffsetGrid(NamedTuple):
+    """The offset planes of one direction: (3,) direction, (n,) heights of all vertices in steps above the first plane, how many
+    planes (columns) there are, and the step between them."""
+
+    direction: Floats
+    heights: Floats
+    columns: int
+    step_mm: float
+
+
+class Overhangs(NamedTuple):
+    """What the risky areas need of a surface: points (3, n), corners (3, m), unit normals (3, m), areas (m,), faces risky upright
+    (m,), and the cosine of normal and direction below which a face is risky along that direction."""
+
+    points: Floats
+    corners: Indices
+    normals: Floats
+    areas_mm2: Floats
+    risky: Mask
+    risky_below: float
+
+
+class Block(NamedTuple):
+    """Some faces: sorted heights of their corners, the two factors of their share above an offset, their weight, the first
+    column each crosses and how many it does."""
+
+    low: Floats
+    middle: Floats
+    high: Floats
+    rise: Floats
+    fall: Floats
+    weight: Floats
+    column: Ints
+    crossed: Ints
+
+
+@vector_part
+def find_heights(x: Floats, y: Floats, z: Floats, d: Floats, step: float, heights: Floats) -> tuple[int, int]:
+    """Fill the heights of all vertices; returns the first offset's number and the count of offsets in between."""
+    d0, d1, d2 = d[0], d[1], d[2]
+    for v in range(len(heights)):
+        heights[v] = (x[v] * d0 + y[v] * d1 + z[v] * d2) / step
+    least, most = _range(heights)
+    begin = int(np.floor(least)) + 1
+    shift = float(begin)
+    for v in range(len(heights)):
+        heights[v] -= shift
+    return begin, max(int(np.ceil(most)) - begin, 0)
+
+
+@vector_part
+def _range(values: Floats) -> tuple[float, float]:
+    """Least and greatest value; four of each, for one alone waits for the value before."""
+    a, b, c, d = 1e300, 1e300, 1e300, 1e300
+    p, q, r, s = -1e300, -1e300, -1e300, -1e300
+    whole = len(values) // 4 * 4
+    for v in range(0, whole, 4):
+        a, b, c, d = min(a, values[v]), min(b, values[v + 1]), min(c, values[v + 2]), min(d, values[v + 3])
+        p, q, r, s = max(p, values[v]), max(q, values[v + 1]), max(r, values[v + 2]), max(s, values[v + 3])
+    for v in range(whole, len(values)):
+        a, p = min(a, values[v]), max(p, values[v])
+    return min(a, b, c, d), max(p, q, r, s)
+
+
+@inlined
+def column_over(height: float) -> int:
+    """The number of offsets strictly below a height: the first column that is not below it."""
+    return max(int(np.ceil(height)), 0)
+
+
+@part
+def cut_block(rows: Floats, places: Ints, size: int) -> Block:
+    """A block of `size` faces in (6, BLOCK) and (2, BLOCK) arrays."""
+    low, middle, high = rows[0, :size], rows[1, :size], rows[2, :size]
+    return Block(low, middle, high, rows[3, :size], rows[4, :size], rows[5, :size], places[0, :size], places[1, :size])
+
+
+@vector_part
+def sort_heights(a: Indices, b: Indices, c: Indices, heights: Floats, block: Block) -> None:
+    low, middle, high = block.low, block.middle, block.high
+    for k in range(len(low)):
+        p, q, r = heights[a[k]], heights[b[k]], heights[c[k]]
+        least, most = min(p, q), max(p, q)
+        low[k], high[k] = min(least, r), max(most, r)
+        middle[k] = max(least, min(most, r))
+
+
+@vector_part
+def dot(x: Floats, y: Floats, z: Floats, d: Floats, out: Floats) -> None:
+    """Products of (n,) vectors given by their coordinates with one vector."""
+    d0, d1, d2 = d[0], d[1], d[2]
+    for k in range(len(out)):
+        out[k] = x[k] * d0 + y[k] * d1 + z[k] * d2
+
+
+@vector_part
+def find_ramps(block: Block) -> None:
+    """The first column each face crosses and how many, and the two factors of its share above an offset."""
+    low, middle, high, rise, fall = block.low, block.middle, block.high, block.rise, block.fall
+    column, crossed = block.column, block.crossed
+    for k in range(len(low)):
+        extent = high[k] - low[k]
+        lower, upper = (middle[k] - low[k]) * extent, (high[k] - middle[k]) * extent
+        rise[k] = 1.0 / lower if lower > 0.0 else 0.0
+        fall[k] = 1.0 / upper if upper > 0.0 else 0.0
+        first = max(np.ceil(low[k]), 0.0)
+        column[k] = np.int32(first)
+        crossed[k] = np.int32(max(np.ceil(high[k]), 0.0)) - np.int32(first)
+
+
+@inlined
+def _share(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
+    """Share of a face above an offset that it crosses."""
+    return 1.0 - (c - low) * (c - low) * rise if c < middle else (high - c) * (high - c) * fall
+
+
+@inlined
+def _moment(c: float, low: float, middle: float, high: float, rise: float, fall: float) -> float:
+    """First moment about an offset of the share of a face above it."""
+    mean, up, down = (low + middle + high) * THIRD, c - low, high - c
+    return mean - c + up * up * rise * up * THIRD if c < middle else down * down * fall * down * THIRD
+
+
+@vector_part
+def _weigh(ahead: float, block: Block, area: Floats, moment: Floats) -> None:
+    """Weighted share and moment of each face above the column that lies `ahead` columns after its first."""
+    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
+    for k in range(len(low)):
+        c = max(np.ceil(low[k]), 0.0) + ahead
+        inside = weight[k] if c < high[k] else 0.0
+        area[k] = inside * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+        moment[k] = inside * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
+
+
+@vector_part
+def _add_volumes(block: Block, shares: Floats, integrals: Floats) -> None:
+    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
+    column, crossed = block.column, block.crossed
+    for k in range(len(low)):
+        b = np.uint32(column[k])
+        integrals[b, 0] += weight[k]
+        integrals[b, 1] += weight[k] * ((low[k] + middle[k] + high[k]) * THIRD)
+        integrals[b, 2] += shares[0, k]
+        integrals[b, 3] += shares[1, k]
+        integrals[b + 1, 2] += shares[2, k]
+        integrals[b + 1, 3] += shares[3, k]
+        integrals[b + 2, 2] += shares[4, k]
+        integrals[b + 2, 3] += shares[5, k]
+        for ahead in range(AHEAD, crossed[k]):
+            c = float(b) + ahead
+            integrals[b + ahead, 2] += weight[k] * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+            integrals[b + ahead, 3] += weight[k] * _moment(c, low[k], middle[k], high[k], rise[k], fall[k])
+
+
+@part
+def integrate_volume(rows: Rows, grid: OffsetGrid, section: Floats, volume: Floats) -> None:
+    """Cross-section at (mm2) and volume above (mm3) each offset, by the divergence theorem."""
+    corners, vectors, d, n = rows.corners, rows.vectors_mm2, grid.direction, grid.columns
+    integrals = table(n + AHEAD + 1, 4)
+    values, shares, places = table(6, BLOCK), table(2 * AHEAD, BLOCK), int_table(2, BLOCK)
+    for begin in range(0, corners.shape[1], BLOCK):
+        end = min(begin + BLOCK, corners.shape[1])
+        size = end - begin
+        block = cut_block(values, places, size)
+        sort_heights(corners[0, begin:end], corners[1, begin:end], corners[2, begin:end], grid.heights, block)
+        dot(vectors[0, begin:end], vectors[1, begin:end], vectors[2, begin:end], d, block.weight)
+        find_ramps(block)
+        for ahead in range(AHEAD):
+            _weigh(float(ahead), block, shares[2 * ahead, :size], shares[2 * ahead + 1, :size])
+        _add_volumes(block, shares, integrals)
+    whole, first_moment = 0.0, 0.0
+    for column in range(n - 1, -1, -1):
+        whole += integrals[column + 1, 0]
+        first_moment += integrals[column + 1, 1]
+        section[column] = integrals[column, 2] + whole
+        volume[column] = (integrals[column, 3] + first_moment - column * whole) * grid.step_mm
+
+
+@part
+def _select(surface: Overhangs, d: Floats, chosen: Ints, kind: Ints) -> int:
+    """The faces that are risky either way, with 1: upright only, 2: along d only, 3: both; returns how many."""
+    normals, risky, risky_below = surface.normals, surface.risky, surface.risky_below
+    cosines = floats(BLOCK, 0.0)
+    many = 0
+    for begin in range(0, normals.shape[1], BLOCK):
+        end = min(begin + BLOCK, normals.shape[1])
+        dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], d, cosines[: end - begin])
+        for f in range(begin, end):
+            code = int(risky[f]) + 2 * int(cosines[f - begin] < risky_below)
+            chosen[many], kind[many] = f, code
+            many += int(code > 0)
+    return many
+
+
+@vector_part
+def _pick(chosen: Ints, surface: Overhangs, picked: Indices, weight: Floats) -> None:
+    """Corners (3, k) and areas of the chosen faces."""
+    corners, areas = surface.corners, surface.areas_mm2
+    for k in range(len(chosen)):
+        f = np.uint32(chosen[k])
+        picked[0, k], picked[1, k], picked[2, k] = corners[0, f], corners[1, f], corners[2, f]
+    for k in range(len(chosen)):
+        weight[k] = areas[chosen[k]]
+
+
+@vector_part
+def _cover(ahead: float, block: Block, area: Floats) -> None:
+    """Weighted share of each face above the column that lies `ahead` columns after its first."""
+    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
+    for k in range(len(low)):
+        c = max(np.ceil(low[k]), 0.0) + ahead
+        inside = weight[k] if c < high[k] else 0.0
+        area[k] = inside * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+
+
+@vector_part
+def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> None:
+    low, middle, high, rise, fall, weight = block.low, block.middle, block.high, block.rise, block.fall, block.weight
+    column, crossed = block.column, block.crossed
+    for k in range(len(low)):
+        b, which = np.uint32(column[k]), 2 * np.uint32(kind[k])
+        integrals[b, which] += weight[k]
+        integrals[b, which + 1] += shares[0, k]
+        integrals[b + 1, which + 1] += shares[1, k]
+        integrals[b + 2, which + 1] += shares[2, k]
+        for ahead in range(AHEAD, crossed[k]):
+            c = float(b) + ahead
+            integrals[b + ahead, which + 1] += weight[k] * _share(c, low[k], middle[k], high[k], rise[k], fall[k])
+
+
+@part
+def integrate_risky_area(surface: Overhangs, grid: OffsetGrid, scratch: Ints, up: Floats, residual: Floats) -> None:
+    """Risky areas above each offset: printed straight up, and along the direction; only faces that are risky either way count.
+
+    scratch: (2, m + 1) whole numbers to work in.
+    """
+    n = grid.columns
+    integrals = table(n + AHEAD + 1, 8)
+    chosen, kind = scratch[0], scratch[1]
+    many = _select(surface, grid.direction, chosen, kind)
+    values, shares, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
+    picked = np.empty((3, BLOCK), np.uint32)
+    for begin in range(0, many, BLOCK):
+        end = min(begin + BLOCK, many)
+        size = end - begin
+        block = cut_block(values, places, size)
+        _pick(chosen[begin:end], surface, picked, block.weight)
+        sort_heights(picked[0, :size], picked[1, :size], picked[2, :size], grid.heights, block)
+        find_ramps(block)
+        for ahead in range(AHEAD):
+            _cover(float(ahead), block, shares[ahead, :size])
+        _add_areas(kind[begin:end], block, shares, integrals)
+    whole = floats(4, 0.0)
+    for column in range(n - 1, -1, -1):
+        for which in range(1, 4):
+            whole[which] += integrals[column + 1, 2 * which]
+        both = integrals[column, 7] + whole[3]
+        up[column] = integrals[column, 3] + whole[1] + both
+        residual[column] = integrals[column, 5] + whole[2] + both
+
+
+@part
+def find_lowest(z: Floats, edges: Indices, grid: OffsetGrid, watched: float, lowest: Floats) -> None:
+    """Least z above each offset, among vertices and crossings of edges, lowest first, below the watched height."""
+    heights, n = grid.heights, grid.columns
+    known = 0  # columns before it have their least z: that of a vertex above them met earlier
+    for e in range(edges.shape[1]):
+        v, w = edges[0, e], edges[1, e]
+        if known >= n or z[v] >= watched:
+            break
+        if heights[v] > known:
+            known = column_over(heights[v])
+            lowest[known - 1] = min(lowest[known - 1], z[v])
+        if heights[w] > known:
+            rise = (z[w] - z[v]) / (heights[w] - heights[v])
+            for column in range(known, column_over(heights[w])):
+                lowest[column] = min(lowest[column], z[v] + rise * (column - heights[v]))
+    for column in range(n - 2, -1, -1):
+        lowest[column] = min(lowest[column], lowest[column + 1])

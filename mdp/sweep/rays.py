@@ -1,0 +1,124 @@
+"""Rays: the first face that a ray meets, over a tree of boxes."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import floats, ints, table
+from mdp.kernels.kernel import inlined, kernel, part
+from mdp.mesh import Floats, Ints, Mesh
+
+LEAF_FACES = 4
+DEPTH = 64
+
+
+class TriangleTree(NamedTuple):
+    """A surface's triangles in spatial order, and boxes over them: node k has the children 2k and 2k + 1, each leaf LEAF_FACES.
+
+    vertices (n, 3), faces (m, 3), unit normals (m, 3); least and greatest corners low and high (2 leaves, 3) of the boxes.
+    """
+
+    vertices: Floats
+    faces: Ints
+    normals: Floats
+    low: Floats
+    high: Floats
+
+
+def triangle_tree(mesh: Mesh) -> TriangleTree:
+    """The tree of a mesh whose faces are in spatial order."""
+    leaves = 1
+    while leaves * LEAF_FACES < len(mesh.faces):
+        leaves *= 2
+    return TriangleTree(mesh.vertices, mesh.faces, mesh.normals, *_boxes(mesh.vertices, mesh.faces, leaves))
+
+
+@kernel
+def _boxes(vertices: Floats, faces: Ints, leaves: int) -> tuple[Floats, Floats]:
+    low, high = table(2 * leaves, 3), table(2 * leaves, 3)
+    for node in range(2 * leaves):
+        for axis in range(3):
+            low[node, axis], high[node, axis] = np.inf, -np.inf
+    for f in range(len(faces)):
+        leaf = leaves + f // LEAF_FACES
+        for corner in range(3):
+            for axis in range(3):
+                x = vertices[faces[f, corner], axis]
+                low[leaf, axis], high[leaf, axis] = min(low[leaf, axis], x), max(high[leaf, axis], x)
+    for node in range(leaves - 1, 0, -1):
+        for axis in range(3):
+            low[node, axis] = min(low[2 * node, axis], low[2 * node + 1, axis])
+            high[node, axis] = max(high[2 * node, axis], high[2 * node + 1, axis])
+    for node in range(2 * leaves):
+        if low[node, 0] > high[node, 0]:
+            for axis in range(3):
+                high[node, axis] = np.inf  # an empty box that no ray enters
+    return low, high
+
+
+@inlined
+def _enters(tree: TriangleTree, node: int, origin: Floats, inverse: Floats, reach: float) -> bool:
+    """Whether a ray, given by the inverse of its direction, meets a node's box within reach."""
+    low, high = tree.low, tree.high
+    near, far = 0.0, reach
+    for axis in range(3):
+        a = (low[node, axis] - origin[axis]) * inverse[axis]
+        b = (high[node, axis] - origin[axis]) * inverse[axis]
+        near = max(near, min(a, b))
+        far = min(far, max(a, b))
+    meets: bool = near <= far * (1.0 + 1e-9)
+    return meets
+
+
+@part
+def _distance(p: Floats, q: Floats, r: Floats, origin: Floats, ray: Floats) -> float:
+    """Distance along the ray to a triangle (Moeller and Trumbore, edges included), infinite for a miss."""
+    e1x, e1y, e1z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    e2x, e2y, e2z = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    hx, hy, hz = ray[1] * e2z - ray[2] * e2y, ray[2] * e2x - ray[0] * e2z, ray[0] * e2y - ray[1] * e2x
+    a = e1x * hx + e1y * hy + e1z * hz
+    if a == 0.0:
+        return np.inf
+    sx, sy, sz = origin[0] - p[0], origin[1] - p[1], origin[2] - p[2]
+    u = (sx * hx + sy * hy + sz * hz) / a
+    qx, qy, qz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
+    v = (ray[0] * qx + ray[1] * qy + ray[2] * qz) / a
+    if u < -1e-9 or v < -1e-9 or u + v > 1.0 + 1e-9:
+        return np.inf
+    t: float = (e2x * qx + e2y * qy + e2z * qz) / a
+    return t if t > 0.0 else np.inf
+
+
+@part
+def first_hit(tree: TriangleTree, origin: Floats, ray: Floats, reach: float, own_vertex: int, facing: float) -> int:
+    """The first face met along `ray` within reach whose normal has at least the cosine `facing` with it; -1: none.
+
+    The faces around own_vertex are left out (-1: around none).
+    """
+    vertices, faces, normals = tree.vertices, tree.faces, tree.normals
+    leaves = len(tree.low) // 2
+    inverse = floats(3, 0.0)
+    for axis in range(3):
+        inverse[axis] = 1.0 / ray[axis] if abs(ray[axis]) > 1e-300 else 1e300
+    stack = ints(DEPTH, 1)
+    top, hit = 1, -1
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if not _enters(tree, node, origin, inverse, reach):
+            continue
+        if node < leaves:
+            stack[top] = 2 * node
+            stack[top + 1] = 2 * node + 1
+            top += 2
+            continue
+        first = (node - leaves) * LEAF_FACES
+        for f in range(first, min(first + LEAF_FACES, len(faces))):
+            if normals[f, 0] * ray[0] + normals[f, 1] * ray[1] + normals[f, 2] * ray[2] < facing:
+                continue
+            if own_vertex in (faces[f, 0], faces[f, 1], faces[f, 2]):
+                continue
+            t = _distance(vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]], origin, ray)
+            if t < reach:
+                reach, hit = t, f
+    return hit

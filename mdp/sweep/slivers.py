@@ -1,0 +1,78 @@
+"""Slivers: how near a plane comes to what it would leave too thin to print, or to what is thin already.
+
+A surface nearly level with the plane and close to it becomes a sliver. A fin, a bridge or a plate is thin by itself: a plane
+through it leaves an interface no wider than it is thick. A face is thin when a ray from its middle into the solid soon meets one
+that looks the other way; near an acute edge the other face looks aside, that is no thin wall.
+"""
+
+import numpy as np
+
+from mdp.kernels.arrays import flags, floats
+from mdp.kernels.kernel import inlined, kernel, part
+from mdp.mesh import Floats
+from mdp.overhang import Mask
+from mdp.plane import Plane
+from mdp.sweep.facets import Rows
+from mdp.sweep.integrals import OffsetGrid, column_over
+from mdp.sweep.rays import TriangleTree, first_hit
+
+THIN_MM = 1.0  # walls and rods of two lines or less are fragile where a plane crosses them
+SLIVER_COSINE = 0.92  # a surface within 23 degrees of the plane is cut into a sliver when the plane comes too near
+OPPOSITE_COSINE = 0.8  # two faces of one wall or rod look opposite ways, within 37 degrees
+
+
+@inlined
+def _note(cosine: float, height: float, n: int, above: Floats, below: Floats) -> None:
+    b = min(column_over(height), n)
+    if cosine < 0.0:
+        below[b] = max(below[b], height)
+    elif b > 0:
+        above[b - 1] = min(above[b - 1], height)
+
+
+@part
+def find_slivers(rows: Rows, grid: OffsetGrid, cosines: Floats, fragile: Floats) -> None:
+    """Distance from each offset up to the next surface looking along the direction and down to the next one looking against it.
+
+    Where the surface is smooth the normal of a vertex tells where it looks, at an edge or corner those of its faces do. cosines:
+    (n,) of vertex normals and the direction.
+    """
+    d, heights, n, step = grid.direction, grid.heights, grid.columns, grid.step_mm
+    corners, normals, flatness = rows.corners, rows.normals, rows.flatness
+    above, below = floats(n + 1, np.inf), floats(n + 1, -np.inf)
+    for v in range(len(heights)):
+        if abs(cosines[v]) > SLIVER_COSINE and flatness[v] > SLIVER_COSINE:
+            _note(cosines[v], heights[v], n, above, below)
+    for corner in rows.sharp:
+        f = corner // 3
+        cosine = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
+        if abs(cosine) > SLIVER_COSINE:
+            _note(cosine, heights[corners[corner % 3, f]], n, above, below)
+    nearest = np.inf
+    for column in range(n - 1, -1, -1):
+        nearest = min(nearest, above[column])
+        fragile[column] = (nearest - column) * step
+    nearest = -np.inf
+    for column in range(n):
+        nearest = max(nearest, below[column])
+        fragile[column] = min(fragile[column], (column - nearest) * step)
+
+
+@kernel
+def thin_faces(tree: TriangleTree, thickness_mm: float) -> Mask:
+    """(m,) whether the solid is thinner than that under the middle of a face."""
+    vertices, faces, normals = tree.vertices, tree.faces, tree.normals
+    thin, middle, ray = flags(len(faces)), floats(3, 0.0), floats(3, 0.0)
+    for f in range(len(faces)):
+        for axis in range(3):
+            total = vertices[faces[f, 0], axis] + vertices[faces[f, 1], axis] + vertices[faces[f, 2], axis]
+            middle[axis], ray[axis] = total / 3.0, -normals[f, axis]
+        thin[f] = first_hit(tree, middle, ray, thickness_mm, -1, OPPOSITE_COSINE) >= 0
+    return thin
+
+
+def least_distance_mm(corners: Floats, plane: Plane) -> float:
+    """Distance from a plane to the nearest of some triangles, (k, 3, 3) corners, 0 where it meets one, infinite for none."""
+    heights = corners @ plane.normal - plane.offset_mm
+    low, high = heights.min(axis=1, initial=np.inf), heights.max(axis=1, initial=-np.inf)
+    return float(np.maximum(np.maximum(low, -high), 0.0).min(initial=np.inf))

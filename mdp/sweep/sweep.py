@@ -1,0 +1,211 @@
+"""Sweep: every offset of a direction evaluated in one pass over the faces, nothing is cut.
+
+For a unit direction d let h = vertex . d. A face adds a piecewise quadratic in the offset c to "area above c", weighted
+with 1 (risky areas) or with n . d: by the divergence theorem the n . d-weighted area above c is the cross-section at c and
+its first moment about c the volume above c. Faces wholly above an offset go into suffix sums, faces that cross sampled
+offsets are added where they cross. Cost: vertices + faces + crossings.
+
+There are two passes: `gains` touches only the faces that are risky one way or the other and says what a cut would make safe;
+`sweep` says whether it can be made, and runs only for the directions of candidates that come up.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import floats, int_table, ints
+from mdp.kernels.kernel import kernel
+from mdp.kernels.threads import in_threads
+from mdp.mesh import Floats, Ints, Mesh
+from mdp.overhang import Mask
+from mdp.plane import Plane
+from mdp.sweep.components import UNKNOWN, Topology, View, count_pieces, find_critical
+from mdp.sweep.contact_area import find_contact_areas
+from mdp.sweep.facets import Facets, Rows, lay_out
+from mdp.sweep.integrals import OffsetGrid, Overhangs, dot, find_heights, find_lowest, integrate_risky_area, integrate_volume
+from mdp.sweep.rays import TriangleTree, triangle_tree
+from mdp.sweep.rims import Rims, integrate_rim
+from mdp.sweep.slivers import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
+
+
+class Gains(NamedTuple):
+    """Values for each of k directions (rows) and its offsets c = (first + column) * step; those beyond `columns` are unused.
+
+    up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along the
+    direction; rim_mm: weighted length of the rim that a cut leaves, 0 where the remainder counts no seams.
+    """
+
+    first: Ints
+    columns: Ints
+    up_mm2: Floats
+    residual_mm2: Floats
+    rim_mm: Floats
+
+
+class Sweep(NamedTuple):
+    """Rows and columns as in Gains.
+
+    section_mm2: cross-section; volume_mm3: volume above; lowest_mm: least z of what lies above, exact where it is below the
+    direction's watched height, some greater number elsewhere; fragile_mm: distance to the nearest surface that the plane
+    would cut into a sliver; pieces: components of the solid below that do not reach the platform; contact_area_mm2: least
+    cross-section of a component of the solid above, crumbs left out, where there are no such pieces and what lies above is
+    nowhere below the watched height.
+    """
+
+    first: Ints
+    columns: Ints
+    section_mm2: Floats
+    volume_mm3: Floats
+    lowest_mm: Floats
+    fragile_mm: Floats
+    pieces: Ints
+    contact_area_mm2: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """What the sweep needs to know of a solid, made once for all directions: its mesh, which faces are risky upright, and how
+    much a mm of a seam's rim counts on each face (m,), feather edges more; None: seams do not count."""
+
+    mesh: Mesh
+    risky: Mask
+    seam_weights: Floats | None = None
+    feather: float = 0.0
+
+    @cached_property
+    def facets(self) -> Facets:
+        """The surface laid out for sweeping."""
+        return lay_out(self.mesh, self.risky, self.seam_weights)
+
+    @cached_property
+    def triangles(self) -> TriangleTree:
+        """The faces and boxes over them, for rays."""
+        return triangle_tree(self.facets.mesh)
+
+    @cached_property
+    def rows(self) -> Rows:
+        """What the sweep reads in a row; sharp: where the normal of a vertex does not tell where the surface looks."""
+        return self.facets.rows(SLIVER_COSINE)
+
+    @cached_property
+    def topology(self) -> Topology:
+        """What the components need; the sweep looks up the anchors when needed."""
+        anchors = np.full(len(self.mesh.vertices), UNKNOWN, np.int32)
+        return Topology(self.triangles, self.facets.vertex_normals, self.facets.rings, self.facets.standing, anchors)
+
+    @cached_property
+    def thin(self) -> Floats:
+        """(k, 3, 3) corners of the faces under whose middle the solid is a thin wall or rod: a ray for every face."""
+        mesh = self.facets.mesh
+        corners: Floats = mesh.vertices[mesh.faces[thin_faces(self.triangles, THIN_MM)]]
+        return corners
+
+    def thin_mm(self, plane: Plane) -> float:
+        """Distance of a plane to the nearest thin wall or rod on either side, 0 where it goes through one; infinite: no such."""
+        return least_distance_mm(self.thin, plane)
+
+    def most_columns(self, step_mm: float) -> int:
+        """No direction has more offsets."""
+        return int(float(np.linalg.norm(self.mesh.bounds_mm[1] - self.mesh.bounds_mm[0])) / step_mm) + 3
+
+
+class Scars(NamedTuple):
+    """What blemishes a surface: areas that need support, and the rims of cuts."""
+
+    overhangs: Overhangs
+    rims: Rims
+
+
+class Sampling(NamedTuple):
+    """Directions (k, 3), the step of their offsets, for each (k,) the height below which the least z of a part matters and the
+    one that it must reach for the contact area to be of use, and how many steps a piece must be high to need one."""
+
+    directions: Floats
+    step_mm: float
+    watched_mm: Floats
+    needed_mm: Floats
+    crumb: float
+
+
+def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below: float) -> Gains:
+    """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle."""
+    facets = remainder.facets
+    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.mesh.areas_mm2, facets.risky, risky_below)
+    shape = (len(directions), remainder.most_columns(step_mm))
+    swept = Gains(np.zeros(shape[0], np.int32), np.zeros(shape[0], np.int32), np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    rims = Rims(facets.corners, facets.normals, facets.mesh.areas_mm2, facets.seam_weights, remainder.feather)
+    in_threads(_gains, shape[0], Scars(surface, rims), np.ascontiguousarray(directions), step_mm, swept)
+    return swept
+
+
+def sweep(
+    remainder: Remainder,
+    directions: Floats,
+    step_mm: float,
+    watched_mm: Floats | None = None,
+    crumb_mm: float = 2.0,
+) -> Sweep:
+    """Whether a cut can be made at all offsets of (k, 3) unit directions.
+
+    watched_mm (k,): the height below which the least z of a part matters; absent: all heights. crumb_mm: a
+    piece above the plane that is lower than this may stand on any area.
+    """
+    watched = np.full(len(directions), np.inf) if watched_mm is None else np.ascontiguousarray(watched_mm)
+    needed = np.full(len(directions), -np.inf) if watched_mm is None else watched
+    sampling = Sampling(np.ascontiguousarray(directions), step_mm, watched, needed, crumb_mm / step_mm)
+    shape = (len(directions), remainder.most_columns(step_mm))
+    swept = Sweep(
+        first=np.zeros(shape[0], np.int32),
+        columns=np.zeros(shape[0], np.int32),
+        section_mm2=np.zeros(shape),
+        volume_mm3=np.zeros(shape),
+        lowest_mm=np.full(shape, np.inf),
+        fragile_mm=np.full(shape, np.inf),
+        pieces=np.zeros(shape, np.int32),
+        contact_area_mm2=np.zeros(shape),
+    )
+    in_threads(_sweep, shape[0], remainder.rows, remainder.topology, sampling, swept)
+    return swept
+
+
+@kernel
+def _gains(begin_row: int, end_row: int, scars: Scars, directions: Floats, step_mm: float, out: Gains) -> None:
+    surface, rims = scars
+    points = surface.points
+    heights, scratch = floats(points.shape[1], 0.0), int_table(2, len(surface.areas_mm2) + 1)
+    for row in range(begin_row, end_row):
+        d = directions[row]
+        first, n = find_heights(points[0], points[1], points[2], d, step_mm, heights)
+        out.first[row], out.columns[row] = first, n
+        if n > 0:
+            grid = OffsetGrid(d, heights, n, step_mm)
+            integrate_risky_area(surface, grid, scratch, out.up_mm2[row], out.residual_mm2[row])
+            if len(rims.weights) > 0:
+                integrate_rim(rims, grid, out.rim_mm[row])
+
+
+@kernel
+def _sweep(begin_row: int, end_row: int, rows: Rows, topology: Topology, sampling: Sampling, out: Sweep) -> None:
+    points, normals, step_mm = rows.points, rows.vertex_normals, sampling.step_mm
+    section, contact_area, lowest, pieces = out.section_mm2, out.contact_area_mm2, out.lowest_mm, out.pieces
+    size = points.shape[1]
+    heights, cosines, scratch = floats(size, 0.0), floats(size, 0.0), ints(size, 0)
+    for row in range(begin_row, end_row):
+        d = sampling.directions[row]
+        first, n = find_heights(points[0], points[1], points[2], d, step_mm, heights)
+        out.first[row], out.columns[row] = first, n
+        if n > 0:
+            grid = OffsetGrid(d, heights, n, step_mm)
+            integrate_volume(rows, grid, section[row], out.volume_mm3[row])
+            find_lowest(points[2], rows.rising_edges, grid, sampling.watched_mm[row], lowest[row])
+            dot(normals[0], normals[1], normals[2], d, cosines)
+            find_slivers(rows, grid, cosines, out.fragile_mm[row])
+            view = View(grid, cosines, scratch[: find_critical(cosines, rows.flatness, heights, topology.rings, scratch)])
+            count_pieces(topology, view, pieces[row])
+            wanted = ints(n, 0)
+            for column in range(n):
+                contact_area[row, column] = section[row, column]
+                wanted[column] = int(pieces[row, column] == 0 and lowest[row, column] >= sampling.needed_mm[row])
+            find_contact_areas(rows, topology, view, sampling.crumb, wanted, contact_area[row])

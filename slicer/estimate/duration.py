@@ -1,0 +1,49 @@
+"""Duration: how long strokes and travels take with acceleration, on a machine like classic Marlin: no axis changes its speed at
+once by more than the junction speed, and none accelerates faster than it may.
+"""
+
+from math import sqrt
+
+from mdp.kernels.arrays import floats
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats
+
+TINY = 1e-9
+
+
+def line_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, ends_mm_s: float = 0.0) -> float:
+    """Seconds of a straight line that is begun and ended at one speed: a trapezoid of speeds, or a triangle."""
+    ends = min(ends_mm_s, speed_mm_s)
+    peak = min(speed_mm_s, sqrt(ends * ends + acceleration_mm_s2 * length_mm))
+    ramps_mm = (peak * peak - ends * ends) / acceleration_mm_s2
+    return 2.0 * (peak - ends) / acceleration_mm_s2 + max(0.0, length_mm - ramps_mm) / max(peak, TINY)
+
+
+@kernel
+def loop_s(loop: Floats, speed_mm_s: float, acceleration_mm_s2: float, junction_mm_s: float) -> float:
+    """Seconds of a closed stroke round a loop (n, 2), from a stand at its first point to a stand there.
+
+    acceleration_mm_s2: of each axis, so a slanting side may have up to the square root of two times as much.
+    """
+    n = len(loop)
+    corner, ramp, length = floats(n + 1, 0.0), floats(n, 0.0), floats(n, 0.0)
+    x, y = 0.0, 0.0
+    for i in range(n):
+        following = (i + 1) % n
+        dx, dy = loop[following, 0] - loop[i, 0], loop[following, 1] - loop[i, 1]
+        length[i] = max(sqrt(dx * dx + dy * dy), TINY)
+        dx, dy = dx / length[i], dy / length[i]
+        ramp[i] = acceleration_mm_s2 / max(abs(dx), abs(dy), TINY)
+        if i > 0:
+            corner[i] = min(speed_mm_s, junction_mm_s / max(abs(dx - x), abs(dy - y), TINY))
+        x, y = dx, dy
+    for i in range(n - 1, -1, -1):
+        corner[i] = min(corner[i], sqrt(corner[i + 1] ** 2 + 2.0 * ramp[i] * length[i]))
+    seconds = 0.0
+    for i in range(n):
+        corner[i + 1] = min(corner[i + 1], sqrt(corner[i] ** 2 + 2.0 * ramp[i] * length[i]))
+        v0, v1 = corner[i], corner[i + 1]
+        peak = min(speed_mm_s, sqrt(0.5 * (v0 * v0 + v1 * v1) + ramp[i] * length[i]))
+        ramps_mm = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * ramp[i])
+        seconds += (2.0 * peak - v0 - v1) / ramp[i] + max(0.0, length[i] - ramps_mm) / peak
+    return float(seconds)

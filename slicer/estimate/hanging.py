@@ -1,0 +1,77 @@
+"""Hanging: the support of a part from few thick layers, by the rules of the real ones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdp.mesh import Floats, Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
+from profiles.process import Process
+from slicer.bead import with_line_width
+from slicer.estimate.shell import NOTHING, Extent, extent_of
+from slicer.geometry.polygons import Polygons, clean, contours, offset
+from slicer.heights import Heights
+from slicer.section import sections
+from slicer.support.overhang import detect_overhangs
+from slicer.support.support import generate_supports
+
+LAYERS = 50  # thick layers at most: on thin limbs 40 lost up to 0.3 of the support that 60 find
+COARSE_MM = 0.05  # sections are simplified by this
+LEAST_MM = 0.7  # of a thick layer
+
+
+@dataclass(frozen=True, eq=False)
+class ThickSupport:
+    """Support in thick layers: their tops, (k,) mm, what stands in each of them and what of it touches the part; foot: the
+    lowest one's.
+    """
+
+    tip_mm: Floats
+    height_mm: Floats
+    areas: tuple[Extent, ...]
+    contacts: tuple[Extent, ...]
+    walls: tuple[tuple[Floats, ...], ...]
+    foot: Polygons
+
+    def at(self, z_mm: float) -> int | None:
+        """The thick layer at a height, None where there is none."""
+        k = int(np.searchsorted(self.tip_mm, z_mm))
+        return k if k < len(self.areas) and self.areas[k] is not NOTHING else None
+
+
+NONE = ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons())
+
+
+def thick_support(mesh: Mesh, heights: Heights, process: Process, on_platform: bool, floor: Polygons) -> ThickSupport:
+    """The support of a mesh in its part frame; parts printed later are not looked at."""
+    risky = _hanging(mesh, process)
+    hanging_mm2 = -float((mesh.normals[risky, 2] * mesh.areas_mm2[risky]).sum())
+    if process.support == "none" or hanging_mm2 <= process.support_least_mm2:
+        return NONE
+    top_mm = float(mesh.vertices[mesh.faces[risky], 2].max())
+    thick = _thick_layers(float(heights.tip_mm[0]), min(top_mm + LEAST_MM, float(heights.tip_mm[-1])))
+    outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in sections(mesh, thick.cut_mm)]
+    below = None if on_platform else outlines[0]
+    hanging = [overhang.hanging for overhang in detect_overhangs(mesh, outlines, thick.cut_mm, process, below)]
+    single = with_line_width(process, process.support_line_width_mm).model_copy(
+        update={"support_interface_layers": 1, "support_bottom_interface_layers": 1}
+    )
+    supports = generate_supports(hanging, outlines, thick, single, below, [Polygons()] * len(outlines), floor)
+    areas, contacts = tuple(map(extent_of, supports.areas)), tuple(map(extent_of, supports.dense))
+    walls = tuple(tuple(contours(offset(area, -0.5 * single.line_width_mm))) for area in supports.areas)
+    return ThickSupport(thick.tip_mm, thick.height_mm, areas, contacts, walls, supports.areas[0])
+
+
+def _hanging(mesh: Mesh, process: Process) -> Mask:
+    """(m,) risky faces, without those that rest on the base plane."""
+    lifted = mesh.vertices[mesh.faces, 2].max(axis=1) > PLATFORM_TOLERANCE_MM
+    risky: Mask = (mesh.normals[:, 2] < threshold(process.self_supporting_angle_deg)) & lifted
+    return risky
+
+
+def _thick_layers(first_mm: float, top_mm: float) -> Heights:
+    """Few equal layers over the first one."""
+    count = int(np.clip((top_mm - first_mm) / LEAST_MM, 1, LAYERS)) if top_mm > first_mm else 0
+    tips = first_mm + (top_mm - first_mm) * np.arange(count + 1) / max(count, 1)
+    thick = np.diff(tips, prepend=0.0)
+    return Heights(tips, thick, tips - 0.5 * thick)

@@ -1,0 +1,80 @@
+"""Shell: what one layer of a part prints of it: walls, the gaps they leave, skin and sparse infill, as shapes without beads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import HIDDEN_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
+from slicer.geometry.polygons import Polygons, contours, edges, offset, opening
+from slicer.region import sparse_area
+from slicer.walls.gap import LEAST_GAP, LEAST_LINE
+
+LEAST_REST_MM2 = 0.3  # smaller places between the walls hardly ever get a bead
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How large an area is: mm2, mm of boundary, connected pieces."""
+
+    area_mm2: float
+    boundary_mm: float
+    pieces: int
+
+
+NOTHING = Extent(0.0, 0.0, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """walls[k]: centrelines of wall k from outside, (n, 2) mm; narrow[k]: what wall k leaves; skin, sparse: what is inside."""
+
+    walls: tuple[tuple[Floats, ...], ...]
+    narrow: tuple[Extent, ...]
+    skin: Extent
+    sparse: Extent
+    islands: int
+
+
+def extent_of(area: Polygons) -> Extent:
+    """The extent of an area."""
+    if area.is_empty():
+        return NOTHING
+    sides = edges(area)
+    length = float(np.hypot(sides[:, 2] - sides[:, 0], sides[:, 3] - sides[:, 1]).sum())
+    return Extent(area.area(), length, len(area.decompose()))
+
+
+def shell_of(section: Polygons, process: Process, height_mm: float, above: Polygons | None, below: Polygons | None) -> Shell:
+    """The shell of a section. above, below: what covers it so far that it need not be skin; None: it is solid.
+
+    Walls by offsets alone: a wall turns round where there is core behind it, and what neither it nor the core covers is
+    narrow (slicer/walls/walls.py has the exact rule).
+    """
+    loops: list[tuple[Floats, ...]] = []
+    narrow: list[Extent] = []
+    area = section
+    for level in range(process.walls):
+        if area.is_empty():
+            break
+        width = process.line_width_mm if level else outer_wall_width_mm(process)
+        spacing = spacing_mm(width, height_mm)
+        half = 0.5 * spacing if level else 0.5 * width
+        core = offset(area, -half - 0.5 * spacing)
+        line = core if core.is_empty() else offset(core, 0.5 * spacing)
+        loops.append(tuple(contours(line)))
+        covered = core if core.is_empty() else offset(line, half)
+        least = (LEAST_GAP if level else LEAST_LINE) * process.line_width_mm
+        bare = area.area() - covered.area() > LEAST_REST_MM2
+        narrow.append(extent_of(opening(area - covered, 0.5 * least)) if bare else NOTHING)
+        area = core.simplify(HIDDEN_RESOLUTION_MM)
+    inside = area if area.is_empty() else opening(area, spacing_mm(process.line_width_mm, height_mm))
+    if area.area() - inside.area() > LEAST_REST_MM2:
+        narrow.append(extent_of(opening(area - inside, 0.5 * LEAST_GAP * process.line_width_mm)))
+    area = inside
+    sparse = Polygons()
+    if above is not None and below is not None and not area.is_empty():
+        sparse = sparse_area(area, above, below, process)
+    skin = area if sparse.is_empty() else area - sparse
+    return Shell(tuple(loops), tuple(narrow), extent_of(skin), extent_of(sparse), len(section.decompose()))

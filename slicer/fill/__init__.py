@@ -1,0 +1,1 @@
+"""Fill: skins, sparse infill, bridges."""

@@ -1,0 +1,257 @@
+"""Anchors: ends of infill lines joined along the border of their area, and hooked onto it where no neighbour is near.
+
+Ends that follow each other on the border are joined by rising distance, unless that would close a ring or the distance
+is beyond a limit; an end left alone gets a short run along the border, towards the side with more room.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import flags, floats, longs
+from mdp.kernels.kernel import kernel, part
+from mdp.kernels.sorting import argsort
+from mdp.mesh import Floats
+from slicer.geometry.clip import Border, Indices, Pieces
+
+TIE_MM = 1e-6  # distances nearer to each other count as equal: rounding must not choose between the sides of a zigzag
+
+
+class _Pieces(NamedTuple):
+    """points: (n, 2) mm; bounds: (k + 1,) first point of each piece; ends: (k, 2) edges on which its two ends lie.
+
+    contour: (2 k,) contour on which each end lies; group: (k,) only pieces of one group are joined.
+    """
+
+    points: Floats
+    bounds: Indices
+    ends: Indices
+    contour: Indices
+    group: Indices
+
+
+class _Limits(NamedTuple):
+    """hook_mm: length of a hook; most_mm: longest joint; apart_mm: what a hook keeps from the next end or hook."""
+
+    hook_mm: float
+    most_mm: float
+    apart_mm: float
+
+
+class _Border(NamedTuple):
+    """edges: (m, 4) mm; offsets: (contours + 1,) first edge of each contour; way: (m + 1,) mm along all contours to each edge."""
+
+    edges: Floats
+    offsets: Indices
+    way: Floats
+
+
+class _BorderPoint(NamedTuple):
+    """A point of the border: on which edge of which contour, and how far along the way to it."""
+
+    edge: int
+    contour: int
+    place_mm: float
+
+
+def anchor_lines(
+    pieces: Pieces, border: Border, hook_mm: float, most_mm: float, apart_mm: float, group: Indices | None = None
+) -> list[Floats]:
+    """Pieces as long lines (n, 2): joined where ends are at most most_mm apart along the border, else with hooks.
+
+    A hook is hook_mm long, less where it would come nearer than apart_mm to another end or hook. group: (k,) only pieces
+    of one group are joined.
+    """
+    if not len(pieces.starts):
+        return []
+    bounds = np.append(pieces.starts, len(pieces.points))
+    contour = np.searchsorted(border.offsets, pieces.ends.ravel(), side="right") - 1
+    own = np.zeros(len(pieces.ends), np.int64) if group is None else group
+    out = np.empty((len(pieces.points) + 2 * len(border.edges) + 4 * len(pieces.ends) + 8, 2))
+    starts = np.empty(len(pieces.ends), np.int64)
+    n, count = _lay_lines(
+        _Pieces(pieces.points, bounds, pieces.ends, contour, own),
+        _Border(border.edges, border.offsets, _way(border.edges)),
+        _Limits(hook_mm, most_mm, apart_mm),
+        out,
+        starts,
+    )
+    return np.split(out[:n].copy(), starts[1:count])
+
+
+def _way(edges: Floats) -> Floats:
+    """(m + 1,) way along all contours to the beginning of each edge, mm."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(edges[:, 2] - edges[:, 0], edges[:, 3] - edges[:, 1]))])
+
+
+@part
+def _places(pieces: _Pieces, border: _Border) -> Floats:
+    """(2 k,) way along all contours to each end."""
+    points, bounds, ends, edges, way = pieces.points, pieces.bounds, pieces.ends, border.edges, border.way
+    place: Floats = floats(2 * len(ends), 0.0)
+    for k in range(len(ends)):
+        for side in range(2):
+            p, e = bounds[k + 1] - 1 if side else bounds[k], ends[k, side]
+            along = np.hypot(points[p, 0] - edges[e, 0], points[p, 1] - edges[e, 1])
+            place[2 * k + side] = min(way[e] + along, way[e + 1])
+    return place
+
+
+@part
+def _next_ends(place: Floats, contour: Indices, border: _Border) -> tuple[Indices, Floats]:
+    """Of each end the next one on its contour, which may be itself, and how far it is."""
+    order = argsort(place)
+    after, gap = longs(len(place), 0), floats(len(place), 0.0)
+    i = 0
+    while i < len(order):
+        c, j = contour[order[i]], i
+        while j < len(order) and contour[order[j]] == c:
+            j += 1
+        for k in range(i, j):
+            here, there = order[k], order[k + 1 if k + 1 < j else i]
+            after[here] = there
+            gap[here] = place[there] - place[here]
+            if k + 1 == j:
+                gap[here] += border.way[border.offsets[c + 1]] - border.way[border.offsets[c]]
+        i = j
+    return after, gap
+
+
+@part
+def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> tuple[Indices, Indices]:
+    """Of each end the one it is joined with (-1: none), and 1 where the way there goes forward, -1 backward."""
+    partner, sense, ties = longs(len(after), -1), longs(len(after), 0), floats(len(after), 0.0)
+    for here in range(len(after)):
+        ties[here] = np.rint(gap[here] / TIE_MM)
+    order, root = argsort(ties), longs(len(after) // 2, 0)
+    for k in range(len(root)):
+        root[k] = k
+    for here in order:
+        there = after[here]
+        if gap[here] > most_mm:
+            break
+        if partner[here] >= 0 or partner[there] >= 0:
+            continue
+        a, b = here // 2, there // 2
+        if group[a] != group[b]:
+            continue
+        while root[a] != a:
+            root[a] = root[root[a]]
+            a = root[a]
+        while root[b] != b:
+            root[b] = root[root[b]]
+            b = root[b]
+        if a != b:
+            root[a] = b
+            partner[here], partner[there], sense[here], sense[there] = there, here, 1, -1
+    return partner, sense
+
+
+@part
+def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, limits: _Limits) -> Floats:
+    """Of each end the length of its hook, negative for a way back along the border."""
+    hooks: Floats = floats(len(after), 0.0)
+    free, before = floats(len(after), 0.0), longs(len(after), 0)
+    for here in range(len(after)):
+        before[after[here]] = here
+        free[here] = 0.0 if sense[here] == 1 else gap[here] - limits.apart_mm
+    for here in range(len(after)):
+        if partner[here] < 0:
+            back = before[here]
+            side = here if free[here] >= free[back] else back
+            length = min(limits.hook_mm, free[side])
+            if length > limits.apart_mm:
+                hooks[here] = length if side == here else -length
+                free[side] -= length + limits.apart_mm
+    return hooks
+
+
+@part
+def _runs(partner: Indices, sense: Indices, gap: Floats, hooks: Floats) -> Floats:
+    """Of each end the length of its run along the border, to its partner or as a hook; negative: backward."""
+    runs: Floats = floats(len(partner), 0.0)
+    for here in range(len(partner)):
+        runs[here] = hooks[here]
+        if partner[here] >= 0:
+            runs[here] = gap[here] if sense[here] > 0 else -gap[partner[here]]
+    return runs
+
+
+@part
+def _append_run(out: Floats, n: int, since: _BorderPoint, length: float, border: _Border) -> int:
+    """Appends the vertices of the contour passed on a run from a point of it, backward where the length is negative.
+
+    Also its last point; returns the new n.
+    """
+    edges, way = border.edges, border.way
+    e, first, end = since.edge, border.offsets[since.contour], border.offsets[since.contour + 1]
+    left, forward = abs(length), length > 0.0
+    at = since.place_mm - way[e] if forward else way[e + 1] - since.place_mm
+    step = way[e + 1] - way[e]
+    corner = 2 if forward else 0
+    while left > step - at:
+        left -= step - at
+        out[n, 0], out[n, 1] = edges[e, corner], edges[e, corner + 1]
+        n += 1
+        e += 1 if forward else -1
+        e = first if e == end else end - 1 if e < first else e
+        step, at = way[e + 1] - way[e], 0.0
+    share = (at + left) / step if step > 0.0 else 0.0
+    share = share if forward else 1.0 - share
+    out[n, 0] = edges[e, 0] + share * (edges[e, 2] - edges[e, 0])
+    out[n, 1] = edges[e, 1] + share * (edges[e, 3] - edges[e, 1])
+    return n + 1
+
+
+@part
+def _append_piece(out: Floats, n: int, pieces: _Pieces, end: int) -> int:
+    """Appends the points of a piece, beginning at one of its ends; returns the new n."""
+    first, last = pieces.bounds[end // 2], pieces.bounds[end // 2 + 1] - 1
+    for i in range(last - first + 1):
+        p = first + i if end % 2 == 0 else last - i
+        out[n, 0], out[n, 1] = pieces.points[p, 0], pieces.points[p, 1]
+        n += 1
+    return n
+
+
+@part
+def _reverse(out: Floats, first: int, end: int) -> None:
+    """Turns round the order of points first .. end - 1."""
+    for k in range((end - first) // 2):
+        for axis in range(2):
+            out[first + k, axis], out[end - 1 - k, axis] = out[end - 1 - k, axis], out[first + k, axis]
+
+
+@kernel
+def _lay_lines(pieces: _Pieces, border: _Border, limits: _Limits, out: Floats, starts: Indices) -> tuple[int, int]:
+    """Fills in the lines and where each begins; returns the number of points and of lines."""
+    place = _places(pieces, border)
+    after, gap = _next_ends(place, pieces.contour, border)
+    partner, sense = _join_ends(after, gap, pieces.group, limits.most_mm)
+    runs = _runs(partner, sense, gap, _hooks(partner, sense, after, gap, limits))
+    done = flags(len(pieces.ends))
+    n = count = 0
+    for seed in range(len(pieces.ends)):
+        if done[seed]:
+            continue
+        end = 2 * seed
+        while partner[end] >= 0:
+            end = partner[end] ^ 1
+        starts[count] = n
+        count += 1
+        if runs[end] != 0.0:
+            since = _BorderPoint(pieces.ends[end // 2, end % 2], pieces.contour[end], place[end])
+            first, n = n, _append_run(out, n, since, runs[end], border)
+            _reverse(out, first, n)
+        while True:
+            done[end // 2] = True
+            n = _append_piece(out, n, pieces, end)
+            end ^= 1
+            if runs[end] != 0.0:
+                since = _BorderPoint(pieces.ends[end // 2, end % 2], pieces.contour[end], place[end])
+                n = _append_run(out, n, since, runs[end], border)
+            if partner[end] < 0:
+                break
+            n -= 1  # the run's last point is the partner itself
+            end = partner[end]
+    return n, count

@@ -1,0 +1,144 @@
+"""Bridges: hanging places whose lines can span from bank to bank, and the direction in which they sag least."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mdp.kernels.arrays import floats, table
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import Bead
+from slicer.fill.skin import skin_beads
+from slicer.geometry.polygons import Polygons, edges, offset, opening
+from slicer.geometry.scanlines import scan_lines
+from slicer.geometry.segments import inside as is_inside
+from slicer.paths import Kind
+
+TURNS = 18  # directions tried over half a turn, besides those of the place's own sides
+SIDES = 8  # so many of its longest sides are tried, along and across
+LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
+NARROW = 4.0  # line widths: narrower strips of skin over sparse infill are no bridges
+ANCHOR = 2.0  # line widths that the lines of a bridge reach over its banks
+LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
+ADRIFT = 10.0  # and one held nowhere like this
+TOLERATED = 0.02  # share of a bridge's length that may have a loose end: corners of the place
+NEAR_MM = 1e-6  # more than rounding moves the end of a line off the side it lies on
+GAIN = 0.01  # a direction is better only by this share, more than where the lines happen to lie; else the place's own sides win
+
+
+@dataclass(frozen=True, eq=False)
+class Bridge:
+    """place: what hangs; angle_deg: direction of its lines, 0 to 180.
+
+    longest_mm: the longest span; loose: share of the lines' length that is not held at both ends.
+    """
+
+    place: Polygons
+    angle_deg: float
+    longest_mm: float
+    loose: float
+
+    def carries(self, longest_mm: float) -> bool:
+        """Whether it needs no support: every line from bank to bank, none longer than that."""
+        return self.loose <= TOLERATED and self.longest_mm <= longest_mm
+
+
+def find_bridge(hanging: Polygons, banks: Floats, width_mm: float) -> Bridge | None:
+    """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
+
+    banks: (n, 4) edges of the layer below, grown by a quarter of a line. The sum of squared spans is least, a line held at
+    one end counting as 2.63 times its length: where all lines reach over, that is the direction of the shortest spans.
+    """
+    if hanging.area() < LEAST * width_mm**2 or not len(banks):
+        return None
+    sides = edges(hanging)
+    angles = _angles(sides)
+    best, longest_mm, loose = _least_sag(sides, _edges_near(banks, sides), np.array(angles), width_mm)
+    return None if best < 0 else Bridge(hanging, float(np.degrees(angles[best])), longest_mm, loose)
+
+
+def _edges_near(banks: Floats, sides: Floats) -> Floats:
+    """The edges that a ray to the right may cross from anywhere on a place with these sides."""
+    x, y = sides[:, 0], sides[:, 1]
+    above, below = y.min() - NEAR_MM, y.max() + NEAR_MM
+    right = np.maximum(banks[:, 0], banks[:, 2]) > x.min() - NEAR_MM
+    level = (np.maximum(banks[:, 1], banks[:, 3]) > above) & (np.minimum(banks[:, 1], banks[:, 3]) < below)
+    near: Floats = banks[right & level]
+    return near
+
+
+def _angles(sides: Floats) -> list[float]:
+    """Directions worth trying, radians in 0 .. pi, those of the place's sides first."""
+    steps = sides[:, 2:] - sides[:, :2]
+    longest = np.argsort(-np.hypot(*steps.T), kind="stable")[:SIDES]
+    along = np.arctan2(steps[longest, 1], steps[longest, 0])
+    own = np.round(np.concatenate([along, along + 0.5 * np.pi]) % np.pi, 4)
+    return [*np.unique(own).tolist(), *(np.pi * np.arange(TURNS) / TURNS).tolist()]
+
+
+@kernel
+def _least_sag(sides: Floats, banks: Floats, angles: Floats, width_mm: float) -> tuple[int, float, float]:
+    """Which angle sags least (-1: none is held), its longest span and the share of its lines that is loose."""
+    best, least, longest_mm, loose = -1, np.inf, 0.0, 0.0
+    turned, sag_of = table(len(sides), 4), np.array([ADRIFT**2, LOOSE**2, 1.0])
+    for a in range(len(angles)):
+        cos, sin = np.cos(angles[a]), np.sin(angles[a])
+        low, high = np.inf, -np.inf
+        for e in range(len(sides)):
+            for k in range(0, 4, 2):
+                x, y = sides[e, k], sides[e, k + 1]
+                turned[e, k], turned[e, k + 1] = x * cos + y * sin, y * cos - x * sin
+            low, high = min(low, turned[e, 1]), max(high, turned[e, 1])
+        heights = floats(max(int(np.ceil((high - low) / width_mm - 0.5)), 0), 0.0)
+        for k in range(len(heights)):
+            heights[k] = low + (k + 0.5) * width_mm
+        rows = scan_lines(turned, heights)
+        total = sagging = free = longest = 0.0
+        any_held = False
+        for r in range(len(rows)):
+            held, y = 0, rows[r, 2]
+            for end in range(2):
+                x = rows[r, end]
+                held += is_inside(banks, cos * x - sin * y, sin * x + cos * y)
+            span = rows[r, 1] - rows[r, 0]
+            total, longest, any_held = total + span, max(longest, span), any_held or held > 0
+            sagging += sag_of[held] * span * span
+            free += span if held < 2 else 0.0
+        if any_held and sagging < least * (1.0 - GAIN) * total:
+            best, least, longest_mm, loose = a, sagging / total, longest, free / total
+    return best, longest_mm, loose
+
+
+def bridge_area(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:
+    """Where the lines of a bridge run: over what hangs of a layer's inside, and onto the banks as far as the inside reaches."""
+    open_place = opening(span.place ^ inside, 0.5 * width_mm)
+    return open_place if open_place.is_empty() else offset(open_place, ANCHOR * width_mm) ^ inside
+
+
+def bridge_beads(area: Polygons, angle_deg: float, flow: float, width_mm: float, height_mm: float, overlap: float) -> list[Bead]:
+    """The lines of a bridge with its own flow."""
+    return [
+        replace(bead, flow=bead.flow * flow) for bead in skin_beads(area, Kind.BRIDGE, angle_deg, width_mm, height_mm, overlap)
+    ]
+
+
+def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float) -> Polygons:
+    """Where solid lines span the sparse infill of the layer below, and as far beyond as they hold on to what is solid there.
+
+    Strips narrower than NARROW lines are left out: the skin beside them carries their lines.
+    """
+    if solid.is_empty() or sparse_below.is_empty():
+        return Polygons()
+    place = solid ^ sparse_below
+    if place.area() < (NARROW * width_mm) ** 2:
+        return Polygons()
+    open_place = opening(place, 0.5 * NARROW * width_mm)
+    return open_place if open_place.is_empty() else offset(open_place, ANCHOR * width_mm) ^ solid
+
+
+def infill_bridge_beads(area: Polygons, angle_deg: float, process: Process, height_mm: float) -> list[Bead]:
+    """The first solid lines over sparse infill, across the lines below wherever those have one direction."""
+    overlap, width = process.infill_overlap if process.walls else 0.0, process.line_width_mm
+    beads = bridge_beads(area, angle_deg, process.infill_bridge_flow, width, height_mm, overlap)
+    return [replace(bead, over_infill=True) for bead in beads]

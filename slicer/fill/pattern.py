@@ -1,0 +1,55 @@
+"""Line patterns: open lines over a box in a frame turned by an angle, before they are clipped to an area."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from mdp.mesh import Floats
+from slicer.geometry.clip import NO_PIECES, Border, Indices, Pieces, clip_lines, rotation_2d
+
+Box = tuple[float, float, float, float]
+Lines = tuple[Floats, Indices]
+MARGIN_MM = 0.1  # lines begin and end this far outside the box
+
+
+@dataclass(frozen=True, eq=False)
+class LinePattern:
+    """draw gives, for a box x0 y0 x1 y1 of the turned frame, points (n, 2) and the start of each line, mm."""
+
+    angle_deg: float
+    draw: Callable[[Box], Lines]
+
+
+def clip_pattern(border: Border, pattern: LinePattern) -> Pieces:
+    """What of a pattern lies inside a border, in the border's own frame."""
+    if not len(border.edges):
+        return NO_PIECES
+    edges = border.turned(pattern.angle_deg)
+    x0, y0 = edges[:, :2].min(axis=0)
+    x1, y1 = edges[:, :2].max(axis=0)
+    pieces = clip_lines(*pattern.draw((x0 - MARGIN_MM, y0 - MARGIN_MM, x1 + MARGIN_MM, y1 + MARGIN_MM)), edges)
+    return Pieces(pieces.points @ rotation_2d(pattern.angle_deg).T, pieces.starts, pieces.ends)
+
+
+def grid_numbers(low: float, high: float, apart_mm: float) -> Floats:
+    """Whole numbers k for which (k + 1/2) apart lies between low and high: a grid that is the same in every layer."""
+    return np.arange(ceil(low / apart_mm - 0.5), ceil(high / apart_mm - 0.5), dtype=np.float64)
+
+
+def horizontal_lines(heights: Floats, box: Box) -> Lines:
+    """Horizontal lines across a box."""
+    points = np.empty((len(heights), 2, 2))
+    points[:, 0, 0], points[:, 1, 0] = box[0], box[2]
+    points[:, :, 1] = heights[:, None]
+    return points.reshape(-1, 2), 2 * np.arange(len(heights))
+
+
+def parallel_lines(angle_deg: float, apart_mm: float, shift_mm: float = 0.0) -> LinePattern:
+    """Straight lines at an angle, on a grid that is the same in every layer but for a shift across the lines."""
+
+    def draw(box: Box) -> Lines:
+        return horizontal_lines((grid_numbers(box[1] - shift_mm, box[3] - shift_mm, apart_mm) + 0.5) * apart_mm + shift_mm, box)
+
+    return LinePattern(angle_deg, draw)

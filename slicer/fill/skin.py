@@ -1,0 +1,77 @@
+"""Skin: solid fill by lines at alternating +-45 degrees, and by short beads where no such line fits."""
+
+from collections.abc import Sequence
+from math import ceil
+
+import numpy as np
+
+from mdp.mesh import Floats
+from slicer.bead import Bead, length_mm, spacing_mm
+from slicer.fill.anchor import anchor_lines
+from slicer.fill.monotonic import monotonic_lines
+from slicer.fill.pattern import MARGIN_MM, Box, LinePattern, Lines, clip_pattern, horizontal_lines
+from slicer.geometry.clip import border_of
+from slicer.geometry.polygons import Polygons, offset, opening, strips
+from slicer.paths import Kind
+from slicer.walls.gap import LEAST_GAP, gaps
+
+JOIN = 4.0  # spacings along the border: line ends nearer than this are joined
+EDGE = 0.15  # spacings that the outermost lines keep from the extreme points, where a line would only touch
+RANK = 2
+FEW_MM2 = 0.6  # of the line width squared: a smaller place beside the lines stays empty, it is not worth the travel
+LEAST_FLOW, MOST_FLOW = 0.85, 1.15
+
+
+def skin_beads(
+    area: Polygons, kind: Kind, angle_deg: float, width_mm: float, height_mm: float, overlap: float, in_order: bool = False
+) -> list[Bead]:
+    """Beads that fill an area completely; `overlap` is the reach into the walls around, share of a line width.
+
+    in_order: every line is printed on the same side of its neighbour.
+
+    The lines of each connected piece are spread evenly; places they leave get beads of their own. The flow makes the
+    plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill it.
+    """
+    spacing = spacing_mm(width_mm, height_mm)
+    beads: list[Bead] = []
+    for island in area.decompose() if not area.is_empty() else []:
+        border = border_of(offset(island, -(0.5 * spacing - overlap * width_mm)))
+        pieces = clip_pattern(border, _even(angle_deg, spacing))
+        if in_order:
+            lines = monotonic_lines(pieces, border, angle_deg, spacing, JOIN * spacing)
+        else:
+            lines = anchor_lines(pieces, border, 0.0, JOIN * spacing, 0.0)
+        lines = [line for line in lines if length_mm(line) > 0.5 * width_mm]
+        rest = uncovered_area(island, lines, width_mm)
+        beads += gaps(rest, width_mm, height_mm)
+        total = sum(length_mm(line) for line in lines)
+        if total > 0:
+            flow = min(max((island.area() - rest.area()) / (total * spacing), LEAST_FLOW), MOST_FLOW)
+            beads += [Bead(kind, line, width_mm, RANK, flow, follows=in_order and k > 0) for k, line in enumerate(lines)]
+    return beads
+
+
+def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float) -> Polygons:
+    """What of an area lines of that width do not cover, as far as plastic fits into it."""
+    rest = area - strips(lines, 0.5 * width_mm) if lines else area
+    if rest.area() < FEW_MM2 * width_mm**2:
+        return Polygons()
+    places = [place for place in opening(rest, 0.5 * LEAST_GAP * width_mm).decompose() if place.area() >= FEW_MM2 * width_mm**2]
+    return Polygons.compose(places) if places else Polygons()
+
+
+def angle_of_layer_deg(infill_angle_deg: float, layer: int) -> float:
+    """Direction of the skin lines of a layer: neighbours cross at right angles."""
+    return infill_angle_deg + 90.0 * (layer % 2)
+
+
+def _even(angle_deg: float, spacing: float) -> LinePattern:
+    """Lines spread evenly over the whole extent, at most a spacing apart."""
+
+    def draw(box: Box) -> Lines:
+        low, high, edge = box[1] + MARGIN_MM, box[3] - MARGIN_MM, EDGE * spacing
+        between = ceil((high - low - 2.0 * edge) / spacing - 0.01)
+        ends = (low + edge, high - edge) if between > 0 else (0.5 * (low + high),) * 2
+        return horizontal_lines(np.linspace(*ends, max(between, 0) + 1, dtype=np.float64), box)
+
+    return LinePattern(angle_deg, draw)

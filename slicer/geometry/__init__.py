@@ -1,0 +1,1 @@
+"""Plane geometry: polygons, lines clipped to them, cells, distances, triangulations; nothing of printing."""

@@ -1,0 +1,183 @@
+"""Cells: the edges of polygons sorted into a grid of square cells, so that a short travel meets only the few edges near it."""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.arrays import longs
+from mdp.kernels.kernel import kernel, part
+from mdp.kernels.sorting import sort_into_bins
+from mdp.mesh import Floats
+from slicer.geometry.polygons import Polygons, contours, edges_of
+from slicer.geometry.segments import Segment, crossing, edge, level_crossing, nearest_share
+
+MARGIN_MM = 1e-6  # by which an edge reaches into neighbouring cells, so that rounding never hides it
+Indices = NDArray[np.int64]
+
+
+class Grid(NamedTuple):
+    """Square cells of size_mm, row by row from the corner x, y."""
+
+    x: float
+    y: float
+    size_mm: float
+    columns: int
+    rows: int
+
+
+class Cells(NamedTuple):
+    """edges: (n, 4) x0 y0 x1 y1, loop after loop; loop: (n,) number of an edge's loop; begins: where each loop begins, and n.
+
+    Cell c of row r of the grid holds the edges items[first[r * columns + c] : first[r * columns + c + 1]].
+    """
+
+    edges: Floats
+    loop: Indices
+    begins: Indices
+    grid: Grid
+    first: Indices
+    items: Indices
+
+
+def cells_of(polygons: Polygons) -> Cells:
+    """The edges of all contours in cells, about one edge a cell."""
+    loops = contours(polygons)
+    begins = np.cumsum([0, *(len(loop) for loop in loops)]).astype(np.int64)
+    edges = edges_of(loops)
+    loop = np.repeat(np.arange(len(loops), dtype=np.int64), np.diff(begins))
+    low = edges.reshape(-1, 2).min(axis=0, initial=1e9) - 1.0
+    wide, deep = np.maximum(edges.reshape(-1, 2).max(axis=0, initial=-1e9) + 1.0 - low, 1.0)
+    size = max(sqrt(wide * deep / max(len(edges), 1)), max(wide, deep) / 1000.0)
+    grid = Grid(float(low[0]), float(low[1]), float(size), int(wide / size) + 1, int(deep / size) + 1)
+    return Cells(edges, loop, begins, grid, *_sort_edges(edges, grid))
+
+
+@part
+def _columns(grid: Grid, segment: Segment, low: float, high: float) -> tuple[int, int]:
+    """First and last column that a segment touches between the heights low and high; the last below the first: none."""
+    x0, y0, x1, y1 = segment
+    bottom, top = min(y0, y1), max(y0, y1)
+    if bottom > high or top < low:
+        return 1, 0
+    left, right = min(x0, x1), max(x0, x1)
+    if top > bottom:
+        slope = (x1 - x0) / (y1 - y0)
+        a, b = x0 + (max(low, bottom) - y0) * slope, x0 + (min(high, top) - y0) * slope
+        left, right = max(left, min(a, b)), min(right, max(a, b))
+    first, last = int((left - MARGIN_MM - grid.x) / grid.size_mm), int((right + MARGIN_MM - grid.x) / grid.size_mm)
+    return max(first, 0), min(last, grid.columns - 1)
+
+
+@part
+def _rows(grid: Grid, y0: float, y1: float) -> tuple[int, int]:
+    """First and last row that what lies between two heights touches."""
+    first, last = int((min(y0, y1) - MARGIN_MM - grid.y) / grid.size_mm), int((max(y0, y1) + MARGIN_MM - grid.y) / grid.size_mm)
+    return max(first, 0), min(last, grid.rows - 1)
+
+
+@kernel
+def _sort_edges(edges: Floats, grid: Grid) -> tuple[Indices, Indices]:
+    """first and items of Cells. An edge is a run of cells in every row that it touches."""
+    many = 0
+    for e in range(len(edges)):
+        low, high = _rows(grid, edges[e, 1], edges[e, 3])
+        many += high - low + 1
+    begin, end, owner = longs(many, 0), longs(many, 0), longs(many, 0)
+    n = 0
+    for e in range(len(edges)):
+        low, high = _rows(grid, edges[e, 1], edges[e, 3])
+        for r in range(low, high + 1):
+            bottom = grid.y + r * grid.size_mm
+            a, b = _columns(grid, edge(edges, e), bottom - MARGIN_MM, bottom + grid.size_mm + MARGIN_MM)
+            begin[n], end[n], owner[n] = r * grid.columns + a, r * grid.columns + b, e
+            n += 1
+    first, items = sort_into_bins(begin, end, grid.columns * grid.rows)
+    for k in range(len(items)):
+        items[k] = owner[items[k]]
+    return first, items
+
+
+@part
+def _near(cells: Cells, r: int, segment: Segment) -> tuple[int, int]:
+    """Which of the items lie in the cells that a segment touches in a row: from and to."""
+    grid = cells.grid
+    bottom = grid.y + r * grid.size_mm
+    a, b = _columns(grid, segment, bottom - MARGIN_MM, bottom + grid.size_mm + MARGIN_MM)
+    return (cells.first[r * grid.columns + a], cells.first[r * grid.columns + b + 1]) if a <= b else (0, 0)
+
+
+@part
+def crossings(cells: Cells, segment: Segment, shares: Floats, crossed: Indices) -> int:
+    """Fills in where (0..1, rising) and which edges a segment crosses; returns how many, -1 where there is no room for them."""
+    low, high = _rows(cells.grid, segment.y0, segment.y1)
+    n = 0
+    for r in range(low, high + 1):
+        begin, end = _near(cells, r, segment)
+        for k in range(begin, end):
+            e = cells.items[k]
+            share = crossing(segment, edge(cells.edges, e))
+            known = share < 0.0
+            for i in range(n):
+                known = known or crossed[i] == e
+            if known:
+                continue
+            if n == len(shares):
+                return -1
+            i = n
+            while i > 0 and shares[i - 1] > share:
+                shares[i], crossed[i] = shares[i - 1], crossed[i - 1]
+                i -= 1
+            shares[i], crossed[i] = share, e
+            n += 1
+    return n
+
+
+@part
+def free(cells: Cells, segment: Segment) -> bool:
+    """Whether a segment crosses no edge."""
+    low, high = _rows(cells.grid, segment.y0, segment.y1)
+    for r in range(low, high + 1):
+        begin, end = _near(cells, r, segment)
+        for k in range(begin, end):
+            if crossing(segment, edge(cells.edges, cells.items[k])) >= 0.0:
+                return False
+    return True
+
+
+@part
+def within(cells: Cells, x: float, y: float) -> bool:
+    """Whether a point lies in the polygons: the edges that a ray to the right crosses, each counted in one cell."""
+    grid = cells.grid
+    row, column = int((y - grid.y) / grid.size_mm), max(int((x - grid.x) / grid.size_mm), 0)
+    if y < grid.y or row >= grid.rows:
+        return False
+    odd = False
+    for c in range(column, grid.columns):
+        cell = row * grid.columns + c
+        for k in range(cells.first[cell], cells.first[cell + 1]):
+            cut = level_crossing(edge(cells.edges, cells.items[k]), y)
+            if cut > x and int((cut - grid.x) / grid.size_mm) == c:
+                odd = not odd
+    return odd
+
+
+@part
+def nearest(cells: Cells, x: float, y: float, reach: float) -> tuple[float, float, int]:
+    """The nearest point of any edge within reach, and its edge; edge -1: none."""
+    grid = cells.grid
+    best, which, nx, ny = reach, -1, x, y
+    low, high = _rows(grid, y - reach, y + reach)
+    left = max(int((x - reach - grid.x) / grid.size_mm), 0)
+    right = min(int((x + reach - grid.x) / grid.size_mm), grid.columns - 1)
+    for r in range(low, high + 1):
+        for c in range(r * grid.columns + left, r * grid.columns + right + 1):
+            for k in range(cells.first[c], cells.first[c + 1]):
+                side = edge(cells.edges, cells.items[k])
+                share = nearest_share(side, x, y)
+                px, py = side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0)
+                distance = np.hypot(px - x, py - y)
+                if distance < best:
+                    best, which, nx, ny = distance, cells.items[k], px, py
+    return nx, ny, which

@@ -1,0 +1,120 @@
+"""Segments: the predicates of plane geometry that kernels share: orientation, crossing, nearest point, even-odd rule.
+
+A point on a line counts as its right side, and a point at the height of an edge's end as below it, for all that meet there alike:
+no crossing is counted twice or missed at a vertex.
+"""
+
+from math import inf
+from typing import Any, NamedTuple
+
+from mdp.kernels.kernel import part
+from mdp.mesh import Floats
+
+
+class Segment(NamedTuple):
+    """A straight line from x0, y0 to x1, y1."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+
+@part
+def edge(edges: Floats, e: int) -> Segment:
+    """One of (n, 4) edges x0 y0 x1 y1."""
+    return Segment(edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3])
+
+
+@part
+def orientation(line: Segment, x: float, y: float) -> float:
+    """Twice the signed area of the triangle of a line's two points and a third: positive where that lies to the left."""
+    return float((line.x1 - line.x0) * (y - line.y0) - (line.y1 - line.y0) * (x - line.x0))
+
+
+@part
+def crossing(segment: Segment, other: Segment) -> float:
+    """Where (0..1) a segment crosses another one; -1 where it does not."""
+    if (orientation(segment, other.x0, other.y0) > 0.0) == (orientation(segment, other.x1, other.y1) > 0.0):
+        return -1.0
+    start, end = orientation(other, segment.x0, segment.y0), orientation(other, segment.x1, segment.y1)
+    if (start > 0.0) == (end > 0.0):
+        return -1.0
+    return float(start / (start - end))
+
+
+@part
+def crosses_any(segment: Segment, edges: Floats) -> bool:
+    """Whether a segment crosses any of the (n, 4) edges."""
+    left, right = min(segment.x0, segment.x1), max(segment.x0, segment.x1)
+    low, high = min(segment.y0, segment.y1), max(segment.y0, segment.y1)
+    for e in range(len(edges)):
+        side = edge(edges, e)
+        if max(side.x0, side.x1) < left or min(side.x0, side.x1) > right:
+            continue
+        if max(side.y0, side.y1) < low or min(side.y0, side.y1) > high:
+            continue
+        if crossing(segment, side) >= 0.0:
+            return True
+    return False
+
+
+@part
+def clamp_projection(along: float, square: float) -> float:
+    """Where (0..1) on a segment its point nearest to another one lies.
+
+    along: product of the vectors from the segment's beginning to the point and to its end; square: its length squared.
+    """
+    return min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+
+
+@part
+def nearest_share(segment: Segment, x: float, y: float) -> float:
+    """Where (0..1) on a segment the point nearest to x, y lies."""
+    dx, dy = segment.x1 - segment.x0, segment.y1 - segment.y0
+    return clamp_projection((x - segment.x0) * dx + (y - segment.y0) * dy, dx * dx + dy * dy)
+
+
+@part
+def squared_distance(segment: Segment, x: float, y: float) -> float:
+    """Square of the distance between a point and a segment."""
+    share = nearest_share(segment, x, y)
+    px, py = x - segment.x0, y - segment.y0
+    return float((px - share * (segment.x1 - segment.x0)) ** 2 + (py - share * (segment.y1 - segment.y0)) ** 2)
+
+
+@part
+def squared_distance_to_any(edges: Floats, x: float, y: float) -> float:
+    """Square of the distance between a point and the nearest of (n, 4) edges; infinite without edges."""
+    least = inf
+    for e in range(len(edges)):
+        least = min(least, squared_distance(edge(edges, e), x, y))
+    return least
+
+
+@part
+def squared_distance_in_space(p: Any, a: Any, b: Any) -> float:
+    """Square of the distance between a point and the segment from a to b; each three numbers."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    x, y, z = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    share = clamp_projection(x * dx + y * dy + z * dz, dx * dx + dy * dy + dz * dz)
+    x, y, z = x - share * dx, y - share * dy, z - share * dz
+    return float(x * x + y * y + z * z)
+
+
+@part
+def level_crossing(segment: Segment, y: float) -> float:
+    """Where (x) a segment goes through the height y; -inf where it does not. What an even-odd test counts to one side."""
+    if (segment.y0 > y) == (segment.y1 > y):
+        return -inf
+    return float(segment.x0 + (y - segment.y0) / (segment.y1 - segment.y0) * (segment.x1 - segment.x0))
+
+
+@part
+def inside(edges: Floats, x: float, y: float) -> bool:
+    """Whether a point lies in the polygons of (n, 4) edges, by the even-odd rule."""
+    odd = False
+    for e in range(len(edges)):
+        if level_crossing(edge(edges, e), y) > x:
+            odd = not odd
+    return odd

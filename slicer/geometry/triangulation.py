@@ -1,0 +1,85 @@
+"""Triangulation: the constrained Delaunay triangulation of polygons: any triangles, their inner sides flipped (Lawson 1977)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import manifold3d
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats, Ints
+from slicer.geometry.halfedges import opposites
+from slicer.geometry.segments import Segment, orientation
+
+Indices = NDArray[np.int64]
+MOST_PASSES = 60  # of flipping; real polygons need fewer than ten, rounding must not make it endless
+
+
+class Triangulation(NamedTuple):
+    """points: (n, 2) mm. Half-edge 3 t + k runs from the point tails[3 t + k] of triangle t to its next one.
+
+    tails: (3 m,) counter-clockwise in every triangle; across: (3 m,) the half-edge on the other side, -1 on the boundary.
+    """
+
+    points: Floats
+    tails: Ints
+    across: Ints
+
+
+def triangulate(loops: Sequence[Floats]) -> Triangulation | None:
+    """The Delaunay triangulation of polygons given by their contours (k, 2); None where they have no area."""
+    if not loops:
+        return None
+    triangles = np.asarray(manifold3d.triangulate(list(loops)), dtype=np.int32).reshape(-1, 3)
+    if not len(triangles):
+        return None
+    triangulation = Triangulation(np.concatenate(loops), triangles.ravel().copy(), opposites(triangles))
+    _flip(triangulation)
+    return triangulation
+
+
+@part
+def doubled_area(points: Floats, a: int, b: int, c: int) -> float:
+    """Twice the signed area of a triangle of three of the points."""
+    return orientation(Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1]), points[c, 0], points[c, 1])
+
+
+@part
+def _inside_circle(points: Floats, a: int, b: int, c: int, p: int) -> bool:
+    """Whether p lies clearly inside the circle through a, b, c (counter-clockwise)."""
+    x, y = points[p, 0], points[p, 1]
+    ax, ay, bx, by = points[a, 0] - x, points[a, 1] - y, points[b, 0] - x, points[b, 1] - y
+    cx, cy = points[c, 0] - x, points[c, 1] - y
+    a2, b2, c2 = ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy
+    determinant = a2 * (bx * cy - by * cx) + b2 * (cx * ay - cy * ax) + c2 * (ax * by - ay * bx)
+    return bool(determinant > 1e-12)
+
+
+@kernel
+def _flip(triangulation: Triangulation) -> None:
+    """Flips inner sides in place until every one is locally Delaunay."""
+    points, tails, across = triangulation
+    for _ in range(MOST_PASSES):
+        flipped = 0
+        for a in range(len(tails)):
+            b = across[a]
+            if b < a:
+                continue
+            a_prev, b_prev = a - a % 3 + (a + 2) % 3, b - b % 3 + (b + 2) % 3
+            p, q, r, s = tails[a], tails[b], tails[a_prev], tails[b_prev]
+            if not _inside_circle(points, p, q, r, s):
+                continue
+            if doubled_area(points, s, q, r) <= 0.0 or doubled_area(points, r, p, s) <= 0.0:
+                continue
+            outer_a, outer_b = across[a_prev], across[b_prev]
+            tails[a], tails[b] = s, r
+            across[a], across[b] = outer_b, outer_a
+            if outer_b >= 0:
+                across[outer_b] = a
+            if outer_a >= 0:
+                across[outer_a] = b
+            across[a_prev], across[b_prev] = b_prev, a_prev
+            flipped += 1
+        if not flipped:
+            break

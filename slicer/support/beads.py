@@ -1,0 +1,49 @@
+"""Support beads: outlines, sparse lines that stand on each other, dense lines next to the part."""
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import Bead, spacing_mm
+from slicer.fill.zigzag import zigzag_lines
+from slicer.geometry.polygons import Polygons, close_loop, contours, offset, opening
+from slicer.paths import Kind
+from slicer.travel.order import OUTSIDE
+
+JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
+SEAM = 0.1  # of a line width: lines overlap the outline by this and so hold on to it
+
+
+def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: float, first: bool) -> list[Bead]:
+    """The beads of a layer's support, its dense places as an interface; first: the first layer on the platform."""
+    if area.is_empty():
+        return []
+    width = process.line_width_mm
+    spacing = spacing_mm(width, height_mm)
+    beads = [
+        Bead(Kind.SUPPORT, close_loop(loop), width, OUTSIDE)
+        for level in range(process.support_walls)
+        for loop in contours(offset(area, -0.5 * width - level * spacing))
+    ]
+    edge = process.support_walls * spacing
+    inner = offset(area, SEAM * width - edge) if edge else area
+    roof = opening(inner ^ dense, 0.5 * width) if not dense.is_empty() else dense
+    rest = inner if roof.is_empty() else opening(inner - roof, 0.25 * width)
+    density = process.support_foot_density if first else process.support_density
+    beads += [Bead(Kind.SUPPORT, line, width, OUTSIDE) for line in _sparse(rest, density, process, spacing)]
+    lines = _lines(roof, process.infill_angle_deg + 90.0, process.support_interface_density, process, spacing)
+    return beads + [Bead(Kind.SUPPORT_INTERFACE, line, width, OUTSIDE) for line in lines]
+
+
+def _sparse(area: Polygons, density: float, process: Process, spacing: float) -> list[Floats]:
+    angle = process.infill_angle_deg
+    if process.support_pattern == "lines":
+        return _lines(area, angle, density, process, spacing)
+    return [line for turn in (0.0, 90.0) for line in _lines(area, angle + turn, 0.5 * density, process, spacing)]
+
+
+def _lines(area: Polygons, angle_deg: float, density: float, process: Process, spacing: float) -> list[Floats]:
+    """Zigzags; where no line meets the area its outline, unless it has one already."""
+    width = process.line_width_mm
+    apart = spacing / density
+    inner = offset(area, -0.5 * width)
+    lines = zigzag_lines(inner, offset(area, -0.25 * width), angle_deg, apart, JOIN * apart) if not inner.is_empty() else []
+    return lines if lines or process.support_walls else [close_loop(loop) for loop in contours(inner)]

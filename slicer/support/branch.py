@@ -1,0 +1,233 @@
+"""Branch: a piece of support on its way down; it shrinks to a trunk, and trunks lean towards each other until they are one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, hypot, pi, radians, tan
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.geometry.distance import signed_distances
+from slicer.geometry.polygons import Polygons, closing, contours, edges, offset, union
+from slicer.support.reachable import (
+    EVEN_MM,
+    FINE_MM,
+    LEAST_MM2,
+    SLIVER_MM,
+    SMOOTH_MM,
+    ReachableAreas,
+    carrying_area,
+    dilate,
+    drop_slivers,
+)
+
+CORNERS = 12  # of a trunk's outline
+THICKEST_MM = 2.5  # a trunk's radius: enough for any part that fits a machine
+MEETING = 0.8  # trunks lean towards each other only if they meet in this share of the height that is left
+FATTER = 3.0  # times the usual growth: how fast a branch that had to be thin recovers
+THIN_MM = 0.1  # radius of the places of a branch between obstacles: hardly more than one place
+TIDY_EVERY = 4  # slits and slivers of branches in the way of something are seen to in every so many layers
+INSET = 0.7  # of the lean: then right corners move by the lean
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """The places of a branch's middle in one layer, all within `radius` of x, y; top_mm: where the branch ends.
+
+    full: the area has every place within the radius.
+    """
+
+    area: Polygons
+    x: float
+    y: float
+    radius: float
+    top_mm: float
+    full: bool = False
+
+    @property
+    def reach_mm(self) -> float:
+        """How far from x, y its farthest place is."""
+        return self.radius / cos(pi / CORNERS) if self.full else self.radius
+
+    def shrink(self, radius: float) -> "Branch":
+        """Every place moved towards the middle, by no more than the radius becomes less."""
+        share = radius / self.radius
+        matrix = np.array([[share, 0.0, (1.0 - share) * self.x], [0.0, share, (1.0 - share) * self.y]])
+        return Branch(self.area.transform(matrix), self.x, self.y, radius, self.top_mm)
+
+
+def branch_of(area: Polygons, top_mm: float) -> Branch:
+    """A branch through all places of an area."""
+    points = np.concatenate(contours(area))
+    x, y = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return Branch(area, float(x), float(y), float(np.hypot(points[:, 0] - x, points[:, 1] - y).max()), top_mm)
+
+
+def trunk(x: float, y: float, radius: float, top_mm: float) -> Branch:
+    """A round branch."""
+    around = Polygons.circle(radius / cos(pi / CORNERS), CORNERS)
+    return Branch(around.translate((x, y)), x, y, radius, top_mm, True)
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """How thick trunks are: radius of their places at the top, its growth per mm downward."""
+
+    least_mm: float
+    per_mm: float
+
+    @classmethod
+    def of(cls, process: Process, radius_mm: float) -> "Growth":
+        """The growth of a process whose beads reach radius_mm around each place."""
+        slope = tan(radians(process.support_branch_growth_deg))
+        return cls(max(0.5 * process.support_branch_mm - radius_mm, 0.1 * radius_mm), slope)
+
+    def radius_mm(self, branch: Branch, z_mm: float) -> float:
+        """Of a trunk at a height."""
+        return min(self.least_mm + self.per_mm * max(branch.top_mm - z_mm, 0.0), max(THICKEST_MM, self.least_mm))
+
+
+def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int, growth: Growth) -> list[Branch]:
+    """The branches of a layer in the layer below: every place of the former is within the lean of one of the latter, or
+    on ground.
+    """
+    z, lean, reachable = float(areas.top_mm[layer - 1]), float(areas.lean_mm[layer]), areas.reachable[layer - 1]
+    targets = _target_branches(branches, z, lean, float(areas.top_mm[layer]) - z, growth)
+    borders = edges(reachable)
+    free = _depths(targets, borders) >= np.array([branch.reach_mm for branch in targets])
+    doubtful = [branch.area for branch, is_free in zip(targets, free, strict=True) if not is_free]
+    bad = union(doubtful) - reachable
+    if bad.area() < LEAST_MM2:
+        return _drop_enclosed(targets)
+    low: list[Branch] = []
+    left: list[Branch] = []
+    for old, new, is_free, depth in zip(branches, targets, free, _depths(branches, borders), strict=True):
+        if is_free or (new.area ^ bad).area() < LEAST_MM2:
+            low.append(new)
+            continue
+        narrow = _narrow(old, reachable, borders, float(depth), lean)
+        if narrow is not None:
+            low.append(narrow)
+        elif not old.full or not _stands_on(old, areas.ground[layer]):
+            left.append(old)
+    return _drop_enclosed(low + _move_aside(left, areas, layer))
+
+
+def _depths(branches: Sequence[Branch], borders: Floats) -> Floats:
+    """How deep the middles of branches lie inside an area with those edges."""
+    depths_mm: Floats = signed_distances(np.array([[branch.x, branch.y] for branch in branches]).reshape(-1, 2), borders)
+    return depths_mm
+
+
+def _target_branches(branches: Sequence[Branch], z_mm: float, lean: float, rise: float, growth: Growth) -> list[Branch]:
+    """Where the branches would go if nothing was in their way: wide ones shrink, trunks go to meet the nearest trunk."""
+    thick = [growth.radius_mm(branch, z_mm) for branch in branches]
+    trunks = [k for k, branch in enumerate(branches) if branch.radius <= thick[k] + EVEN_MM]
+    goals = _goals(np.array([[branches[k].x, branches[k].y] for k in trunks]), z_mm * lean / rise)
+    goal_of = dict(zip(trunks, goals, strict=True))
+    targets = []
+    for k, branch in enumerate(branches):
+        if branch.radius - lean > thick[k]:
+            targets.append(branch.shrink(branch.radius - lean))
+            continue
+        x, y = goal_of.get(k, (branch.x, branch.y))
+        away = hypot(x - branch.x, y - branch.y)
+        share = 1.0 if away <= lean else lean / away
+        x, y = branch.x + share * (x - branch.x), branch.y + share * (y - branch.y)
+        radius = max(growth.least_mm, branch.radius + FATTER * growth.per_mm * rise)
+        targets.append(trunk(x, y, min(thick[k], radius), branch.top_mm))
+    return targets
+
+
+def _goals(at: Floats, reach_mm: float) -> list[tuple[float, float]]:
+    """For each trunk half way to the nearest other one, or its own place; reach_mm: how far it can lean down to the ground."""
+    if len(at) < 2:
+        return [(float(x), float(y)) for x, y in at]
+    apart = np.hypot(at[:, None, 0] - at[None, :, 0], at[:, None, 1] - at[None, :, 1])
+    np.fill_diagonal(apart, np.inf)
+    nearest = apart.argmin(axis=1)
+    meet = apart[np.arange(len(at)), nearest] <= 2.0 * MEETING * reach_mm
+    goals = np.where(meet[:, None], 0.5 * (at + at[nearest]), at)
+    return [(float(x), float(y)) for x, y in goals]
+
+
+def _narrow(branch: Branch, reachable: Polygons, borders: Floats, depth_mm: float, lean: float) -> Branch | None:
+    """The branch where it is, as thick as it was or by the lean thinner, if that is free.
+
+    borders: edges of the reached places; depth_mm: how deep inside them the branch's middle lies.
+    """
+    if branch.full and depth_mm >= branch.reach_mm:
+        return branch
+    if branch.radius <= THIN_MM:
+        return None
+    if branch.full or branch.radius - lean <= THIN_MM:
+        thin = trunk(branch.x, branch.y, max(branch.radius - lean, THIN_MM), branch.top_mm)
+        return thin if depth_mm >= thin.reach_mm else None
+    thin = branch.shrink(branch.radius - lean)
+    if depth_mm >= thin.radius:
+        return thin
+    if signed_distances(contours(thin.area)[0][:1], borders)[0] < 0.0:
+        return None
+    return thin if (thin.area - reachable).area() < LEAST_MM2 else None
+
+
+def _stands_on(branch: Branch, ground: Polygons) -> bool:
+    """Whether most of a branch has come to ground."""
+    return bool(2.0 * (branch.area - ground).area() < branch.area.area())
+
+
+def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
+    """Branches in the way of something: what of them has a place below stays, the rest goes aside, or ends on ground."""
+    if not branches:
+        return []
+    reachable, lean = areas.reachable[layer - 1], float(areas.lean_mm[layer])
+    area = union([branch.area for branch in branches])
+    tidy = layer % TIDY_EVERY == 0
+    area = closing(area, SMOOTH_MM) if tidy else area
+    carrying = carrying_area(area, reachable, areas.ground[layer], lean)
+    carrying = _draw_in(carrying, lean) if tidy and (area - reachable).is_empty() else carrying
+    islands = _tidy(carrying, reachable).decompose() if tidy else _islands_below(carrying, reachable)
+    top = max(branch.top_mm for branch in branches)
+    return [branch_of(island, top) for island in islands if island.area() >= LEAST_MM2]
+
+
+def _tidy(places: Polygons, reachable: Polygons) -> Polygons:
+    """Places whose slivers are wide enough to be followed down."""
+    thick = drop_slivers(places)
+    return thick.simplify(FINE_MM) + (dilate(places - thick, THIN_MM) ^ reachable)
+
+
+def _islands_below(places: Polygons, reachable: Polygons) -> list[Polygons]:
+    """The islands of places, wider where all of an island is a sliver: what is just a thin limb of one can wait."""
+    islands: list[Polygons] = []
+    for island in places.decompose():
+        islands += (dilate(island, THIN_MM) ^ reachable).decompose() if _sliver(island) else [island.simplify(FINE_MM)]
+    return islands
+
+
+def _sliver(island: Polygons) -> bool:
+    """Whether an island is on average narrower than a sliver, judged by its box."""
+    x0, y0, x1, y1 = island.bounds()
+    return bool(island.area() < 2.0 * SLIVER_MM * hypot(x1 - x0, y1 - y0))
+
+
+def _draw_in(area: Polygons, lean: float) -> Polygons:
+    """The area with its edges drawn in; what is too narrow for that stays."""
+    drawn_in = []
+    for island in area.decompose():
+        core = offset(island, -INSET * lean)
+        bits = [] if core.is_empty() else (island - dilate(core, lean)).decompose()
+        drawn_in += [island] if core.is_empty() else [core, *(bit for bit in bits if bit.area() >= lean**2)]
+    return union(drawn_in)
+
+
+def _drop_enclosed(branches: list[Branch]) -> list[Branch]:
+    """Without branches that lie wholly inside a trunk."""
+    if len(branches) < 2:
+        return branches
+    x, y, radius, full = np.array([[b.x, b.y, b.radius, b.full] for b in branches]).T
+    deep = radius[None, :] - radius[:, None] - np.hypot(x[:, None] - x[None, :], y[:, None] - y[None, :])
+    rank = np.arange(len(branches))
+    inside = (deep >= -1e-9) & (full[None, :] > 0) & ((radius[None, :] > radius[:, None]) | (rank[None, :] < rank[:, None]))
+    return [branches[k] for k in np.flatnonzero(~inside.any(axis=1))]

@@ -1,0 +1,66 @@
+"""Tree: support as branches; what begins near each other grows down as one branch."""
+
+from dataclasses import dataclass
+from itertools import product
+from math import floor
+
+from slicer.geometry.polygons import Polygons, closing, union
+from slicer.support.branch import Branch, Growth, branch_of, lower_branches
+from slicer.support.columns import JOIN_MM
+from slicer.support.reachable import LEAST_MM2, SMOOTH_MM, ReachableAreas
+
+CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its middle is down after half of that
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """The branches of a layer; those that are no trunks yet take up what begins in their square."""
+
+    growth: Growth
+    branches: tuple[Branch, ...] = ()
+
+    @property
+    def area(self) -> Polygons:
+        """The places of all branches."""
+        return union([branch.area for branch in self.branches])
+
+    def add_contact(self, contact: Polygons, reachable: Polygons, top_mm: float) -> "Tree":
+        """With what begins in this layer."""
+        if contact.is_empty():
+            return self
+        branches = list(self.branches)
+        young = {_cell(b.x, b.y): k for k, b in enumerate(branches) if not b.full}
+        for cell, piece in _pieces(contact):
+            k = young.get(cell)
+            area = piece if k is None else branches[k].area + piece
+            area = closing(area, JOIN_MM).simplify(SMOOTH_MM) ^ reachable
+            if area.area() <= LEAST_MM2:
+                continue
+            if k is None:
+                branches.append(branch_of(area, top_mm))
+            else:
+                branches[k] = branch_of(area, branches[k].top_mm)
+        return Tree(self.growth, tuple(branches))
+
+    def lower(self, areas: ReachableAreas, layer: int) -> "Tree":
+        """What carries a layer's support in the layer below."""
+        return Tree(self.growth, tuple(lower_branches(self.branches, areas, layer, self.growth))) if self.branches else self
+
+
+def _cell(x: float, y: float) -> tuple[int, int]:
+    return floor(x / CELL_MM), floor(y / CELL_MM)
+
+
+def _pieces(area: Polygons) -> list[tuple[tuple[int, int], Polygons]]:
+    """An area cut along a fixed lattice, with the lattice's numbers."""
+    pieces: dict[tuple[int, int], list[Polygons]] = {}
+    square = Polygons.square((CELL_MM, CELL_MM))
+    for island in area.decompose():
+        x0, y0, x1, y1 = island.bounds()
+        (i0, j0), (i1, j1) = _cell(x0, y0), _cell(x1, y1)
+        for i, j in product(range(i0, i1 + 1), range(j0, j1 + 1)):
+            whole = (i0, j0) == (i1, j1)
+            piece = island if whole else island ^ square.translate((i * CELL_MM, j * CELL_MM))
+            if piece.area() > LEAST_MM2:
+                pieces.setdefault((i, j), []).append(piece)
+    return [(cell, Polygons.compose(several)) for cell, several in sorted(pieces.items())]

@@ -1,0 +1,1 @@
+"""Travel: the order of a layer's beads and the ways between them."""

@@ -1,0 +1,297 @@
+"""Seam: where a wall that runs round begins and ends.
+
+Every outer wall begins at the place of least cost: the distance to a target (the seam of the layer below, the rear, the tip),
+less a reward for corners, which hide a seam. Places near the edge of an interface are out of the question. Inner walls begin
+beside their outer wall.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import Bead
+from slicer.geometry.polygons import start_at
+from slicer.geometry.segments import Segment, nearest_share, squared_distance_in_space
+from slicer.paths import Kind
+
+WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
+REACH_MM = 3.0  # a seam of the layer below that lies nearer than this to a wall is continued
+ARM_MM = 1.0  # a corner's angle is measured between points this far before and after it, so that noise is none
+SMOOTH_DEG, SHARP_DEG = 20.0, 90.0  # from where on a turn hides a seam at all, and from where on it does so fully
+SMOOTH_COSINE = float(np.cos(np.radians(SMOOTH_DEG)))
+ANYWHERE = (1000.0, 300.0)  # a sharp inner or outer corner is worth this distance, mm: inner before outer before none
+NEARBY = (2.0, 1.0)  # the same where a seam is continued: it moves into a corner that it passes
+NO_CORNER = (0.0, 0.0)
+SAMPLE_MM = 2.0  # straight sides are tried at this distance when their ends are too near an interface
+GOLDEN = 0.6180339887498949
+FORBIDDEN = 1e6
+NO_EDGES = np.zeros((0, 6))
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
+
+    tip: (2,) where the nozzle comes from. interfaces: (n, 6) segments of their edges, z_mm: the layer's middle. layer: number.
+    """
+
+    rear: Floats
+    before: Floats
+    tip: Floats
+    interfaces: Floats
+    z_mm: float
+    layer: int
+
+
+def rear_of(bounds_mm: Floats) -> Floats:
+    """(2,) a point behind the middle of a part, as far as the part is deep; bounds_mm: (2, 3)."""
+    low, high = bounds_mm
+    return np.array([0.5 * (low[0] + high[0]), 2.0 * high[1] - low[1]])
+
+
+def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -> tuple[list[Bead], Floats]:
+    """The beads with their walls begun at their seams, and the (k, 2) seams of the outer walls.
+
+    The walls come as loops (n, 2), solid on their left, and become polylines. A wall stops short of its beginning by
+    seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width inside
+    instead, over its inner walls.
+    """
+    interfaces = _at_height(around, process.interface_seam_mm)
+    seams: dict[int, Floats] = {}
+    out = list(beads)
+    for kind in WALLS:
+        known = np.array(list(seams.values())).reshape(-1, 2)
+        for k, bead in enumerate(beads):
+            if bead.kind is kind:
+                loop = np.ascontiguousarray(bead.points)
+                lead_mm = 0.0
+                if kind is Kind.INNER_WALL:
+                    loop, _ = _start_at_best(loop, _beside(loop, known), interfaces._replace(edges=NO_EDGES))
+                else:
+                    loop, free = _start_at_best(loop, _target(loop, process, around), interfaces)
+                    seams[k] = loop[0]
+                    lead_mm = 0.0 if free else bead.width_mm
+                out[k] = replace(bead, points=_open(loop, process.seam_gap * bead.width_mm, lead_mm))
+    return out, np.array(list(seams.values())).reshape(-1, 2)
+
+
+def start_at_rear(loop: Floats) -> Floats:
+    """A loop (n, 2) closed and begun at its rearmost point, the leftmost of several."""
+    at = int(np.lexsort((loop[:, 0], -loop[:, 1]))[0])
+    return np.concatenate([loop[at:], loop[: at + 1]])
+
+
+class _Target(NamedTuple):
+    """Where a seam is drawn to, and the distance, mm, that an inner or outer corner is worth."""
+
+    x: float
+    y: float
+    inner_mm: float
+    outer_mm: float
+
+
+class _Interfaces(NamedTuple):
+    """edges: (n, 6) segments of interface edges that seams at the height z keep clear of by keep_mm."""
+
+    edges: Floats
+    z: float
+    keep_mm: float
+
+
+def _at_height(around: Surroundings, keep_mm: float) -> _Interfaces:
+    """Those interface edges that lie within reach of a layer."""
+    z = around.interfaces[:, [2, 5]] - around.z_mm
+    edges = np.ascontiguousarray(around.interfaces[(z.min(axis=1) < keep_mm) & (z.max(axis=1) > -keep_mm)])
+    return _Interfaces(edges, float(around.z_mm), float(keep_mm))
+
+
+def _start_at_best(loop: Floats, target: _Target, interfaces: _Interfaces) -> tuple[Floats, bool]:
+    """The loop (n, 2) begun at its place of least cost, and whether that is clear of interface edges."""
+    at, share, free = _best(loop, target, interfaces)
+    if share > 0.0:
+        new = loop[at] + share * (loop[(at + 1) % len(loop)] - loop[at])
+        return np.concatenate([new[None], loop[at + 1 :], loop[: at + 1]]), free
+    return start_at(loop, at), free
+
+
+def _beside(loop: Floats, outer: Floats) -> _Target:
+    """Where an inner wall's seam is drawn to: the nearest of the (k, 2) seams of outer walls."""
+    distance, x, y = _nearest(loop, outer, np.inf)
+    return _Target(x, y, *NO_CORNER) if distance < np.inf else _Target(float(loop[0, 0]), float(loop[0, 1]), *NO_CORNER)
+
+
+def _target(loop: Floats, process: Process, around: Surroundings) -> _Target:
+    """Where an outer wall's seam is drawn to."""
+    rear = float(around.rear[0]), float(around.rear[1])
+    if process.seam == "rear":
+        return _Target(*rear, *NO_CORNER)
+    if process.seam == "nearest":
+        return _Target(float(around.tip[0]), float(around.tip[1]), *NO_CORNER)
+    if process.seam == "random":
+        return _Target(*_point_at(loop, (GOLDEN * (around.layer + 1)) % 1.0), *NO_CORNER)
+    distance, x, y = _nearest(loop, around.before, REACH_MM)
+    if distance == np.inf:
+        return _Target(*rear, *ANYWHERE)
+    return _Target(x, y, *(ANYWHERE if process.seam == "corner" else NEARBY))
+
+
+def _open(loop: Floats, gap_mm: float, lead_mm: float) -> Floats:
+    """The loop as a polyline that ends a gap before its beginning; lead_mm: both ends are drawn inside by that."""
+    points = np.concatenate([loop, loop[:1]])
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    if gap_mm > 0.0 and steps.sum() > 4.0 * gap_mm:
+        beyond = np.cumsum(steps[::-1])[::-1]  # from each point to the end
+        last = int(np.flatnonzero(beyond > gap_mm)[-1])
+        share = (beyond[last] - gap_mm) / steps[last]
+        points = np.concatenate([points[: last + 1], (points[last] + share * (points[last + 1] - points[last]))[None]])
+    if lead_mm > 0.0:
+        inward = _inward(loop) * lead_mm
+        points = np.concatenate([(points[0] + inward)[None], points, (points[-1] + 0.5 * inward)[None]])
+    return points
+
+
+def _inward(loop: Floats) -> Floats:
+    """Unit vector to the left of the loop at its beginning, where the solid is."""
+    steps = np.array([loop[0] - loop[-1], loop[1] - loop[0]])
+    steps /= np.maximum(np.hypot(*steps.T), 1e-12)[:, None]
+    along = steps.sum(axis=0)
+    length = float(np.hypot(*along))
+    along = along / length if length > 1e-6 else steps[1]
+    return np.array([-along[1], along[0]])
+
+
+@kernel
+def _point_at(loop: Floats, share: float) -> tuple[float, float]:
+    """The point at a share of a loop's length, counted from its least point, so that it does not depend on the loop's start."""
+    n = len(loop)
+    first = 0
+    for i in range(n):
+        if loop[i, 0] < loop[first, 0] or (loop[i, 0] == loop[first, 0] and loop[i, 1] < loop[first, 1]):
+            first = i
+    total = 0.0
+    for i in range(n):
+        total += np.hypot(loop[i, 0] - loop[i - 1, 0], loop[i, 1] - loop[i - 1, 1])
+    left = share * total
+    for i in range(first, first + n):
+        ax, ay = loop[i % n, 0], loop[i % n, 1]
+        dx, dy = loop[(i + 1) % n, 0] - ax, loop[(i + 1) % n, 1] - ay
+        step = np.hypot(dx, dy)
+        if step >= left:
+            along = left / step if step > 0.0 else 0.0
+            return ax + along * dx, ay + along * dy
+        left -= step
+    return loop[first, 0], loop[first, 1]
+
+
+@part
+def _side(loop: Floats, i: int) -> Segment:
+    """The side from a vertex of a loop to the next one."""
+    after = (i + 1) % len(loop)
+    return Segment(loop[i, 0], loop[i, 1], loop[after, 0], loop[after, 1])
+
+
+@part
+def _project(loop: Floats, x: float, y: float) -> tuple[float, int, float]:
+    """Distance from a point to a loop, the side that is nearest and how far along it."""
+    least, at, share = np.inf, 0, 0.0
+    for i in range(len(loop)):
+        side = _side(loop, i)
+        t = nearest_share(side, x, y)
+        distance = np.hypot(side.x0 + t * (side.x1 - side.x0) - x, side.y0 + t * (side.y1 - side.y0) - y)
+        if distance < least:
+            least, at, share = distance, i, t
+    return least, at, share
+
+
+@kernel
+def _nearest(loop: Floats, points: Floats, reach_mm: float) -> tuple[float, float, float]:
+    """The point nearest to a loop as (distance, x, y); the distance is infinite when none is within reach."""
+    low_x, high_x, low_y, high_y = loop[0, 0], loop[0, 0], loop[0, 1], loop[0, 1]
+    for i in range(len(loop)):
+        low_x, high_x = min(low_x, loop[i, 0]), max(high_x, loop[i, 0])
+        low_y, high_y = min(low_y, loop[i, 1]), max(high_y, loop[i, 1])
+    best, bx, by = np.inf, 0.0, 0.0
+    for p in range(len(points)):
+        x, y = points[p, 0], points[p, 1]
+        out = np.hypot(max(low_x - x, 0.0, x - high_x), max(low_y - y, 0.0, y - high_y))
+        if out < min(best, reach_mm):
+            distance = _project(loop, x, y)[0]
+            if distance < min(best, reach_mm):
+                best, bx, by = distance, x, y
+    return best, bx, by
+
+
+@kernel
+def _best(loop: Floats, target: _Target, interfaces: _Interfaces) -> tuple[int, float, bool]:
+    """The place of least cost as (side, share of it), and whether it keeps clear of interface edges."""
+    n = len(loop)
+    distance, at, share = _project(loop, target.x, target.y)
+    if share >= 1.0 - 1e-6:
+        at, share = (at + 1) % n, 0.0
+    elif share <= 1e-6:
+        share = 0.0
+    side = _side(loop, at)
+    free = _clear(interfaces, side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0))
+    least = distance + (0.0 if free else FORBIDDEN)
+    if target.inner_mm == 0.0 and target.outer_mm == 0.0 and free:
+        return at, share, free
+    for i in range(n):
+        side = _side(loop, i)
+        dx, dy = side.x1 - side.x0, side.y1 - side.y0
+        count = 1 if free and len(interfaces.edges) == 0 else int(np.hypot(dx, dy) / SAMPLE_MM) + 1
+        for s in range(count):
+            cx, cy = side.x0 + s / count * dx, side.y0 + s / count * dy
+            cost = np.hypot(cx - target.x, cy - target.y) + 1e-6 * cx
+            if s == 0 and target.inner_mm > 0.0:
+                cost -= _reward(loop, i, target)
+            if cost < least:
+                clear = _clear(interfaces, cx, cy)
+                if clear or not free:
+                    cost += 0.0 if clear else FORBIDDEN
+                    if cost < least:
+                        least, at, share, free = cost, i, s / count, clear
+    return at, share, free
+
+
+@part
+def _reward(loop: Floats, i: int, target: _Target) -> float:
+    """What the corner at a vertex is worth: nothing up to SMOOTH_DEG of turn, all from SHARP_DEG on."""
+    px, py = _arm(loop, i, -1)
+    qx, qy = _arm(loop, i, 1)
+    bx, by, cx, cy = loop[i, 0] - px, loop[i, 1] - py, qx - loop[i, 0], qy - loop[i, 1]
+    cross, dot = bx * cy - by * cx, bx * cx + by * cy
+    if dot > SMOOTH_COSINE * np.hypot(bx, by) * np.hypot(cx, cy):
+        return 0.0
+    turn = np.degrees(np.arctan2(abs(cross), dot))
+    strength = min((turn - SMOOTH_DEG) / (SHARP_DEG - SMOOTH_DEG), 1.0)
+    return float(strength * (target.inner_mm if cross < 0.0 else target.outer_mm))
+
+
+@part
+def _arm(loop: Floats, i: int, sense: int) -> tuple[float, float]:
+    """The point ARM_MM along the loop from a vertex, forward or backward."""
+    n, left, at = len(loop), ARM_MM, i
+    for _ in range(n):
+        ax, ay = loop[at % n, 0], loop[at % n, 1]
+        dx, dy = loop[(at + sense) % n, 0] - ax, loop[(at + sense) % n, 1] - ay
+        step = np.hypot(dx, dy)
+        if step >= left:
+            return ax + left / step * dx, ay + left / step * dy
+        left -= step
+        at += sense
+    return loop[at % n, 0], loop[at % n, 1]
+
+
+@part
+def _clear(interfaces: _Interfaces, x: float, y: float) -> bool:
+    """Whether a place at their height keeps clear of all interface edges."""
+    for e in range(len(interfaces.edges)):
+        begin, end = interfaces.edges[e, :3], interfaces.edges[e, 3:]
+        if squared_distance_in_space((x, y, interfaces.z), begin, end) < interfaces.keep_mm * interfaces.keep_mm:
+            return False
+    return True

@@ -1,0 +1,100 @@
+"""A plan is kept, edited and used again: the same parts and the same G-code without a search."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from machine.app.cli import main
+
+FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.4"]
+FAST += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6", "--set", "process.infill_density=0.05"]
+PARTS = ["part-01.stl", "part-02.stl", "decomposition.3mf"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def _run(*arguments: str) -> None:
+    assert main([*arguments, *FAST]) == 0
+
+
+def _values(path: str) -> Any:
+    values = json.loads(Path(path).read_text())
+    return {key: value for key, value in values.items() if key not in ("seconds", "candidates_evaluated", "rounds")}
+
+
+def test_the_plan_in_the_folder_gives_the_same_parts_and_stays_as_it_is(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _run("decompose", "demo:tree", "-o", "a")
+    edited = "# my own remark\n" + Path("a/plan.toml").read_text()
+    Path("a/plan.toml").write_text(edited)
+    _run("decompose", "demo:tree", "--plan", "a/plan.toml", "-o", "b")
+    assert "cut by a plan in" in capsys.readouterr().out
+    assert [Path(f"a/{name}").read_bytes() for name in PARTS] == [Path(f"b/{name}").read_bytes() for name in PARTS]
+    assert json.loads(Path("b/decomposition.json").read_text())["candidates_evaluated"] == 0
+    again = Path("b/plan.toml").read_text()
+    _run("decompose", "demo:tree", "--plan", "a/plan.toml", "-o", "a")
+    assert Path("a/plan.toml").read_text() == edited
+    assert again.split("[[front]]")[0] in edited
+
+
+def test_a_plan_that_is_not_there_yet_is_written_and_then_used(folder: Path) -> None:
+    for name in ("first", "second"):
+        _run("decompose", "demo:tree", "--plan", "tree.toml", "--json", f"{name}.json")
+    first, second = _values("first.json"), _values("second.json")
+    assert second["parts"] == first["parts"]
+    assert [row["parts"] for row in second["front"]] == [row["parts"] for row in first["front"]]
+    _run("decompose", "demo:tree", "--plan", "tree.toml", "--parts", "2", "--json", "two.json")
+    assert len(_values("two.json")["parts"]) == 2
+
+
+def test_more_parts_than_there_are_give_all_there_are_and_say_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _run("decompose", "demo:tree", "--parts", "50", "--json", "many.json")
+    count = len(_values("many.json")["parts"])
+    assert f"demo:tree: --parts 50: the search found no more than {count}\n" in capsys.readouterr().err
+
+
+HIGH = "version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 500\n"
+OTHER = f"sha256 = 'abc'\nmodel = 'other.stl'\n{HIGH}"
+REFUSED = [
+    ("--plan", HIGH, "plan mine.toml: part 2 cannot be cut off: its plane misses the model"),
+    ("--planes", HIGH, "plan mine.toml: part 2 cannot be cut off: its plane misses the model"),
+    ("--plan", OTHER, "plan mine.toml was made of another model: other.stl is not demo:tree as it is read now"),
+    ("--planes", OTHER, "plan mine.toml was made of another model: other.stl is not demo:tree as it is read now"),
+    ("--planes", "version = 1\n[[part]]\n[[part]]\n", "part 2 has neither normal nor offset_mm"),
+]
+
+
+@pytest.mark.parametrize(("option", "text", "sentence"), REFUSED)
+def test_planes_that_cannot_be_cut_end_in_one_sentence(
+    folder: Path, capsys: pytest.CaptureFixture[str], option: str, text: str, sentence: str
+) -> None:
+    Path("mine.toml").write_text(text)
+    assert main(["decompose", "demo:tree", option, "mine.toml", "-o", "parts", *FAST]) == 1
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.startswith("tiltprint: ")
+    assert sentence in last
+    assert not Path("parts").exists()
+
+
+@pytest.mark.parametrize("orient", [[], ["--orient"]])
+def test_export_by_a_plan_gives_the_g_code_of_the_search_byte_by_byte(folder: Path, orient: list[str]) -> None:
+    _run("export", "demo:tree", "-o", "searched.gcode", *orient)
+    _run("decompose", "demo:tree", "--plan", "tree.toml", *orient)
+    _run("export", "demo:tree", "-o", "planned.gcode", "--plan", "tree.toml")
+    assert Path("planned.gcode").read_bytes() == Path("searched.gcode").read_bytes()
+
+
+def test_planes_by_hand_are_in_the_plan_with_their_zones(folder: Path) -> None:
+    zone = "[[keep]]\nmin_mm = [-2.0, -2.0, 10.0]\nmax_mm = [2.0, 2.0, 11.0]\n"
+    Path("mine.toml").write_text(f"version = 1\n{zone}")
+    _run("decompose", "demo:tree", "--planes", "mine.toml", "--plan", "tree.toml", "--json", "zone.json")
+    assert zone in Path("tree.toml").read_text()
+    last = _values("zone.json")["parts"][-1]["base"]
+    Path("mine.toml").write_text(f"version = 1\n[[part]]\n[[part]]\nnormal = {last['normal']}\noffset_mm = {last['offset_mm']}\n")
+    _run("decompose", "demo:tree", "--planes", "mine.toml", "--json", "planes.json")
+    assert _values("planes.json")["parts"][-1]["base"] == last

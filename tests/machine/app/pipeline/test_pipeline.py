@@ -1,0 +1,55 @@
+"""The whole way from a model file to the plastic of a simulated printer."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from machine.app.pipeline.pipeline import build, decompose_model
+from machine.app.requests import ModelRequest
+from machine.dryrun.deposit import inside_share
+from machine.link.stream import print_lines
+from machine.simulator.simulator import SimulatedPrinter
+from machine.view.program import Program
+from profiles.profile import load
+
+SHARED = Path(__file__).parents[4].parent / "shared" / "models"
+RUNS = [("generic_ac", f"demo:{name}") for name in ("bracket", "figure", "lattice", "tree")] + [("fractal5pro", "demo:tree")]
+if SHARED.exists():
+    RUNS += [("generic_ac", str(SHARED / name)) for name in ("hook.stl", "bracket.3mf", "kitten.off")]
+    RUNS += [("fractal5pro", str(SHARED / "deer.ply"))]
+QUICK = ["search.directions=200", "search.beam_width=1", "process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3"]
+QUICK += ["process.scale=0.6"]  # half the lines, the same shapes
+
+
+def _built(model: str, machine: str) -> Program:
+    profile = load(machine=machine, settings=QUICK)
+    return build(decompose_model(ModelRequest(model, profile)).decomposition, profile)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("machine", "model"), RUNS, ids=lambda name: Path(name).name)
+def test_the_simulated_printer_lays_the_plastic_where_the_model_is(machine: str, model: str) -> None:
+    profile = load(machine=machine)
+    program = _built(model, machine)
+    assert not [finding for finding in program.run.findings if finding.severity == "error"]
+    with SimulatedPrinter(profile.machine) as printer:
+        assert not print_lines(program.lines, printer.path).cancelled
+        record = printer.record
+    segments, volumes = record.deposited(profile.material.diameter_mm)
+    assert volumes.sum() == pytest.approx(program.run.segment_mm3.sum(), rel=1e-3)
+    assert np.abs(segments - program.run.segments_mm).max() < 2e-3
+    assert program.decomposition is not None
+    assert inside_share(program.run, program.decomposition.mesh, profile.process.line_width_mm).share >= 0.99
+    assert (record.clamped, record.unknown, record.nozzle_target_c, record.bed_target_c) == (0, 0, 0.0, 0.0)
+
+
+@pytest.mark.slow
+def test_the_plastic_is_what_the_sliced_paths_say() -> None:
+    from slicer.slice import slice_part
+
+    profile = load(settings=QUICK)
+    found = decompose_model(ModelRequest("demo:tree", profile)).decomposition
+    parts = found.parts
+    planned = sum(slice_part(part, profile, parts[:k], parts[k + 1 :]).volume_mm3 for k, part in enumerate(parts))
+    assert build(found, profile).run.segment_mm3.sum() == pytest.approx(planned, rel=1e-3)

@@ -1,0 +1,27 @@
+"""Progress of long work: lines in a log, one live line on a terminal."""
+
+import pytest
+
+from machine.app.terminal import progress
+from machine.app.terminal.progress import PLAIN_AGAIN_S, PLAIN_EVERY_S, PlainLines
+from tests.machine.person import Person
+
+
+def test_a_log_hears_of_what_changes_every_five_seconds_and_of_what_does_not_once_a_minute(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = [(1.0, "a"), (PLAIN_EVERY_S, "a"), (3 * PLAIN_EVERY_S, "a"), (4 * PLAIN_EVERY_S, "b"), (2 * PLAIN_AGAIN_S, "b")]
+    clock = iter([0.0, *(now for now, _ in said)])
+    monkeypatch.setattr(progress, "monotonic", lambda: next(clock))
+    lines = PlainLines()
+    for _, text in said:
+        lines.show(text)
+    assert capsys.readouterr().err == "a\nb\nb\n"
+
+
+def test_on_a_terminal_the_work_under_way_is_one_live_line_that_goes_away() -> None:
+    with Person("decompose", "demo:bracket", "--set", "search.directions=60") as person:
+        person.see("searching parts: stage")
+        person.see("part  tilt deg")
+        assert person.end() == 0
+    assert person.raw.count("\x1b[?25l") == person.raw.count("\x1b[?25h") == 1

@@ -1,0 +1,145 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from machine.app.terminal.report import front_table, in_words, parts_table, run_table, table
+from machine.dryrun.dryrun import dry_run
+from machine.view.quantities import duration
+from mdp.cut import cut, mesh_of, solid_of
+from mdp.decomposition import Decomposition, FrontRow, Part
+from mdp.mesh import Mesh
+from mdp.plane import PLATFORM, Plane
+from mdp.pose import Pose, about
+from mdp.search.orientation import best_orientation
+from profiles.profile import load, load_one
+from tests.shapes import box, hollow, tee
+
+
+def part(index: int, mesh: Mesh, base: Plane, pose: Pose, risky_mm2: float = 0.0) -> Part:
+    return Part(index, mesh, base, pose, np.eye(3), mesh.volume_mm3, risky_mm2)
+
+
+def tee_in_parts() -> Decomposition:
+    """A tee with its arms cut off sideways, 300 mm2 of underside that hang printed straight up; 30 of them stay risky."""
+    right, left = Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0)
+    one, rest = cut(solid_of(tee()), left)
+    other, stem = cut(rest, right)
+    parts = (
+        part(1, mesh_of(stem), PLATFORM, Pose(0.0, 0.0)),
+        part(2, mesh_of(other), right, Pose(90.0, 90.0), 30.0),
+        part(3, mesh_of(one), left, Pose(90.0, -90.0)),
+    )
+    return Decomposition("tee.stl", tee(), parts, 2, "classic", 300.0, 30.0, 1234, 2, 0.25)
+
+
+def test_the_parts_of_a_tee_stand_in_print_order_with_what_they_save() -> None:
+    lines = parts_table(tee_in_parts()).splitlines()
+    assert lines == [
+        "part  tilt deg  turn deg  base mm  volume mm3   share  risky before  after mm2",
+        "1          0.0       0.0      0.0        4000  57.1 %           0.0        0.0",
+        "2         90.0      90.0      5.0        1500  21.4 %         150.0       30.0",
+        "3         90.0     -90.0      5.0        1500  21.4 %         150.0        0.0",
+        "",
+        "risky area                 mm2     less",
+        "straight up              300.0",
+        "best single orientation    0.0  100.0 %  turned 90 about x",
+        "in 3 parts                30.0   90.0 %",
+        "1234 candidates in 0.2 s",
+    ]
+
+
+def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
+    planes = (Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0))
+    rows = (
+        FrontRow((), 300.0, 0.0, 300.0, time_s=3723.0, filament_mm=4040.0),
+        FrontRow(planes[:1], 150.0, 40.0, 174.0),
+        FrontRow(planes, 30.0, 80.0, 78.0, chosen=True),
+    )
+    assert front_table(rows).splitlines() == [
+        "in parts  needs support mm2  seams mm  costs mm2  about  filament m",
+        "1                     300.0         0      300.0  1h 2m         4.0",
+        "2                     150.0        40      174.0      -           -",
+        "3                      30.0        80       78.0      -           -  taken: the least cost",
+    ]
+    assert front_table(rows) in parts_table(replace(tee_in_parts(), front=rows))
+
+
+def test_the_table_fits_a_terminal_of_80_columns() -> None:
+    assert max(len(line) for line in parts_table(tee_in_parts()).splitlines()) <= 80
+
+
+def alone(mesh: Mesh, risky_mm2: float) -> Decomposition:
+    whole = (part(1, mesh, PLATFORM, Pose(0.0, 0.0), risky_mm2),)
+    return Decomposition("m.stl", mesh, whole, 2, "classic", risky_mm2, risky_mm2, 0, 0, 0.0)
+
+
+def test_the_areas_follow_the_self_supporting_angle() -> None:
+    leaning = box(10, 10, 40).transform(about(np.array([0.0, 1.0, 0.0]), np.radians(30)), (0, 0, 5))
+    before = [float(parts_table(alone(leaning, 400.0), angle).splitlines()[1].split()[-2]) for angle in (25.0, 35.0)]
+    assert before == [pytest.approx(400 + 100, abs=0.2), pytest.approx(100, abs=0.2)]
+
+
+def test_the_authors_terms_count_what_stands_on_the_platform() -> None:
+    lines = parts_table(tee_in_parts(), count_platform_faces=True).splitlines()
+    assert lines[1].split()[-2] == "100.0"
+    assert lines[7].split()[3] == "700.0"
+
+
+def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:
+    lines = parts_table(alone(box(), 0.0)).splitlines()
+    assert lines[-2].split() == ["in", "1", "part", "0.0", "0.0", "%"]
+    assert lines[-3].endswith("as it stands")
+
+
+def test_a_rounding_error_is_no_negative_share() -> None:
+    lines = parts_table(alone(hollow(), 100.0 - 1e-9)).splitlines()
+    assert [line.split()[-2:] for line in lines[-2:-1]] == [["0.0", "%"]]
+    assert "-0.0" not in "\n".join(lines)
+
+
+def test_a_rotation_is_told_as_the_setting_takes_it() -> None:
+    upside_down = tee().transform(np.diag([1.0, -1.0, -1.0]))
+    assert in_words(best_orientation(upside_down, 45.0)) == "as it stands"
+    oblique = tee().transform(about(np.array([0.0, 1.0, 0.0]), np.radians(30)))
+    assert in_words(best_orientation(oblique, 45.0)) == "turned 90 about x"
+    assert "rests nowhere" in in_words(best_orientation(hollow(), 45.0, resting=False))
+
+
+def run_lines(moves: str) -> list[str]:
+    lines = ["G28", "G92 A0 C0", "M109 S210", "M83", *moves.split("\n"), "M104 S0"] if moves else ["M105"]
+    profile = load()
+    machine = profile.machine.model_copy(update={"uncalibrated": []})
+    return run_table(dry_run(lines, profile.model_copy(update={"machine": machine}))).splitlines()
+
+
+def test_a_run_is_told_in_four_lines_and_its_findings() -> None:
+    assert run_lines(";PART:1 of 1\n;LAYER_CHANGE\nG0 Z10 F600\nG1 X30 E1\nG1 E-1\nM777") == [
+        "time 4s, filament 0.00 m, 0.00 cm3",
+        "1 part, 1 layer, 0 reorientations, 1 retraction, 0.01 m travel",
+        "plastic from 0.0, 0.0, 10.0 to 30.0, 0.0, 10.0 mm (workpiece)",
+        "axes X 0.0..30.0, Y 0.0..0.0, Z 10.0..10.0, A 0.0..0.0, C 0.0..0.0",
+        "error: the part begins in air: 30.0 mm of its first layer have nothing under them (line 8)",
+        "warning: M777 is not known to the dry run and was ignored (line 10)",
+    ]
+
+
+def test_a_long_finding_is_told_in_lines_with_every_key_whole() -> None:
+    machine = load_one("trident_5axis")["machine"]
+    told = run_table(dry_run(["M105"], load(machine="trident_5axis"))).splitlines()
+    first = next(k for k, line in enumerate(told) if line.startswith("warning: 8 numbers of "))
+    assert max(len(line) for line in told) <= 100
+    assert set(machine.uncalibrated) <= set(" ".join(told[first:]).replace(",", "").split())
+
+
+def test_a_program_without_a_move_says_so() -> None:
+    assert run_lines("")[2] == "nothing moves"
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(3975.4, "1h 6m 15s"), (61, "1m 1s"), (0.4, "0s")])
+def test_a_duration_is_hours_minutes_seconds(seconds: float, told: str) -> None:
+    assert duration(seconds) == told
+
+
+def test_a_table_aligns_words_left_and_numbers_right() -> None:
+    assert table([["part", "mm"], ["1", "10.5"]]) == "part    mm\n1     10.5\n"

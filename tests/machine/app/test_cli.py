@@ -1,0 +1,289 @@
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from machine.app import start
+from machine.app.cli import main
+from mdp.save import stl
+from tests import shapes
+
+FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "process.first_layer_height_mm=0.3"]
+FAST += ["--set", "process.line_width_mm=0.6", "--set", "process.scale=0.6"]
+
+WRONG = [
+    (["decompose", "nowhere.stl"], "nowhere.stl"),
+    (["decompose", "."], "folder"),
+    (["decompose", f"{'long' * 80}.stl"], "there is no such file"),
+    (["decompose", "demo:tree", "--machine", "long" * 80], "is not known"),
+    (["decompose", "demo:tree", "-o", "long" * 80], "file name too long"),
+    (["decompose", "demo:tree", "--json", "long" * 80], "file name too long"),
+    (["decompose", "demo:unicorn"], "figure"),
+    (["decompose", "demo:tree", "--nonsense"], "--beam-width"),
+    (["decompose", ""], "the model's name is empty"),
+    (["decompose", "demo:tree", "--machine", "lathe"], "generic_ac"),
+    (["decompose", "demo:tree", "--machine", "generic_ca"], "did you mean generic_ac?"),
+    (["decompose", "demo:tree", "--material", "PLA"], "did you mean pla?"),
+    (["decompose", "demo:tree", "--process", ""], "process profile '' is not known"),
+    (["decompose", "demo:tree", "--jsn", "x"], "did you mean --json?"),
+    (["decompose", "demo:tree", "--set", "process.wals=2"], "process.wals"),
+    (["decompose", "demo:tree", "--set", "process.walls=-2"], "process.walls"),
+    (["decompose", "demo:tree", "--set", "walls"], "KEY=VALUE"),
+    (["decompose", "demo:tree", "--beam-width", "0"], "beam_width"),
+    (["decompose", "demo:tree", "--beam-width", "many"], "--beam-width is 'many': it must be a whole number"),
+    (["decompose", "demo:tree", "--beam-width=many"], "--beam-width is 'many': it must be a whole number"),
+    (["decompose", "demo:tree", "-o", "-"], "a folder is expected"),
+    (["decompose", "demo:tree", "--png", "-"], "output -: a file name is expected"),
+    (["export", "demo:tree", "-o", "-", "--json", "-"], "only one of them can go to standard output"),
+    (["view", "short.gcode", "-o", "-"], "output -: a file name is expected"),
+    (["decompose", "demo:tree", "--search", "luck"], 'search.method is "luck": it must be one of "best", "published"'),
+    (["decompose", "demo:tree", "--time-limit", "-1"], "search.time_limit_s is -1"),
+    (["decompose", "demo:tree", "--time-limit", "soon"], "--time-limit is 'soon'"),
+    (["decompose", "demo:tree", "--ranker", "oracle"], "classic"),
+    (["export", "demo:tree"], "--out"),
+    (["export", "demo:tree", "-o", "/nowhere/x.gcode"], "/nowhere"),
+    (["export", "demo:tree", "-o", "."], "folder"),
+    (["export", "demo:tree", "-o", "x.gcode", "--layer", "1:1"], "--svg FILE must say where to"),
+    (["export", "demo:tree", "-o", "x.gcode", "--svg", "x.svg", "--layer", "two"], "PART:LAYER is expected"),
+    (["print", "demo:tree"], "--port"),
+    (["print", "empty.gcode", "--port", "sim"], "empty.gcode"),
+    (["simulate", "rubbish.gcode"], "rubbish.gcode"),
+    (["simulate", "demo:tree", "--model", "demo:tree"], "--model demo:tree"),
+    (["simulate", "short.gcode", "--model", "nowhere.stl"], "nowhere.stl"),
+    (["decompose", "demo:tree", "--parts", "0"], "--parts is 0: 1 to 1000 is allowed"),
+    (["decompose", "demo:tree", "--parts", "few"], "--parts is 'few': it must be a whole number"),
+    (["decompose", "demo:tree", "--plan", "rubbish.gcode"], "plan rubbish.gcode is not text"),
+    (["decompose", "demo:tree", "--plan", "box.toml", "--planes", "box.toml"], "so nothing is searched; one of them is allowed"),
+    (["decompose", "demo:tree", "--plan", "box.toml", "--record", "x.npz"], "so nothing is searched that could be recorded"),
+    (["decompose", "demo:tree", "--plan", "/nowhere/p.toml"], "the folder /nowhere does not exist"),
+    (["decompose", "demo:tree", "--planes", "box.toml", "--orient"], "--orient: the planes of box.toml belong to the model"),
+    (["decompose", "demo:tree", "--planes", "none.toml"], "plan none.toml cannot be read: no such file or directory"),
+    (["export", "demo:tree", "-o", "x.gcode", "--plan", "none.toml"], "plan none.toml cannot be read: no such file or directory"),
+    (["export", "demo:tree", "-o", "x.gcode", "--plan", "long" * 80], "cannot be read: file name too long"),
+    (["simulate", "short.gcode", "--plan", "box.toml"], "--plan box.toml: short.gcode is G-code, which is cut already"),
+    (["view", "short.gcode", "--parts", "2"], "--parts 2: short.gcode is G-code, which is cut already"),
+    (["print", "demo:tree", "--port", "sim", "--plan", "."], "plan . cannot be read: is a directory"),
+    (["profiles", "show", "unicorn"], "generic_ac"),
+    (["profiles", "check", "nowhere.toml"], "nowhere.toml"),
+    (["profiles", "show", "pla", "--set", "process.walls=3"], "pla is a material profile"),
+    (["calibrate", "--measured", "nowhere.toml"], "sheet nowhere.toml cannot be read"),
+    (["fly"], "decompose"),
+    (["exprot"], "did you mean export?"),
+    (["print", "demo:tree", "--port", "/dev/nowhere"], "/dev/nowhere does not exist"),
+    (["print", "demo:tree", "--port", "/dev/null"], "/dev/null"),
+    (["print", "demo:tree", "--port", "sim", "--sim-speed", "-1"], "--sim-speed is -1"),
+    (["print", "short.gcode", "--port", "sim", "--baud", "0"], "--baud is 0"),
+    (["print", "short.gcode", "--port", "sim", "--watch-port", "70000"], "--watch-port is '70000': it must be at most 65535"),
+    (["decompose", "-lead.stl"], "./-lead.stl"),
+    (["decompose", "demo:tree", "--json", "empty.gcode/x.json"], "empty.gcode is a file"),
+    (["decompose", "demo:tree", "-o", "empty.gcode/parts"], "empty.gcode is a file"),
+]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty.gcode").write_text("")
+    (tmp_path / "short.gcode").write_text("G28\nG1 Z5 F600\n")
+    (tmp_path / "box.toml").write_text("version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 500\n")
+    (tmp_path / "-lead.stl").write_text("solid")
+    (tmp_path / "rubbish.gcode").write_bytes(bytes(range(256)))
+    return tmp_path
+
+
+@pytest.mark.parametrize(("arguments", "named"), WRONG, ids=lambda value: " ".join(value) if isinstance(value, list) else value)
+def test_wrong_input_is_one_sentence_naming_what_is_allowed(
+    folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], named: str
+) -> None:
+    before = sorted(folder.iterdir())
+    assert main(arguments) == 1
+    message = capsys.readouterr().err
+    assert named in message
+    assert message.startswith("tiltprint: ")
+    assert message.count("\n") == 1
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_bug_ends_with_exit_3_and_a_log_file(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def broken() -> int:
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr("machine.app.commands.profiles.list_profiles", broken)
+    assert main(["profiles", "list"]) == 3
+    log = Path(capsys.readouterr().err.strip().rsplit(" ", 1)[1])
+    assert "ZeroDivisionError: planted" in log.read_text()
+    log.unlink()
+
+
+def test_a_full_disk_under_standard_output_is_no_bug(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def full() -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("machine.app.commands.profiles.list_profiles", full)
+    assert main(["profiles", "list"]) == 1
+    assert capsys.readouterr().err == "tiltprint: standard output cannot be written: no space is left\n"
+
+
+def test_ctrl_c_before_the_command_line_is_loaded_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("machine.app.cli.main", interrupted)
+    assert start.main() == 130
+
+
+def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> int:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as beneath:
+            raise SystemError("returned a result with an exception set") from beneath
+
+    monkeypatch.setattr("machine.app.commands.profiles.list_profiles", interrupted)
+    assert main(["profiles", "list"]) == 130
+
+
+def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
+    wanted = ["-o", "parts", "--json", "out.json", "--png", "parts.png", "--sheet", "sheet.png"]
+    assert main(["decompose", "demo:bracket", *FAST, *wanted]) == 0
+    told = json.loads(Path("out.json").read_text())
+    assert set(told) == {
+        "model", "faces", "beam_width", "ranker", "seconds", "risky_area_mm2", "residual_area_mm2", "reduction", "volume_mm3",
+        "candidates_evaluated", "rounds", "parts", "cost_mm2", "seam_mm", "front",
+    }  # fmt: skip
+    assert set(told["parts"][0]) == {
+        "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "faces", "file",
+    }  # fmt: skip
+    assert sum(part["volume_mm3"] for part in told["parts"]) == pytest.approx(told["volume_mm3"], rel=1e-6)
+    files = {part["file"] for part in told["parts"]} | {"decomposition.3mf", "decomposition.json", "plan.toml"}
+    assert {file.name for file in Path("parts").iterdir()} == files
+    assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png"))
+
+
+def test_options_of_the_search_are_its_profile_keys(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["decompose", "demo:bracket", *FAST, "--search", "published", "--beam-width", "3", "--json", "a.json"]) == 0
+    words = ["--set", "search.method=published", "--set", "search.beam_width=3"]
+    assert main(["decompose", "demo:bracket", *FAST, *words, "--json", "b.json"]) == 0
+    first, again = (json.loads(Path(name).read_text()) for name in ("a.json", "b.json"))
+    assert {**first, "seconds": None} == {**again, "seconds": None}
+
+
+@pytest.mark.parametrize("command", [["decompose"], ["export", "-o", "a.gcode"], ["simulate"], ["print", "--port", "sim"]])
+def test_a_time_limit_of_nothing_prints_one_part_and_says_so(
+    folder: Path, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    assert main([*command, "demo:bracket", *FAST, "--set", "process.support=none", "--time-limit", "0"]) == 0
+    assert "search.time_limit_s = 0 ended the search" in capsys.readouterr().err
+
+
+def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Path) -> None:
+    for name in ("a.gcode", "b.gcode"):
+        assert main(["export", "demo:bracket", *FAST, "-o", name, "--json", "a.json"]) == 0
+    assert Path("a.gcode").read_bytes() == Path("b.gcode").read_bytes()
+    assert main(["simulate", "a.gcode", *FAST, "--json", "again.json"]) == 0
+    first, again = (json.loads(Path(name).read_text()) for name in ("a.json", "again.json"))
+    assert set(first) == {
+        "time_s", "filament_mm", "extruded_mm3", "travel_mm", "layers", "parts", "reorientations", "retractions", "bounds_mm",
+        "axes", "findings",
+    }  # fmt: skip
+    assert first == again
+    assert main(["simulate", "a.gcode", "--model", "demo:bracket", "--json", "beside.json"]) == 0
+    beside = json.loads(Path("beside.json").read_text())["model"]
+    assert (beside["outside"], beside["filled"] > 0.5) == (0.0, True)
+
+
+def test_g_code_on_standard_output_is_the_file_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "demo:bracket", *FAST, "-o", "a.gcode"]) == 0
+    table = capsys.readouterr().out
+    assert main(["export", "demo:bracket", *FAST, "-o", "-"]) == 0
+    told = capsys.readouterr()
+    assert (told.out, table in told.err) == (Path("a.gcode").read_text(), True)
+    assert not Path("-").exists()
+
+
+def test_every_command_is_told_in_one_line_of_a_narrow_screen(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["--help"]) == 0
+    lines = capsys.readouterr().out.partition("Commands:")[2].splitlines()[1:]
+    assert len(lines) == 11
+    assert all(line.endswith(".") and not line.endswith("...") for line in lines)
+
+
+def test_the_simulated_speed_must_be_a_number(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("one.gcode").write_text("G28\nM104 S0\nM140 S0\n")
+    assert main(["print", "one.gcode", "--port", "sim", "--sim-speed", "nan"]) == 1
+    assert "--sim-speed is nan" in capsys.readouterr().err
+
+
+def test_a_byte_order_mark_is_read_over(folder: Path) -> None:
+    Path("mark.gcode").write_bytes(b"\xef\xbb\xbfG28\nM104 S0\nM140 S0\n")
+    assert main(["simulate", "mark.gcode"]) == 0
+
+
+def test_a_model_that_does_better_lying_down_is_laid_down(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    left = []
+    for arguments in ([], ["--orient"]):
+        assert main(["decompose", "tee.stl", *arguments, "--set", "search.directions=20", "--json", "out.json"]) == 0
+        left.append(json.loads(Path("out.json").read_text())["residual_area_mm2"])
+    assert left[1] <= left[0]
+    assert left[1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_profiles_show_and_check_agree(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["profiles", "show", "generic_ac", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["machine"]["tilt"]["letter"] == "A"
+    Path("mine.toml").write_text('inherits = "generic_ac"\n[machine.tilt]\nlimits_deg = [50.0, -50.0]\n')
+    assert main(["profiles", "check", "mine.toml"]) == 1
+    assert "limits_deg" in capsys.readouterr().err
+
+
+def _program(folder: Path) -> Path:
+    """Three hours of careful strokes over a hot bed."""
+    lines = ["G21", "G90", "M83", "G28 X Y Z", "G92 A0 C0", "M140 S60", "M190 S60", "M104 S210", "M109 S210", "G0 Z0.2 F600"]
+    lines += [f"G1 X{40 * (k % 2)} E1.0 F60" for k in range(1, 200)]
+    file = folder / "long.gcode"
+    file.write_text("\n".join([*lines, "M104 S0", "M140 S0"]) + "\n")
+    return file
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_print_ends_with_heaters_off_and_exit_130(folder: Path, number: int) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "machine.app.cli",
+        "print",
+        str(_program(folder)),
+        "--port",
+        "sim",
+        "--sim-speed",
+        "20",
+        "--force",
+    ]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3])
+    assert process.stderr is not None
+    _wait_for(process, "printing:")
+    os.kill(process.pid, number)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "heaters off" in message
+
+
+def _wait_for(process: "subprocess.Popen[str]", word: str) -> None:
+    assert process.stderr is not None
+    for _ in range(100):
+        line = process.stderr.readline()
+        if word in line:
+            return
+        if not line:
+            time.sleep(0.1)
+    pytest.fail(f"{word!r} was never said")

@@ -1,0 +1,33 @@
+"""The foot of a file holds the profile it was made with, whole."""
+
+import pytest
+
+from machine.app.embedded_profile import read_embedded_profile
+from machine.gcode.settings import foot
+from profiles.profile import load, shipped
+
+OTHER = load("generic_ac", "petg" if "petg" in shipped("material") else "pla", settings=["machine.lift_mm=33", "process.walls=7"])
+
+
+@pytest.mark.parametrize("machine", shipped("machine"))
+def test_every_shipped_profile_comes_back_from_a_file_s_foot(machine: str) -> None:
+    made = load(machine, settings=["process.walls=5", "material.nozzle_c=222"])
+    told, taken = read_embedded_profile(tuple(foot(made, 1.0, 1.0)), OTHER, frozenset())
+    plain = {section: getattr(made, section).model_dump(exclude={"sources"}) for section in taken}
+    assert {section: getattr(told, section).model_dump(exclude={"sources"}) for section in taken} == plain
+    assert set(taken) == {"machine", "material", "process", "search"}
+
+
+def test_what_the_user_has_named_is_not_taken_from_the_file() -> None:
+    told, taken = read_embedded_profile(tuple(foot(load(), 1.0, 1.0)), OTHER, frozenset({"machine"}))
+    assert (told.machine.lift_mm, told.process.walls, "machine" in taken) == (33.0, load().process.walls, False)
+
+
+@pytest.mark.parametrize("edit", ["; machine.x.speed_mm_s = fast", "; machine.head.boxes[9].name = x", "; machine[0] = 1", "; ="])
+def test_a_foot_that_makes_no_sense_changes_nothing_of_the_machine(edit: str) -> None:
+    lines = ["; tiltprint_config = begin", edit, "; tiltprint_config = end"]
+    assert read_embedded_profile(lines, OTHER, frozenset()) == (OTHER, ())
+
+
+def test_a_file_without_a_foot_changes_nothing() -> None:
+    assert read_embedded_profile(["G28"], OTHER, frozenset()) == (OTHER, ())

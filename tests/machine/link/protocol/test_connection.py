@@ -1,0 +1,664 @@
+"""The connection on a bench: what a printer says, the clock, and the bytes that the sender writes."""
+
+import random
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from machine.firmware import FIRMWARES, Firmware
+from machine.firmware.klipper import KLIPPER
+from machine.firmware.marlin import MARLIN
+from machine.firmware.repetier import REPETIER
+from machine.firmware.reprapfirmware import REPRAPFIRMWARE
+from machine.firmware.smoothieware import SMOOTHIEWARE
+from machine.link.protocol.connection import Connection
+from machine.link.protocol.decoder import LONGEST_LINE
+from machine.link.protocol.events import (
+    Area,
+    Event,
+    Ok,
+)
+from machine.link.protocol.framing import FRAME, LINE_LIMIT, command_of, frame
+from machine.link.protocol.questions import QUESTIONS_MOST
+from machine.link.protocol.resends import ASKED_LIMIT
+from machine.link.protocol.states import State
+from machine.link.protocol.timeout import Timing
+from machine.link.protocol.verdict import SYNC_TRIES
+from machine.link.protocol.window import HISTORY
+from profiles.errors import FirmwareError, LocalProtocolError, RemoteProtocolError, SilenceError
+
+PATIENT = Timing(stall_s=4.0, stall_mute_s=30.0, sync_s=3.0, drain_s=0.5, quiet_s=0.12)
+HELLO = b"N1 M115*39\n"
+ASK2 = b"N2 M105*37\n"
+CHUNKS = pytest.mark.parametrize("size", [1, 3, 10**6])
+
+
+class Table:
+    """A protocol on a bench: say() is the printer, wait() the clock, wire() what the sender wrote since the last look."""
+
+    def __init__(self, size: int = 10**6) -> None:
+        self.now_s, self.size = 0.0, size
+        self.connection = Connection(PATIENT, 0.0)
+
+    def say(self, text: bytes) -> list[Event]:
+        events = []
+        for begin in range(0, len(text), self.size):
+            events += self.connection.receive(text[begin : begin + self.size], self.now_s)
+        return events
+
+    def wait(self, seconds: float) -> None:
+        self.now_s += seconds
+        self.connection.tick(self.now_s)
+
+    def wire(self) -> bytes:
+        return self.connection.take()
+
+    def send(self, *commands: str) -> bytes:
+        for command in commands:
+            self.connection.send(command, self.now_s)
+        return self.wire()
+
+
+def opened(size: int = 10**6, advanced: bool = True) -> Table:
+    """A greeted printer; the window is open where it tells numbers."""
+    table = Table(size)
+    table.wait(0.6)
+    table.say(b"ok N0 P15 B3\n" if advanced else b"ok\n")
+    table.say(b"FIRMWARE_NAME:M\nCap:EMERGENCY_PARSER:1\nok N1 P15 B3\n" if advanced else b"FIRMWARE_NAME:M\nok\n")
+    table.say(b"ok T:20.00 /0.00 B:20.00 /0.00\n")
+    assert table.connection.state is State.OPEN
+    for number in range(3, 11):
+        table.send("G4 P0" if number == 3 else f"G1 X{number}")
+        table.say(b"ok N%d P15 B3\n" % number if advanced else b"ok\n")
+    return table
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_are_survived_and_read_the_same_in_portions(data: bytes) -> None:
+    whole, single = Table().say(data), Table(1).say(data)
+    assert whole == single
+
+
+def test_a_line_without_end_is_thrown_away_and_its_tail_is_no_answer() -> None:
+    table = opened()
+    table.send("G1 X1")
+    for _ in range(3):
+        assert table.say(b"x" * LONGEST_LINE) == []
+    assert table.say(b"\nok N11 P15 B3\n") == [Ok(11, 15, 3, None, "ok N11 P15 B3")]
+
+
+@CHUNKS
+def test_the_greeting_agrees_on_numbers_then_asks_who_is_there(size: int) -> None:
+    table = Table(size)
+    table.say(b"T:20 /0\nhalf a li")
+    table.wait(0.4)
+    assert table.wire() == b""
+    table.wait(0.2)
+    assert table.wire() == b"\nN0 M110 N0*125\n"
+    table.say(b"ne\nok\n")
+    assert table.wire() == HELLO
+    table.say(b"FIRMWARE_NAME:Marlin\nCap:AUTOREPORT_TEMP:1\nok\n")
+    assert table.wire() == ASK2
+    table.say(b"ok T:20.00 /0.00\n")
+    assert table.connection.state is State.OPEN
+    assert table.connection.greeting.capabilities == {"AUTOREPORT_TEMP": True}
+
+
+def test_a_board_that_restarts_on_opening_is_greeted_again() -> None:
+    table = Table()
+    table.wait(0.6)
+    table.wire()
+    table.wait(1.0)
+    table.say(b"start\necho: Last Updated\nok P15 B3\n")
+    assert table.wire() == b""
+    table.wait(0.6)
+    assert table.wire() == b"\nN0 M110 N0*125\n"
+    table.say(b"ok P15 B3\n")
+    assert table.connection.state is State.SYNC
+    table.say(b"ok\n")
+    table.say(b"start\n")
+    assert table.connection.state is State.DRAIN
+    assert table.connection.fault is None
+
+
+def test_a_mute_printer_is_given_up_after_some_greetings() -> None:
+    table = Table()
+    for _ in range(SYNC_TRIES + 2):
+        table.wait(3.1)
+    assert isinstance(table.connection.fault, SilenceError)
+    assert table.now_s < 30
+
+
+def test_a_plain_printer_gets_one_line_at_a_time() -> None:
+    table = opened(advanced=False)
+    table.send("G1 X1")
+    assert not table.connection.can_send("G1 X2")
+    table.say(b"ok\n")
+    assert table.connection.can_send("G1 X2")
+
+
+def test_a_printer_that_tells_numbers_gets_what_its_ring_holds() -> None:
+    table, command = opened(), "G1 X100.123 Y100.123 E1.12345"
+    written = b""
+    while table.connection.can_send(command):
+        written += table.send(command)
+    assert written.count(b"\n") == 3
+    assert len(written) <= MARLIN.line.rx_bytes
+    short = opened()
+    assert sum(len(short.send("G1 X1")) > 0 for _ in range(9) if short.connection.can_send("G1 X1")) == 4
+
+
+def test_a_numbered_ok_acknowledges_all_lines_before_it_too() -> None:
+    table = opened()
+    table.send("G1 X1", "G1 X2", "G1 X3")
+    table.say(b"ok N12 P15 B3\n")
+    assert table.connection.window.acknowledged == 12
+
+
+def test_slow_commands_travel_alone() -> None:
+    table = opened()
+    table.send("G1 X1")
+    assert not table.connection.can_send("M109 S200")
+    table.say(b"ok N11 P15 B3\n")
+    table.send("M109 S200")
+    assert not table.connection.can_send("G1 X1")
+
+
+@CHUNKS
+@pytest.mark.parametrize("advanced", [True, False])
+def test_a_resend_repeats_the_line_once_and_its_ok_acknowledges_nothing(size: int, advanced: bool) -> None:
+    table = opened(size, advanced)
+    first = table.send("G1 X1")
+    table.say(b"Error:checksum mismatch, Last Line: 10\nResend: 11\nok\n")
+    assert table.wire() == first
+    assert table.connection.window.acknowledged == 10
+    table.say(b"ok N11 P15 B3\n" if advanced else b"ok\n")
+    assert table.connection.window.acknowledged == 11
+    assert table.connection.state is State.OPEN
+
+
+def test_many_resends_for_lines_in_flight_cause_one_repetition_one_by_one() -> None:
+    table = opened()
+    lines = table.send("G1 X1", "G1 X2", "G1 X3").splitlines(keepends=True)
+    table.say(b"Error:checksum mismatch, Last Line: 10\nResend: 11\nok\n" * 3)
+    assert table.wire() == b""
+    table.wait(0.13)
+    assert table.wire() == lines[0]
+    table.say(b"ok N11 P15 B3\n")
+    assert table.wire() == lines[1]
+    table.say(b"ok N12 P15 B3\n")
+    assert table.wire() == lines[2]
+    table.say(b"ok N13 P15 B3\n")
+    assert table.connection.state is State.OPEN
+
+
+def test_a_resend_without_its_ok_goes_on_after_a_pause() -> None:
+    table = opened(advanced=False)
+    line = table.send("G1 X1")
+    table.say(b"Resend: 11\n")
+    table.wait(0.13)
+    assert table.wire() == line
+    table.say(b"ok\n")
+    assert table.connection.window.acknowledged == 11
+
+
+@pytest.mark.parametrize("advanced", [True, False])
+def test_a_lost_ok_is_cleared_up_by_a_new_question_never_by_a_repeat(advanced: bool) -> None:
+    table = opened(advanced=advanced)
+    table.send("G1 X1")
+    table.wait(3.9)
+    assert table.wire() == b""
+    table.wait(0.2)
+    assert table.wire() == frame(12, "M105")
+    table.say(b"ok T:20.00 /0.00\n")
+    assert (table.connection.state, table.connection.window.acknowledged) == (State.OPEN, 12)
+
+
+def test_a_question_answered_by_resend_shows_which_line_was_lost() -> None:
+    table = opened(advanced=False)
+    line = table.send("G1 X1")
+    table.wait(30.1)
+    table.wire()
+    table.say(b"Error:Line Number is not Last Line Number+1, Last Line: 10\nResend: 11\nok\n")
+    table.wait(0.13)
+    assert table.wire() == line
+    table.say(b"ok\n")
+    assert table.wire() == frame(12, "M105")
+
+
+def test_busy_shortens_the_timeout_and_restarts_it() -> None:
+    table = opened()
+    table.send("G1 X1")
+    for _ in range(100):
+        table.say(b"echo:busy: processing\n")
+        table.wait(2.0)
+    assert table.wire() == b""
+    table.wait(2.1)
+    assert table.wire() == frame(12, "M105")
+
+
+def test_reports_are_no_progress() -> None:
+    table = opened()
+    table.send("G1 X1")
+    for _ in range(16):
+        table.wait(2.0)
+        table.say(b" T:20.00 /0.00 B:20.00 /0.00\n")
+    assert table.connection.state is State.PROBING
+
+
+def test_heating_may_take_its_time_and_is_asked_about_ever_later() -> None:
+    table = opened()
+    table.send("M109 S200")
+    asked = []
+    for second in range(3600):
+        table.wait(1.0)
+        table.say(b"T:100.00 /200.00 W:?\n")
+        asked += [second + 1] * table.wire().count(b"M105")
+    assert asked == [5, 35, 155, 635]
+    assert table.connection.fault is None
+    table.say(b"ok N11 P15 B3\nok T:200 /200\n")
+    assert table.connection.state is State.OPEN
+
+
+def test_a_dead_printer_is_given_up_in_bounded_time() -> None:
+    table = opened()
+    table.send("G1 X1")
+    while table.connection.fault is None and table.now_s < 1000:
+        table.wait(0.5)
+    assert isinstance(table.connection.fault, SilenceError)
+    assert table.now_s < 30.0 * (QUESTIONS_MOST + 2)
+
+
+def test_a_question_that_would_overflow_the_buffer_of_a_printer_in_a_long_move_waits_longer() -> None:
+    table = opened()
+    table.send(*["G1 X100.123 Y100.123 E1.12345"] * 2, "G1 X100.123 Y100.123 E1.12345 F1800.5")
+    table.wait(29.0)
+    assert table.wire() == b""
+    table.wait(1.1)
+    assert table.wire() == frame(14, "M105")
+
+
+def test_two_waits_with_a_line_in_flight_ask_at_once() -> None:
+    table = opened()
+    table.send("G1 X1")
+    table.say(b"wait\nwait\n")
+    assert table.wire() == frame(12, "M105")
+
+
+@pytest.mark.parametrize("surplus", [b"ok\n", b"ok\nok\nok\n", b"ok N99 P15 B3\n", b"ok N4 P15 B3\n"])
+def test_surplus_oks_are_never_credited_forward(surplus: bytes) -> None:
+    table = opened()
+    table.say(surplus)
+    table.send("G1 X1", "G1 X2")
+    table.say(surplus)
+    assert table.connection.window.acknowledged == 10
+
+
+def test_a_plain_ok_does_not_answer_the_question_for_the_temperature() -> None:
+    table = opened(advanced=False)
+    table.send("M105")
+    table.say(b"ok\n")
+    assert table.connection.window.acknowledged == 10
+    table.say(b"ok T:20.00 /0.00\n")
+    assert table.connection.window.acknowledged == 11
+
+
+def test_a_resend_of_a_handshake_line_twice_is_a_restart() -> None:
+    table = opened()
+    table.send("G1 X1")
+    table.say(b"Resend: 1\nok\n")
+    assert table.wire() == frame(12, "M105")
+    assert table.connection.fault is None
+    table.say(b"Resend: 1\nok\n")
+    assert isinstance(table.connection.fault, FirmwareError)
+    assert "restarted" in str(table.connection.fault)
+
+
+@pytest.mark.parametrize("number", [10**6, 14, 3])
+def test_a_resend_of_an_impossible_line_is_an_error_when_it_is_repeated(number: int) -> None:
+    table = opened()
+    for _ in range(20):
+        table.say(b"ok N%d P15 B3\n" % table.connection.send("G1 X1", table.now_s))
+    asked = number + (20 if number == 14 else 0)
+    table.say(b"Resend: %d\nok\n" % asked)
+    assert table.connection.fault is None
+    table.say(b"Resend: %d\nok\n" % asked)
+    assert isinstance(table.connection.fault, RemoteProtocolError)
+
+
+def test_a_single_damaged_resend_number_does_no_harm() -> None:
+    table = opened()
+    line = table.send("G1 X1")
+    table.say(b"Resend: 91\nok\n")
+    table.say(b"Resend: 11\nok\n")
+    table.wait(0.2)
+    table.wire()
+    table.say(b"ok N11 P15 B3\n")
+    assert table.connection.fault is None
+    assert line == frame(11, "G1 X1")
+
+
+def test_the_same_line_asked_for_again_and_again_ends_the_print() -> None:
+    table = opened()
+    table.send("G1 X1")
+    for asked in range(ASKED_LIMIT + 1):
+        assert table.connection.fault is None, asked
+        table.say(b"Resend: 11\nok\n")
+    assert isinstance(table.connection.fault, RemoteProtocolError)
+
+
+@CHUNKS
+@pytest.mark.parametrize(("said", "state", "error"), [
+    (b"start\n", State.LOST, FirmwareError),
+    (b"Error:Thermal Runaway, system stopped! Heater_ID: 0\nok\n", State.HALTED, FirmwareError),
+    (b"!! Lost communication with MCU\nok\n", State.HALTED, FirmwareError),
+    (b"ok P15 B3\n", State.LOST, RemoteProtocolError),
+])  # fmt: skip
+def test_fatal_words_end_the_conversation(size: int, said: bytes, state: State, error: type[Exception]) -> None:
+    table = opened(size)
+    table.connection.send("G1 X1", table.now_s)
+    table.say(said)
+    assert table.connection.state is state
+    assert isinstance(table.connection.fault, error)
+    assert table.wire() == b""
+    with pytest.raises(LocalProtocolError):
+        table.send("G1 X2")
+
+
+def test_a_torn_line_that_the_printer_did_not_understand_does_no_harm() -> None:
+    table = opened()
+    table.send("G1 X1")
+    table.say(b'echo:Unknown command: "11 G1 X1*97"\nok P15 B3\n')
+    assert table.connection.fault is None
+    assert table.connection.window.acknowledged == 10
+
+
+ACTS: dict[str, Callable[[Table, int], object]] = {
+    "ok": lambda table, n: table.say(b"ok N%d P15 B3\n" % n),
+    "bare": lambda table, n: table.say(b"ok\n"),
+    "resend": lambda table, n: table.say(b"Resend: %d\nok\n" % n),
+    "wait": lambda table, n: table.wait(n / 3),
+    "busy": lambda table, n: table.say(b"echo:busy: processing\n"),
+    "heat": lambda table, n: table.say(b"ok T:20 /0\n"),
+    "send": lambda table, n: table.connection.can_send("G1 X1") and table.send("G1 X1"),
+    "half": lambda table, n: table.say(b"ok N"),
+}
+
+
+@given(st.lists(st.tuples(st.sampled_from(sorted(ACTS)), st.integers(1, 40)), max_size=60))
+def test_no_conversation_breaks_the_counts(acts: list[tuple[str, int]]) -> None:
+    table = opened()
+    for name, number in acts:
+        ACTS[name](table, number)
+        connection = table.connection
+        assert 0 <= connection.window.acknowledged <= connection.window.sent
+        assert (connection.fault is None) == (connection.state not in (State.HALTED, State.LOST))
+
+
+def greeted_by(name: str, size: int = 10**6) -> Table:
+    """A greeted printer that answers with plain oks and names itself."""
+    table = Table(size)
+    table.wait(0.6)
+    table.say(b"ok\nFIRMWARE_NAME:" + name.encode() + b"\nok\nok T:20.00 /0.00 B:20.00 /0.00\n")
+    assert table.connection.state is State.OPEN
+    table.wire()
+    return table
+
+
+@pytest.mark.parametrize(("name", "firmware"), [
+    ("Marlin 2.1.2 (Jun 1 2024) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin", MARLIN),
+    ("Prusa-Firmware 3.13.3 based on Marlin", MARLIN),
+    ("Something nobody knows", MARLIN),
+    ("Repetier_1.0.4 FIRMWARE_URL:https://github.com/repetier/Repetier-Firmware/", REPETIER),
+    ("Smoothieware, FIRMWARE_URL:http%3A//smoothieware.org", SMOOTHIEWARE),
+    (" RepRapFirmware for Duet 2 WiFi/Ethernet FIRMWARE_VERSION: 3.5.1", REPRAPFIRMWARE),
+    ("Klipper FIRMWARE_VERSION:v0.12.0-100", KLIPPER),
+])  # fmt: skip
+def test_the_firmware_s_own_name_chooses_its_rules(name: str, firmware: Firmware) -> None:
+    assert greeted_by(name).connection.greeting.firmware is firmware
+
+
+@pytest.mark.parametrize("name", ["RepRapFirmware for Duet", "Klipper"])
+def test_a_line_without_answer_is_never_repeated_to_a_firmware_that_asks_for_none(name: str) -> None:
+    table = greeted_by(name)
+    table.send("G1 X7")
+    table.wait(4.1)
+    assert table.wire() == frame(4, "M105")
+    table.say(b"ok T:20.00 /0.00\n")
+    assert isinstance(table.connection.fault, RemoteProtocolError)
+    assert "line 3 (G1 X7) was not answered" in str(table.connection.fault)
+
+
+def test_a_late_answer_of_such_a_firmware_is_an_answer() -> None:
+    table = greeted_by("RepRapFirmware for Duet")
+    table.send("G1 X7")
+    table.wait(4.1)
+    table.say(b"ok\nok T:20.00 /0.00\n")
+    assert (table.connection.state, table.connection.window.acknowledged) == (State.OPEN, 4)
+
+
+def test_klipper_s_macros_may_work_for_minutes_without_a_word() -> None:
+    table = greeted_by("Klipper FIRMWARE_VERSION:v0.12.0")
+    table.send("PRINT_START BED=60")
+    table.wait(4.1)
+    table.wait(500.0)
+    assert table.wire() == frame(4, "M105")
+    assert table.connection.fault is None
+
+
+def test_smoothie_gives_no_ok_after_its_resend() -> None:
+    table = greeted_by("Smoothieware")
+    line = table.send("G1 X1")
+    table.say(b"rs N3\r\n")
+    table.wait(0.13)
+    assert table.wire() == line
+    table.say(b"ok\r\n")
+    assert table.connection.window.acknowledged == 3
+
+
+def test_repetier_gets_as_many_characters_as_its_buffer_holds() -> None:
+    table = greeted_by("Repetier_1.0.4")
+    for number in range(3, 11):
+        table.send("G1 X1")
+        table.say(b"ok %d\n" % number)
+    written = b""
+    while table.connection.can_send("G1 X100.5"):
+        written += table.send("G1 X100.5")
+    assert written.count(b"\n") == 127 // len(frame(11, "G1 X100.5"))
+
+
+@pytest.mark.parametrize(("rx_bytes", "lines"), [(63, 1), (127, 3), (1023, 4)])
+def test_the_window_keeps_to_the_machine_s_own_buffer_and_to_the_printer_s_places(rx_bytes: int, lines: int) -> None:
+    table = Table()
+    table.connection = Connection(PATIENT, 0.0, rx_bytes=rx_bytes)
+    table.wait(0.6)
+    table.say(b"ok N0 P15 B3\nFIRMWARE_NAME:Marlin\nCap:EMERGENCY_PARSER:1\nok N1 P15 B3\nok T:20.00 /0.00\n")
+    for _ in range(3, 11):
+        table.say(b"ok N%d P15 B3\n" % table.connection.send("G1 X1", 0.0))
+    table.wire()
+    written = b""
+    while table.connection.can_send("G1 X100.123 Y100.123 E1.123"):
+        written += table.send("G1 X100.123 Y100.123 E1.123")
+    assert written.count(b"\n") == lines
+
+
+def test_two_lines_of_sixty_three_bytes_fill_the_ring_of_an_avr() -> None:
+    table, command = opened(), "G1 X100.12345 Y100.12345 Z10.12345 E1.1234 F3600.12345"
+    written = table.send(command)
+    assert table.connection.can_send(command)
+    written += table.send(command)
+    assert (len(command), len(written)) == (54, 126)
+    assert not table.connection.can_send("T0")
+
+
+def numbered_to(last: int, advanced: bool = True) -> Table:
+    """A greeted printer whose numbers begin anew after `last`."""
+    table = Table()
+    table.connection = Connection(PATIENT, 0.0, firmware=replace(MARLIN, line=replace(MARLIN.line, last_number=last)))
+    table.wait(0.6)
+    table.say(b"ok N0 P15 B3\nok N1 P15 B3\nok T:20.00 /0.00\n" if advanced else b"ok\nok\nok T:20.00 /0.00\n")
+    table.wire()
+    return table
+
+
+@pytest.mark.parametrize("advanced", [True, False])
+def test_numbers_begin_anew_before_they_grow_too_long(advanced: bool) -> None:
+    table = numbered_to(4, advanced)
+    for number in (3, 4):
+        table.send("G1 X1")
+        table.say(b"ok N%d P15 B3\n" % number if advanced else b"ok\n")
+    assert not table.connection.can_send("G1 X1")
+    table.wait(0.01)
+    assert table.wire() == frame(1000, "M110 N1000")
+    table.say(b"ok N1000 P15 B3\n" if advanced else b"ok\n")
+    assert table.send("G1 X5") == frame(1001, "G1 X5")
+    table.say(b"Error:checksum mismatch, Last Line: 1000\nResend: 1001\nok\n")
+    assert table.wire() == frame(1001, "G1 X5")
+    table.say(b"ok N1001 P15 B3\n" if advanced else b"ok\n")
+    assert (table.connection.state, table.connection.window.acknowledged) == (State.OPEN, 5)
+
+
+def test_a_damaged_new_beginning_of_the_numbers_is_given_again() -> None:
+    table = numbered_to(3)
+    table.send("G1 X1")
+    table.say(b"ok N3 P15 B3\n")
+    table.wait(0.01)
+    first = table.wire()
+    table.say(b"Error:checksum mismatch, Last Line: 3\nResend: 4\nok\n")
+    table.wait(0.13)
+    assert table.wire() == first
+    table.say(b"ok N1000 P15 B3\n")
+    assert table.connection.can_send("G1 X1")
+
+
+def test_a_new_beginning_without_answer_ends_the_print() -> None:
+    table = numbered_to(3)
+    table.send("G1 X1")
+    table.say(b"ok N3 P15 B3\n")
+    for _ in range(600):
+        table.wait(0.5)
+    assert isinstance(table.connection.fault, SilenceError)
+
+
+def test_no_number_is_longer_than_a_checked_line_has_room_for() -> None:
+    longest = "M117 " + "x" * (LINE_LIMIT - FRAME - 5)
+    assert command_of(longest, 1) == longest
+    assert all(len(frame(row.line.last_number + QUESTIONS_MOST, longest)) - 1 <= LINE_LIMIT for row in FIRMWARES)
+
+
+def test_the_geometry_report_tells_the_axes_limits() -> None:
+    table = Table()
+    table.say(b"area:{full:{min:{x:0.0000,y:0.0000,z:0.0000,i:-120.0000,j:-36000.0000},max:{x:200.0000,y:200.0000,z:180.0000,"
+              b"i:120.0000,j:36000.0000}},work:{min:{x:5.0000,y:0.0000},max:{x:190.0000,y:200.0000}}}\n")  # fmt: skip
+    assert table.connection.greeting.area == Area((
+        ("X", 0.0, 200.0), ("Y", 0.0, 200.0), ("Z", 0.0, 180.0), ("I", -120.0, 120.0), ("J", -36000.0, 36000.0)))  # fmt: skip
+
+
+def test_an_error_of_two_lines_is_told_whole_and_nothing_is_sent_meanwhile() -> None:
+    table = opened()
+    table.say(b"Error:0\n")
+    assert (table.connection.fault, table.connection.can_send("G1 X1")) == (None, False)
+    table.say(b": Extruder switched off. MAXTEMP triggered !\n")
+    assert "Error:0: Extruder switched off. MAXTEMP triggered !" in str(table.connection.fault)
+
+
+def test_an_error_whose_words_never_come_is_an_error() -> None:
+    table = opened()
+    table.say(b"Error:0\n")
+    table.wait(0.3)
+    assert isinstance(table.connection.fault, FirmwareError)
+
+
+def test_an_error_of_the_line_whose_resend_is_lost_is_asked_about_at_once() -> None:
+    table = opened()
+    table.send("G1 X1")
+    table.say(b"Error:checksum mismatch, Last Line: 10\nok\n")
+    table.wait(0.6)
+    assert table.wire() == frame(12, "M105")
+
+
+def test_a_line_asked_for_in_every_tenth_line_is_too_much_noise() -> None:
+    table = opened()
+    for number in range(11, 300):
+        table.send("G1 X1")
+        if number % 5 == 0:
+            table.say(b"Resend: %d\nok\n" % number)
+        table.say(b"ok N%d P15 B3\n" % number)
+        if table.connection.fault is not None:
+            break
+    assert "20 of the last 200 lines" in str(table.connection.fault)
+
+
+RUBBISH = bytes(random.Random(5).choices([0, 0x80, 0xF8, 0xFE, 0x1C, 0xE6, 0x66, 0x06], k=60)) + b"\xfe"
+
+
+def test_rubbish_of_a_wrong_baud_rate_is_recognised_and_other_rates_are_named() -> None:
+    table = Table()
+    table.connection = Connection(PATIENT, 0.0, baud=115200)
+    for _ in range(4):
+        table.say(RUBBISH)
+        table.wait(3.1)
+    assert str(table.connection.fault) == (
+        "what comes at 115200 baud is rubbish: the printer speaks at another rate, "
+        "try --baud 250000, 230400, 500000, 1000000, 57600"
+    )
+    assert table.now_s < 13
+
+
+def test_rubbish_of_a_boot_loader_before_the_banner_is_forgiven() -> None:
+    table = Table()
+    table.say(RUBBISH + b"start\nMarlin 2.1.2\n")
+    table.wait(0.6)
+    table.say(b"ok\nok\nok T:20 /0\n")
+    assert table.connection.state is State.OPEN
+
+
+def test_a_device_that_is_no_printer_is_told_by_its_own_words() -> None:
+    table = Table()
+    while table.connection.fault is None and table.now_s < 100:
+        table.say(b"$GPGGA,123519,4807.038,N\r\n")
+        table.wait(1.0)
+    assert "no printer that this program knows: to 6 greetings it said '$GPGGA,123519,4807.038,N'" in str(table.connection.fault)
+
+
+@pytest.mark.parametrize("said", [b"\x00\xf8start\n", b"echo: Last Updated: 2024-09-29 | Author: (none)\n", b"Grbl 1.1h\n",
+                                  b"RepRapFirmware for Duet 3 is up and running.\n", b"// Klipper state: Ready\n"])  # fmt: skip
+def test_a_restart_is_heard_behind_rubbish_and_by_its_other_words(said: bytes) -> None:
+    table = opened()
+    table.send("G1 X1")
+    table.say(said)
+    assert "restarted in the middle of the print" in str(table.connection.fault)
+
+
+def test_a_mended_cable_is_followed_by_a_question_and_what_was_lost_is_repeated() -> None:
+    table = opened()
+    line = table.send("G1 X1")
+    table.say(b"ok N1")
+    table.connection.reconnect(table.now_s)
+    assert table.wire() == b"\n" + frame(12, "M105")
+    table.say(b"Error:Line Number is not Last Line Number+1, Last Line: 10\nResend: 11\nok\n")
+    table.wait(0.2)
+    assert table.wire() == line
+
+
+def test_a_printer_that_restarted_behind_a_mended_cable_is_not_printed_on() -> None:
+    table = opened()
+    table.connection.reconnect(table.now_s)
+    table.say(b"Resend: 1\nok\n" * 2)
+    assert "restarted without a word" in str(table.connection.fault)
+
+
+def test_words_of_the_card_reader_do_not_stop_a_print() -> None:
+    table = opened()
+    table.say(b"Error:volume.init failed\necho:No media\n")
+    assert table.connection.fault is None
+
+
+def test_the_history_stays_bounded() -> None:
+    table = opened()
+    for _ in range(2000):
+        table.say(b"ok N%d P15 B3\n" % table.connection.send("G1 X1", 0.0))
+    assert len(table.connection.window._history) == HISTORY

@@ -1,0 +1,66 @@
+"""What counts as executed, from what the printer acknowledges and reports of its planner."""
+
+from collections.abc import Iterator
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from machine.link.line_history import PLANNER_BLOCKS, LineHistory, SentLine
+
+POSE = (1.5, -2.0, 60.25, 30.0, 725.0, 12.34567)
+
+
+def moves(count: int) -> Iterator[SentLine]:
+    """Commands of lines 1, 2, ..., wire numbers from 4 on; every fourth moves nothing."""
+    for line in range(1, count + 1):
+        yield SentLine(line + 3, line, bool(line % 4), POSE)
+
+
+def test_acknowledged_moves_are_executed_as_far_as_the_planner_has_room() -> None:
+    history = LineHistory()
+    for step in moves(40):
+        history.send(step)
+    for _ in range(2):
+        history.acknowledge(33, PLANNER_BLOCKS - 1)
+    assert (history.sent, history.acknowledged, history.executed) == (40, 30, 29)
+    history.acknowledge(33, 5)
+    assert history.executed == 29
+
+
+@given(st.lists(st.integers(0, 15), min_size=1, max_size=60))
+def test_what_counts_as_executed_never_holds_a_move_that_waits(free: list[int]) -> None:
+    """The planner is simulated: it holds at most 15 moves, the oldest leave as many places as `free` asks for."""
+    history, waiting = LineHistory(), []
+    for step, places in zip(moves(len(free)), free, strict=True):
+        history.send(step)
+        waiting += [step.line] if step.moves else []
+        del waiting[: max(0, len(waiting) - (15 - places))]
+        history.acknowledge(step.number, 15 - len(waiting))
+        assert history.executed < min(waiting, default=len(free) + 1)
+
+
+def test_a_damaged_number_of_free_places_moves_nothing_on() -> None:
+    history = LineHistory()
+    for step in moves(40):
+        history.send(step)
+        history.acknowledge(step.number, 95 if step.line == 30 else 5)
+    assert history.executed < 40 - 10
+
+
+def test_without_word_of_the_planner_only_a_barrier_tells() -> None:
+    history = LineHistory()
+    for step in moves(40):
+        history.send(step)
+        history.acknowledge(step.number)
+    assert (history.acknowledged, history.executed) == (40, 0)
+    history.end_moves()
+    assert history.executed == 40
+
+
+def test_the_history_of_a_mute_printer_stays_small() -> None:
+    history = LineHistory()
+    for step in moves(20000):
+        history.send(step)
+        history.acknowledge(step.number)
+    assert len(history._planned) < 5000
+    assert history.commands == 20000

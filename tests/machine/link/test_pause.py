@@ -1,0 +1,342 @@
+"""Pause, overrides, user lines, cancel, emergency stop, a lost port: on a simulated printer whose time is its own."""
+
+import re
+from collections.abc import Callable
+from threading import Event as Flag
+
+import numpy as np
+import pytest
+
+from machine.app.printer.serial_log import tap
+from machine.link.medium import Medium, Wire
+from machine.link.pending_commands import Command, Control
+from machine.link.progress import Progress
+from machine.link.stream import Outcome, print_lines
+from machine.simulator.faults import Fault, FaultScript
+from machine.simulator.virtual import PATH, VirtualPrinter
+from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError
+from profiles.profile import Profile, load
+
+PROFILE = load()
+MACHINE = PROFILE.machine
+UNASKING = {dialect: load(settings=[f"machine.dialect={dialect}"]) for dialect in ("klipper", "reprapfirmware")}
+START = ["G21", "G90", "M83", "M140 S60", "M104 S200", "G28 X Y Z", "G92 A0 C0", "M190 S60", "M109 S200", "G92 E0", "M106 S128"]
+POSED = ["G0 Z120 F900", "G0 A30 C725 F6000", "G0 X10 Y10 F6000", "G0 Z60 F900", "M204 P800 T1200", "G1 F1500"]
+# strokes with a travel after every tenth, where a pause can begin
+BODY = [
+    f"G1 X{10 + i % 7}.{i:03d} Y{10 + i % 5} E0.05" if i % 10 else f"G0 X{10 + i % 7}.{i:03d} Y{10 + i % 5}" for i in range(400)
+]
+PROGRAM = [*START, *POSED, *BODY, "M104 S0", "M140 S0"]
+
+
+class Watcher:
+    """Asks for things when the print has come to a line or a state, and remembers what was shown and sent."""
+
+    def __init__(self, printer: VirtualPrinter, profile: Profile = PROFILE) -> None:
+        self.printer, self.control, self.profile = printer, Control(), profile
+        self.shown: list[Progress] = []
+        self.sent = b""
+        self.when: dict[str | int, Callable[[], None]] = {}
+
+    def see(self, progress: Progress) -> None:
+        self.shown.append(progress)
+        line = next((at for at in self.when if isinstance(at, int) and progress.file_line >= at), None)
+        for key in (line, progress.state):
+            if key is not None and key in self.when:
+                self.when.pop(key)()
+
+    def traffic(self, direction: str, data: bytes) -> None:
+        self.sent += data if direction == ">" else b""
+
+    def lines(self) -> list[str]:
+        """The commands sent, without number and checksum."""
+        return [re.sub(r"^N\d+ |\*\d+$", "", line) for line in self.sent.decode().splitlines()]
+
+    def run(self, program: list[str], medium: Medium | None = None, stop: Flag | None = None) -> Outcome:
+        return print_lines(
+            program,
+            PATH,
+            on_progress=self.see,
+            stop=stop,
+            control=self.control,
+            profile=self.profile,
+            medium=tap(self.traffic, medium or self.printer.medium),
+        )
+
+    def ask(self, wish: Command, value: float = 100.0, text: str = "") -> Callable[[], None]:
+        return lambda: self.control.ask(wish, value, text)
+
+
+def watched(faults: tuple[Fault, ...] = (), seed: int = 1, profile: Profile = PROFILE) -> Watcher:
+    script = FaultScript(faults, seed) if faults else None
+    return Watcher(VirtualPrinter(profile.machine, faults=script, most_s=20000.0), profile)
+
+
+def strokes(printer: VirtualPrinter) -> np.ndarray:
+    """X, Y and pushed filament of the executed moves that push while they move across."""
+    record = printer.record
+    pushed = record.end[:, 5] - record.start[:, 5]
+    rows = (pushed > 1e-9) & (record.end[:, :2] != record.start[:, :2]).any(axis=1)
+    return np.column_stack([record.end[rows, :2], pushed[rows]])
+
+
+def planned(program: list[str]) -> np.ndarray:
+    found = [re.fullmatch(r"G1 X(\S+) Y(\S+) E(\S+)", line) for line in program]
+    return np.array([[float(m[1]), float(m[2]), float(m[3])] for m in found if m])
+
+
+def test_a_pause_at_a_tilted_pose_returns_to_the_same_pose_filament_feed_and_modes() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
+    assert not watcher.run(PROGRAM).cancelled
+    lines = watcher.lines()
+    back = lines[lines.index("M114") :]
+    after = back[back.index("M109 S200") : back.index("M114", 5)]
+    assert not [line for line in back if re.search(r"[AC]-?\d", line)]  # neither to 5 nor to 725: the table never moves
+    assert [line for line in after if line.startswith("G92")] == [f"G92 E{filament_before_pause(lines):.5f}"]
+    assert {"G90", "M83", "G21", "G1 F1500", "M106 S128", "M204 P800 T1200"} <= set(after)
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert watcher.printer.record.end[-1, 4] == 725.0
+
+
+def filament_before_pause(lines: list[str]) -> float:
+    """The sum of the program's pushes up to the first M400."""
+    return sum(float(m[1]) for line in lines[: lines.index("M400")] if (m := re.search(r" E(\S+)$", line)))
+
+
+def test_the_states_of_a_pause_are_told_in_order() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
+    watcher.run(PROGRAM)
+    told = list(dict.fromkeys(progress.state for progress in watcher.shown))
+    assert told == ["printing", "pausing", "paused", "resuming", "finishing"]
+
+
+def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
+    watcher.run(PROGRAM)
+    lines = watcher.lines()
+    stop = lines.index("M400")
+    assert " E" in lines[stop - 1]
+    assert lines[stop + 3 : stop + 5] == ["G21", "M83"]
+    away = lines[stop + 5 : stop + 9]
+    assert re.fullmatch(r"G1 E-\S+ F\d+", away[0])
+    assert re.fullmatch(r"G0 Z\S+ F\d+", away[2])
+    assert re.fullmatch(r"G0 X\S+ Y\S+ F\d+", away[3])
+
+
+@pytest.mark.parametrize("action", ["pause", "cancel"])
+def test_the_printer_may_ask_for_a_pause_or_the_end(action: str) -> None:
+    watcher = watched()
+    speak = [watcher.printer.firmware]
+    watcher.when = {150: lambda: speak[0]._said.append(f"//action:{action}"), "paused": watcher.ask(Command.RESUME)}
+    outcome = watcher.run(PROGRAM)
+    assert outcome.cancelled == (action == "cancel")
+    assert any(progress.state == "pausing" for progress in watcher.shown) == (action == "pause")
+
+
+def test_cancelling_lifts_the_tip_and_neither_homes_nor_turns() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Command.CANCEL)}
+    outcome = watcher.run(PROGRAM)
+    record = watcher.printer.record
+    assert (outcome.cancelled, outcome.heaters_off) == (True, True)
+    assert record.end[-1, 2] == pytest.approx(60.0 + MACHINE.lift_mm)
+    assert (record.end[-1, 3], record.end[-1, 4]) == (30.0, 725.0)
+    assert [text for _, text in record.events if text.startswith("homed")] == ["homed XYZ"]
+
+
+def test_an_error_that_leaves_the_printer_alive_lifts_the_tip_too() -> None:
+    watcher = watched()
+    watcher.when = {150: lambda: watcher.printer.firmware._said.append("//action:disconnect")}
+    with pytest.raises(PrinterError, match=r"asked to be disconnected.*; the printer reports its heaters off"):
+        watcher.run(PROGRAM)
+    assert watcher.printer.record.end[-1, 2] == pytest.approx(60.0 + MACHINE.lift_mm)
+    assert [text for _, text in watcher.printer.record.events if text.startswith("homed")] == ["homed XYZ"]
+
+
+def test_a_printer_that_has_stopped_by_itself_is_not_moved() -> None:
+    watcher = watched((Fault("error", at=150, unit="line", text="Error:Thermal Runaway, system stopped! Heater_ID: 0"),))
+    with pytest.raises(FirmwareError, match="Thermal Runaway, system stopped"):
+        watcher.run(PROGRAM)
+    assert "G91" not in watcher.lines()
+
+
+def test_a_cancel_while_the_tip_is_parked_leaves_it_there() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.CANCEL)}
+    outcome = watcher.run(PROGRAM)
+    assert outcome.heaters_off
+    assert "G91" not in watcher.lines()
+
+
+def test_the_emergency_stop_is_the_next_thing_on_the_wire_and_no_line_follows() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Command.EMERGENCY_STOP)}
+    written: list[bytes] = []
+    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"):
+        watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written))
+    assert written[-1] == b"\nM112\n"
+    assert watcher.printer.record.happened("M112")
+
+
+def test_an_emergency_stop_without_answer_is_given_twice_and_says_to_cut_the_power() -> None:
+    watcher = watched()
+    written: list[bytes] = []
+    watcher.when = {150: watcher.ask(Command.EMERGENCY_STOP)}
+    with pytest.raises(FirmwareError, match="did not confirm M112: cut the power"):
+        watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written, deaf=b"M112"))
+    assert written[-2:] == [b"\nM112\n", b"\nM112\n"]
+
+
+class _Tap:
+    """A wire that keeps what is written; what holds `deaf` does not arrive."""
+
+    def __init__(self, wire: Wire, written: list[bytes], deaf: bytes) -> None:
+        self._wire, self._written, self._deaf, self.name = wire, written, deaf, wire.name
+        self.read, self.discard, self.close = wire.read, wire.discard, wire.close
+
+    def write(self, data: bytes) -> None:
+        self._written.append(data)
+        if not self._deaf or self._deaf not in data:
+            self._wire.write(data)
+
+
+def _written(medium: Medium, written: list[bytes], deaf: bytes = b"") -> Medium:
+    return Medium(lambda name, baud: _Tap(medium.open(name, baud), written, deaf), medium.now_s, medium.wait)
+
+
+@pytest.mark.parametrize(("wish", "value", "sent", "undone"), [
+    (Command.FEED, 150.0, "M220 S150", "M220 S100"), (Command.FLOW, 95.0, "M221 S95", "M221 S100"),
+])  # fmt: skip
+def test_overrides_are_sent_told_and_taken_back_at_the_end(wish: Command, value: float, sent: str, undone: str) -> None:
+    watcher = watched()
+    watcher.when = {100: watcher.ask(wish, value)}
+    watcher.run(PROGRAM)
+    lines, last = watcher.lines(), watcher.shown[-1]
+    assert lines.index(sent) < lines.index(undone)
+    assert value in (last.feed_percent, last.flow_percent)
+
+
+@pytest.mark.parametrize(
+    ("wish", "value"), [(Command.FEED, 5.0), (Command.FEED, 1000.0), (Command.FLOW, 0.0), (Command.FLOW, 250.0)]
+)
+def test_an_override_outside_its_limits_is_refused_with_what_is_allowed(wish: Command, value: float) -> None:
+    watcher = watched()
+    watcher.when = {100: watcher.ask(wish, value)}
+    watcher.run(PROGRAM)
+    assert any(re.search(r"is not possible: 10 to [23]00 % are allowed", progress.message) for progress in watcher.shown)
+    assert not [line for line in watcher.lines() if line.startswith("M22")]
+
+
+@pytest.mark.parametrize("text", [
+    "M110 N5", "M112", "M0", "G28", "G28 X", "g28", "G1 A5", "G0 Z0", "G1 X5 E1", "G92 E0", "G91", "M82", "T1", "M84", "M18 E",
+    "MANUAL_STEPPER STEPPER=stepper_a MOVE=3", "HOME_AB", "G1 X1*5", "M117 schön", "", "; nothing", "M600",
+])  # fmt: skip
+def test_a_line_that_would_spoil_the_print_is_not_sent(text: str) -> None:
+    watcher = watched()
+    watcher.when = {
+        100: watcher.ask(Command.LINE, text=text),
+        120: watcher.ask(Command.PAUSE),
+        "paused": watcher.ask(Command.RESUME),
+    }
+    watcher.run(PROGRAM)
+    assert any(progress.message.startswith("not sent") for progress in watcher.shown)
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+
+
+def test_a_harmless_line_goes_out_between_those_of_the_program() -> None:
+    watcher = watched()
+    watcher.when = {100: watcher.ask(Command.LINE, text="M117 half way ; a note")}
+    watcher.run(PROGRAM)
+    assert "M117 half way" in watcher.lines()
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+
+
+def test_filament_may_be_changed_in_a_pause_and_the_count_is_restored() -> None:
+    watcher = watched()
+
+    def change() -> None:
+        for text in ("G1 E-50 F300", "G1 E60 F300"):
+            watcher.control.ask(Command.LINE, text=text)
+        watcher.control.ask(Command.RESUME)
+
+    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": change}
+    watcher.run(PROGRAM)
+    lines = watcher.lines()
+    assert f"G92 E{filament_before_pause(lines):.5f}" in lines[lines.index("G1 E60 F300") :]
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+
+
+def test_a_temperature_of_ones_own_holds_beyond_a_pause() -> None:
+    watcher = watched()
+    watcher.when = {
+        100: watcher.ask(Command.LINE, text="M104 S215"),
+        150: watcher.ask(Command.PAUSE),
+        "paused": watcher.ask(Command.RESUME),
+    }
+    watcher.run(PROGRAM)
+    assert "M109 S215" in watcher.lines()
+
+
+@pytest.mark.parametrize("length_s", [0.5, 30.0])
+def test_a_port_that_comes_back_to_a_printer_that_went_on_loses_and_doubles_nothing(length_s: float) -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=length_s),))
+    assert not watcher.run(PROGRAM).cancelled
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+    assert "reconnecting" in {progress.state for progress in watcher.shown}
+
+
+@pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
+@pytest.mark.parametrize("line", [14, 30, 61])
+def test_a_firmware_that_never_asks_for_a_line_again_goes_on_by_its_place(dialect: str, line: int) -> None:
+    watcher = watched((Fault("disconnect", at=line, unit="line", seconds=2.0),), profile=UNASKING[dialect])
+    assert not watcher.run(PROGRAM).cancelled
+    assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
+
+
+@pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
+@pytest.mark.parametrize("byte", range(2000, 2040, 9))
+def test_a_line_that_was_torn_with_the_port_is_never_done_twice_or_left_out(dialect: str, byte: int) -> None:
+    watcher, error = watched((Fault("disconnect", at=byte, seconds=2.0),), profile=UNASKING[dialect]), ""
+    try:
+        watcher.run(PROGRAM)
+    except RemoteProtocolError as stopped:
+        error = str(stopped)
+    done, program = strokes(watcher.printer), planned(PROGRAM)
+    assert np.abs(done - program[: len(done)]).max() < 1e-6
+    assert len(done) == len(program) or "whether it was done is not known" in error or "can no longer be trusted" in error
+
+
+@pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
+def test_a_firmware_that_restarted_behind_the_lost_port_is_seen_by_its_place(dialect: str) -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=2.0),), profile=UNASKING[dialect])
+    reset = watcher.printer.firmware.reset
+    watcher.when = {"reconnecting": lambda: reset(False)}
+    with pytest.raises(RemoteProtocolError, match=r"was not answered|can no longer be trusted"):
+        watcher.run(PROGRAM)
+    assert len(strokes(watcher.printer)) < len(planned(PROGRAM))
+
+
+def test_a_port_that_comes_back_to_a_restarted_printer_ends_the_print() -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=2.0),))
+    reset = watcher.printer.firmware.reset
+    watcher.when = {"reconnecting": lambda: reset(False)}
+    with pytest.raises(FirmwareError, match="restarted"):
+        watcher.run(PROGRAM)
+    assert len(strokes(watcher.printer)) < len(planned(PROGRAM))
+
+
+def test_a_port_that_stays_away_ends_the_print_in_bounded_time() -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=1e6),))
+    with pytest.raises(PortError, match=r"did not come back within 120 s; its heaters may still be on"):
+        watcher.run(PROGRAM)
+    assert watcher.printer.now_s < 1000.0
+
+
+def test_the_stop_flag_ends_the_wait_for_a_lost_port() -> None:
+    watcher, stop = watched((Fault("disconnect", at=120, unit="line", seconds=1e6),)), Flag()
+    watcher.when = {"reconnecting": stop.set}
+    outcome = watcher.run(PROGRAM, stop=stop)
+    assert (outcome.cancelled, outcome.heaters_off) == (True, False)

@@ -1,0 +1,193 @@
+"""Ports: devices, socket:// and rfc2217:// behave the same way, and what goes wrong is a sentence."""
+
+import os
+import pty
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from time import monotonic
+
+import pytest
+
+from machine.link import port as port_module
+from machine.link.medium import SERIAL
+from machine.link.port import Port, open_port, serial_devices
+from machine.link.protocol.timeout import Timing
+from machine.link.stream import print_lines
+from machine.simulator.board import BuildOptions
+from machine.simulator.firmware import SimulatedFirmware
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import PortError
+from profiles.profile import load
+from tests.machine.peers import PATIENCE_S, RATES, behind_rfc2217, on_socket, on_terminal
+
+MACHINE = load().machine
+PATIENT = Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
+PROGRAM = ["M83", *(f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 F3000" for i in range(300))]
+
+
+def heard(port: Port, length: int) -> bytes:
+    """The next bytes of a port; gives up after a minute of silence."""
+    data, end_s = b"", monotonic() + PATIENCE_S
+    while len(data) < length and monotonic() < end_s:
+        data += port.read()
+    return data
+
+
+@contextmanager
+def accepted() -> Iterator[tuple[Port, socket.socket]]:
+    """A socket:// port and the other end of its connection."""
+    with socket.create_server(("localhost", 0)) as server:
+        port = open_port(f"socket://localhost:{server.getsockname()[1]}", 115200)
+        host, _ = server.accept()
+        with host, port:
+            yield port, host
+
+
+@pytest.mark.parametrize("build", [BuildOptions(), BuildOptions(advanced_ok=False)], ids=["window", "ping-pong"])
+def test_a_printer_behind_a_socket_prints_every_line_once(build: BuildOptions) -> None:
+    firmware = SimulatedFirmware(MACHINE, build)
+    with on_socket(firmware) as address:
+        outcome = print_lines(PROGRAM, address, 115200, timing=PATIENT)
+    assert (outcome.acknowledged, outcome.repeated) == (301, 0)
+    assert [round(x, 5) for x in firmware.record().end[:, 0]] == [float(f"{1 + i % 90}.{i:05d}") for i in range(300)]
+
+
+def test_a_printer_behind_rfc_2217_prints_every_line_once() -> None:
+    with SimulatedPrinter(MACHINE) as printer, behind_rfc2217(printer.path) as address:
+        outcome = print_lines(PROGRAM, address, 115200, timing=PATIENT)
+        record = printer.record
+    assert (outcome.acknowledged, outcome.repeated) == (301, 0)
+    assert [round(x, 5) for x in record.end[:, 0]] == [float(f"{1 + i % 90}.{i:05d}") for i in range(300)]
+
+
+def test_a_read_over_a_socket_takes_all_that_is_there() -> None:
+    with accepted() as (port, host):
+        host.sendall(b"ok N1 P15 B3\n" * 50)
+        while not (data := port.read()):
+            continue
+        assert data == b"ok N1 P15 B3\n" * 50
+
+
+def test_bytes_of_every_value_pass_through_rfc_2217() -> None:
+    every = bytes(range(256))
+    master, slave = pty.openpty()
+    os.set_blocking(master, True)
+    with behind_rfc2217(os.ttyname(slave)) as address, open_port(address, 115200) as port:
+        port.write(every)
+        assert os.read(master, 4096) == every
+        os.write(master, every)
+        assert heard(port, 256) == every
+    os.close(master)
+    os.close(slave)
+
+
+@pytest.mark.parametrize("baud", [57600, 1000000])
+def test_the_rate_of_a_port_can_be_changed_while_it_is_open(baud: int) -> None:
+    with on_terminal(lambda data, rate: b"%d\n" % rate) as path, open_port(path, 115200) as port:
+        port.set_baud(baud)
+        port.write(b"?")
+        assert heard(port, 3) == b"%d\n" % baud
+    assert baud in RATES.values()
+
+
+def test_the_rate_is_set_at_the_far_end_of_rfc_2217() -> None:
+    with (
+        on_terminal(lambda data, rate: b"%d\n" % rate) as path,
+        behind_rfc2217(path) as address,
+        open_port(address, 115200) as port,
+    ):
+        port.set_baud(57600)
+        port.write(b"?")
+        assert heard(port, 6) == b"57600\n"
+
+
+@pytest.mark.parametrize("address", ["socket://localhost", "socket://:5000", "rfc2217://localhost:x", "socket://h:70000"])
+def test_an_address_without_host_and_port_says_how_one_is_written(address: str) -> None:
+    with pytest.raises(PortError, match=r"is not complete: (socket|rfc2217)://HOST:PORT is expected"):
+        open_port(address, 115200)
+
+
+@pytest.mark.parametrize(("address", "words"), [
+    ("socket://localhost:1", "connection refused"),
+    ("rfc2217://localhost:1", "connection refused"),
+    ("socket://no-such-host.invalid:5000", "no such host"),
+])  # fmt: skip
+def test_a_network_port_where_nobody_listens_gives_one_sentence(address: str, words: str) -> None:
+    with pytest.raises(PortError, match=rf"^port {address} cannot be opened: .*{words}$"):
+        open_port(address, 115200)
+
+
+def test_a_server_that_does_not_speak_rfc_2217_is_refused() -> None:
+    with on_socket(SimulatedFirmware(MACHINE)) as address, pytest.raises(PortError, match=r"cannot be opened: .*support rfc2217"):
+        open_port(address.replace("socket://", "rfc2217://") + "?timeout=0.3", 115200)
+
+
+def test_a_connection_closed_by_the_other_end_is_lost() -> None:
+    with accepted() as (port, host):
+        host.close()
+        with pytest.raises(PortError, match="was lost: is the printer or the network down"):
+            port.read()
+
+
+def test_a_server_of_rfc_2217_that_goes_away_is_a_lost_connection() -> None:
+    master, slave = pty.openpty()
+    with behind_rfc2217(os.ttyname(slave)) as address, open_port(address, 115200) as port:
+        os.close(master)
+        os.close(slave)
+        with pytest.raises(PortError, match="was lost"):
+            heard(port, 1)
+
+
+def test_a_network_printer_that_stops_reading_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(port_module, "WRITE_S", 0.2)
+    with accepted() as (port, _), pytest.raises(PortError, match=r"has stopped reading: it took no bytes for 0\.2 s"):
+        port.write(b"x" * 64_000_000)
+
+
+def test_a_network_printer_lost_in_mid_print_ends_it_and_leaves_no_thread() -> None:
+    before = set(threading.enumerate())
+    firmware = SimulatedFirmware(MACHINE)
+    with socket.create_server(("localhost", 0)) as server:
+
+        def serve() -> None:
+            host, _ = server.accept()
+            server.close()
+            with host:
+                while firmware.record().lines < 100:
+                    firmware.receive(host.recv(4096))
+                    host.sendall(firmware.advance())
+
+        thread, address = threading.Thread(target=serve), f"socket://localhost:{server.getsockname()[1]}"
+        thread.start()
+        with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
+            print_lines(PROGRAM, address, 115200, timing=PATIENT, medium=replace(SERIAL, lost_s=0.2))
+        thread.join(PATIENCE_S)
+    assert set(threading.enumerate()) <= before
+
+
+def test_a_closed_port_stays_closed() -> None:
+    with accepted() as (port, _):
+        port.close()
+        port.close()
+        with pytest.raises(PortError, match="was lost"):
+            port.write(b"G28\n")
+
+
+def test_serial_devices_are_told_once_and_stable_names_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Found:
+        def __init__(self, device: str, product: str | None, number: str | None) -> None:
+            self.device, self.product, self.serial_number = device, product, number
+            self.manufacturer, self.description = None, "n/a"
+            self.vid, self.pid = (0x2341, 0x42) if product else (None, None)
+
+    ports = [Found("/dev/ttyS0", None, None), Found("/dev/ttyACM0", "Mega 2560", "7533")]
+    monkeypatch.setattr(port_module.list_ports, "comports", lambda: ports)
+    monkeypatch.setattr(port_module, "_stable_names", lambda: {"/dev/ttyACM0": "/dev/serial/by-id/usb-Mega"})
+    told = [(device.name, device.path, device.description, device.serial_number) for device in serial_devices()]
+    assert told == [
+        ("/dev/serial/by-id/usb-Mega", "/dev/ttyACM0", "Mega 2560 (2341:0042)", "7533"),
+        ("/dev/ttyS0", "/dev/ttyS0", "", ""),
+    ]

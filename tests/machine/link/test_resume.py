@@ -1,0 +1,497 @@
+"""Resuming: where a print goes on after its host or its printer has died, and the way back to it."""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from threading import Event as Flag
+
+import numpy as np
+import pytest
+
+from machine.app.cli import main
+from machine.app.printer.serial_log import tap
+from machine.gcode.modal_state import ModalState
+from machine.gcode.modes import axes_of
+from machine.link import status
+from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
+from machine.link.medium import Medium, Wire
+from machine.link.progress import Progress
+from machine.link.protocol.events import Position, Temperature
+from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, plan_resume, read_interrupted_print
+from machine.link.status import PrinterStatus
+from machine.link.stream import print_lines
+from machine.reader.gcode_file import GcodeFile
+from machine.simulator.board import BuildOptions
+from machine.simulator.faults import Fault, FaultScript
+from machine.simulator.simulator import SimulatedPrinter
+from machine.simulator.virtual import PATH, VirtualPrinter
+from profiles.errors import FirmwareError, JournalError, SilenceError
+from profiles.profile import Profile, load
+from tests.machine.peers import on_terminal
+
+PROFILE = load()
+LIMIT = 95
+START = ["G21", "G90", "M83", "M140 S60", "M104 S200", "G28 X Y Z", "G92 A0 C0", "M190 S60", "M109 S200", "G92 E0", "M106 S128"]
+
+
+def part(number: int, tilt: int, turn: int, strokes: int = 90) -> list[str]:
+    way = [f";PART:{number} of 3", "G1 E-2 F2100", "G0 Z150 F900", f"G0 A{tilt} C{turn} F6000", f"G0 X10 Y10 F{6000 + number}"]
+    lines = [f"G1 X{10 + 7 * i % 23 + 0.01 * i:.2f} Y{10 + 5 * i % 19} E0.0{5 + i % 3} F1800" for i in range(strokes)]
+    layer = [";LAYER_CHANGE", f"G0 Z{60 + number}.2 F900"]
+    return [*way, f"G0 Z{60 + number} F900", "G1 E2 F2100", *lines[: strokes // 2], *layer, *lines[strokes // 2 :]]
+
+
+PROGRAM = [*START, *part(1, 5, 15), *part(2, 30, 725), *part(3, -20, 360), "M104 S0", "M140 S0"]
+
+
+class KilledError(BaseException):
+    """The host is no more: nothing is done on its way out."""
+
+
+class _Mortal:
+    """A wire whose host dies after so many writings: from then on nothing is sent and nothing heard."""
+
+    def __init__(self, wire: Wire, writings: int) -> None:
+        self._wire, self._left, self.name = wire, writings, wire.name
+        self.discard, self.close = wire.discard, wire.close
+
+    def write(self, data: bytes) -> None:
+        self._left -= 1
+        if self._left < 0:
+            raise KilledError
+        self._wire.write(data)
+
+    def read(self) -> bytes:
+        if self._left < 0:
+            raise KilledError
+        return self._wire.read()
+
+
+@pytest.fixture
+def text(tmp_path: Path) -> GcodeFile:
+    (tmp_path / "p.gcode").write_text("\n".join(PROGRAM) + "\n", encoding="utf-8")
+    return GcodeFile(tmp_path / "p.gcode")
+
+
+def journal_of(text: GcodeFile, name: str) -> Journal:
+    profile = PROFILE.model_dump(mode="json")
+    return Journal(text.path.with_name(name), JournalHeading(str(text.path), text.sha256(), "p", profile))
+
+
+def killed(text: GcodeFile, printer: VirtualPrinter, writings: int) -> JournalContents:
+    """Print until the host dies."""
+    medium = replace(printer.medium, open=lambda name, baud: _Mortal(printer.medium.open(name, baud), writings))
+    with journal_of(text, "first") as journal, pytest.raises(KilledError):
+        print_lines(text, PATH, medium=medium, profile=PROFILE, journal=journal)
+    return read_journal(journal.path)
+
+
+def resumed(text: GcodeFile, printer: VirtualPrinter, story: JournalContents) -> tuple[ResumePlan, list[str]]:
+    """Resume; the decision, and the commands sent."""
+    found: list[ResumePlan] = []
+    sent: list[bytes] = []
+
+    def begin(seen: PrinterStatus) -> ResumePoint:
+        found.append(plan_resume(read_interrupted_print(text, story.last, PROFILE, LIMIT), seen, PROFILE))
+        return found[0].start
+
+    with journal_of(text, "rest") as journal:
+        print_lines(
+            text,
+            PATH,
+            medium=tap(lambda way, data: sent.append(data) if way == ">" else None, printer.medium),
+            profile=PROFILE,
+            journal=journal,
+            begin=begin,
+        )
+    assert read_journal(journal.path).finished
+    return found[0], [re.sub(r"^N\d+ |\*\d+$", "", line) for line in b"".join(sent).decode().splitlines()]
+
+
+def moved(printer: VirtualPrinter) -> np.ndarray:
+    """X Y Z A C of the ends and the filament of the executed moves."""
+    record = printer.record
+    return np.column_stack([record.end[:, :5], record.end[:, 5] - record.start[:, 5]]).round(4)
+
+
+@pytest.fixture(scope="module")
+def whole() -> np.ndarray:
+    printer = VirtualPrinter(PROFILE.machine)
+    print_lines(PROGRAM, PATH, medium=printer.medium)
+    return moved(printer)
+
+
+@pytest.mark.parametrize("writings", [50, 77, 90, 120, 180, 200, 233])
+def test_after_the_host_has_died_the_rest_follows_without_gap_or_overlap(
+    text: GcodeFile, whole: np.ndarray, writings: int
+) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, writings)
+    way, _ = resumed(text, printer, story)
+    assert way.reason.endswith("nothing is repeated")
+    assert np.array_equal(moved(printer), whole)
+
+
+def test_a_print_that_had_hardly_begun_begins_anew(text: GcodeFile, whole: np.ndarray) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    way, _ = resumed(text, printer, killed(text, printer, 9))
+    assert way.start == ResumePoint(1, ())
+    assert np.array_equal(moved(printer)[-len(whole) :], whole)
+
+
+def cold(text: GcodeFile, writings: int) -> tuple[VirtualPrinter, JournalContents, ResumePlan, list[str]]:
+    """The power goes for host and printer, and comes back."""
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, writings)
+    printer.firmware.reset()
+    return printer, story, *resumed(text, printer, story)
+
+
+def test_after_a_power_cut_all_that_was_not_surely_printed_is_printed_again(text: GcodeFile, whole: np.ndarray) -> None:
+    printer, story, way, _ = cold(text, 233)
+    assert way.start.line == story.last.executed + 1
+    done = moved(printer)[:, [0, 1, 5]]
+    rest = whole[sum(is_move(line) for line in PROGRAM[: way.start.line - 1]) :][:, [0, 1, 5]]
+    assert np.array_equal(done[-len(rest) :], rest)
+
+
+def is_move(line: str) -> bool:
+    return re.match(r"G[01] .*[XYZACE]", line) is not None
+
+
+def test_after_a_power_cut_z_and_the_table_are_neither_homed_nor_turned(text: GcodeFile) -> None:
+    _, _, way, _ = cold(text, 233)
+    homed = [line for line in way.start.before if line.startswith("G28")]
+    assert homed == ["G28 X Y"]
+    assert not [line for line in way.start.before if re.match(r"G[01] .*[AC]", line)]
+
+
+def test_after_a_power_cut_the_bed_heats_first_and_the_tip_rises_before_anything_else_moves(text: GcodeFile) -> None:
+    _, _, way, _ = cold(text, 233)
+    order = [next(i for i, line in enumerate(way.start.before) if line.startswith(word)) for word in (
+        "G92 X", "M190 S60", "M109 S200", "G1 E-", "G0 Z", "G28 X Y", "G0 X", "G1 Z", "M106")]  # fmt: skip
+    assert order == sorted(order)
+
+
+def test_the_turns_of_the_table_are_not_forgotten(text: GcodeFile) -> None:
+    _, _, way, _ = cold(text, 150)
+    assert any(line.startswith("G92 X") and line.endswith("A30 C725") for line in way.start.before)
+
+
+def test_a_parked_printer_whose_host_has_died_comes_back_without_homing(text: GcodeFile, whole: np.ndarray) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, 233)
+    line = printer.medium.open(PATH, 0)
+    line.write(b"G91\nG0 Z20 F900\nG90\nG0 X-100 Y-100 F6000\nM400\n")
+    printer.medium.wait(30.0)
+    line.close()
+    way, sent = resumed(text, printer, story)
+    assert "has not restarted and knows its place" in way.reason
+    assert not [line for line in sent if line.startswith(("G28", "G92 X"))]
+    rest = whole[sum(is_move(line) for line in PROGRAM[: way.start.line - 1]) :]
+    assert np.array_equal(moved(printer)[-len(rest) :], rest)
+
+
+def test_a_second_death_is_resumed_from_the_second_journal(text: GcodeFile, whole: np.ndarray) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, 120)
+    medium = replace(printer.medium, open=lambda name, baud: _Mortal(printer.medium.open(name, baud), 60))
+    with journal_of(text, "second") as journal, pytest.raises(KilledError):
+        print_lines(
+            text, PATH, medium=medium, profile=PROFILE, journal=journal,
+            begin=lambda seen: plan_resume(read_interrupted_print(text, story.last, PROFILE, LIMIT), seen, PROFILE).start,
+        )  # fmt: skip
+    again = read_journal(journal.path)
+    assert again.last.executed > story.last.executed
+    resumed(text, printer, again)
+    assert np.array_equal(moved(printer), whole)
+
+
+@pytest.mark.parametrize("advanced", [True, False])
+def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: GcodeFile, advanced: bool) -> None:
+    for line in range(20, len(PROGRAM), 31):
+        fault = FaultScript((Fault("reset", at=line, unit="line"),))
+        printer = VirtualPrinter(PROFILE.machine, None if advanced else BuildOptions(advanced_ok=False), fault)
+        with journal_of(text, f"at {line}") as journal, pytest.raises(FirmwareError):
+            print_lines(text, PATH, medium=printer.medium, profile=PROFILE, journal=journal)
+        last = read_journal(journal.path).last
+        surely = sum(is_move(each) for each in PROGRAM[: last.executed])
+        assert surely <= len(printer.record.start), line
+        assert last.executed <= last.acknowledged <= last.sent
+
+
+def point(executed: int, acknowledged: int | None = None, number: int = 100) -> InterruptedPrint:
+    moment = Checkpoint(acknowledged or executed, acknowledged or executed, executed, number)
+    return read_interrupted_print(PROGRAM, moment, PROFILE, LIMIT)
+
+
+def found(position: dict[str, float] | None = None, last: int | None = 0) -> PrinterStatus:
+    return PrinterStatus(last, Position(tuple(position.items())) if position is not None else None, Temperature())
+
+
+LINE = PROGRAM.index(";PART:2 of 3") + 40
+
+
+def test_the_point_knows_part_layer_pose_and_modes() -> None:
+    at = point(LINE)
+    assert (at.line, at.position.part, at.position.parts) == (LINE + 1, 2, 3)
+    assert at.modal.at[3:5] == [30.0, 725.0]
+    assert (at.modal.modes.filament_relative, at.modal.modes.relative, at.modal.modes.feed, at.modal.nozzle_c) == (
+        True,
+        False,
+        1800.0,
+        200.0,
+    )
+    assert at.stroked
+
+
+def test_a_printer_that_stands_at_several_lines_ends_is_taken_at_the_first() -> None:
+    still = [*START, "G0 X10 Y20 Z30", "G1 X11 E1 F600", "M106 S10", "M106 S20", "M106 S30", "G1 X12 E1"]
+    at = read_interrupted_print(still, Checkpoint(13, 13, 13, 5), PROFILE, LIMIT)
+    way = plan_resume(at, found({"X": 11.0, "Y": 20.0, "Z": 30.0, "E": 1.0}), PROFILE)
+    assert way.start.line == still.index("M106 S10") + 1
+
+
+def test_a_table_that_was_turning_when_the_power_went_is_refused() -> None:
+    line = PROGRAM.index("G0 A30 C725 F6000")
+    with pytest.raises(JournalError, match=r"the table was turning about A.*machine\.gcode\.resume"):
+        plan_resume(point(line, line + 5), found(), PROFILE)
+
+
+@pytest.mark.parametrize("state", ["paused", "left"])
+def test_a_tip_that_was_taken_away_is_told_where_it_was_taken(state: str) -> None:
+    moment = Checkpoint(LINE + 3, LINE, LINE, 100, (159.0, -159.0, 120.0, 30.0, 725.0, 5.0), state)
+    before = plan_resume(read_interrupted_print(PROGRAM, moment, PROFILE, LIMIT), found(), PROFILE).start.before
+    assert "G92 X159 Y-159 Z120 A30 C725" in before
+
+
+@pytest.mark.parametrize("state", ["pausing", "resuming"])
+def test_a_tip_that_was_on_its_way_when_the_power_went_is_refused(state: str) -> None:
+    moment = Checkpoint(LINE + 3, LINE, LINE, 100, (10.0, 10.0, 62.0, 30.0, 725.0, 5.0), state)
+    with pytest.raises(JournalError, match=r"was on its way between print and parking place"):
+        plan_resume(read_interrupted_print(PROGRAM, moment, PROFILE, LIMIT), found(), PROFILE)
+
+
+def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text: GcodeFile) -> None:
+    printer, stop = VirtualPrinter(PROFILE.machine), Flag()
+
+    def see(progress: Progress) -> None:
+        if progress.file_line > LINE:
+            stop.set()
+
+    with journal_of(text, "first") as journal:
+        print_lines(text, PATH, on_progress=see, stop=stop, medium=printer.medium, profile=PROFILE, journal=journal)
+    last = read_journal(journal.path).last
+    assert last.state == "left"
+    assert last.pose[:5] == pytest.approx(tuple(printer.record.end[-1, :5]), abs=0.005)
+
+
+def test_a_profiles_own_block_homes_instead() -> None:
+    block = "G28 Z\nG28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
+    profile = load(settings=[f"machine.gcode.resume={block!r}"])
+    before = plan_resume(point(LINE), found(), with_block(profile, block)).start.before
+    assert before[before.index("G28 Z") : before.index("G28 Z") + 3] == ("G28 Z", "G28 X Y", "HOME_AC")
+    assert "G0 A30 C725" in before
+    assert not [line for line in before if line.startswith("G92 X")]
+
+
+def with_block(profile: Profile, block: str) -> Profile:
+    gcode = profile.machine.gcode.model_copy(update={"resume": block})
+    return profile.model_copy(update={"machine": profile.machine.model_copy(update={"gcode": gcode})})
+
+
+def test_a_printer_that_was_moved_since_it_restarted_is_refused() -> None:
+    with pytest.raises(JournalError, match="stands at X50 Y50 Z50: it was moved"):
+        plan_resume(point(LINE), found({"X": 50.0, "Y": 50.0, "Z": 50.0}), PROFILE)
+
+
+def test_a_program_that_does_not_tell_where_it_stands_is_refused() -> None:
+    lines = [*START, "G1 X1 E1", "G28", *(f"M106 S{k}" for k in range(60)), "G1 X5 E1"]
+    with pytest.raises(JournalError, match="does not tell where X Y Z stand"):
+        plan_resume(read_interrupted_print(lines, Checkpoint(14, 14, 13, 5), PROFILE, LIMIT), found(), PROFILE)
+
+
+def test_a_firmware_that_follows_the_table_goes_on_only_where_it_stands() -> None:
+    machine = PROFILE.machine.model_copy(update={"coordinates": "workpiece"})
+    with pytest.raises(JournalError, match="follows the table by itself"):
+        plan_resume(point(LINE), found(), PROFILE.model_copy(update={"machine": machine}))
+
+
+def test_when_the_table_must_turn_back_it_turns_above_everything() -> None:
+    turned = {"X": 20.0, "Y": 14.0, "Z": 150.0, "A": -20.0, "C": 360.0, "E": 3.0}
+    way = plan_resume(point(LINE, number=10), found(turned, last=20), PROFILE)
+    lines = list(way.start.before)
+    turn = next(i for i, line in enumerate(lines) if re.match(r"G0 A30\S* C725", line))
+    heights = [float(m[1]) for line in lines[:turn] if (m := re.match(r"G0 Z(\S+)", line))]
+    assert heights[0] >= 80.0
+
+
+MODES: list[tuple[str, Callable[[ModalState], object], object]] = [
+    ("G91", lambda modal: (modal.modes.relative, modal.modes.filament_relative), (True, True)),
+    ("M82", lambda modal: modal.modes.filament_relative, False),
+    ("G20", lambda modal: modal.modes.inches, True),
+    ("G1 F7200", lambda modal: modal.modes.feed, 7200.0),
+    ("G01X5Y6", lambda modal: modal.at[:2], [5.0, 6.0]),
+    ("M106 P1 S9", lambda modal: modal.fans["1"], "M106 P1 S9"),
+    ("M204 P500", lambda modal: modal.settings["M204P"], "M204 P500"),
+    ("M568 P0 S230", lambda modal: modal.nozzle_c, 230.0),
+    ("SET_HEATER_TEMPERATURE HEATER=extruder TARGET=215", lambda modal: modal.nozzle_c, 215.0),
+    ("G92 C1085", lambda modal: modal.at[4], 1085.0),
+    ("G28", lambda modal: modal.at[:5], [None] * 5),
+]
+
+
+@pytest.mark.parametrize(("command", "look", "expected"), MODES)
+def test_what_a_firmware_remembers_of_a_command(command: str, look: Callable[[ModalState], object], expected: object) -> None:
+    modal = ModalState(axes_of(PROFILE.machine))
+    modal.take(command)
+    assert look(modal) == expected
+
+
+def test_saying_all_again_leads_to_the_same_state() -> None:
+    first, second = ModalState(axes_of(PROFILE.machine)), ModalState(axes_of(PROFILE.machine))
+    for command in [*START, "M204 P500 T900", "G20", "G91", "G1 X1 E2 F50", "M106 P1 S3"]:
+        first.take(command)
+    for command in first.lines():
+        second.take(command)
+    assert second.lines() == first.lines()
+
+
+@pytest.mark.parametrize("dialect", ["open5x_voron0", "open5x_jubilee", "fractal5pro"])
+def test_every_firmware_is_told_where_its_axes_stand(dialect: str) -> None:
+    profile = load(dialect)
+    letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
+    x, y = (0.5 * sum(axis.limits_mm) for axis in (profile.machine.x, profile.machine.y))
+    lines = [f"G92 {letters[0]}0 {letters[1]}0", f"G0 X{x} Y{y} Z60 F600", "M109 S200", *(f"G1 X{x + k} E1" for k in range(9))]
+    way = plan_resume(read_interrupted_print(lines, Checkpoint(6, 6, 6, 5), profile, 120), found(), profile)
+    assert re.search(r"(G92 X\S+ Y\S+ Z60|SET_KINEMATIC_POSITION X=\S+ Y=\S+ Z=60)", "\n".join(way.start.before))
+    assert "G28 X Y" in way.start.before
+
+
+def cancelled(text: GcodeFile, port: str) -> Path:
+    """A print on a pseudo-terminal that was stopped in its second part."""
+    stop = Flag()
+    with journal_of(text, "first") as journal:
+        outcome = print_lines(
+            text, port, 250000, lambda told: stop.set() if told.file_line > 190 else None, stop, profile=PROFILE, journal=journal
+        )
+    assert outcome.cancelled
+    return journal.path
+
+
+@pytest.mark.slow
+def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
+    text: GcodeFile, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with SimulatedPrinter(PROFILE.machine, speed=100.0) as printer:
+        journal = cancelled(text, printer.path)
+        further = str(journal.with_name("rest"))
+        assert main(["resume", str(journal), "--port", printer.path, "--yes", "--journal", further, "--watch"]) == 0
+        record = printer.record
+        assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
+    told = capsys.readouterr().err
+    assert re.search(r"p, part [23] of 3, (layer 1, )?line \d+ of 310", told)
+    assert "has not restarted and knows its place" in told
+    assert "watch the print at http://" in told
+    assert "was resumed already, what became of it is in" in told
+    assert record.end[-1, 3:5].tolist() == [-20.0, 360.0]
+
+
+@pytest.mark.parametrize(("spoil", "words"), [
+    (lambda path: path.write_text("G28\n"), "is of another program"),
+    (lambda path: path.unlink(), "is gone"),
+])  # fmt: skip
+def test_the_command_refuses_a_journal_of_another_program(
+    text: GcodeFile, spoil: Callable[[Path], object], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with journal_of(text, "j") as journal:
+        journal.write(Checkpoint(20, 20, 10, 20))
+    spoil(text.path)
+    assert main(["resume", str(journal.path), "--port", "/dev/none"]) == 1
+    assert words in capsys.readouterr().err
+
+
+def test_a_cut_while_the_table_turned_is_resumed_by_a_profile_that_tells_how_it_is_homed(
+    text: GcodeFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = PROGRAM.index("G0 A30 C725 F6000")
+    with journal_of(text, "j") as journal:
+        journal.write(Checkpoint(line + 5, line, line, 100))
+    mine = tmp_path / "mine.toml"
+    block = "G28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
+    mine.write_text(f'inherits = "generic_ac"\n\n[machine.gcode]\nresume = {json.dumps(block)}\n')
+    for machine in ((), ("--machine", str(mine))):
+        with SimulatedPrinter(PROFILE.machine) as printer:
+            assert main(["resume", str(journal.path), "--port", printer.path, *machine]) == 1
+    told = capsys.readouterr().err.splitlines()
+    assert "the table was turning about A" in told[2]
+    assert "name that profile with --machine" in told[2]
+    assert told[-2] == "then: machine.gcode.resume homes the axes, bed and nozzle heat"
+
+
+def test_a_journal_stays_whole_when_the_printer_does_not_answer(
+    text: GcodeFile, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(status, "ANSWER_S", 0.1)
+    with journal_of(text, "j") as journal:
+        journal.write(Checkpoint(233, 233, 220, 20))
+    with on_terminal(lambda data, baud: b"") as path:
+        assert main(["resume", str(journal.path), "--port", path, "--yes"]) == 1
+    assert "is --baud the firmware's rate" in capsys.readouterr().err
+    assert read_journal(journal.path).continued_in is None
+
+
+def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that_nobody_gives(
+    text: GcodeFile, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with journal_of(text, "j") as journal:
+        journal.write(Checkpoint(50, 50, 40, 20))
+    with SimulatedPrinter(PROFILE.machine) as printer:
+        assert main(["resume", str(journal.path), "--port", printer.path, "--machine", "gen5x"]) == 1
+        assert main(["resume", str(journal.path), "--port", printer.path]) == 1
+        assert not printer.record.happened("nozzle")
+    with journal_of(text, "done") as journal:
+        journal.write(Checkpoint(120, 120, 100, 20, state="finished"))
+    assert main(["resume", str(journal.path), "--port", "x"]) == 1
+    assert main(["resume", str(journal.path), "--port", "sim"]) == 1
+    told = capsys.readouterr().err
+    assert "--machine gives another machine" in told
+    assert "give --yes where there is no terminal" in told
+    assert "ran to its end" in told
+    assert "a simulated printer ends with its print" in told
+
+
+def test_a_cancel_is_heeded_while_the_printer_is_asked_where_it_stands(text: GcodeFile) -> None:
+    printer, stop = VirtualPrinter(PROFILE.machine), Flag()
+    deaf = Medium(lambda name, baud: _Deaf(printer.medium.open(name, baud)), printer.medium.now_s, printer.medium.wait)
+    stop.set()
+    outcome = print_lines(text, PATH, stop=stop, medium=deaf, profile=PROFILE, begin=lambda found: ResumePoint(1, ()))
+    assert (outcome.cancelled, outcome.sent, outcome.heaters_off) == (True, 0, None)
+    assert printer.now_s < 1.0
+
+
+def test_a_printer_that_says_nothing_is_not_resumed(text: GcodeFile) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = killed(text, printer, 233)
+    deaf = Medium(lambda name, baud: _Deaf(printer.medium.open(name, baud)), printer.medium.now_s, printer.medium.wait)
+    seen: list[PrinterStatus] = []
+
+    def begin(asked: PrinterStatus) -> ResumePoint:
+        seen.append(asked)
+        return plan_resume(read_interrupted_print(text, story.last, PROFILE, LIMIT), asked, PROFILE).start
+
+    with pytest.raises(SilenceError, match=r"did not answer when it was asked where it stands"):
+        print_lines(text, PATH, medium=deaf, profile=PROFILE, begin=begin)
+    assert seen == [PrinterStatus(None, None, Temperature())]
+
+
+class _Deaf:
+    """A wire on which nothing arrives."""
+
+    def __init__(self, wire: Wire) -> None:
+        self.name, self.read, self.discard, self.close = wire.name, wire.read, wire.discard, wire.close
+
+    def write(self, data: bytes) -> None:
+        pass

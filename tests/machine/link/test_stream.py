@@ -1,0 +1,381 @@
+import errno
+import os
+import pty
+import signal
+import socket
+import threading
+import tty
+from collections.abc import Callable, Iterator
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+import serial
+
+from machine.link.medium import Medium
+from machine.link.port import open_port, refusal
+from machine.link.progress import ProgramPosition, Progress, Schedule
+from machine.link.protocol.framing import frame
+from machine.link.protocol.timeout import Timing
+from machine.link.stream import Outcome, print_lines
+from machine.simulator.board import BuildOptions
+from machine.simulator.faults import HEALED, Fault, random_script
+from machine.simulator.firmware import SimulatedFirmware
+from machine.simulator.record import Record
+from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import FirmwareError, LocalProtocolError, PortError, PrinterError, SilenceError
+from profiles.profile import load
+from tests.machine.peers import PATIENCE_S
+
+MACHINE = load().machine
+QUICK = Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=1.0, drain_s=0.05, quiet_s=0.03)
+# Where nothing goes wrong nobody has to be asked again, however long a busy machine takes.
+PATIENT = Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
+PLAIN = BuildOptions(advanced_ok=False)
+HEAT = ["M140 S60", "M104 S200", "M109 S200"]
+OFF = ["M104 S0", "M140 S0"]
+
+
+def strokes(n: int) -> list[str]:
+    """n different moves, each with filament of its own."""
+    return ["M83"] + [f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 E0.{1 + i:05d} F3000" for i in range(n)]
+
+
+def expected(lines: list[str]) -> np.ndarray:
+    """X, Y and pushed filament of the moves of a program of strokes()."""
+    rows = [[float(word[1:]) for word in line.split()[1:4]] for line in lines if line.startswith("G1 X")]
+    return np.array(rows).reshape(-1, 3)
+
+
+def done(record: Record) -> np.ndarray:
+    return np.column_stack([record.end[:, 0], record.end[:, 1], record.end[:, 5] - record.start[:, 5]])
+
+
+def assert_executed(record: Record, lines: list[str], whole: bool = True) -> None:
+    """The moves of the program happened exactly once and in order; all of them, or a beginning of them."""
+    got, wanted = done(record), expected(lines)
+    assert len(got) == len(wanted) if whole else len(got) <= len(wanted)
+    assert np.abs(got - wanted[: len(got)]).max(initial=0.0) < 1e-6
+
+
+def run(lines: list[str], faults: tuple[Fault, ...] = (), build: BuildOptions | None = None) -> tuple[Outcome, Record]:
+    with SimulatedPrinter(MACHINE, build=build, faults=faults) as printer:
+        return print_lines(lines, printer.path, 250000, timing=QUICK if faults else PATIENT), printer.record
+
+
+@pytest.mark.parametrize("build", [BuildOptions(), PLAIN, BuildOptions(emergency_parser=False, autoreport=False, busy=False)])
+def test_two_thousand_lines_arrive_once_and_in_order(build: BuildOptions) -> None:
+    lines = HEAT + strokes(2000) + OFF
+    outcome, record = run(lines, build=build)
+    assert_executed(record, lines)
+    assert (outcome.cancelled, outcome.sent, outcome.acknowledged, outcome.repeated) == (False, 2006, 2006, 0)
+    assert (record.nozzle_target_c, record.unknown) == (0.0, 0)
+    assert outcome.firmware.startswith("Marlin")
+
+
+def test_comments_and_blank_lines_are_never_sent() -> None:
+    outcome, record = run(["; a", "", "  ", "G21 ; mm", "\n"])
+    assert outcome.sent == 1
+    assert record.lines == 1 + len(["M110", "M115", "M105", "M155 S2", "M155 S0", "M400", "M105"])
+
+
+def test_the_end_of_a_print_is_the_end_of_its_moves() -> None:
+    with SimulatedPrinter(MACHINE, speed=50.0) as printer:
+        print_lines(["G1 X60 F600"], printer.path, 250000, timing=PATIENT)
+        record = printer.record
+        assert record.begin_s[-1] + record.duration_s[-1] <= printer._firmware.board.now_s
+
+
+def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
+    told: list[Progress] = []
+    body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
+    with SimulatedPrinter(MACHINE) as printer:
+        print_lines(HEAT + body, printer.path, 250000, told.append, timing=PATIENT)
+    last = told[-1]
+    assert (last.sent, last.acknowledged, last.total) == (6, 6, 6)
+    assert (last.part, last.parts, last.layer, last.share) == (2, 2, 2, 0.5)
+    assert last.left_s == pytest.approx(180.0, abs=60.0)
+    assert last.temperature.nozzle_c == pytest.approx(200.0, abs=1.5)
+    assert last.temperature.bed_target_c == 60.0
+
+
+def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:
+    told: list[Progress] = []
+    with SimulatedPrinter(MACHINE) as printer:
+        schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=2.0)
+        print_lines(iter(["G21", "M220 S50", "G90"]), printer.path, 250000, told.append, schedule=schedule, timing=PATIENT)
+    assert told[-1].left_s == pytest.approx((1000.0 - 300.0) / 2.0 / 0.5)
+    assert told[-1].total is None
+
+
+def test_where_the_pace_is_not_known_the_one_so_far_holds() -> None:
+    schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=None)
+    assert schedule.left_s(2, 4, 10.0, 50.0) == pytest.approx(600.0 * 10.0 / 200.0)
+    assert schedule.left_s(2, 2, 10.0, 50.0) is None
+
+
+def test_m73_s_minutes_follow_the_feed_override() -> None:
+    place = ProgramPosition(minutes_left=3.0, reported_at_s=10.0)
+    assert place.left_s(20.0, 200.0) == pytest.approx(80.0)
+
+
+@pytest.mark.parametrize("bad", ["M117 schön", "M117 " + "x" * 90, "G1 X1*5", "M112", "M0 wait"])
+def test_a_line_that_cannot_be_sent_is_refused_before_anything_is_sent(bad: str) -> None:
+    with SimulatedPrinter(MACHINE) as printer:
+        with pytest.raises(LocalProtocolError, match="line 3"):
+            print_lines(["G28", "G1 X1", bad], printer.path, 250000, timing=PATIENT)
+        assert printer.record.lines == 0
+
+
+def test_a_bad_line_of_a_stream_stops_the_print_with_heaters_off() -> None:
+    with SimulatedPrinter(MACHINE) as printer:
+        with pytest.raises(LocalProtocolError, match=r"line 4 .*; the printer reports its heaters off"):
+            print_lines(iter([*HEAT, "M117 ö"]), printer.path, 250000, timing=PATIENT)
+        assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
+
+
+def test_a_stream_is_consumed_only_as_fast_as_it_is_printed() -> None:
+    stop, ahead = threading.Event(), []
+
+    def lines() -> Iterator[str]:
+        for i in count():
+            yield f"G1 X{i % 50}"
+            if i == 500:
+                ahead.append(i - printer._firmware._taken)
+                stop.set()
+
+    with SimulatedPrinter(MACHINE) as printer:
+        outcome = print_lines(lines(), printer.path, 250000, stop=stop, timing=PATIENT)
+    assert outcome.cancelled
+    assert ahead[0] < 20
+    assert outcome.sent < 520
+
+
+def _once_sent(count: int, act: Callable[[], object]) -> Callable[[Progress], None]:
+    """Told of the progress of a print, does something as soon as so many commands are sent."""
+    waiting = [act]
+
+    def told(progress: Progress) -> None:
+        if progress.sent >= count and waiting:
+            waiting.pop()()
+
+    return told
+
+
+@pytest.mark.parametrize("lines", [HEAT + strokes(3000), ["M109 S250"]])
+def test_stopping_leaves_heaters_off_and_moves_nothing_home(lines: list[str]) -> None:
+    stop = threading.Event()
+    with SimulatedPrinter(MACHINE, speed=5.0) as printer:
+        outcome = print_lines(["M106 S255", *lines], printer.path, 250000, _once_sent(2, stop.set), stop=stop, timing=PATIENT)
+        record = printer.record
+    assert outcome.cancelled
+    assert outcome.heaters_off
+    assert (record.nozzle_target_c, record.bed_target_c, record.fan) == (0.0, 0.0, 0.0)
+    assert record.happened("M410")
+    assert not record.happened("homed")
+
+
+def test_without_an_emergency_parser_stopping_still_switches_the_heaters_off() -> None:
+    stop = threading.Event()
+    with SimulatedPrinter(MACHINE, speed=5.0, build=BuildOptions(emergency_parser=False)) as printer:
+        lines = ["M104 S200", *(["G1 X5 F3000", "G1 X0"] * 999)]
+        outcome = print_lines(lines, printer.path, 250000, _once_sent(9, stop.set), stop=stop, timing=PATIENT)
+        assert outcome.heaters_off
+        assert printer.record.nozzle_target_c == 0.0
+
+
+def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
+    with SimulatedPrinter(MACHINE, speed=5.0) as printer:
+        press = _once_sent(9, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT))
+        with pytest.raises(KeyboardInterrupt):
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, press, timing=PATIENT)
+        assert printer.record.nozzle_target_c == 0.0
+        assert printer.record.happened("nozzle 200")
+
+
+def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
+    def burst(progress: Progress) -> None:
+        if progress.sent > 1:
+            raise ZeroDivisionError
+
+    with SimulatedPrinter(MACHINE, speed=5.0) as printer:
+        with pytest.raises(ZeroDivisionError):
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, burst, timing=PATIENT)
+        assert printer.record.nozzle_target_c == 0.0
+
+
+PROGRAM = ["M104 S200", "M109 S200", *strokes(300)]
+WIRE = [b"\nN0 M110 N0*125\n", frame(1, "M115"), frame(2, "M105"), frame(3, "M155 S2")]
+WIRE += [frame(4 + i, line) for i, line in enumerate(PROGRAM)]
+
+
+def byte_of(line: int, offset: int = 0) -> int:
+    """Where a byte of a wire line stands in the faultless stream to the printer; negative offsets count from its end."""
+    return sum(len(w) for w in WIRE[:line]) + (offset if offset >= 0 else len(WIRE[line]) + offset)
+
+
+def answered(lines: int) -> bytes:
+    """What a faultless printer says to the first wire lines."""
+    firmware = SimulatedFirmware(MACHINE)
+    firmware.receive(b"".join(WIRE[:lines]))
+    return firmware.advance()
+
+
+LINE = answered(50).count(b"\n")  # answers and bytes before the strokes that the faults below aim at
+BYTE = len(answered(50))
+LOST_LINE = tuple(Fault("drop", byte_of(50, i)) for i in range(len(WIRE[50])))
+SURVIVED = {
+    "a byte lost": (Fault("drop", byte_of(50, 9)),),
+    "a bit flipped in a number": (Fault("flip", byte_of(50, 9), value=0),),
+    "the leading N lost": (Fault("drop", byte_of(50)),),
+    "the newline lost, two lines melt": (Fault("drop", byte_of(50, -1)),),
+    "a whole line lost": LOST_LINE,
+    "the number becomes that of the line before": (Fault("flip", byte_of(51, 2), value=0),),
+    "the checksum's star becomes a newline": (Fault("flip", byte_of(50, WIRE[50].index(b"*")), value=5),),
+    "a byte doubled": (Fault("duplicate", byte_of(50, 7)),),
+    "an ok lost": (Fault("swallow ok", LINE, True),),
+    "three oks lost in a row": tuple(Fault("swallow ok", LINE + n, True) for n in range(3)),
+    "the last oks lost": tuple(Fault("swallow ok", LINE + n, True) for n in range(250, 253)),
+    "bytes of answers lost": tuple(Fault("drop", BYTE + n, True) for n in (0, 71, 133, 280)),
+    "bytes of answers flipped": tuple(Fault("flip", BYTE + n, True, n % 7) for n in (0, 71, 133, 280)),
+    "a resend of an acknowledged line": (Fault("spurious resend", LINE, True, 45),),
+    "a resend of a line far back": (Fault("spurious resend", LINE, True, 10),),
+    "a resend of a line to come": (Fault("spurious resend", LINE, True, 999),),
+    "a damaged greeting": (Fault("drop", 3), Fault("flip", 20, value=2), Fault("drop", 30, True)),
+}
+
+
+@pytest.mark.parametrize("build", [BuildOptions(), PLAIN], ids=["advanced", "plain"])
+@pytest.mark.parametrize("name", SURVIVED)
+def test_a_fault_is_healed(name: str, build: BuildOptions) -> None:
+    outcome, record = run(PROGRAM, SURVIVED[name], build)
+    assert_executed(record, PROGRAM)
+    assert outcome.acknowledged == len(PROGRAM)
+
+
+@pytest.mark.parametrize(("kind", "build"), [
+    ("reset", BuildOptions()), ("reset", PLAIN), ("silent reset", BuildOptions()), ("silent reset", PLAIN)])  # fmt: skip
+def test_a_restart_in_mid_print_stops_it_at_once(kind: str, build: BuildOptions) -> None:
+    with SimulatedPrinter(MACHINE, build=build, faults=[Fault(kind, byte_of(100), unit="byte")]) as printer:  # type: ignore[arg-type]
+        with pytest.raises(FirmwareError, match="restarted"):
+            print_lines(PROGRAM, printer.path, 250000, timing=QUICK)
+        record = printer.record
+    assert_executed(record, PROGRAM, whole=False)
+    assert 60 < len(record.end) < 97  # the planner's sixteen are lost too
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_faults_end_in_the_exact_moves_or_in_an_error(seed: int) -> None:
+    build = BuildOptions(advanced_ok=seed % 2 == 0, emergency_parser=seed % 3 > 0, busy=seed % 5 > 0)
+    with SimulatedPrinter(MACHINE, build=build, faults=random_script(seed, 8, range(3, 280), HEALED, 30)) as printer:
+        try:
+            print_lines(PROGRAM, printer.path, 250000, timing=QUICK)
+            whole = True
+        except PrinterError:
+            whole = False
+        assert_executed(printer.record, PROGRAM, whole)
+
+
+def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
+    with SimulatedPrinter(MACHINE, speed=5.0) as printer:
+        other = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
+        kill = _once_sent(9, lambda: os.write(other, b"\nM112\n"))
+        with pytest.raises(FirmwareError, match="Printer halted"):
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, kill, timing=PATIENT)
+        os.close(other)
+        assert printer.record.nozzle_target_c == 0.0
+
+
+def test_a_printer_that_never_answers_is_given_up() -> None:
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    hasty = Timing(stall_s=0.1, stall_mute_s=0.1, sync_s=0.1, drain_s=0.05)
+    with pytest.raises(SilenceError, match="greetings"):
+        print_lines(["G28"], os.ttyname(slave), 250000, timing=hasty)
+    os.close(master)
+    os.close(slave)
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    ("/dev/no-such-port", "does not exist"),
+    ("/dev", "is a folder"),
+    (__file__, "is a file"),
+    ("/dev/null", "not a working serial device"),
+    ("/dev/null/x", "port /dev/null/x"),
+    ("socket://localhost:1", "cannot be opened"),
+    ("nonsense://x", "cannot be opened"),
+])  # fmt: skip
+def test_a_port_that_cannot_be_opened_gives_one_sentence(name: str, words: str) -> None:
+    with pytest.raises(PortError, match=words) as caught:
+        open_port(name, 115200)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("baud", [0, -1, 10**9])
+def test_an_impossible_baud_rate_is_named(baud: int) -> None:
+    with pytest.raises(PortError, match=f"baud rate {baud}"):
+        open_port("/dev/null", baud)
+
+
+def test_a_port_that_another_program_holds_is_busy() -> None:
+    with (
+        SimulatedPrinter(MACHINE) as printer,
+        serial.Serial(printer.path, exclusive=True),
+        pytest.raises(PortError, match="is busy: another program holds it"),
+    ):
+        print_lines(["G28"], printer.path, 250000)
+
+
+def test_a_port_without_rights_names_the_group_that_has_them(tmp_path: Path) -> None:
+    sentence = refusal(str(tmp_path), 115200, PermissionError(errno.EACCES, "denied"))
+    assert "belongs to group" in sentence
+    assert "usermod" in sentence
+
+
+def test_a_cable_pulled_out_is_one_error_for_reading_and_writing() -> None:
+    master, slave = pty.openpty()
+    port = open_port(os.ttyname(slave), 115200)
+    os.close(slave)
+    os.close(master)
+    for act in (port.read, lambda: port.write(b"G28\n")):
+        with pytest.raises(PortError, match="was lost"):
+            act()
+    port.close()
+
+
+def test_a_cable_pulled_in_mid_print_ends_it_and_leaves_no_thread() -> None:
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    firmware = SimulatedFirmware(MACHINE)
+
+    def serve() -> None:
+        while firmware._taken < 100:
+            firmware.receive(os.read(master, 4096))
+            os.write(master, firmware.advance())
+        os.close(master)
+
+    before, server = set(threading.enumerate()), threading.Thread(target=serve, daemon=True)
+    server.start()
+    with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
+        print_lines(PROGRAM, os.ttyname(slave), 250000, timing=QUICK, medium=Medium(lost_s=0.3))
+    server.join(PATIENCE_S)
+    os.close(slave)
+    assert set(threading.enumerate()) <= before
+
+
+def test_a_printer_behind_a_socket_is_printed_on_too() -> None:
+    firmware, server = SimulatedFirmware(MACHINE), socket.create_server(("localhost", 0))
+
+    def serve() -> None:
+        host, _ = server.accept()
+        with host:
+            while data := host.recv(4096):
+                firmware.receive(data)
+                host.sendall(firmware.advance())
+
+    threading.Thread(target=serve, daemon=True).start()
+    with server:
+        outcome = print_lines(PROGRAM, f"socket://localhost:{server.getsockname()[1]}", 115200, timing=PATIENT)
+    assert outcome.acknowledged == len(PROGRAM)
+    assert_executed(firmware.record(), PROGRAM)

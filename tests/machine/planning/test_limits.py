@@ -1,0 +1,89 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from machine.planning.limits import axis_limits, check, check_parts, travel_speed, turn_speed
+from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Travel, rows
+from machine.planning.plan import plan
+from mdp.pose import Pose
+from profiles.errors import MoveError
+from profiles.profile import load
+from tests.machine.hand import post_and_arm, squares
+
+MACHINE = load().machine
+
+
+def _checked(*moves) -> None:
+    program = MachineProgram("p", (BeginPart(3, Pose(0, 0), 1), BeginLayer(3, 7, 0.2, 0.2, 0.0), *moves))
+    check(program, rows(program, 0.0, 0.0), MACHINE)
+
+
+@pytest.mark.parametrize(
+    ("end", "message"),
+    [
+        ([161, 0, 5], "part 3, layer 7: X would go to 161.000 mm, allowed is -160 to 160 mm on generic A/C table"),
+        ([0, -160.5, 5], "part 3, layer 7: Y would go to -160.500 mm"),
+        ([0, 0, 261], "part 3, layer 7: Z would go to 261.000 mm, allowed is -80 to 260 mm"),
+    ],
+)
+def test_a_point_outside_is_refused_with_part_layer_axis_value_and_range(end: list[float], message: str) -> None:
+    with pytest.raises(MoveError) as error:
+        _checked(Travel(np.array([[0, 0, 5], end], dtype=float), 100.0))
+    assert message in str(error.value)
+
+
+def test_a_rotary_angle_outside_is_refused() -> None:
+    with pytest.raises(MoveError, match=r"A would go to 96\.000 deg, allowed is -95 to 95 deg"):
+        _checked(Reorient(Pose(96.0, 0.0), 10.0))
+    with pytest.raises(MoveError, match=r"C would go to -3601\.000 deg, allowed is -3600 to 3600 deg"):
+        _checked(Reorient(Pose(0.0, -3601.0), 10.0))
+
+
+def test_the_limit_itself_is_allowed() -> None:
+    _checked(Travel(np.array([[0, 0, 5], [160, -160, 260]], dtype=float), 100.0), Reorient(Pose(95.0, 3600.0), 10.0))
+
+
+def test_a_plan_outside_is_refused_before_any_text() -> None:
+    profile = load()
+    machine = profile.machine.model_copy(update={"x": profile.machine.x.model_copy(update={"limits_mm": (-3.0, 3.0)})})
+    decomposition = post_and_arm(profile.machine)
+    with pytest.raises(MoveError, match="before the first part: X would go to"):
+        plan(decomposition, [squares(decomposition.parts[0], profile)], profile.model_copy(update={"machine": machine}))
+
+
+def test_limits_carry_the_machine_s_own_letters() -> None:
+    assert list(axis_limits(load(machine="fractal5pro").machine)) == ["X", "Y", "Z", "B", "A"]
+
+
+def test_a_slanted_travel_is_slowed_so_that_z_keeps_its_speed() -> None:
+    slanted = np.array([[0, 0, 0], [3, 0, 4]], dtype=float)
+    assert travel_speed(slanted, 150.0, MACHINE) == pytest.approx(15.0 / 0.8)
+    assert travel_speed(np.array([[0, 0, 0], [3, 4, 0]], dtype=float), 150.0, MACHINE) == 150.0
+
+
+def test_a_turn_of_both_axes_lasts_as_long_as_the_slower_one() -> None:
+    assert turn_speed(30.0, 40.0, MACHINE) == pytest.approx(50.0)  # 1 s of tilt at 30 deg/s
+    assert turn_speed(0.0, -120.0, MACHINE) == pytest.approx(60.0)
+    assert turn_speed(0.0, 0.0, MACHINE) == 30.0
+
+
+def test_a_cable_bounds_the_turn_like_a_limit() -> None:
+    machine = load(settings=["machine.turn.budget_deg=400"]).machine
+    assert axis_limits(machine)["C"] == (-400.0, 400.0)
+
+
+@pytest.mark.parametrize(
+    ("scale", "message"),
+    [
+        ((1.0, 1.0, 5.0), r"part 1 reaches Z 300.0 mm at A0.0 C0.0, Z goes from -80 to 260 mm on generic A/C table"),
+        ((40.0, 1.0, 1.0), r"part 1 reaches X -199.8 mm at A0.0 C0.0, X goes from -160 to 160 mm"),
+    ],
+)
+def test_a_part_larger_than_the_axes_is_refused_before_it_is_sliced(scale: tuple[float, float, float], message: str) -> None:
+    profile = load()
+    part = post_and_arm(profile.machine).parts[0]
+    large = replace(part, mesh=type(part.mesh)(part.mesh.vertices * scale, part.mesh.faces))
+    with pytest.raises(MoveError, match=message):
+        check_parts([large], profile)
+    check_parts([part], profile)

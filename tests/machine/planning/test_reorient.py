@@ -1,0 +1,122 @@
+"""Routes around a turn of the table against brute force: points all over head, table, cradle and print, pose by pose."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from machine.kinematics.collision import hull
+from machine.kinematics.table import machine_points
+from machine.planning.reorient import Speeds, poses_between, route, stands, way_s
+from mdp.head import corners
+from mdp.pose import Pose, level
+from profiles.errors import MoveError
+from profiles.machine import CradleBox, Machine
+from profiles.profile import load
+
+SPEEDS = Speeds(10.0, 150.0)
+PRINT = corners((-20.0, -15.0, 0.0), (20.0, 15.0, 50.0))
+AT, TARGET = np.array([10.0, 5.0, 50.2]), np.array([0.0, -40.0, 30.0])
+TURN = Pose(60.0, 50.0)
+YOKE = CradleBox(name="yoke", min_mm=(-130.0, -20.0, -40.0), max_mm=(-110.0, 20.0, 60.0))
+
+
+def _machine(name: str) -> Machine:
+    generic = load().machine
+    changed = {
+        "disc": {},
+        "cradle": {"cradle": [YOKE]},
+        "rectangle": {"table": generic.table.model_copy(update={"size_mm": (180.0, 120.0), "radius_mm": 108.2})},
+        "fractal": None,
+    }[name]
+    return load(machine="fractal5pro").machine if changed is None else generic.model_copy(update=changed)
+
+
+def _filled(least, most, step: float = 6.0) -> np.ndarray:
+    """Points over the six faces of a box."""
+    axes = [np.linspace(a, b, max(2, int((b - a) / step) + 1)) for a, b in zip(least, most, strict=True)]
+    grid = np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1).T
+    return grid[np.any((grid == np.array(least)) | (grid == np.array(most)), axis=1)]
+
+
+@cache
+def _head(name: str) -> np.ndarray:
+    """Points all over the head, tip at the origin: the silhouette's rings up to 150 mm, the boxes."""
+    machine = _machine(name)
+    around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    profile = [*machine.head.silhouette_mm, *((machine.head.silhouette_mm[-1][0], z) for z in np.linspace(20, 150, 40))]
+    rings = [np.column_stack([r * np.cos(around), r * np.sin(around), np.full(24, h)]) for r, h in profile]
+    return np.vstack([*rings, *(_filled(box.min_mm, box.max_mm, 8.0) for box in machine.head.boxes)])
+
+
+def _turned(machine: Machine, pose: Pose) -> np.ndarray:
+    """Points all over what turns, in the frame of X Y Z."""
+    table = machine.table
+    if table.size_mm is not None:
+        x, y = (size / 2 for size in table.size_mm)
+        plate = _filled((-x, -y, -table.thickness_mm), (x, y, 0.0))
+    else:
+        around, radii = np.linspace(0, 2 * np.pi, 72, endpoint=False), np.linspace(0, table.radius_mm, 16)
+        plate = np.array([[r * np.cos(a), r * np.sin(a), 0.0] for r in radii for a in around])
+    tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
+    found = [machine_points(machine, pose, np.vstack([plate, _filled(PRINT.min(axis=0), PRINT.max(axis=0))]))]
+    return np.vstack(found + [machine_points(machine, tilted, _filled(box.min_mm, box.max_mm)) for box in machine.cradle])
+
+
+def _least_distance(name: str, tips: np.ndarray) -> np.ndarray:
+    """(n,) least distance of the head at (n, 3) tips from all that turns, over the poses of the turn."""
+    machine = _machine(name)
+    least = np.full(len(tips), np.inf)
+    for pose in poses_between(level(machine), TURN, 10.0):
+        points = _turned(machine, pose)
+        for k, tip in enumerate(tips):
+            near = points[points[:, 2] > tip[2] - least[k]]
+            for piece in np.array_split(near, max(1, len(near) // 200)):
+                if len(piece):
+                    gap = np.linalg.norm(piece[:, None] - (_head(name) + tip)[None], axis=2).min()
+                    least[k] = min(least[k], float(gap))
+    return least
+
+
+@cache
+def _route(name: str):
+    machine = _machine(name)
+    return route(machine, hull(PRINT, 0.0), AT, TARGET, level(machine), TURN, SPEEDS, 2)
+
+
+ALL = pytest.mark.parametrize("name", ["disc", "cradle", "rectangle", "fractal"])
+
+
+@ALL
+def test_through_the_whole_turn_the_head_keeps_the_lift_from_table_cradle_and_print(name: str) -> None:
+    way = _route(name)
+    assert _least_distance(name, np.array([[*way.over_mm, way.z_mm]]))[0] >= _machine(name).lift_mm - 1e-6
+
+
+@pytest.mark.parametrize("name", ["disc", "cradle"])
+def test_no_stand_of_the_family_is_quicker_and_safe_too(name: str) -> None:
+    machine, way = _machine(name), _route(name)
+    found = []
+    for x, y in list(stands(machine, AT, TARGET))[::4]:
+        for z in np.arange(AT[2] + machine.clearance_mm, way.z_mm + 40.0, 4.0):
+            seconds = way_s(machine, AT, (x, y), (z, max(z, TARGET[2] + 1)), TARGET, SPEEDS)
+            if seconds < way.seconds - 0.25:
+                found.append((x, y, z))
+    assert not found or (_least_distance(name, np.array(found)) < machine.lift_mm).all()
+
+
+def test_a_cradle_in_the_way_costs_time() -> None:
+    assert _route("cradle").seconds >= _route("disc").seconds
+
+
+def test_the_tip_crosses_above_the_next_part_with_clearance() -> None:
+    way = _route("disc")
+    assert way.across_z_mm >= TARGET[2] + _machine("disc").clearance_mm
+
+
+def test_a_machine_too_low_for_every_stand_says_how_high_it_would_need_to_be() -> None:
+    machine = load().machine
+    low = machine.model_copy(update={axis: machine.x.model_copy(update={"limits_mm": (-5.0, 5.0)}) for axis in "xy"})
+    low = low.model_copy(update={"z": machine.z.model_copy(update={"limits_mm": (-80.0, 52.0)})})
+    with pytest.raises(MoveError, match=r"part 2: turning the table to A60.000 C50.000 needs the tip at Z \d+\.\d mm"):
+        route(low, hull(PRINT, 0.0), AT, None, level(low), TURN, SPEEDS, 2)

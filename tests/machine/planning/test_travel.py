@@ -1,0 +1,110 @@
+"""Retractions: wipe, lift, prime, coast; what is pulled back is pushed forward."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from machine.gcode.writer import write_gcode
+from machine.planning.moves import BeginLayer, MachineProgram, Retract, Stroke, Travel, Wipe
+from machine.planning.plan import plan
+from machine.planning.travel import first_length, wipe_trail
+from machine.reader.parse import parse_gcode
+from mdp.decomposition import Decomposition
+from mdp.mesh import Mesh
+from profiles.profile import Profile, load
+from slicer.slice import slice_part
+from tests.shapes import box
+from tests.slicer.hand import whole
+
+
+def _towers(*settings: str) -> tuple[MachineProgram, Profile]:
+    """Two towers side by side: a retraction in every layer."""
+    profile = load(settings=["process.skirt_loops=0", *settings])
+    mesh = box(6, 6, 3)
+    far = mesh.vertices + np.array([12.0, 0.0, 0.0])
+    both = Mesh(np.vstack([mesh.vertices, far]), np.vstack([mesh.faces, mesh.faces + len(far)]).astype(mesh.faces.dtype))
+    part = whole(both)
+    found = Decomposition("towers", both, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    return plan(found, [slice_part(part, profile)], profile), profile
+
+
+def _filament(program: MachineProgram) -> tuple[float, float]:
+    """Pulled back and pushed forward outside strokes."""
+    pulled = sum(float(np.sum(m.filament_mm)) for m in program.moves if isinstance(m, Wipe))
+    amounts = [m.filament_mm for m in program.moves if isinstance(m, Retract)]
+    return pulled + sum(a for a in amounts if a > 0), -sum(a for a in amounts if a < 0)
+
+
+@pytest.mark.parametrize("wipe", [0, 0.5, 2, 50])
+def test_what_is_pulled_back_is_pushed_forward_again(wipe: float) -> None:
+    pulled, pushed = _filament(_towers(f"material.wipe_mm={wipe}")[0])
+    assert pulled > 10
+    assert pulled == pytest.approx(pushed + 0.8)  # the print ends pulled back
+
+
+def test_extra_prime_is_pushed_after_every_retraction() -> None:
+    pulled, pushed = _filament(_towers("material.retract_prime_extra_mm=0.1")[0])
+    count = round(pulled / 0.8) - 1
+    assert pushed == pytest.approx(0.9 * count)
+
+
+def test_a_wipe_goes_over_the_path_just_printed_at_the_pace_of_the_filament() -> None:
+    program, profile = _towers()
+    wipes = [(a, b) for a, b in pairwise(program.moves) if isinstance(b, Wipe)]
+    assert all(isinstance(before, Stroke) for before, _ in wipes)
+    for _, wipe in wipes:
+        lengths = np.linalg.norm(np.diff(wipe.points_mm, axis=0), axis=1)
+        assert 0 < lengths.sum() <= profile.material.wipe_mm + 1e-9
+        assert wipe.filament_mm.sum() == pytest.approx(profile.material.retract_mm)
+        seconds = lengths.sum() / wipe.speed_mm_s
+        assert wipe.filament_mm.sum() / seconds <= profile.material.retract_speed_mm_s + 1e-9
+
+
+def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
+    layer, checked = BeginLayer(1, 1, 0.0, 0.2, 0.0), 0
+    for before, move in pairwise(_towers("process.lift_mm=0.4")[0].moves):
+        layer = move if isinstance(move, BeginLayer) else layer
+        crosses = isinstance(move, Travel) and np.hypot(*(move.points_mm[-1] - move.points_mm[0])[:2]) > 4
+        if layer.z_mm and crosses and isinstance(before, Travel):
+            assert move.points_mm[:, 2] == pytest.approx(layer.z_mm + 0.4)
+            checked += 1
+    assert checked >= 14
+
+
+def test_coasting_pushes_nothing_over_the_last_stretch_before_a_retraction() -> None:
+    moves = _towers("material.coast_mm=0.5", "process.infill_density=1")[0].moves
+    coasted = [a for a, b in pairwise(moves) if isinstance(a, Stroke) and isinstance(b, Wipe) and a.filament_mm[-1] == 0]
+    assert len(coasted) > 5
+    for stroke in coasted:
+        dry = np.linalg.norm(np.diff(stroke.points_mm, axis=0), axis=1)[stroke.filament_mm == 0]
+        assert dry.sum() == pytest.approx(0.5)
+
+
+def test_accelerations_are_written_where_they_change_and_read_back() -> None:
+    program, profile = _towers("process.outer_wall_acceleration_mm_s2=500", "process.travel_acceleration_mm_s2=1200")
+    lines = list(write_gcode(program, profile))
+    assert {line for line in lines if line.startswith("M204")} == {"M204 P500 T1200", "M204 P1500 T1200"}
+    parsed = parse_gcode(lines, profile.machine)
+    outer = (parsed.type == parsed.types.index("External perimeter")) & (parsed.e_mm > 0) & (parsed.layer > 1)
+    assert set(parsed.acceleration[outer]) == {500.0}
+
+
+def test_no_acceleration_is_written_unless_one_is_set() -> None:
+    program, profile = _towers()
+    assert not [line for line in write_gcode(program, profile) if line.startswith("M204")]
+
+
+def test_wipes_are_written_with_the_marks_that_viewers_know() -> None:
+    program, profile = _towers()
+    lines = list(write_gcode(program, profile))
+    assert lines.count(";WIPE_START") == lines.count(";WIPE_END") > 0
+    inside = lines[lines.index(";WIPE_START") + 1 : lines.index(";WIPE_END")]
+    assert inside
+    assert all(" E-" in line for line in inside)
+
+
+def test_a_ring_is_wiped_onward_and_a_line_backward() -> None:
+    ring = np.array([[0, 0, 1], [9, 0, 1], [9, 9, 1], [0, 9, 1], [0, 0, 1]], dtype=float)
+    assert first_length(wipe_trail(ring, 0.4), 2.0)[-1] == pytest.approx([2, 0, 1])
+    assert first_length(wipe_trail(ring[:4], 0.4), 2.0)[-1] == pytest.approx([2, 9, 1])

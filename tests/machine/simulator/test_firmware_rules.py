@@ -1,0 +1,144 @@
+"""RepRapFirmware's and Klipper's own rules at their end of the line, and each family's refusals, row by row."""
+
+from math import inf
+
+import pytest
+
+from machine.link.protocol.framing import frame
+from machine.simulator.board import BuildOptions
+from machine.simulator.cable import Cable
+from machine.simulator.firmware import SimulatedFirmware
+from machine.simulator.simulator import SimulatedPrinter
+from tests.machine.firmware.test_dialects import profile
+
+RRF, KLIPPER, MARLIN = (profile(dialect).machine for dialect in ("reprapfirmware", "klipper", "marlin"))
+
+
+def answer(firmware: SimulatedFirmware, text: str | bytes, until_s: float = inf) -> list[str]:
+    firmware.receive(text if isinstance(text, bytes) else text.encode())
+    return firmware.advance(until_s).decode().splitlines()
+
+
+def test_reprapfirmware_drops_a_bad_checksum_in_silence() -> None:
+    firmware = SimulatedFirmware(RRF)
+    assert answer(firmware, "N1 G1 X5*0\n") == []
+    assert firmware.record().moves == 0
+
+
+def test_reprapfirmware_takes_any_number_and_runs_a_repeat_again() -> None:
+    firmware = SimulatedFirmware(RRF)
+    assert answer(firmware, b"N9 G91\n" + frame(7, "G1 X5") * 2) == ["ok"] * 3
+    assert firmware.record().end[:, 0].tolist() == [5.0, 10.0]
+
+
+def test_reprapfirmware_drops_a_line_with_an_overrun_mark() -> None:
+    assert answer(SimulatedFirmware(RRF), b"N1 G1 \x7fX5\n") == []
+
+
+def test_reprapfirmware_takes_a_crc_of_five_digits_for_a_checksum() -> None:
+    firmware = SimulatedFirmware(RRF)
+    assert answer(firmware, "N1 G1 X5*43210\nN2 G1 X9*4321\n") == ["ok"]
+    assert firmware.record().end[:, 0].tolist() == [5.0]
+
+
+def test_klipper_does_nothing_at_m110_and_never_asks_for_a_line() -> None:
+    firmware = SimulatedFirmware(KLIPPER)
+    assert answer(firmware, "M110 N500\nN7 M110 N3*0\nN9 G1 X5*1\n") == ["ok"] * 3
+    assert firmware.record().moves == 1
+
+
+def test_reprapfirmware_neither_numbers_its_ok_nor_says_busy() -> None:
+    assert answer(SimulatedFirmware(RRF), b"N1 G4 S9\n") == ["ok"]
+
+
+@pytest.mark.parametrize("line", [frame(5, "G1 X5"), b"N5 G1 X5*0\n", b"N-3 G1 X5\n", b"G1 X5*7\n"])
+def test_klipper_reads_neither_numbers_nor_checksums(line: bytes) -> None:
+    firmware = SimulatedFirmware(KLIPPER)
+    assert answer(firmware, line) == ["ok"]
+    assert firmware.record().end[-1, 0] == 5.0
+
+
+def test_klipper_s_errors_are_followed_by_ok_and_the_stream_goes_on() -> None:
+    firmware = SimulatedFirmware(KLIPPER)
+    assert answer(firmware, "G1 X999\nG1 X5\n") == ["!! Move out of range: 999.000 0.000 0.000 [0.000]", "ok", "ok"]
+    assert answer(firmware, "M83\nG1 X6 E1\n")[-2:] == ["!! Extrude below minimum temp", "ok"]
+    assert firmware.record().end[:, 0].tolist() == [5.0]
+
+
+def test_klipper_names_itself_behind_its_ok_and_tells_the_bed_first() -> None:
+    firmware = SimulatedFirmware(KLIPPER)
+    assert answer(firmware, "M115\n")[0].startswith("ok FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13")
+    assert answer(firmware, "M105\nM114\n") == ["ok B:20.0 /0.0 T0:20.0 /0.0", "X:0.000 Y:0.000 Z:0.000 E:0.000", "ok"]
+
+
+def test_klipper_stops_reading_behind_twenty_commands() -> None:
+    firmware = SimulatedFirmware(KLIPPER)
+    firmware.receive(b"G4 P100\n" * 60)
+    firmware.advance(0.0)
+    assert firmware.full
+    firmware.advance(9.0)
+    assert not firmware.full
+
+
+def test_the_terminal_s_back_pressure_reaches_the_host() -> None:
+    import os
+
+    with SimulatedPrinter(KLIPPER, speed=1.0) as printer:
+        host = os.open(printer.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        written, refused = 0, False
+        while written < 1 << 20 and not refused:
+            try:
+                written += os.write(host, b"G4 S100\n" * 64)
+            except BlockingIOError:
+                refused = True
+        os.close(host)
+    assert refused
+
+
+def test_klipper_sees_m112_out_of_order_and_refuses_everything_after_it() -> None:
+    firmware = SimulatedFirmware(KLIPPER)
+    answer(firmware, "G4 S50\n" * 5, until_s=1.0)
+    assert answer(firmware, "M112\n", until_s=1.0)[0] == "!! Shutdown due to M112 command"
+    assert answer(firmware, "M105\n", until_s=2.0) == ["!! Shutdown due to M112 command", "ok"]
+
+
+@pytest.mark.parametrize(("machine", "line", "said"), [
+    (MARLIN, "G77", 'echo:Unknown command: "G77"'),
+    (RRF, "M777", "Warning: M777: Command is not supported"),
+    (KLIPPER, "M155 S2", '// Unknown command:"M155 S2"'),
+])  # fmt: skip
+def test_each_family_has_its_own_words_for_what_it_does_not_know(machine, line: str, said: str) -> None:  # type: ignore[no-untyped-def]
+    firmware = SimulatedFirmware(machine)
+    assert said in answer(firmware, f"{line}\n")
+    assert firmware.record().unknown == 1
+
+
+def test_reprapfirmware_tells_places_steps_and_machine_coordinates() -> None:
+    said = answer(SimulatedFirmware(RRF), "G92 X5\nM114\n")
+    assert said[:2] == ["ok", "X:5.000 Y:0.000 Z:0.000 A:0.000 C:0.000 E:0.000 E0:0.0 Count 0 0 0 0 0 "
+                        "Machine 5.000 0.000 0.000 0.000 0.000 Bed comp 0.000"]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("machine", "greeting"), [(MARLIN, b"start\n"), (RRF, b"RepRapFirmware for"), (KLIPPER, b"// Klipper state")]
+)
+def test_each_family_greets_in_its_own_words(machine, greeting: bytes) -> None:  # type: ignore[no-untyped-def]
+    firmware = SimulatedFirmware(machine)
+    firmware.reset()
+    assert Cable(firmware).exchange(b"").startswith(greeting)
+
+
+@pytest.mark.parametrize(("machine", "slowed"), [(MARLIN, 3), (RRF, 0), (KLIPPER, 0)])
+def test_only_marlin_stretches_short_moves_while_few_wait(machine, slowed: int) -> None:  # type: ignore[no-untyped-def]
+    firmware = SimulatedFirmware(machine)
+    answer(firmware, "".join(f"G1 X0.{k} F6000\n" for k in range(1, 6)), until_s=0.0)
+    assert firmware.record().slowed == slowed
+
+
+@pytest.mark.parametrize(("machine", "said"), [
+    (MARLIN, "echo:Home XYZ First"), (RRF, "Error: G0/G1: insufficient axes homed"),
+    (KLIPPER, "!! Must home axis first: 5.000 0.000 0.000 [0.000]")])  # fmt: skip
+def test_a_printer_may_refuse_to_move_before_it_is_homed(machine, said: str) -> None:  # type: ignore[no-untyped-def]
+    firmware = SimulatedFirmware(machine, BuildOptions(advanced_ok=False, must_home=True))
+    assert answer(firmware, "G1 X5\nG1 A5\nG28\nG1 X5\nM84\nG1 X6\n").count(said) >= 1
+    assert [move[0] for move in firmware.record().end.tolist()] == [0.0, 5.0]

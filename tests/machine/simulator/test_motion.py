@@ -1,0 +1,37 @@
+from math import sqrt
+
+import pytest
+
+from machine.simulator.motion import Motion
+from profiles.profile import load
+
+
+def _seconds(words: dict[str, float], told: dict[str, float]) -> float:
+    """How long one move takes that stands alone, with a corner speed of nothing."""
+    motion = Motion(load().machine.model_copy(update={"junction_speed_mm_s": 0.0}))
+    motion.accelerate(told)
+    motion.reach(motion.target(words), 0.0)
+    return motion.planner.ahead()[0].duration_s
+
+
+STROKE = {"X": 20.0, "E": 1.0, "F": 60000.0}
+TRAVEL = {"X": 20.0, "F": 60000.0}
+
+
+@pytest.mark.parametrize("told", [{"P": 500.0}, {"S": 500.0}, {"P": 500.0, "T": 1000.0}])
+def test_a_stroke_is_accelerated_as_m204_p_tells(told: dict[str, float]) -> None:
+    assert _seconds(STROKE, told) == pytest.approx(2 * sqrt(20 / 500))
+
+
+@pytest.mark.parametrize("told", [{"T": 500.0}, {"S": 500.0}, {"P": 1000.0, "T": 500.0}])
+def test_a_travel_is_accelerated_as_m204_t_tells(told: dict[str, float]) -> None:
+    assert _seconds(TRAVEL, told) == pytest.approx(2 * sqrt(20 / 500))
+
+
+@pytest.mark.parametrize("told", [{}, {"S": 0.0}, {"P": 1e6, "T": 1e6}, {"T": 500.0}])
+def test_more_than_the_axes_allow_or_nothing_changes_nothing(told: dict[str, float]) -> None:
+    assert _seconds(STROKE, told) == pytest.approx(2 * sqrt(20 / 1500))
+
+
+def test_a_turn_keeps_the_axis_s_own_acceleration() -> None:
+    assert _seconds({"C": 30.0, "F": 60000.0}, {"S": 1.0}) == pytest.approx(30 / 60 + 60 / 400)

@@ -1,0 +1,313 @@
+import os
+import select
+import time
+from math import inf, pi
+
+import numpy as np
+import pytest
+import serial
+from hypothesis import given
+from hypothesis import strategies as st
+
+from machine.link.protocol.framing import frame
+from machine.simulator.board import BuildOptions, Heater
+from machine.simulator.firmware import SimulatedFirmware
+from machine.simulator.simulator import SimulatedPrinter
+from mdp.pose import Pose, rotation
+from profiles.profile import load
+from tests.machine.peers import PATIENCE_S
+
+MACHINE = load().machine
+HOT = "M104 S200\nM109 S200\n"
+
+
+def printer(build: BuildOptions | None = None) -> SimulatedFirmware:
+    return SimulatedFirmware(MACHINE, build or BuildOptions(advanced_ok=False))
+
+
+def answer(firmware: SimulatedFirmware, text: str | bytes, until_s: float = inf) -> list[str]:
+    firmware.receive(text if isinstance(text, bytes) else text.encode())
+    return firmware.advance(until_s).decode().splitlines()
+
+
+def ran(text: str) -> SimulatedFirmware:
+    firmware = printer()
+    answer(firmware, text)
+    return firmware
+
+
+def test_a_numbered_line_is_taken_with_ok() -> None:
+    firmware = printer()
+    assert answer(firmware, b"N0 M110 N0*125\n" + frame(1, "G1 X5")) == ["ok", "ok"]
+    assert firmware.record().end[:, 0].tolist() == [5.0]
+
+
+def test_any_line_number_may_be_set_in_both_ways_of_writing() -> None:
+    firmware = printer()
+    assert answer(firmware, b"N-1 M110 N-1*125\n" + frame(0, "G1 X1")) == ["ok", "ok"]
+    assert answer(firmware, b"M110 N70\n") == ["ok"]
+
+
+def test_a_wrong_checksum_is_refused_in_marlins_words() -> None:
+    assert answer(printer(), "N1 G28*19\n") == ["Error:checksum mismatch, Last Line: 0", "Resend: 1", "ok"]
+
+
+def test_a_missing_checksum_is_refused_in_marlins_words() -> None:
+    assert answer(printer(), "N1 G28\n") == ["Error:No Checksum with line number, Last Line: 0", "Resend: 1", "ok"]
+
+
+@pytest.mark.parametrize("number", [3, 99])
+def test_a_number_too_high_is_refused_in_marlins_words(number: int) -> None:
+    said = answer(printer(), frame(number, "G28"))
+    assert said == ["Error:Line Number is not Last Line Number+1, Last Line: 0", "Resend: 1", "ok"]
+
+
+def test_a_refusal_throws_away_what_waits_behind() -> None:
+    firmware = printer()
+    assert len(answer(firmware, frame(2, "G1 X1") + frame(1, "G1 X2") + b"N2 G1")) == 3
+    assert answer(firmware, frame(1, "G1 X3")) == ["ok"]
+
+
+def test_a_repeat_of_the_last_two_lines_is_swallowed_in_silence() -> None:
+    firmware = printer()
+    answer(firmware, frame(1, "G1 X1") + frame(2, "G1 X2") + frame(3, "G1 X3"))
+    assert answer(firmware, frame(3, "G1 X3") + frame(2, "G1 X2")) == []
+    assert answer(firmware, frame(1, "G1 X1"))[1] == "Resend: 4"
+
+
+def test_a_line_over_95_characters_loses_its_checksum() -> None:
+    said = answer(printer(), b"N1 M117 " + b"x" * 90 + b"*11\n")
+    assert said[0] == "Error:No Checksum with line number, Last Line: 0"
+
+
+def test_a_lost_n_makes_an_unknown_command_that_is_still_answered() -> None:
+    assert answer(printer(), "5 G92 Z0*3\n") == ['echo:Unknown command: "5 G92 Z0"', "ok"]
+
+
+def test_unnumbered_lines_comments_and_blank_lines_are_as_in_marlin() -> None:
+    assert answer(printer(), ";c\n\n  \nG21 ; mm\nG1X1 F600;go\n") == ["ok", "ok"]
+
+
+def test_advanced_ok_tells_number_and_free_places() -> None:
+    firmware = printer(BuildOptions())
+    assert answer(firmware, frame(1, "G21") + frame(2, "G1 X9")) == ["ok N1 P15 B2", "ok N2 P14 B3"]
+    assert answer(firmware, "G91\n") == ["ok P14 B3"]
+    assert answer(firmware, frame(3, "M105"))[0].startswith("ok T:20.00 /0.00 B:20.00 /0.00")
+
+
+def test_ok_is_withheld_while_fifteen_blocks_are_planned() -> None:
+    firmware = printer(BuildOptions(advanced_ok=False, busy=False))
+    moves = "".join(f"G1 X{i} F60\n" for i in range(1, 40))
+    assert answer(firmware, moves, until_s=0.5) == ["ok"] * 15
+    assert len(answer(firmware, "", until_s=2.5)) in (2, 3)
+
+
+def test_busy_comes_every_two_seconds_of_a_long_wait() -> None:
+    assert answer(printer(), "G4 S9\n") == ["echo:busy: processing"] * 4 + ["ok"]
+
+
+def test_waiting_for_heat_tells_temperatures_every_second_until_they_are_reached() -> None:
+    firmware = printer()
+    *reports, last = answer(firmware, "M109 S200\n")
+    assert last == "ok"
+    assert 20 < len(reports) < 120
+    assert firmware.board.nozzle.at(firmware.board.now_s) == pytest.approx(199.0, abs=0.1)
+
+
+def test_m108_ends_a_wait_for_heat() -> None:
+    firmware = printer()
+    answer(firmware, "M109 S200\n", until_s=5.0)
+    assert answer(firmware, "M108\n", until_s=5.0)[-2:] == ["ok", "ok"]
+
+
+@pytest.mark.parametrize(("parser", "at_once"), [(True, True), (False, False)])
+def test_m112_is_read_past_full_queues_only_by_an_emergency_parser(parser: bool, at_once: bool) -> None:
+    firmware = printer(BuildOptions(emergency_parser=parser))
+    answer(firmware, "G4 S20\n" * 6, until_s=1.0)
+    said = answer(firmware, "N99 M112*0\n", until_s=1.0)
+    assert ("Error:Printer halted. kill() called!" in said) == at_once
+
+
+def test_after_kill_there_is_silence_until_reset() -> None:
+    firmware = ran(HOT + "M112\n")
+    assert answer(firmware, "G28\nM105\n") == []
+    assert firmware.record().nozzle_target_c == 0
+    firmware.reset()
+    assert answer(firmware, "M110 N0\n")[0] == "start"
+
+
+def test_m410_cuts_the_move_under_way_and_drops_the_rest() -> None:
+    firmware = printer()
+    answer(firmware, "G1 X10 F60\nG1 X20\nG1 X30\n", until_s=5.0)
+    answer(firmware, "M410\n", until_s=5.0)
+    assert firmware.record().end[-1, 0] == pytest.approx(5.0, abs=0.3)
+    assert answer(firmware, "M114\n", until_s=6.0)[0].startswith(f"X:{firmware.record().end[-1, 0]:.2f} ")
+
+
+def test_temperature_reports_come_by_themselves_after_m155() -> None:
+    firmware = printer()
+    answer(firmware, "M155 S2\n", until_s=0.0)
+    assert len(answer(firmware, "", until_s=9.0)) == 4
+    assert answer(firmware, "M155 S0\n", until_s=30.0)[-1] == "ok"
+
+
+def test_m114_and_g92_tell_all_axes() -> None:
+    said = answer(printer(), "G92 X1 A-30 C725 E2\nM114\n")
+    assert said[0] == said[2]
+    assert said[0].startswith("X:1.00 Y:0.00 Z:0.00 A:-30.00 C:725.00 E:2.00 Count X:0 ")
+
+
+def test_m115_names_itself_and_its_capabilities() -> None:
+    said = answer(printer(), "M115\n")
+    assert said[0].startswith("FIRMWARE_NAME:Marlin")
+    assert "Cap:AUTOREPORT_TEMP:1" in said
+
+
+def test_g92_renames_the_place_and_moves_nothing() -> None:
+    record = ran("G1 X10\nG92 X0\nG1 X5\n").record()
+    assert record.end[:, 0].tolist() == [10.0, 15.0]
+
+
+def test_relative_and_absolute_modes_and_inches() -> None:
+    record = ran("G91\nG1 X5\nG1 X5\nG90\nG20\nG1 X1\nG1 A30\nG21\nG1 X1\n").record()
+    assert record.end[:, 0].tolist() == [5.0, 10.0, 25.4, 25.4, 1.0]
+    assert record.end[3, 3] == 30.0
+
+
+def test_g90_makes_filament_absolute_again_as_in_marlin() -> None:
+    record = ran(HOT + "M83\nG1 X1 E1\nG1 X2 E1\nG90\nG92 E0\nG1 X3 E0.5\n").record()
+    assert record.end[:, 5].tolist() == [1.0, 2.0, 2.5]
+
+
+def test_soft_limits_clamp_and_are_counted() -> None:
+    record = ran("G0 A200\nG1 X-999 F6000\n").record()
+    assert record.end[0, 3] == 95.0
+    assert record.end[1, 0] == -160.0
+    assert record.clamped == 2
+
+
+def test_cold_extrusion_moves_without_filament() -> None:
+    firmware = printer()
+    assert answer(firmware, "M83\nG1 X1 E1\n") == ["ok", "echo: cold extrusion prevented", "ok"]
+    assert firmware.record().end[0, [0, 5]].tolist() == [1.0, 0.0]
+
+
+def test_homing_is_on_record_as_an_event() -> None:
+    firmware = ran("G28 X Y\n")
+    assert firmware.record().events[-1][1] == "homed XY"
+    assert firmware.board.motion.place[:3] == [-160.0, -160.0, 0.0]
+
+
+def test_heaters_and_fan_at_the_end_are_on_record() -> None:
+    record = ran("M140 S60\nM104 S210\nM106 S127.5\n").record()
+    assert (record.nozzle_target_c, record.bed_target_c, record.fan) == (210.0, 60.0, 0.5)
+    record = ran("M140 S60\nM106\nM107\nM140 S0\n").record()
+    assert (record.bed_target_c, record.fan) == (0.0, 0.0)
+
+
+def test_display_and_setup_commands_are_answered() -> None:
+    assert answer(printer(), "M73 P1 R2\nM117 Hi X5\nM204 P500\nM84\nM18\nT0\nM400\n") == ["ok"] * 7
+
+
+def test_commands_may_be_written_with_zeros_and_without_blanks() -> None:
+    record = ran("G01X5\nG1Y6\nM0104S33\nG92.9 X0\n").record()
+    assert record.end[-1, :2].tolist() == [5.0, 6.0]
+    assert (record.nozzle_target_c, record.unknown) == (33.0, 1)
+
+
+@given(
+    st.lists(st.sampled_from(["G1", "G0", " X", "Y-", "E1", "9", ".", "-", "N", "*", ";", "\n", "M109", " S", "G4", "G28", "M1"]))
+)
+def test_no_text_breaks_the_firmware(pieces: list[str]) -> None:
+    firmware = printer()
+    answer(firmware, "".join(pieces) + "\n")
+    assert answer(firmware, "M105\n")[-1].startswith("ok T:")
+
+
+@given(st.binary(max_size=200))
+def test_no_bytes_break_the_firmware(data: bytes) -> None:
+    firmware = printer()
+    answer(firmware, data + b"\n")
+    assert firmware.dead == (firmware.record().happened("M112"))
+    assert firmware.dead or answer(firmware, "M105\n")[-1].startswith("ok T:")
+
+
+def test_a_wait_of_years_is_over_at_once() -> None:
+    assert answer(printer(), "G4 S999999999\n")[-1] == "ok"
+
+
+def test_a_full_uart_ring_drops_bytes() -> None:
+    firmware = printer(BuildOptions(rx_ring=128))
+    answer(firmware, b"G4 S50\n" * 4, until_s=0.1)
+    answer(firmware, b"G1 X1\n" * 50, until_s=0.1)
+    assert firmware.record().lost_bytes == 300 - 127
+
+
+@pytest.mark.parametrize(("command", "seconds"), [
+    ("G1 X100 F600", 2 * 10 / 1500 + (100 - 100 / 1500) / 10),  # 0 to 10 mm/s and back, the rest at 10
+    ("G1 A3 F6000", 2 * (3 / 200) ** 0.5),  # too short to reach 30 deg/s: a triangle
+    ("G1 Z50 F60000", None),
+])  # fmt: skip
+def test_moves_take_as_long_as_a_trapezoid_does(command: str, seconds: float | None) -> None:
+    duration = ran(command + "\n").record().duration_s[0]
+    if seconds is None:
+        assert 50 / 15 < duration < 50 / 15 + 1
+    else:
+        assert duration == pytest.approx(seconds, rel=1e-9)
+
+
+@given(st.floats(30, 290), st.floats(21, 29))
+def test_a_heater_is_at_a_temperature_when_it_says_so(target: float, early: float) -> None:
+    heater = Heater("nozzle", 300.0, 60.0)
+    heater.set(target, 0.0)
+    assert heater.at(heater.reaches(early)) == pytest.approx(early)
+    heater.set(0.0, 500.0)
+    assert heater.at(heater.reaches(early)) == pytest.approx(early)
+    assert heater.reaches(target + 5) == inf
+
+
+def test_deposited_plastic_lies_on_the_workpiece_however_the_table_stands() -> None:
+    record = ran(HOT + "M83\nG0 A90 Y10\nG1 X10 E1\nG1 E1\nG1 X20\nG1 C90 E2\n").record()
+    segments, volumes = record.deposited(1.75)
+    assert volumes == pytest.approx([pi / 4 * 1.75**2, pi / 2 * 1.75**2])
+    pivot = np.array(MACHINE.tilt.point_mm)
+    by_hand = rotation(MACHINE, Pose(90.0, 0.0)).T @ (np.array([[0, 10, 0], [10, 10, 0]]) - pivot).T
+    assert segments[0] == pytest.approx((by_hand + pivot[:, None]).T, abs=1e-9)
+    assert segments[0][1] - segments[0][0] == pytest.approx([10, 0, 0])
+
+
+def test_a_machine_with_other_letters_is_spoken_to_in_them() -> None:
+    firmware = SimulatedFirmware(load(machine="fractal5pro").machine, BuildOptions())
+    answer(firmware, "G1 B30 A45\n")
+    assert firmware.record().end[0, 3:5].tolist() == [30.0, 45.0]
+
+
+def test_the_terminal_answers_a_plain_serial_program() -> None:
+    with SimulatedPrinter(MACHINE) as simulated, serial.Serial(simulated.path, 250000, timeout=PATIENCE_S) as host:
+        host.write(b"M105\nG1 X5\n")
+        assert host.readline().startswith(b"ok T:20.00")
+        assert host.readline() == b"ok P14 B3\n"
+        assert simulated.record.end[0, 0] == 5.0
+
+
+def test_ten_times_real_time_is_ten_times_real_time() -> None:
+    with SimulatedPrinter(MACHINE, speed=10.0) as simulated:
+        host = os.open(simulated.path, os.O_RDWR | os.O_NOCTTY)
+        began = time.monotonic()
+        os.write(host, b"G4 S5\n")
+        said = b""
+        while b"ok" not in said and select.select([host], [], [], PATIENCE_S)[0]:
+            said += os.read(host, 100)
+        os.close(host)
+    assert time.monotonic() - began > 0.45
+    assert said.count(b"busy") == 2
+
+
+def test_while_it_heats_the_printer_always_has_a_next_moment_ahead() -> None:
+    firmware = SimulatedFirmware(MACHINE)
+    firmware.receive(b"M155 S2\nM140 S60\nM190 S60\n")
+    now_s, reports = 0.0, 0
+    while reports < 20:
+        reports += firmware.advance(now_s).count(b"W:?")
+        assert firmware.next_s() > now_s
+        now_s = firmware.next_s()

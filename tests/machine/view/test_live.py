@@ -1,0 +1,156 @@
+"""A running print on a page: who is answered, what is told, and that it ends with the print."""
+
+import http.client
+import json
+import socket
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.client import HTTPResponse
+from pathlib import Path
+
+import pytest
+
+from machine.app.cli import main
+from machine.link.progress import Progress
+from machine.link.protocol.events import Temperature
+from machine.view.live import Watched, serve, state_of
+from profiles.errors import OutputError
+from tests.machine.pages import opened
+from tests.machine.peers import PATIENCE_S
+
+HALF = Progress(
+    sent=60, acknowledged=50, total=100, elapsed_s=10.0, left_s=9.5, share=0.5,
+    temperature=Temperature(nozzle_c=209.5, nozzle_target_c=210.0), part=2, parts=3, layer=7, file_line=123,
+)  # fmt: skip
+
+
+@pytest.fixture
+def watched(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
+    monkeypatch.setattr("machine.view.live.LAST_WORD_S", 0.0)
+    with serve(b"<p>the page</p>") as running:
+        yield running
+
+
+def asked(watched: Watched, path: str, method: str = "GET", **headers: str) -> tuple[HTTPResponse, bytes]:
+    """What the server answers."""
+    connection = http.client.HTTPConnection("127.0.0.1", int(watched.address.split(":")[2].strip("/")), timeout=PATIENCE_S)
+    connection.request(method, path, headers=headers)
+    answer = connection.getresponse()
+    content = answer.read()
+    connection.close()
+    return answer, content
+
+
+def test_the_page_and_the_state_are_served(watched: Watched) -> None:
+    assert asked(watched, "/")[1] == b"<p>the page</p>"
+    assert json.loads(asked(watched, "/state")[1]) == {"state": "waiting"}
+    watched.follow(HALF)
+    told = json.loads(asked(watched, "/state")[1])
+    assert (told["state"], told["line"], told["acknowledged"], told["total"]) == ("printing", 123, 50, 100)
+    assert (told["nozzle_c"], told["nozzle_target_c"], told["bed_c"]) == (209.5, 210.0, None)
+
+
+@pytest.mark.parametrize("path", ["/etc/passwd", "/../state", "/state/", "/?state", "/favicon.ico"])
+def test_nothing_else_is_served(watched: Watched, path: str) -> None:
+    assert asked(watched, path)[0].status == 404
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "HEAD", "OPTIONS"])
+def test_nothing_can_be_ordered(watched: Watched, method: str) -> None:
+    assert asked(watched, "/state", method)[0].status == 501
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("localhost", 200), ("localhost:8420", 200), ("127.0.0.1:1", 200),
+        ("evil.example", 403), ("evil.example:80", 403), ("127.0.0.1.evil.example:80", 403), ("", 403), ("[::1]:80", 403),
+    ],
+)  # fmt: skip
+def test_only_this_computer_by_name_is_answered(watched: Watched, host: str, status: int) -> None:
+    answer, content = asked(watched, "/state", Host=host)
+    assert answer.status == status
+    assert (b"waiting" in content) == (status == 200)
+
+
+def test_no_other_page_may_frame_it_or_keep_it(watched: Watched) -> None:
+    answer, _ = asked(watched, "/")
+    assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+    assert answer.headers["Cache-Control"] == "no-store"
+    assert answer.headers["Access-Control-Allow-Origin"] is None
+
+
+def test_who_hangs_up_leaves_the_terminal_alone(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.view.live.LAST_WORD_S", 0.0)
+    with serve(b"x" * 20_000_000) as running:
+        port = int(running.address.split(":")[2].strip("/"))
+        for _ in range(3):
+            with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as rude:
+                rude.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                rude.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                rude.recv(10)
+        assert asked(running, "/state")[0].status == 200
+    assert capfd.readouterr().err == ""
+
+
+def test_it_listens_on_this_computer_only(watched: Watched) -> None:
+    assert watched.address.startswith("http://127.0.0.1:")
+    port = int(watched.address.split(":")[2].strip("/"))
+    with pytest.raises(OSError, match=r"refused|unreachable"), socket.create_connection(("127.0.0.2", port), timeout=PATIENCE_S):
+        pass
+
+
+def test_a_port_in_use_is_refused_with_a_sentence(watched: Watched) -> None:
+    port = int(watched.address.split(":")[2].strip("/"))
+    with pytest.raises(OutputError, match=rf"--watch-port {port} cannot be used: address already in use"), serve(b"", port):
+        pass
+
+
+def test_the_server_ends_with_the_print() -> None:
+    with serve(b"page") as running:
+        port = int(running.address.split(":")[2].strip("/"))
+    with pytest.raises(ConnectionRefusedError), socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S):
+        pass
+
+
+def test_a_print_that_fails_is_told_as_stopped() -> None:
+    def failing() -> Iterator[Watched]:
+        with serve(b"page") as running:
+            yield running
+            raise KeyboardInterrupt
+
+    print_ = failing()
+    running = next(print_)
+    with pytest.raises(KeyboardInterrupt):
+        next(print_)
+    assert json.loads(running.state()) == {"state": "stopped"}
+
+
+def test_how_it_ended_is_said_once() -> None:
+    watched = Watched(b"")
+    watched.follow(HALF)
+    watched.end("stopped")
+    watched.end("done")
+    assert state_of(HALF, "stopped") == json.loads(watched.state())
+
+
+def test_print_watch_follows_the_print_to_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept: list[Watched] = []
+
+    @contextmanager
+    def remembered(page: bytes, port: int) -> Iterator[Watched]:
+        with serve(page, port) as running:
+            kept.append(running)
+            yield running
+
+    monkeypatch.setattr("machine.app.printer.watch_page.serve", remembered)
+    file = tmp_path / "moves.gcode"
+    file.write_text("G28\nM109 S200\nG1 Z0.2 F6000\nG1 X10 E1\nG1 Y10 E2\nM104 S0\nM140 S0\n")
+    assert main(["print", str(file), "--port", "sim", "--watch", "--force"]) == 0
+    told, (header, _) = json.loads(kept[0].state()), opened(kept[0].page)
+    assert (told["state"], told["acknowledged"], told["total"]) == ("done", 7, 7)
+    assert header["live"] is True
+    assert f"watch the print at {kept[0].address}" in capsys.readouterr().err

@@ -1,0 +1,227 @@
+"""The page as a file: nothing fetched, nothing that a name could inject, written whole; and the commands that write it."""
+
+import base64
+import re
+from hashlib import sha256
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from machine.app.cli import main
+from machine.app.pipeline.pipeline import build, decompose_model
+from machine.app.requests import ModelRequest
+from machine.kinematics.table import workpiece_path
+from machine.view.contents import of_parts
+from machine.view.page import page, print_page
+from mdp.save import stl
+from profiles.profile import load
+from tests.machine import hand
+from tests.machine.pages import opened
+from tests.shapes import tee
+
+NASTY = '<img src=x onerror=alert(1)></title><script>alert(2)</script>/*SCRIPT*/<!--DATA-->".stl'
+COARSE = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.4"]
+COARSE += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6"]
+
+
+class Elements(HTMLParser):
+    """Elements with their attributes, and the texts of scripts, styles and the title."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: dict[str, str] = {}
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+    def handle_data(self, text: str) -> None:
+        last, told = self.found[-1] if self.found else ("", {})
+        if last in ("script", "style", "title"):
+            self.texts.setdefault(last + str(told.get("id", "")), text)
+
+
+def shown(name: str = NASTY, live: bool = False) -> tuple[bytes, Elements]:
+    """The page of parts alone under a name."""
+    profile, decomposition, _, _ = hand.printed()
+    content = page(name, of_parts(decomposition, profile), live)
+    return content, Elements(content.decode())
+
+
+def policy(elements: Elements) -> dict[str, str]:
+    """The directives of the content security policy."""
+    (told,) = [a for tag, a in elements.found if tag == "meta" and a.get("http-equiv") == "Content-Security-Policy"]
+    return {name: values for name, _, values in (each.strip().partition(" ") for each in str(told["content"]).split(";"))}
+
+
+def test_a_name_is_text_and_nothing_else() -> None:
+    plain, nasty = (Elements(shown(name)[0].decode()) for name in ("plain.stl", NASTY))
+    assert [tag for tag, _ in plain.found] == [tag for tag, _ in nasty.found]
+    assert nasty.texts["title"].startswith("<img src=x onerror=alert(1)></title>")
+    assert nasty.texts["script"] == plain.texts["script"]
+
+
+def test_the_policy_allows_this_script_and_this_style_alone() -> None:
+    _, elements = shown()
+    told = policy(elements)
+    for directive, element in (("script-src", "script"), ("style-src", "style")):
+        digest = sha256(elements.texts[element].encode()).digest()
+        assert told[directive] == f"'sha256-{base64.b64encode(digest).decode()}'"
+    assert told["default-src"] == "'none'"
+    assert "connect-src" not in told
+
+
+def test_only_a_served_page_may_ask_its_server() -> None:
+    assert policy(shown(live=True)[1])["connect-src"] == "'self'"
+
+
+def test_nothing_is_fetched_and_nothing_stands_in_attributes() -> None:
+    content, elements = shown()
+    for tag, told in elements.found:
+        assert not [name for name in told if name.startswith("on") or name in ("src", "srcset", "style", "action", "formaction")]
+        assert tag not in ("base", "iframe", "object", "embed", "img")
+        assert str(told.get("href", "data:")).startswith("data:")
+    assert set(re.findall(rb"https?://[\w./]+", content)) <= {b"http://www.w3.org/2000/svg"}
+
+
+def test_the_data_say_what_they_are_called() -> None:
+    content, _ = shown()
+    header, found = opened(content)
+    assert header["title"] == "post and arm"
+    assert len(found["faces"]) > 0
+
+
+def test_a_name_of_broken_letters_is_shown_with_marks() -> None:
+    assert b"?.stl" in shown("\udcff.stl")[0]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+MOVES = "G28\nM109 S200\nG1 Z0.2 F600\n;TYPE:Perimeter\nG1 X10 E1\nG1 Y10 E2\nM104 S0\nM140 S0\n"
+
+
+def test_view_names_the_page_after_the_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("moves.gcode").write_text(MOVES)
+    assert main(["view", "moves.gcode"]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("moves.html: 0.1 MB, 3 moves")
+    header, found = opened(Path("moves.html").read_bytes())
+    assert (header["source"], header["machine"]["known"]) == ("foreign", False)
+    assert found["end"][-1].tolist() == [10.0, 10.0, 0.2, 0.0, 0.0]
+
+
+def test_a_machine_that_is_named_is_known(folder: Path) -> None:
+    Path("moves.gcode").write_text(MOVES)
+    assert main(["simulate", "moves.gcode", "--machine", "three_axis", "--html", "a.html"]) in (0, 1)
+    assert opened(Path("a.html").read_bytes())[0]["machine"]["known"] is True
+
+
+def test_view_does_not_write_over_a_page_that_is_not_its_own(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("moves.gcode").write_text(MOVES)
+    Path("moves.html").write_text("<p>my notes")
+    assert main(["view", "moves.gcode"]) == 1
+    assert "moves.html" in capsys.readouterr().err
+    assert Path("moves.html").read_text() == "<p>my notes"
+    assert [main(["view", "moves.gcode", "-o", "other.html"]) for _ in range(2)] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("empty.gcode", "", "is empty"),
+        ("rubbish.gcode", "\x00\x01%%&", "cannot be read as G-code"),
+        ("still.gcode", "M105\n; nothing\n", "holds no move"),
+        ("model.stl", "solid nothing", "model.stl"),
+    ],
+)
+def test_what_cannot_be_shown_is_one_sentence(
+    folder: Path, capsys: pytest.CaptureFixture[str], name: str, text: str, said: str
+) -> None:
+    Path(name).write_text(text)
+    assert main(["view", name]) == 1
+    told = [line for line in capsys.readouterr().err.splitlines() if "compil" not in line]
+    assert len(told) == 1
+    assert said in told[0]
+    assert [file.name for file in folder.iterdir()] == [name]
+
+
+def test_g_code_is_not_compared_with_itself(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("moves.gcode").write_text(MOVES)
+    assert main(["view", "moves.gcode", "--compare"]) == 1
+    assert "--compare goes with a model" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["view", "-o"], ["simulate", "--html"], ["decompose", "--html"]])
+def test_a_page_that_could_not_be_written_is_refused_before_any_work(
+    folder: Path, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    assert main([command[0], "demo:tree", command[1], "nowhere/page.html"]) == 1
+    assert "the folder nowhere does not exist" in capsys.readouterr().err
+
+
+def test_open_shows_the_page_in_the_browser(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda address: asked.append(address) or True)
+    Path("moves.gcode").write_text(MOVES)
+    assert main(["view", "moves.gcode", "--open"]) == 0
+    assert asked == [(folder / "moves.html").resolve().as_uri()]
+
+
+def test_a_model_with_a_nasty_name_goes_all_the_way(folder: Path) -> None:
+    name = "<img onerror=alert(1)>.stl"
+    Path(name).write_bytes(stl(tee()))
+    assert main(["decompose", name, *COARSE, "--html", "a.html"]) == 0
+    content = Path("a.html").read_bytes()
+    assert b"<title>&lt;img onerror=alert(1)&gt;.stl" in content
+    assert opened(content)[0]["title"] == name
+
+
+def test_export_writes_the_page_of_its_own_file(folder: Path) -> None:
+    Path("tee.stl").write_bytes(stl(tee()))
+    assert main(["export", "tee.stl", *COARSE, "-o", "a.gcode", "--html", "a.html"]) == 0
+    header, found = opened(Path("a.html").read_bytes())
+    lines = Path("a.gcode").read_text().splitlines()
+    assert (header["source"], header["live"]) == ("model", False)
+    assert [lines[int(line) - 1][0] for line in found["line"][::100]] == ["G"] * len(found["line"][::100])
+
+
+def test_the_packed_report_tells_the_changed_settings_first(folder: Path) -> None:
+    Path("tee.stl").write_bytes(stl(tee()))
+    assert main(["decompose", "tee.stl", *COARSE, "--html", "a.html"]) == 0
+    report = opened(Path("a.html").read_bytes())[0]["report"]
+    tables = {table["title"]: table for table in report["tables"]}
+    changed = {row[0]: row[1:] for row in tables["Settings changed"]["rows"]}
+    assert changed["process.layer_height_mm"] == ["0.4", "0.2"]
+    assert set(changed) == {word.partition("=")[0] for word in COARSE if "=" in word}
+    assert (tables["All settings"]["folded"], tables["Parts"]["folded"]) == (True, False)
+
+
+def test_another_machine_is_held_against_its_own_shipped_values() -> None:
+    from machine.view.settings import settings_tables
+
+    profile = load(machine="fractal5pro", settings=["machine.clearance_mm=3"])
+    assert [row[0] for row in settings_tables(profile)[0]["rows"]] == ["machine.clearance_mm"]
+
+
+KITTEN = Path(__file__).parents[3].parent / "shared" / "models" / "kitten.off"
+
+
+@pytest.mark.slow
+def test_a_page_takes_a_third_of_what_it_may_and_holds_the_path_to_a_hundredth() -> None:
+    profile = load()
+    model = str(KITTEN) if KITTEN.exists() else "demo:figure"
+    program = build(decompose_model(ModelRequest(model, profile), to_build=True).decomposition, profile)
+    content = print_page(model, program, profile)
+    header, found = opened(content)
+    moves = len(program.run.program.line)
+    assert len(content) < 8e6 / 3 * max(moves / 300_000, 1.0) + 0.3e6
+    on_work = workpiece_path(profile.machine, found["end"])
+    assert np.linalg.norm(on_work - workpiece_path(profile.machine, program.run.program.end), axis=1).max() < 0.01
+    assert header["time_s"] == pytest.approx(found["time"][-1], abs=0.001)

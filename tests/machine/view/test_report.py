@@ -1,0 +1,103 @@
+"""The report beside the picture: its figures add up to the dry run's."""
+
+import re
+from typing import Any
+
+import pytest
+
+from machine.dryrun.dryrun import dry_run
+from machine.view.comparison import Alternative
+from machine.view.layers import layers_of
+from machine.view.paths import end_times_s
+from machine.view.program import Program
+from machine.view.report import parts_report, print_report
+from profiles.profile import load
+from tests.machine.view.test_view import STEPS, example
+
+UNITS = {"h": 3600, "m": 60, "s": 1}
+
+
+def seconds(told: str) -> int:
+    """The seconds of 1h 6m 15s."""
+    return sum(int(number) * UNITS[unit] for number, unit in re.findall(r"(\d+)([hms])", told))
+
+
+def tables(program: Program, alternatives: tuple[Alternative, ...] = ()) -> dict[str, Any]:
+    profile = example()[0]
+    run = program.run
+    report = print_report(program, profile, layers_of(run.program, 0.2), end_times_s(run), alternatives)
+    return {"facts": dict(report["facts"]), **{table["title"]: table for table in report["tables"]}}
+
+
+def of_text(text: str) -> dict[str, Any]:
+    lines = tuple(text.split("\n"))
+    return tables(Program(lines, dry_run(lines, load()), None))
+
+
+def test_times_and_material_of_all_kinds_are_the_whole_print() -> None:
+    program = example()[1]
+    told = tables(program)["Time and material"]["rows"]
+    assert sum(seconds(row[1]) for row in told) == pytest.approx(program.run.time_s, abs=0.5 * len(told))
+    assert sum(float(row[3]) for row in told) == pytest.approx(program.run.program.e_mm.sum() / 1000, abs=0.005 * len(told))
+    assert {row[0] for row in told} >= {"External perimeter", "Perimeter", "travel", "turning the table"}
+
+
+def test_waiting_is_a_kind_of_its_own() -> None:
+    rows = {row[0]: row for row in of_text("G28\nG1 X60 F3600\nG4 S5\nG1 X0\nG1 X9 E1")["Time and material"]["rows"]}
+    assert rows["waiting"][1] == "5s"
+    assert set(rows) == {"not told", "travel", "waiting"}
+
+
+def test_each_part_has_its_shape_its_layers_and_its_time() -> None:
+    told = tables(example()[1])["Parts"]
+    assert told["head"] == ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²", "layers", "time", "g"]
+    assert [row[0] for row in told["rows"]] == ["1", "2"]
+    assert told["rows"][1][3:7] == ["1.00", "100.0", "0.0", "3"]
+
+
+def test_a_file_without_parts_and_layers_is_told_as_a_whole() -> None:
+    found = of_text(STEPS.replace(";LAYER_CHANGE", ""))
+    assert found["facts"]["layers"] == "5, by their heights"
+    assert "parts" not in found["facts"]
+    assert [row[:2] for row in found["Parts"]["rows"]] == [["all", "5"]]
+    assert "Compared" not in found
+
+
+def test_areas_are_compared_at_no_cost_and_alternatives_where_they_are_known() -> None:
+    program = example()[1]
+    areas = tables(program)["Compared"]
+    assert [row[0] for row in areas["rows"]] == ["straight up", "best single orientation", "in 2 parts"]
+    assert areas["rows"][2] == ["in 2 parts", "0.0", "100.0 %"]
+    alternatives = (
+        Alternative("in 2 parts", "", 2, 60.0, 1000.0, 3.0, 0.0, 0.0),
+        Alternative("straight up", "", 1, *[None] * 4, 100.0, "too high"),
+    )
+    known = tables(program, alternatives)["Compared"]
+    assert known["rows"][0] == ["in 2 parts", "1m 0s", "1.00", "3.0", "0.00", "0.0"]
+    assert known["rows"][1][1:5] == ["-"] * 4
+    assert known["notes"] == ["straight up: too high"]
+
+
+def test_parts_alone_have_no_layers_and_no_time() -> None:
+    profile, program = example()
+    assert program.decomposition is not None
+    report = parts_report(program.decomposition, profile)
+    assert report["facts"][:2] == [["parts", "2"], ["volume", "7.00 cm³"]]
+    assert "layers" not in report["tables"][0]["head"]
+
+
+def test_every_row_is_as_long_as_its_head_and_all_is_text() -> None:
+    profile, program = example()
+    report = print_report(program, profile, layers_of(program.run.program, 0.2), end_times_s(program.run))
+    for table in report["tables"]:
+        assert all(len(row) == len(table["head"]) and all(isinstance(cell, str) for cell in row) for row in table["rows"])
+
+
+def test_of_a_file_that_does_not_tell_its_machine_nothing_is_pretended() -> None:
+    profile, program = example()
+    named = (layers_of(program.run.program, 0.2), end_times_s(program.run))
+    report = print_report(program, profile, *named, known=False, ours=False)
+    assert dict(report["facts"])["machine"].startswith("not told")
+    assert dict(report["facts"])["material"] == "not told: weights as of PLA"
+    assert report["tables"][1]["notes"][-1] == "times as on generic A/C table"
+    assert "All settings" not in [table["title"] for table in report["tables"]]

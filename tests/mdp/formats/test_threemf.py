@@ -1,0 +1,74 @@
+"""3MF packages: units, transforms, components and parts."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdp.read import read_mesh
+from tests.mdp import files
+from tests.mdp.files import refusal
+from tests.shapes import tee
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("inch", 25.4), ("meter", 1000.0), ("centimeter", 10.0), ("foot", 304.8)])
+def test_3mf_brings_its_own_unit(tmp_path: Path, unit: str, factor: float) -> None:
+    box = files.threemf_mesh(files.placed(0.5, 1, 2))
+    mesh, _ = read_mesh(files.threemf(tmp_path / "a.3mf", {1: box}, '<item objectid="1"/>', unit))
+    assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx(np.array([0.5, 1, 2]) * factor)
+
+
+def test_3mf_places_objects_and_components_with_their_transforms(tmp_path: Path) -> None:
+    box = files.threemf_mesh(files.placed(10, 10, 10))
+    pair = '<components><component objectid="1"/><component objectid="1" transform="1 0 0 0 1 0 0 0 2 20 0 0"/></components>'
+    items = '<item objectid="2"/><item objectid="1" transform="-1 0 0 0 1 0 0 0 1 60 0 0"/>'
+    mesh, notes = read_mesh(files.threemf(tmp_path / "a.3mf", {1: box, 2: pair}, items))
+    assert notes == ()
+    assert mesh.volume_mm3 == pytest.approx(1000 + 2000 + 1000)
+    assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx([60, 10, 20])
+
+
+def test_a_3mf_that_contains_itself_is_refused(tmp_path: Path) -> None:
+    ring = '<components><component objectid="1"/></components>'
+    assert "contain each other" in refusal(files.threemf(tmp_path / "a.3mf", {1: ring}, '<item objectid="1"/>'))
+
+
+def test_a_3mf_with_an_unknown_unit_or_object_is_refused(tmp_path: Path) -> None:
+    box = {1: files.threemf_mesh(tee())}
+    assert "unit 'ell' is unknown; allowed are micron" in refusal(
+        files.threemf(tmp_path / "a.3mf", box, '<item objectid="1"/>', "ell")
+    )
+    assert "object '7' cannot be placed" in refusal(files.threemf(tmp_path / "b.3mf", box, '<item objectid="7"/>'))
+    assert "places no mesh" in refusal(files.threemf(tmp_path / "c.3mf", box, ""))
+
+
+def test_components_may_name_objects_of_other_parts_by_the_same_number(tmp_path: Path) -> None:
+    inner = {
+        f"3D/{name}.model": files.threemf_model({1: files.threemf_mesh(box), 2: files.threemf_mesh(files.placed(5, 5, 5))})
+        for name, box in {"c": files.placed(10, 10, 10), "b": files.placed(20, 20, 20)}.items()
+    }
+    placed = [("c", 1, 0), ("c", 2, 50), ("b", 1, 100)]
+    components = "".join(
+        f'<component p:path="/3D/{part}.model" objectid="{number}" transform="1 0 0 0 1 0 0 0 1 {x} 0 0"/>'
+        for part, number, x in placed
+    )
+    objects = {7: f"<components>{components}</components>"}
+    mesh, notes = read_mesh(files.threemf(tmp_path / "a.3mf", objects, '<item objectid="7"/>', parts=inner))
+    assert (mesh.volume_mm3, notes) == (pytest.approx(1000 + 125 + 8000), ())
+
+
+def test_components_within_components_are_all_placed(tmp_path: Path) -> None:
+    doubled = {
+        number: f'<components><component objectid="{number - 1}"/>'
+        f'<component objectid="{number - 1}" transform="1 0 0 0 1 0 0 0 1 {2 * 2**number} 0 0"/></components>'
+        for number in range(2, 6)
+    }
+    objects = {1: files.threemf_mesh(files.placed(5, 5, 5)), **doubled}
+    assert read_mesh(files.threemf(tmp_path / "a.3mf", objects, '<item objectid="5"/>'))[0].volume_mm3 == pytest.approx(16 * 125)
+
+
+def test_components_that_double_without_end_are_refused_before_they_are_placed(tmp_path: Path) -> None:
+    doubled = {k: f'<components>{2 * f"""<component objectid="{k - 1}"/>"""}</components>' for k in range(2, 31)}
+    objects = {1: files.threemf_mesh(tee()), **doubled}
+    sentence = refusal(files.threemf(tmp_path / "a.3mf", objects, '<item objectid="30"/>'))
+    assert sentence == "places more than 20000 objects or 20000000 faces by reference"

@@ -1,0 +1,70 @@
+"""Where compiled kernels are cached: a program of two files, edited between runs of the interpreter."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mdp.kernels import cache
+
+KERNEL_FILE = (
+    "from mdp.kernels.kernel import kernel\nfrom mdp.far import PART, far\n\n\n@kernel\ndef near(x):\n    return far(x) + PART\n"
+)
+PART_FILE = "from mdp.kernels.kernel import part\n\nPART = 1.0\n\n\n@part\ndef far(x):\n    return 10.0 * x\n"
+
+
+@pytest.fixture
+def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the packages' kernel page and two files of a program, and a cache of its own."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cached"))
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")  # Python knows an edited file by its size and the second of its date
+    packages = tmp_path / "program" / "mdp"
+    packages.mkdir(parents=True)
+    shutil.copytree(cache.PACKAGES / "mdp" / "kernels", packages / "kernels")
+    (packages / "__init__.py").touch()
+    (packages / "near.py").write_text(KERNEL_FILE, encoding="utf-8")
+    (packages / "far.py").write_text(PART_FILE, encoding="utf-8")
+    return packages
+
+
+def result_and_compilations(program: Path) -> str:
+    """What a new interpreter works out for near(2.0), and how often it had to compile."""
+    code = "from mdp.near import near; print(near(2.0), sum(near.stats.cache_misses.values()))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=program.parent, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_a_kernel_is_compiled_once_and_again_when_a_part_or_a_constant_in_another_file_changes(program: Path) -> None:
+    assert [result_and_compilations(program), result_and_compilations(program)] == ["21.0 1", "21.0 0"]
+    (program / "far.py").write_text(PART_FILE.replace("10.0", "20.0"), encoding="utf-8")
+    assert [result_and_compilations(program), result_and_compilations(program)] == ["41.0 1", "41.0 0"]
+    (program / "far.py").write_text(PART_FILE.replace("PART = 1.0", "PART = 2.0"), encoding="utf-8")
+    assert result_and_compilations(program) == "22.0 1"
+
+
+def test_the_sources_of_a_kernel_are_its_file_and_what_its_parts_and_constants_come_from() -> None:
+    travel = cache.PACKAGES / "slicer" / "travel"
+    sources = cache.sources(travel / "path_order.py")
+    assert {file.relative_to(cache.PACKAGES).as_posix() for file in sources} == {
+        "slicer/travel/path_order.py",
+        "mdp/kernels/arrays.py",
+        "mdp/kernels/kernel.py",
+        "mdp/mesh.py",
+    }
+    assert cache.PACKAGES / "slicer" / "geometry" / "cells.py" in cache.sources(travel / "combing.py")
+
+
+def test_the_folder_is_the_one_named_or_the_user_s_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "named"))
+    assert cache.home() == tmp_path / "named"
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache.home() == tmp_path / "tiltprint" / "kernels"
+
+
+def test_every_kernel_of_the_packages_is_compiled_by_the_decorators_of_the_kernel_page() -> None:
+    packages = [cache.PACKAGES / name for name in ("mdp", "slicer", "machine")]
+    files = [file for package in packages for file in package.rglob("*.py") if file.name != "kernel.py"]
+    assert [file.name for file in files if "njit" in file.read_text(encoding="utf-8")] == []

@@ -1,0 +1,252 @@
+"""Planes by hand: cut as they are, completed or refused with the reason; plans cut again without a search."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.decomposition import Decomposition
+from mdp.mesh import Mesh
+from mdp.plan_file import PlanFile, PlannedPart, plan_of, plan_text, read_plan
+from mdp.save import stl
+from mdp.search.search import cut_by_plan, decompose
+from mdp.zone import Zone, Zones
+from profiles.errors import PlanError
+from profiles.machine import Vector
+from profiles.profile import Profile, load
+from tests import shapes
+
+UP, TO_X, FROM_X = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
+LEANING = (0.6, 0.0, 0.8)
+FREE = "search.clearance=false"
+
+
+def _profile(*settings: str, machine: str = "generic_ac") -> Profile:
+    return load(machine=machine, settings=("search.directions=200", *settings))
+
+
+def _by_hand(*parts: tuple[Vector | None, float | None], zones: Zones | None = None) -> PlanFile:
+    return PlanFile("mine.toml", parts=tuple(PlannedPart(*part) for part in parts), zones=zones or Zones())
+
+
+def _cut(mesh: Mesh, *parts: tuple[Vector | None, float | None], profile: Profile | None = None) -> Decomposition:
+    return cut_by_plan(mesh, "shape", profile or _profile(), _by_hand(*parts))
+
+
+def _refusal(mesh: Mesh, *parts: tuple[Vector | None, float | None], profile: Profile | None = None) -> str:
+    with pytest.raises(PlanError) as refused:
+        _cut(mesh, *parts, profile=profile)
+    assert "\n" not in str(refused.value)
+    return str(refused.value)
+
+
+def _planes(decomposition: Decomposition) -> list[tuple[list[float], float]]:
+    return [(part.base.normal.tolist(), part.base.offset_mm) for part in decomposition.parts[1:]]
+
+
+@pytest.mark.parametrize("name", ["tee", "branch", "bowl", "box"])
+def test_the_plan_of_a_search_gives_its_parts_again_bit_by_bit(tmp_path: Path, name: str) -> None:
+    mesh = getattr(shapes, name)()
+    searched = decompose(mesh, "shape", _profile("search.pedestal_mm=5"))
+    (tmp_path / "plan.toml").write_text(plan_text(plan_of(searched)))
+    again = cut_by_plan(mesh, "shape", _profile("search.pedestal_mm=5"), read_plan(tmp_path / "plan.toml"))
+    assert [stl(part.mesh) for part in again.parts] == [stl(part.mesh) for part in searched.parts]
+    assert [part.pose for part in again.parts] == [part.pose for part in searched.parts]
+    assert again.candidates_evaluated == again.rounds == 0
+    assert [(row.parts, row.chosen) for row in again.front] == [(row.parts, row.chosen) for row in searched.front]
+    assert again.cost_mm2 == pytest.approx(searched.cost_mm2)
+
+
+def _two_arms() -> Mesh:
+    """A post with an arm on either side."""
+    arms = [m3.Manifold.cylinder(35, 5, 5, 48).rotate((0, tilt, 0)).translate((0, 0, 30)) for tilt in (60, -60)]
+    return shapes.standing(m3.Manifold.cylinder(45, 8, 8, 48) + arms[0] + arms[1])
+
+
+def test_a_plan_takes_another_row_of_its_front_without_a_search() -> None:
+    searched = decompose(_two_arms(), "shape", _profile())
+    plan = plan_of(searched)
+    assert len(searched.parts) > 2
+    for count in range(1, len(searched.front) + 1):
+        assert len(cut_by_plan(_two_arms(), "shape", _profile(), plan, parts=count).parts) == count
+    many = cut_by_plan(_two_arms(), "shape", _profile(), plan, parts=50)
+    assert len(many.parts) == len(searched.front)
+    assert many.notes == (f"--parts 50: the plan plan.toml holds no more than {len(searched.front)}",)
+
+
+def test_a_search_for_so_many_parts_takes_that_row_of_the_front() -> None:
+    free, two, many = (decompose(_two_arms(), "shape", _profile(), parts=parts) for parts in (None, 2, 50))
+    assert len(free.parts) > len(two.parts) == 2
+    assert len(many.parts) == len(many.front)
+    assert many.notes == (f"--parts 50: the search found no more than {len(many.front)}",)
+    assert [row.cost_mm2 for row in two.front] == [row.cost_mm2 for row in free.front]
+    assert len(decompose(_two_arms(), "shape", _profile(), parts=1).parts) == 1
+
+
+@pytest.mark.parametrize("parts", [0, -1, 1001])
+def test_no_parts_at_all_or_too_many_are_refused(parts: int) -> None:
+    with pytest.raises(PlanError, match=f"--parts is {parts}: 1 to 1000 is allowed"):
+        decompose(shapes.box(), "shape", _profile(), parts=parts)
+    with pytest.raises(PlanError, match=f"--parts is {parts}: 1 to 1000 is allowed"):
+        cut_by_plan(shapes.box(), "shape", _profile(), _by_hand(), parts=parts)
+
+
+def test_a_plane_by_hand_may_gain_nothing_and_make_a_small_part() -> None:
+    parts = _cut(shapes.box(), (UP, 19.5)).parts
+    assert [part.volume_mm3 for part in parts] == pytest.approx([400 * 19.5, 200.0])
+
+
+def test_a_plan_of_another_model_is_refused() -> None:
+    plan = plan_of(decompose(shapes.tee(), "tee.stl", _profile()))
+    with pytest.raises(PlanError, match=r"was made of another model: tee.stl is not new.stl as it is read now"):
+        cut_by_plan(shapes.tee(arm=41.0), "new.stl", _profile(), plan)
+    with pytest.raises(PlanError, match="was made of another model"):
+        decompose(shapes.tee(arm=41.0), "new.stl", _profile(), by_hand=plan)
+    assert len(cut_by_plan(shapes.tee(arm=40.5), "new.stl", _profile(), replace(plan, sha256="")).parts) == len(plan.parts) + 1
+
+
+def test_a_plane_beside_the_model_is_refused_with_what_it_could_be() -> None:
+    sentence = _refusal(shapes.box(), (UP, 35.0))
+    assert sentence.startswith("plan mine.toml: part 2 cannot be cut off: its plane misses the model")
+    assert "between 0.00 and 20.00 mm, offset_mm is 35" in sentence
+
+
+def test_planes_in_an_impossible_order_are_refused() -> None:
+    assert "part 2 cannot be cut off: nothing is left above its plane, the parts printed after it took it" in _refusal(
+        shapes.box(z=40.0), (UP, 30.0), (UP, 20.0)
+    )
+    assert len(_cut(shapes.box(z=40.0), (UP, 20.0), (UP, 30.0)).parts) == 3
+
+
+def test_a_plane_that_cuts_the_platform_is_refused() -> None:
+    sentence = _refusal(shapes.box(), (LEANING, 2.0))
+    assert "part 2 cannot be cut off: the plane would cut the platform (criterion III)" in sentence
+    assert "offset_mm must be at least 8.5" in sentence  # 0.6 times 10 sqrt 2
+
+
+def test_a_plane_that_lets_something_float_is_refused() -> None:
+    post, beam = m3.Manifold.cube((8, 8, 40)), m3.Manifold.cube((60, 8, 8)).translate((-52, 0, 32))
+    gallows = shapes.standing(post + beam + m3.Manifold.cube((8, 8, 32)).translate((-52, 0, 4)))
+    sentence = _refusal(gallows, (LEANING, 22.0), profile=_profile(FREE))
+    assert "part 2 cannot be cut off: what remains would not stand on the platform (criterion II)" in sentence
+
+
+def test_a_direction_out_of_reach_is_refused() -> None:
+    machine = load().machine
+    tilt = machine.tilt.model_copy(update={"limits_deg": (-20.0, 20.0)})
+    stiff = _profile().model_copy(update={"machine": machine.model_copy(update={"tilt": tilt})})
+    sentence = _refusal(shapes.branch(), (LEANING, 20.0), profile=stiff)
+    assert "part 2 cannot be cut off: the axes do not reach the direction of its normal on generic A/C table" in sentence
+
+
+def test_the_body_of_the_head_that_would_meet_the_table_is_named() -> None:
+    low = shapes.tee(height=14.0)
+    sentence = _refusal(low, (LEANING, 8.0))
+    assert re.search(
+        r"the head's [a-z ]+ would meet the table: what is cut off must begin at least \d+\.\d mm above it", sentence
+    )
+    assert len(_cut(low, (LEANING, 8.0), profile=_profile(FREE)).parts) == 2
+
+
+def test_the_axis_that_would_leave_its_limits_is_named() -> None:
+    machine = load().machine
+    narrow = machine.model_copy(update={"x": machine.x.model_copy(update={"limits_mm": (-5.0, 5.0)})})
+    sentence = _refusal(shapes.branch(), (UP, 30.0), profile=_profile().model_copy(update={"machine": narrow}))
+    assert re.search(r"part 2 cannot be cut off: X would go from -?\d+\.\d to \d+\.\d mm, -5 to 5 is allowed", sentence)
+
+
+def test_a_sliver_is_refused_with_its_thickness() -> None:
+    assert "its plane would leave a sliver 0.1 mm thin: 0.3 is the least (search.fragile_mm)" in _refusal(
+        shapes.box(), (UP, 19.9)
+    )
+
+
+def test_an_offset_next_to_nothing_is_refused() -> None:
+    assert "offset_mm is 0.001: 0 or at least 0.03125 is allowed" in _refusal(shapes.box(), (TO_X, 0.001), profile=_profile(FREE))
+
+
+def test_a_plan_with_a_plane_left_open_is_sent_to_the_search() -> None:
+    assert "part 2 has no offset_mm: decompose --planes mine.toml has it found" in _refusal(shapes.tee(), (LEANING, None))
+    assert "part 2 has no normal" in _refusal(shapes.tee(), (None, 20.0))
+
+
+def test_an_open_offset_is_found_where_the_most_becomes_safe() -> None:
+    by_hand = _by_hand((LEANING, None))
+    profile = _profile("search.most_parts=2")
+    completed = decompose(shapes.branch(), "shape", profile, by_hand=by_hand)
+    ((normal, offset_mm),) = _planes(completed)
+    assert normal == list(LEANING)
+    assert offset_mm == round(offset_mm)
+    assert completed.reduction > 0.8
+
+
+def test_an_open_direction_is_found_for_its_offset() -> None:
+    found = decompose(shapes.branch(), "shape", _profile("search.most_parts=2"), by_hand=_by_hand((None, 20.25)))
+    assert [plane[1] for plane in _planes(found)] == [20.25]
+    assert found.reduction > 0.5
+
+
+def test_a_plane_that_nothing_can_complete_says_why() -> None:
+    with pytest.raises(PlanError, match=r"part 2: no offset_mm can be found for it among \d+: .*\d+ because "):
+        decompose(shapes.box(z=8.0), "shape", _profile(), by_hand=_by_hand(((0.98, 0.0, 0.2), None)))
+    with pytest.raises(PlanError, match="no normal can be found for it, every such plane misses what is left of the model"):
+        decompose(shapes.box(), "shape", _profile(), by_hand=_by_hand((None, 99999.0)))
+    with pytest.raises(PlanError, match=r"part 2: offset_mm is 1e-05: 0 or at least 0.03125 is allowed"):
+        decompose(shapes.box(), "shape", _profile(), by_hand=_by_hand((None, 1e-5)))
+    with pytest.raises(PlanError, match="part 2 has neither normal nor offset_mm: leave it out"):
+        decompose(shapes.box(), "shape", _profile(), by_hand=_by_hand((None, None)))
+
+
+def test_planes_by_hand_stay_and_the_others_are_found() -> None:
+    arms, profile = _two_arms(), _profile()
+    by_hand = _by_hand((LEANING, 28.25))
+    both = decompose(arms, "shape", profile, by_hand=by_hand)
+    assert _planes(both)[-1] == (list(LEANING), 28.25)
+    assert len(both.parts) == 3
+    assert both.reduction > 0.9
+    assert [row.parts for row in both.front] == list(range(2, len(both.front) + 2))
+    with pytest.raises(PlanError, match=r"--parts 1: the planes by hand of mine.toml alone make 2 parts"):
+        decompose(arms, "shape", profile, by_hand=by_hand, parts=1)
+
+
+def test_planes_by_hand_cut_a_model_that_needs_no_support() -> None:
+    assert _planes(decompose(shapes.box(), "shape", _profile(), by_hand=_by_hand((UP, 10.0)))) == [(list(UP), 10.0)]
+
+
+def test_no_plane_passes_through_a_zone_that_stays_whole() -> None:
+    tee = shapes.tee()
+    zone = Zone((-20.0, -5.0, 30.0), (-6.0, 5.0, 40.0))
+    kept = decompose(tee, "shape", _profile(), by_hand=_by_hand(zones=Zones(keep=(zone,))))
+    free = decompose(tee, "shape", _profile())
+    for part in kept.parts[1:]:
+        low, high = zone.spans_mm(part.base.normal[None])[0]
+        assert not low < part.base.offset_mm < high
+    assert len(free.parts) > len(kept.parts) or kept.cost_mm2 >= free.cost_mm2
+    with pytest.raises(PlanError, match=r"its plane would pass through box 1 of \[\[keep\]\], which stays whole"):
+        cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0), zones=Zones(keep=(zone,))))
+
+
+def test_seams_keep_out_of_a_zone_where_they_weigh_a_hundred_times() -> None:
+    tee = shapes.tee()
+    everywhere = Zone((-50.0, -50.0, 0.0), (50.0, 50.0, 50.0))
+    assert len(decompose(tee, "shape", _profile()).parts) > 1
+    assert len(decompose(tee, "shape", _profile(), by_hand=_by_hand(zones=Zones(no_seam=(everywhere,)))).parts) == 1
+    by_hand = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0), zones=Zones(no_seam=(everywhere,))))
+    free = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0)))
+    assert by_hand.seam_mm == free.seam_mm == pytest.approx(100.0)
+    assert by_hand.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.6 * 100.0)
+
+
+def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:
+    zones = Zones(no_seam=(Zone((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),))
+    found = decompose(shapes.tee(), "shape", _profile("search.seam_mm=0"), by_hand=_by_hand(zones=zones))
+    assert "[[no_seam]] changes nothing where seams cost nothing (search.objective, search.seam_mm)" in found.notes
+
+
+def test_the_published_search_starts_from_planes_by_hand_too() -> None:
+    profile = _profile("search.method=published", FREE)
+    found = decompose(shapes.tee(), "shape", profile, by_hand=_by_hand((LEANING, 30.0)))
+    assert np.allclose(found.parts[-1].base.normal, LEANING)

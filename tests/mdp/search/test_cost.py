@@ -1,0 +1,122 @@
+"""What a cut costs: its rim against exact sections, feather edges, faces that are hidden, and cuts that do not pay."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.cut import below, mesh_of, solid_of
+from mdp.decomposition import Decomposition
+from mdp.mesh import Floats, Mesh
+from mdp.overhang import risky_upright, threshold
+from mdp.plane import Plane
+from mdp.search.cost import CostTerms, measure_seam, rim_weights
+from mdp.search.forecast import Surface
+from mdp.search.search import decompose
+from mdp.sweep.sweep import Gains, Remainder, gains
+from profiles.profile import load
+from tests import shapes
+from tests.mdp.solids import random_solid
+
+ANGLE_DEG = 45.0
+LEAN = st.tuples(st.floats(0.0, 80.0), st.floats(0.0, 360.0))
+
+
+def _direction(lean: tuple[float, float]) -> Floats:
+    angle, turn = np.radians(lean)
+    return np.array([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)])
+
+
+def _remainder(mesh: Mesh, weights: Floats, feather: float) -> Remainder:
+    return Remainder(mesh, risky_upright(mesh, ANGLE_DEG), weights, feather)
+
+
+def _swept(mesh: Mesh, direction: Floats, feather: float = 0.0) -> Gains:
+    return gains(_remainder(mesh, np.ones(len(mesh.faces)), feather), direction[None], 1.0, threshold(ANGLE_DEG))
+
+
+def _section_mm(mesh: Mesh, plane: Plane) -> float:
+    """Length of the outline of a section, by trimesh."""
+    model = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    lines = trimesh.intersections.mesh_plane(model, plane.normal, plane.normal * plane.offset_mm)
+    return float(np.linalg.norm(lines[:, 0] - lines[:, 1], axis=1).sum())
+
+
+@settings(max_examples=25, deadline=None)  # the first call compiles
+@given(st.integers(0, 50), LEAN)
+def test_the_rim_at_every_offset_is_the_outline_of_the_section(seed: int, lean: tuple[float, float]) -> None:
+    mesh, direction = random_solid(seed), _direction(lean)
+    swept = _swept(mesh, direction)
+    for column in range(0, int(swept.columns[0]), 7):
+        plane = Plane(direction, float(swept.first[0] + column) + 0.0)
+        assert swept.rim_mm[0, column] == pytest.approx(_section_mm(mesh, plane), rel=1e-6, abs=1e-5)
+
+
+@pytest.mark.parametrize(("lean_deg", "weight"), [(60.0, 1.0), (45.0, 1.0), (20.0, 1.0 + 0.5 * (2.747477 - 1.732051))])
+def test_a_rim_counts_more_where_face_and_plane_meet_at_a_small_angle(lean_deg: float, weight: float) -> None:
+    wedge = mesh_of(below(solid_of(shapes.box(20.0, 20.0, 40.0)), Plane(_direction((lean_deg, 0.0)), 15.0)))
+    plane = Plane(np.array([0.0, 0.0, 1.0]), 14.0)
+    leaning = measure_seam(wedge, [], plane, 0.5).weighted_mm - measure_seam(wedge, [], plane, 0.0).weighted_mm
+    assert leaning == pytest.approx((weight - 1.0) * 20.0, abs=1e-4)  # one of the rim's four sides lies on the leaning face
+
+
+def test_a_face_that_an_earlier_cut_laid_open_carries_no_seam() -> None:
+    first, second = Plane(np.array([0.0, 0.0, 1.0]), 10.0), Plane(np.array([1.0, 0.0, 0.0]), 0.0)
+    rest = mesh_of(below(solid_of(shapes.box(20.0, 20.0, 30.0)), first))
+    assert measure_seam(rest, [], second, 0.0).length_mm == pytest.approx(20.0 + 10.0 + 10.0)  # the platform's side is free
+    assert measure_seam(rest, [first], second, 0.0).length_mm == pytest.approx(10.0 + 10.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 50), LEAN, st.floats(2.0, 30.0))
+def test_the_seam_of_one_plane_is_the_sweep_s_rim(seed: int, lean: tuple[float, float], offset_mm: float) -> None:
+    mesh, plane = random_solid(seed), Plane(_direction(lean), offset_mm)
+    remainder = _remainder(mesh, rim_weights(mesh, []), 0.5)
+    swept = gains(remainder, plane.normal[None], offset_mm, threshold(ANGLE_DEG))
+    column = 1 - int(swept.first[0])
+    if 0 <= column < swept.columns[0]:
+        assert swept.rim_mm[0, column] == pytest.approx(measure_seam(mesh, [], plane, 0.5).weighted_mm, rel=1e-9, abs=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(LEAN, st.floats(5.0, 35.0)), min_size=1, max_size=4))
+def test_the_forecast_counts_every_seam_as_it_is_after_cutting(leans: list[tuple[tuple[float, float], float]]) -> None:
+    mesh, terms = shapes.branch(), CostTerms(ANGLE_DEG, False, seam_mm=0.6, feather=0.5)
+    planes = [Plane(_direction(lean), offset_mm) for lean, offset_mm in leans]
+    with_seams = Surface.of(_remainder(mesh, rim_weights(mesh, []), 0.5), terms).left_mm2(planes)
+    without = Surface.of(Remainder(mesh, risky_upright(mesh, ANGLE_DEG)), CostTerms(ANGLE_DEG, False)).left_mm2(planes)
+    seams_mm, rest = 0.0, solid_of(mesh)
+    for position, plane in enumerate(planes):
+        seams_mm += measure_seam(mesh_of(rest), planes[:position], plane, 0.5).weighted_mm
+        rest = below(rest, plane)
+        if rest.is_empty():
+            break
+    assert with_seams - without == pytest.approx(0.6 * seams_mm, rel=1e-6, abs=1e-4)
+
+
+def _decompose(mesh: Mesh, *settings_: str) -> Decomposition:
+    return decompose(mesh, "shape", load(settings=("search.directions=200", *settings_)))
+
+
+def test_a_cut_whose_seam_is_a_greater_scar_than_it_saves_is_not_made() -> None:
+    assert len(_decompose(shapes.branch(), "search.seam_mm=100").parts) == 1
+    assert len(_decompose(shapes.branch(), "search.seam_mm=0.6").parts) == 2
+
+
+def test_without_a_width_of_the_seam_the_objective_is_the_paper_s() -> None:
+    ours, paper = (_decompose(shapes.tee(), setting) for setting in ("search.seam_mm=0", "search.objective=risky"))
+    assert [part.base.offset_mm for part in ours.parts] == [part.base.offset_mm for part in paper.parts]
+    assert ours.residual_area_mm2 == paper.residual_area_mm2
+
+
+@pytest.mark.parametrize("shape", ["tee", "branch", "bowl"])
+def test_every_row_of_the_front_says_what_its_parts_cost(shape: str) -> None:
+    decomposition = _decompose(getattr(shapes, shape)())
+    rows = decomposition.front
+    assert [row.parts for row in rows] == list(range(1, len(rows) + 1))
+    assert rows[0].cost_mm2 == rows[0].support_area_mm2 == pytest.approx(decomposition.risky_area_mm2)
+    (chosen,) = (row for row in rows if row.chosen)
+    assert chosen.parts == len(decomposition.parts)
+    assert chosen.support_area_mm2 == pytest.approx(decomposition.residual_area_mm2, abs=1e-6)
+    assert chosen.cost_mm2 <= min(row.cost_mm2 for row in rows) * 1.01

@@ -1,0 +1,118 @@
+import manifold3d as m3
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.mesh import Mesh
+from mdp.overhang import risky_upright
+from mdp.pose import about, unit
+from mdp.search.orientation import best_orientation, resting_orientations, risky_areas, spread
+from tests.shapes import ball, box, branch, hollow, standing, tee
+
+ANGLE_DEG = 45.0
+
+
+def cone() -> Mesh:
+    """A cone on its point: 30 mm across, 30 mm high."""
+    return standing(m3.Manifold.cylinder(30, 0.0, 15.0, 64))
+
+
+def set_down(mesh: Mesh, rotation: object) -> Mesh:
+    turned = mesh.transform(rotation)
+    return turned.transform(np.eye(3), (0.0, 0.0, -turned.bounds_mm[0, 2]))
+
+
+def test_a_box_stays_as_it_stands() -> None:
+    best = best_orientation(box(20, 30, 40), ANGLE_DEG)
+    assert np.allclose(best.rotation, np.eye(3))
+    assert (best.risky_mm2, best.stable) == (0.0, True)
+    assert best.base_mm2 == pytest.approx(600.0)
+
+
+def test_a_tee_lies_on_its_side() -> None:
+    best = best_orientation(tee(), ANGLE_DEG)
+    assert best.turns_deg == pytest.approx((90.0, 0.0))
+    assert best.risky_mm2 == 0.0
+    assert best.base_mm2 == pytest.approx(10 * 40 + 10 * 30)
+
+
+def test_a_cone_on_its_point_is_turned_over() -> None:
+    best = best_orientation(cone(), ANGLE_DEG)
+    assert best.rotation[2] == pytest.approx([0, 0, -1], abs=1e-9)
+    assert best.risky_mm2 == 0.0
+
+
+def test_a_box_rests_on_each_of_its_faces_and_nowhere_else() -> None:
+    resting = resting_orientations(box(20, 30, 40), ANGLE_DEG, 100)
+    directions = sorted(tuple(np.round(o.rotation[2]).astype(int)) for o in resting)
+    assert directions == [(-1, 0, 0), (0, -1, 0), (0, 0, -1), (0, 0, 1), (0, 1, 0), (1, 0, 0)]
+
+
+def test_a_pole_does_not_rest_on_its_end() -> None:
+    pole = set_down(box(4, 60, 4), about(np.array([1.0, 0.0, 0.0]), np.pi / 2))
+    assert pole.bounds_mm[1, 2] == pytest.approx(60)
+    assert len(resting_orientations(pole, ANGLE_DEG, 100)) == 4
+
+
+def test_the_least_risky_come_first_and_no_more_than_asked() -> None:
+    resting = resting_orientations(branch(), ANGLE_DEG, 5)
+    areas = [orientation.risky_mm2 for orientation in resting]
+    assert len(resting) == 5
+    assert areas == sorted(areas)
+    again = [orientation.rotation.tobytes() for orientation in resting_orientations(branch(), ANGLE_DEG, 5)]
+    assert [orientation.rotation.tobytes() for orientation in resting] == again
+
+
+def test_what_only_a_raft_could_hold_is_looked_at_when_asked() -> None:
+    assert best_orientation(hollow(), ANGLE_DEG).risky_mm2 == pytest.approx(100.0)
+    balanced = best_orientation(hollow(), ANGLE_DEG, resting=False)
+    assert (balanced.risky_mm2, balanced.stable) == (0.0, False)
+
+
+def test_the_best_is_never_worse_than_straight_up() -> None:
+    mesh = ball()
+    upright = mesh.areas_mm2[risky_upright(mesh, ANGLE_DEG)].sum()
+    assert best_orientation(mesh, ANGLE_DEG, resting=False).risky_mm2 <= upright
+
+
+@pytest.mark.parametrize("mesh", [tee(), branch(), hollow(), cone()], ids=["tee", "branch", "hollow", "cone"])
+def test_the_area_is_what_the_turned_model_has(mesh: Mesh) -> None:
+    for orientation in [best_orientation(mesh, ANGLE_DEG, resting=False), *resting_orientations(mesh, ANGLE_DEG, 3)]:
+        turned = set_down(mesh, orientation.rotation)
+        assert orientation.risky_mm2 == pytest.approx(turned.areas_mm2[risky_upright(turned, ANGLE_DEG)].sum(), abs=1e-6)
+
+
+def test_the_turns_are_the_rotation() -> None:
+    for orientation in resting_orientations(branch(), ANGLE_DEG, 20):
+        x, y = np.radians(orientation.turns_deg)
+        assert about(np.eye(3)[1], y) @ about(np.eye(3)[0], x) == pytest.approx(orientation.rotation, abs=1e-12)
+
+
+vectors = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
+
+
+@settings(max_examples=25, deadline=None)
+@given(vectors, st.floats(0.0, 6.3))
+def test_turning_a_model_does_not_change_its_best_area(axis: tuple[float, float, float], angle_rad: float) -> None:
+    turned = set_down(hollow(), about(unit(axis), angle_rad))
+    assert best_orientation(turned, ANGLE_DEG).risky_mm2 == pytest.approx(100.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(vectors)
+def test_one_direction_is_what_brute_force_gives(vector: tuple[float, float, float]) -> None:
+    mesh, up = branch(), unit(vector)
+    heights = mesh.vertices @ up - (mesh.vertices @ up).min()
+    risky = sum(
+        area
+        for area, normal, face in zip(mesh.areas_mm2, mesh.normals, mesh.faces, strict=True)
+        if normal @ up < -(np.sin(np.radians(ANGLE_DEG)) + 1e-4) and max(heights[k] for k in face) > 0.3
+    )
+    assert risky_areas(mesh, up[None], ANGLE_DEG)[0][0] == pytest.approx(risky, abs=1e-9)
+
+
+def test_the_spread_directions_are_unit_and_have_no_bias() -> None:
+    directions = spread(1000)
+    assert np.linalg.norm(directions, axis=1) == pytest.approx(np.ones(1000))
+    assert np.abs(directions.mean(axis=0)).max() < 1e-3

@@ -1,0 +1,95 @@
+"""Polish: a sequence of cuts made shorter and better."""
+
+import numpy as np
+import pytest
+
+from mdp.cut import cut, mesh_of, solid_of
+from mdp.mesh import Floats
+from mdp.overhang import risky_above, risky_upright
+from mdp.plane import Plane
+from mdp.search.node import Node
+from mdp.search.polish import polish
+from mdp.search.problem import Problem
+from profiles.profile import load
+from tests import shapes
+
+ANGLE_DEG = 20.0
+ALONG_X = np.array([np.cos(np.radians(15.0)), 0.0, np.sin(np.radians(15.0))])
+
+
+def _problem(*settings: str) -> Problem:
+    """A tee whose undersides are safe only along directions less than 20 degrees above the horizon: one cut a side."""
+    steep = (
+        f"process.self_supporting_angle_deg={ANGLE_DEG}",
+        "search.objective=risky",
+        "search.clearance=false",
+        "search.directions=200",
+    )
+    return Problem(shapes.tee(), load(settings=(*steep, *settings)))
+
+
+def _after(problem: Problem, *planes: Plane) -> Node:
+    nodes = problem.replay(problem.root, planes)
+    assert nodes is not None
+    return nodes[-1]
+
+
+def _through(height_mm: float, x_mm: float, normal: Floats = ALONG_X) -> Plane:
+    return Plane(normal, float(normal @ [x_mm, 0.0, height_mm]))
+
+
+def test_a_plane_moves_to_where_less_stays_risky() -> None:
+    problem = _problem("search.most_parts=2")
+    far_out = _after(problem, _through(30.0, 9.0))
+    better = polish(problem, far_out)
+    assert far_out.cost_mm2 == pytest.approx(300.0 - 110.0, abs=1.0)
+    assert better.cost_mm2 == pytest.approx(150.0, abs=3.0)
+    assert len(better.cuts) == 1
+
+
+def test_a_cut_that_saves_nothing_is_left_out() -> None:
+    problem = _problem("search.most_parts=3")
+    twice = _after(problem, _through(30.0, 12.0), _through(30.0, 5.2))
+    once = polish(_problem("search.most_parts=2"), twice)
+    assert len(twice.cuts) == 2
+    assert len(once.cuts) == 1
+    assert once.cost_mm2 <= twice.cost_mm2
+
+
+def test_where_there_is_room_further_cuts_are_added() -> None:
+    problem = _problem("search.most_parts=4")
+    one_side = _after(problem, _through(30.0, 5.2))
+    both = polish(problem, one_side)
+    assert len(both.cuts) == 2
+    assert both.cost_mm2 < 10.0
+
+
+@pytest.mark.parametrize("x_mm", [5.2, 7.0, 12.0])
+def test_every_cut_of_the_result_leaves_one_standing_solid_and_the_cost_is_what_exact_cuts_leave(x_mm: float) -> None:
+    problem = _problem()
+    polished = polish(problem, _after(problem, _through(30.0, x_mm)))
+    rest, risky_mm2 = solid_of(shapes.tee()), 0.0
+    for base in (each.base for each in polished.cuts):
+        above, rest = cut(rest, base)
+        part = mesh_of(above)
+        risky_mm2 += part.areas_mm2[risky_above(part, base, ANGLE_DEG)].sum()
+        assert above.volume() > 1.0
+        assert [piece.bounding_box()[2] for piece in rest.decompose()] == [0.0]
+    remaining = mesh_of(rest)
+    risky_mm2 += remaining.areas_mm2[risky_upright(remaining, ANGLE_DEG)].sum()
+    assert len(polished.cuts) >= 1
+    assert polished.cost_mm2 == pytest.approx(risky_mm2, abs=1e-6)
+
+
+def test_a_time_limit_of_nothing_leaves_all_as_it_is() -> None:
+    problem = _problem("search.time_limit_s=0")
+    node = _after(problem, _through(30.0, 9.0))
+    assert polish(problem, node).cost_mm2 == node.cost_mm2
+
+
+def test_a_plane_a_hairs_breadth_from_the_origin_is_refused_and_one_through_it_is_looked_at() -> None:
+    problem = _problem()
+    beside, through = Plane(ALONG_X, 1e-17), Plane(ALONG_X, 0.0)
+    assert not problem.allowed(problem.root, beside)
+    assert not problem.allowed(problem.root, through)  # it would cut the platform
+    assert problem.allowed(problem.root, _through(30.0, 9.0))

@@ -1,0 +1,210 @@
+import io
+from concurrent.futures import Future, wait
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mdp.clearance import least_tip_height_mm
+from mdp.decomposition import Decomposition
+from mdp.kernels.threads import ahead
+from mdp.mesh import Mesh
+from mdp.overhang import facing_down
+from mdp.plane import Plane
+from mdp.pose import Pose, rotation
+from mdp.search.candidates import directions
+from mdp.search.search import Progress, decompose, folded_mm3
+from profiles.errors import DecompositionError
+from profiles.profile import load
+from tests import shapes
+from tests.checks import assert_closed
+from tests.mdp.solids import random_solid
+
+
+def _decompose(mesh: Mesh, *settings_: str, machine: str = "generic_ac") -> Decomposition:
+    return decompose(mesh, "shape", load(machine=machine, settings=("search.directions=200", *settings_)))
+
+
+def test_a_leaning_arm_becomes_a_part_of_its_own_without_risk() -> None:
+    decomposition = _decompose(shapes.branch())
+    assert len(decomposition.parts) == 2
+    assert decomposition.parts[1].direction[0] > 0.2
+    assert decomposition.reduction > 0.95
+
+
+@pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
+@pytest.mark.parametrize("name", ["tee", "branch", "bowl", "hollow"])
+def test_parts_are_closed_add_up_and_come_in_a_printable_order(name: str, machine: str) -> None:
+    mesh = getattr(shapes, name)()
+    parts = _decompose(mesh, machine=machine).parts
+    assert sum(part.volume_mm3 for part in parts) == pytest.approx(mesh.volume_mm3, rel=1e-9)
+    assert parts[0].base.heights_mm(parts[0].mesh.vertices).min() == pytest.approx(parts[0].mesh.bounds_mm[0, 2]) == 0.0
+    for position, part in enumerate(parts):
+        assert all(part.base.heights_mm(earlier.mesh.vertices).max() < 1e-6 for earlier in parts[:position])
+        assert_closed(part.mesh)
+        assert rotation(load(machine=machine).machine, part.pose) @ part.direction == pytest.approx([0, 0, 1], abs=1e-7)
+        assert part.in_part_frame().bounds_mm[0, 2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_residual_is_the_area_of_the_parts_faces_that_look_down_over_air() -> None:
+    decomposition = _decompose(shapes.tee(), "process.self_supporting_angle_deg=20", "search.most_parts=2")
+    left_mm2 = sum(_over_air_mm2(part.in_part_frame(), 20.0) for part in decomposition.parts)
+    assert decomposition.residual_area_mm2 == pytest.approx(left_mm2)
+    assert 0.0 < left_mm2 < decomposition.risky_area_mm2
+
+
+def _over_air_mm2(mesh: Mesh, angle_deg: float) -> float:
+    """Area of the faces of a mesh in its part frame that lean further than the angle and lie above z = 0.3."""
+    leaning = mesh.normals[:, 2] < -np.sin(np.radians(angle_deg)) - 1e-4
+    above = mesh.vertices[mesh.faces, 2].max(axis=1) > 0.3
+    return float(mesh.areas_mm2[leaning & above].sum())
+
+
+@pytest.mark.parametrize("seed", [3, 5, 11])
+def test_no_face_of_a_part_rests_on_air(seed: int) -> None:
+    decomposition = _decompose(random_solid(seed), "search.fragile_mm=0", "search.least_gain=0", "search.clearance=false")
+    assert len(decomposition.parts) > 1
+    for position, part in enumerate(decomposition.parts[1:], start=1):
+        beneath = sum(_area_in_plane(earlier.mesh, part.base, 1.0) for earlier in decomposition.parts[:position])
+        down = part.mesh.areas_mm2[facing_down(part.mesh, part.direction, 45.0)].sum()
+        assert _area_in_plane(part.mesh, part.base, -1.0) == pytest.approx(beneath, abs=1e-5)
+        assert part.risky_area_mm2 == pytest.approx(down - beneath, abs=1e-5)
+
+
+def _area_in_plane(mesh: Mesh, plane: Plane, looking: float) -> float:
+    """Area of the faces in a plane that look along its normal (1) or against it (-1)."""
+    inside = np.abs(plane.heights_mm(mesh.vertices)[mesh.faces]).max(axis=1) < 1e-6
+    return float(mesh.areas_mm2[inside & (mesh.normals @ plane.normal * looking > 0.5)].sum())
+
+
+def test_a_box_is_one_part_and_says_why() -> None:
+    decomposition = _decompose(shapes.box())
+    assert len(decomposition.parts) == 1
+    assert decomposition.notes == ("no face needs support: the model is printed straight up as one part",)
+
+
+def test_no_feasible_cut_names_the_constraints_with_their_counts() -> None:
+    decomposition = _decompose(shapes.tee(), "search.least_volume_share=0.9")
+    assert len(decomposition.parts) == 1
+    assert "search.least_volume_share" in decomposition.notes[0]
+
+
+def test_every_part_clears_the_table_by_the_heads_own_measure() -> None:
+    machine = load().machine
+    for part in _decompose(shapes.tee(height=60.0)).parts[1:]:
+        assert part.mesh.bounds_mm[0, 2] >= least_tip_height_mm(machine, part.pose)
+
+
+def test_without_clearance_more_candidates_survive() -> None:
+    low = shapes.tee(height=14.0)
+    assert len(_decompose(low).parts) == 1
+    assert len(_decompose(low, "search.clearance=false").parts) > 1
+
+
+def test_a_pedestal_makes_low_cuts_printable() -> None:
+    low = shapes.tee(height=14.0)
+    lifted = _decompose(low, "search.pedestal_mm=20")
+    assert len(_decompose(low).parts) == 1
+    assert len(lifted.parts) > 1
+    assert lifted.mesh.bounds_mm[1, 2] == pytest.approx(low.bounds_mm[1, 2] + 20.0, abs=0.31)
+
+
+def test_a_record_holds_the_search_and_changes_nothing() -> None:
+    profile = load(settings=["search.directions=200", "search.beam_width=2"])
+    records: list[bytes] = []
+    decomposition = decompose(shapes.tee(), "tee", profile, on_record=records.append)
+    record = np.load(io.BytesIO(records[0]))
+    assert decomposition.residual_area_mm2 == decompose(shapes.tee(), "tee", profile).residual_area_mm2
+    assert record["node_outcome"][0] * decomposition.risky_area_mm2 == pytest.approx(decomposition.cost_mm2, abs=1e-6)
+    assert record["features"].shape[1] == 6
+    assert record["chosen"].sum() == len(record["node_cost"]) - 1
+    assert (record["features"][:, 1] + record["features"][:, 5] <= 1 + 1e-9).all()
+
+
+def test_the_same_search_twice_gives_the_same_parts() -> None:
+    first, second = _decompose(shapes.branch()), _decompose(shapes.branch())
+    for a, b in zip(first.parts, second.parts, strict=True):
+        assert np.array_equal(a.mesh.vertices, b.mesh.vertices)
+        assert a.pose == b.pose
+
+
+def test_a_wider_beam_is_never_worse_on_a_tee() -> None:
+    narrow, wide = (_decompose(shapes.tee(), f"search.beam_width={width}").residual_area_mm2 for width in (1, 4))
+    assert wide <= narrow + 1e-9
+
+
+@pytest.mark.parametrize("name", ["tee", "branch"])
+def test_each_width_of_the_ladder_is_at_least_as_good_as_the_one_before(name: str) -> None:
+    mesh = getattr(shapes, name)()
+    left = [_decompose(mesh, f"search.beam_width={width}").residual_area_mm2 for width in (1, 2, 5)]
+    assert left == sorted(left, reverse=True)
+
+
+def test_the_published_search_keeps_to_its_volume_floor() -> None:
+    mesh = shapes.branch()
+    decomposition = _decompose(mesh, "search.method=published", "search.clearance=false")
+    assert len(decomposition.parts) > 1
+    assert all(part.volume_mm3 >= 0.1 * mesh.volume_mm3 for part in decomposition.parts[1:])
+
+
+def test_a_time_limit_of_nothing_leaves_one_part_and_says_so() -> None:
+    decomposition = _decompose(shapes.tee(), "search.time_limit_s=0")
+    assert len(decomposition.parts) == 1
+    assert decomposition.notes == ("search.time_limit_s = 0 ended the search; the best so far is used",)
+
+
+def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[Future[object]] = []
+
+    def note(*work: Any) -> Future[object]:
+        begun.append(ahead(*work))
+        return begun[-1]
+
+    def interrupt(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mdp.search.beam.ahead", note)
+    with pytest.raises(KeyboardInterrupt):
+        decompose(shapes.branch(), "branch", load(settings=["search.beam_width=8"]), on_stage=interrupt)
+    assert len(begun) > 2
+    assert wait(begun, timeout=60).not_done == set()
+
+
+def test_space_that_a_fold_winds_around_twice_is_reported_and_no_other_difference_is_allowed() -> None:
+    decomposition = _decompose(shapes.tee())
+    folded = shapes.tee(arm=40.004)  # as if its volume counted 0.4 mm3 twice
+    assert folded_mm3(decomposition.mesh, decomposition.parts) == 0.0
+    assert folded_mm3(folded, decomposition.parts) == pytest.approx(0.4)
+    allowed = Decomposition(**vars(decomposition) | {"mesh": folded, "folded_mm3": 0.4001})
+    assert allowed.volume_mm3 == pytest.approx(decomposition.volume_mm3)
+    with pytest.raises(DecompositionError, match="add up to"):
+        Decomposition(**vars(decomposition) | {"mesh": folded})
+
+
+def test_swapped_parts_are_refused() -> None:
+    decomposition = _decompose(shapes.branch())
+    swapped = [decomposition.parts[1], decomposition.parts[0]]
+    fields = vars(decomposition) | {"parts": tuple(swapped)}
+    with pytest.raises(DecompositionError, match="stands at place 1"):
+        Decomposition(**fields)
+
+
+def test_the_clearance_of_one_box_is_the_closed_formula() -> None:
+    machine = load().machine
+    head = machine.head.model_copy(update={"silhouette_mm": [(0.0, 0.0)]})
+    boxed = machine.model_copy(update={"head": head, "clearance_mm": 0.0})
+    for tilt in (20.0, 55.0, 80.0):
+        t = np.radians(tilt)
+        corners = [y * s * np.sin(t) - 40 * np.cos(t) for y, s in product((30.0, -25.0), (1, -1)) if y * s > 0]
+        beam = [y * np.sin(t) - 60 * np.cos(t) for y in (45.0,)]
+        both = {least_tip_height_mm(boxed, Pose(tilt, 0.0)), least_tip_height_mm(boxed, Pose(-tilt, 180.0))}
+        assert max(both) == pytest.approx(max(0.0, *corners, *beam))
+
+
+def test_directions_are_spread_over_the_cap() -> None:
+    spread = directions(load().search)
+    nearest = np.sort(np.arccos(np.clip(spread @ spread.T, -1, 1)), axis=1)[:, 1]
+    assert len(spread) == 600
+    assert spread[:, 2].min() >= np.sin(np.radians(10.0))
+    assert np.degrees(nearest).min() > 3.5

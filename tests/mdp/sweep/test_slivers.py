@@ -1,0 +1,75 @@
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.mesh import Floats, Mesh
+from mdp.plane import Plane
+from mdp.search.candidates import Reason, bounds, check, score_candidates
+from mdp.search.cost import CostTerms
+from mdp.search.ranking import CandidateTable
+from mdp.sweep.sweep import Remainder
+from profiles.profile import load
+from tests import shapes
+
+UP, SIDE = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+
+
+def _remainder(mesh: Mesh) -> Remainder:
+    return Remainder(mesh, np.zeros(len(mesh.faces), bool))
+
+
+def _thin(mesh: Mesh, direction: Floats, *offsets_mm: float) -> list[float]:
+    """Distances of planes to the nearest thin region."""
+    remainder = _remainder(mesh)
+    return [remainder.thin_mm(Plane(direction, offset)) for offset in offsets_mm]
+
+
+def _on_block(*pieces: m3.Manifold) -> Mesh:
+    """A block of 30 x 20 x 10 mm with things on it."""
+    return shapes.standing(sum(pieces, m3.Manifold.cube((30, 20, 10), True).translate((0, 0, 5))))
+
+
+def test_a_plane_through_a_fin_is_at_no_distance_and_one_in_the_block_as_far_as_the_fin() -> None:
+    fin = m3.Manifold.cube((20, 0.8, 15), True).translate((0, 0, 17.4))
+    assert _thin(_on_block(fin), UP, 12.0, 20.0, 4.0) == pytest.approx([0.0, 0.0, 6.0], abs=0.11)
+
+
+def test_a_plane_across_a_thin_bridge_is_at_no_distance_and_one_beside_it_as_far_as_its_end() -> None:
+    posts = [m3.Manifold.cube((8, 8, 20), True).translate((x, 0, 18)) for x in (-11, 11)]
+    bridge = m3.Manifold.cube((22, 0.9, 0.9), True).translate((0, 0, 25))
+    assert _thin(_on_block(*posts, bridge), SIDE, 0.0, 5.0, 10.0) == pytest.approx([0.0, 0.0, 3.0], abs=0.01)
+
+
+@pytest.mark.parametrize(("thickness_mm", "distance_mm"), [(0.8, 3.0), (1.2, np.inf)])
+def test_a_plate_is_thin_below_one_millimetre(thickness_mm: float, distance_mm: float) -> None:
+    plate = _on_block(m3.Manifold.cube((50, 40, thickness_mm), True).translate((0, 0, 10 + thickness_mm / 2)))
+    assert _thin(plate, UP, 7.0) == pytest.approx([distance_mm], abs=0.01)
+
+
+def test_an_acute_edge_is_no_thin_wall() -> None:
+    wedge = m3.Manifold.extrude(m3.CrossSection([[(0, 0), (20, 0), (0, 20)]]), 20).rotate((90, 0, 0))
+    assert _thin(shapes.standing(wedge), UP, 5.0) == [np.inf]
+
+
+def test_only_a_sliver_forbids_a_plane_and_m5_is_less_near_a_fin_than_far_from_it() -> None:
+    table = _table(_on_block(m3.Manifold.cube((20, 0.8, 15), True).translate((0, 0, 17.4))))
+    rows = [int(np.flatnonzero(table.scored.offset_mm == offset_mm)[0]) for offset_mm in (5.0, 9.0, 18.0, 24.0)]
+    table.check_rows(np.array(rows))
+    assert table.reason[rows].tolist() == [Reason.FEASIBLE, Reason.FEASIBLE, Reason.FEASIBLE, Reason.FRAGILE]
+    assert [table.measures(row).fragile_mm for row in rows] == pytest.approx([5.0, 1.0, 0.0, 0.0], abs=0.11)
+
+
+def test_no_plane_lies_in_an_overhanging_face_even_where_slivers_are_allowed() -> None:
+    table = _table(shapes.tee(stem=10, height=40), fragile_mm=0.0)
+    rows = [int(np.flatnonzero(table.scored.offset_mm == offset_mm)[0]) for offset_mm in (29.0, 30.0, 31.0)]
+    table.check_rows(np.array(rows))
+    assert table.reason[rows].tolist() == [Reason.FEASIBLE, Reason.FRAGILE, Reason.FEASIBLE]
+
+
+def _table(mesh: Mesh, fragile_mm: float = 1.0) -> CandidateTable:
+    """All candidates of a solid along the upright direction."""
+    words = ("clearance=false", "least_interface_mm2=0", "least_volume_share=0", f"fragile_mm={fragile_mm}")
+    profile = load(settings=[f"search.{word}" for word in words])
+    limits = bounds(mesh, profile.machine, profile.search, UP[None])
+    scored = score_candidates(_remainder(mesh), limits, profile.search.offset_step_mm, CostTerms(45.0, False), -np.inf)
+    return CandidateTable(scored, limits, 0.0, 0.0, lambda *planes: check(scored.remainder, limits, profile.search, *planes))

@@ -1,0 +1,133 @@
+"""Plan files: what is written is read again, and what cannot be a plan is refused in one sentence."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.plan_file import PlanFile, PlannedPart, PlannedRow, mesh_sha256, plan_text, read_plan
+from mdp.zone import Zone, Zones
+from profiles.errors import PlanError
+from profiles.machine import Vector
+from tests import shapes
+
+FIRST = "version = 1\n[[part]]\n"
+NUMBERS = st.floats(-1e5, 1e5)
+
+
+def unit(vector: Vector) -> Vector:
+    x, y, z = (float(value) for value in np.array(vector) / np.linalg.norm(vector))
+    return x, y, z
+
+
+NORMALS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda vector: np.linalg.norm(vector) > 1e-3).map(unit)
+WHOLE = st.builds(PlannedPart, NORMALS, NUMBERS)
+OPEN = st.builds(
+    PlannedPart, st.none() | NORMALS, st.none() | NUMBERS, st.text(st.characters(categories=["L", "N"]), max_size=20)
+)
+ROWS = st.builds(PlannedRow, st.lists(WHOLE, max_size=3).map(tuple), st.floats(0, 1e9), st.floats(0, 1e9), st.floats(0, 1e9))
+CORNERS = st.tuples(*[st.floats(-9e4, 9e4)] * 3)
+ZONES = CORNERS.map(lambda low: Zone(low, (low[0] + 1.0, low[1] + 20.0, low[2] + 300.0)))
+TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+PLANS = st.builds(
+    PlanFile,
+    name=st.just("plan.toml"),
+    model=st.text(max_size=20),
+    sha256=st.text("0123456789abcdef", max_size=64),
+    orientation=st.sampled_from([None, TURNED]),
+    parts=st.lists(OPEN, max_size=5).map(tuple),
+    zones=st.builds(Zones, st.lists(ZONES, max_size=2).map(tuple), st.lists(ZONES, max_size=2).map(tuple)),
+    front=st.lists(ROWS, max_size=3, unique_by=lambda row: len(row.parts)).map(tuple),
+)
+
+
+@settings(max_examples=60)
+@given(PLANS)
+def test_a_plan_that_is_written_is_read_again_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, plan: PlanFile) -> None:
+    path = tmp_path_factory.mktemp("plan") / "plan.toml"
+    path.write_text(plan_text(plan), encoding="utf-8", newline="")
+    assert read_plan(path) == plan
+
+
+REFUSED = [
+    ("", "version is missing: this program reads version 1"),
+    ("version = 2", "version is 2: this program reads version 1"),
+    ("version = true", "version is True: this program reads version 1"),
+    ("version = 1\ncolour = 'red'", "'colour' is no key of a plan: version, model, sha256, orientation, part,"),
+    ("version = 1\nmodel = 5", "model is 5: a text is expected"),
+    ("version = 1\nsha256 = []", "sha256 is []: a text is expected"),
+    ("version = 1\npart = 3", "part is 3: [[part]] tables are expected"),
+    ("version = 1\norientation = [[1, 0, 0], [0, 1, 0]]", "a rotation is expected, three rows of three numbers"),
+    ("version = 1\norientation = [[2, 0, 0], [0, 1, 0], [0, 0, 1]]", "a rotation is expected, three rows of three numbers"),
+    ("version = 1\norientation = 7", "orientation is 7: 3 numbers in brackets are expected"),
+    ("version = 1\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 5", "part 1 stands on the platform and has no plane"),
+    (f"{FIRST}tilt_deg = 4", "part 1: 'tilt_deg' is no key of a plan: normal, offset_mm are allowed"),
+    (f"{FIRST}[[part]]\nnormal = [0, 1]", "part 2: normal is [0, 1]: 3 numbers in brackets are expected"),
+    (f"{FIRST}[[part]]\nnormal = 'up'", "part 2: normal is 'up': 3 numbers in brackets are expected"),
+    (f"{FIRST}[[part]]\nnormal = [0, 0, nan]", "part 2: normal is [0, 0, nan]: 3 numbers in brackets are expected"),
+    (f"{FIRST}[[part]]\nnormal = [0, 0, 0]", "part 2: normal is [0, 0, 0]: a direction of a length of about 1 is expected"),
+    (f"{FIRST}[[part]]\nnormal = [0, 0, 1e200]", "a direction of a length of about 1 is expected"),
+    (f"{FIRST}[[part]]\noffset_mm = nan", "part 2: offset_mm is nan: a number is expected"),
+    (f"{FIRST}[[part]]\noffset_mm = -inf", "part 2: offset_mm is -inf: a number is expected"),
+    (f"{FIRST}[[part]]\noffset_mm = true", "part 2: offset_mm is True: a number is expected"),
+    (f"{FIRST}[[part]]\noffset_mm = '5'", "part 2: offset_mm is '5': a number is expected"),
+    (f"{FIRST}[[part]]\noffset_mm = 200000", "part 2: offset_mm is 200000: -100000 to 100000 is allowed"),
+    (f"{FIRST}[[part]]\noffset_mm = 0x{'f' * 5000}", "offset_mm is a number of thousands of digits: a number is expected"),
+    (f"{FIRST}[[part]]\noffset_mm = {'9' * 5000}", "is no TOML"),
+    (FIRST * 1 + "[[part]]\n" * 1001, "there are 1002 [[part]] tables: up to 1000 are allowed"),
+    ("version = 1\n[[keep]]\nmin_mm = [0, 0, 0]", "keep 1: max_mm is missing: 3 numbers in brackets are expected"),
+    ("version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 0, 1]", "each number of min_mm must be less"),
+    ("version = 1\n[[no_seam]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, inf, 1]", "no_seam 1: max_mm is [1, inf, 1]"),
+    ("version = 1\n[keep]\nmin_mm = [0, 0, 0]", "[[keep]] tables are expected"),
+    ("version = 1\n[[front]]\nplanes = 4", "front 1: planes is 4: a list of [x, y, z, offset_mm] is expected"),
+    ("version = 1\n[[front]]\nplanes = [[0, 0, 1]]", "front 1: planes is [0, 0, 1]: 4 numbers in brackets are expected"),
+    ("version = 1\n[[front]]\nplanes = []\ncost_mm2 = 'dear'", "front 1: cost_mm2 is 'dear': a number is expected"),
+    ("version = 1\n[[front]]\nplanes = []\n[[front]]\nplanes = []", "two rows of [[front]] have the same number of planes"),
+    ("version = [", "is no TOML"),
+    ("version = 1\n" + "x = " + "[" * 20000, "is no TOML"),
+    ("version = 1\nversion = 1", "is no TOML"),
+]
+
+
+@pytest.mark.parametrize(("text", "sentence"), REFUSED, ids=[sentence for _, sentence in REFUSED])
+def test_what_is_no_plan_is_refused_in_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(PlanError) as refused:
+        read_plan(path)
+    message = str(refused.value)
+    assert sentence in message
+    assert "mine.toml" in message
+    assert "\n" not in message
+    assert len(message) < 400
+
+
+def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path: Path) -> None:
+    (tmp_path / "binary.toml").write_bytes(bytes(range(128, 256)))
+    (tmp_path / "large.toml").write_bytes(b"#" * 10_000_001)
+    for name, why in (("none", "no such file"), (".", "is a directory"), ("binary", "is not text"), ("large", "it is no plan")):
+        with pytest.raises(PlanError, match=why):
+            read_plan(tmp_path / (f"{name}.toml" if name != "." else name))
+
+
+def test_a_normal_of_another_length_is_a_direction_all_the_same(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(f"{FIRST}[[part]]\nnormal = [0, 3, 4]\noffset_mm = 10")
+    (part,) = read_plan(tmp_path / "mine.toml").parts
+    assert part == PlannedPart((0.0, 0.6, 0.8), 10.0)
+
+
+def test_the_word_for_a_mesh_tells_micrometres_apart_and_not_the_last_digits() -> None:
+    box = shapes.box()
+    assert mesh_sha256(box.transform(np.eye(3), (1e-9, 0, 0))) == mesh_sha256(box)
+    assert mesh_sha256(box.transform(np.eye(3), (1e-3, 0, 0))) != mesh_sha256(box)
+
+
+def test_a_row_of_at_most_so_many_parts_is_the_one_with_the_most() -> None:
+    parts = tuple(PlannedPart((0.0, 0.0, 1.0), float(k)) for k in range(5))
+    plan = PlanFile("mine.toml", parts=parts[:2], front=(PlannedRow(parts[:1]), PlannedRow(parts[2:4]), PlannedRow(parts[:4])))
+    assert [len(plan.row(most)) for most in (2, 3, 4, 5, 50)] == [1, 2, 2, 4, 4]
+    assert plan.row(3) == parts[:2]
+    with pytest.raises(PlanError, match=r"holds no decomposition into 1 parts or fewer, only into 2, 3, 5"):
+        plan.row(1)

@@ -1,0 +1,43 @@
+"""Zones: which faces reach into a box and between which offsets a plane passes through it."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.mesh import Mesh
+from mdp.zone import Zone, spans_mm, touched
+from tests import shapes
+from tests.mdp.solids import random_direction, random_solid
+
+
+def test_faces_of_a_box_are_touched_where_the_zone_reaches_them() -> None:
+    box = shapes.box()
+    top = touched(box, [Zone((-5, -5, 15), (5, 5, 25))])
+    assert set(box.normals[top][:, 2]) == {1.0}
+    assert not touched(box, [Zone((-5, -5, 5), (5, 5, 15))]).any()
+    assert not touched(box, []).any()
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 50), st.tuples(*[st.floats(-15.0, 15.0)] * 3), st.floats(0.5, 10.0))
+def test_a_face_with_a_point_in_the_zone_is_touched(seed: int, low: tuple[float, float, float], size: float) -> None:
+    mesh, zone = random_solid(seed), Zone(low, (low[0] + size, low[1] + size, low[2] + size))
+    weights = np.random.default_rng(0).dirichlet((1.0, 1.0, 1.0), 200)
+    points = np.einsum("sc,fci->fsi", weights, mesh.vertices[mesh.faces])
+    inside = ((points >= zone.min_mm) & (points <= zone.max_mm)).all(axis=2).any(axis=1)
+    assert (zone.touches(mesh) >= inside).all()
+
+
+def test_a_face_whose_box_reaches_into_the_zone_but_not_itself_is_not_touched() -> None:
+    mesh = Mesh(
+        np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]]), np.array([[0, 2, 1], [1, 2, 3], [0, 1, 3], [0, 3, 2]])
+    )
+    assert touched(mesh, [Zone((4.0, 4.0, 4.0), (9.0, 9.0, 9.0))]).tolist() == [False, False, False, False]
+    assert touched(mesh, [Zone((3.0, 3.0, 3.0), (9.0, 9.0, 9.0))]).tolist() == [False, True, False, False]
+
+
+@given(st.integers(1, 999), st.integers(1, 999))
+def test_a_plane_passes_through_a_zone_between_its_lowest_and_its_highest_corner(height: int, around: int) -> None:
+    direction, zone = random_direction(height, around), Zone((-1.0, 2.0, 3.0), (4.0, 5.0, 9.0))
+    corners = np.array([[x, y, z] for x in (-1.0, 4.0) for y in (2.0, 5.0) for z in (3.0, 9.0)]) @ direction
+    np.testing.assert_allclose(spans_mm(direction[None], [zone])[0], [[corners.min(), corners.max()]], atol=1e-12)

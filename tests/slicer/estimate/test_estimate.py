@@ -1,0 +1,98 @@
+"""Estimates of time and filament: closed formulas, laws, and the dry run."""
+
+from math import pi
+
+import manifold3d as m3
+import pytest
+
+from machine.app.pipeline.pipeline import build
+from mdp.mesh import Mesh
+from mdp.read import locate, read_mesh
+from mdp.search.search import decompose
+from profiles.process import Process
+from slicer.estimate.estimate import Estimate, estimate
+from tests.shapes import box, standing, tee
+from tests.slicer.hand import BARE, SOLID, cut, profile, whole
+
+FILAMENT_MM2 = pi * 1.75**2 / 4.0
+STROKE_SPEEDS = [
+    key for key in Process.model_fields if key.endswith("speed_mm_s") and not key.startswith(("lift", "travel", "least"))
+]
+
+
+def of(mesh: Mesh, *settings: str) -> Estimate:
+    return estimate(whole(mesh), profile(*settings))
+
+
+@pytest.mark.parametrize("mesh", [box(20, 20, 20), standing(m3.Manifold.cylinder(20, 12, 12, 96))], ids=["box", "cylinder"])
+def test_a_solid_print_takes_as_much_filament_as_it_has_volume(mesh: Mesh) -> None:
+    assert of(mesh, *SOLID).filament_mm * FILAMENT_MM2 == pytest.approx(mesh.volume_mm3, rel=0.015)
+
+
+def test_sparse_infill_takes_its_share_of_the_inside() -> None:
+    mesh = box(40, 40, 40)
+    bare = (*BARE, "process.top_layers=0", "process.bottom_layers=0", "process.solid_below_mm2=0")
+    empty, sparse = (of(mesh, *bare, f"process.infill_density={density}").filament_mm for density in (0.0, 0.25))
+    inside = 40.0 - 0.45 - 5.0 * (0.45 - 0.2 * (1.0 - pi / 4.0))
+    assert (sparse - empty) * FILAMENT_MM2 == pytest.approx(0.25 * inside**2 * 40.0, rel=0.02)
+
+
+def test_a_tower_twice_as_high_takes_twice_as_long() -> None:
+    low, high = (of(box(30, 30, z), *SOLID).time_s for z in (30, 60))
+    assert high / low == pytest.approx(2.0, rel=0.02)
+
+
+def test_slow_strokes_take_the_time_of_their_length() -> None:
+    slow = (*SOLID, *(f"process.{key}=1" for key in STROKE_SPEEDS), "process.least_layer_time_s=0")
+    mesh = box(10, 10, 4)
+    bead_mm2 = 0.2 * (0.45 - 0.2 * (1.0 - pi / 4.0))
+    assert of(mesh, *slow).time_s == pytest.approx(mesh.volume_mm3 / bead_mm2, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("less", "more"),
+    [
+        ("process.infill_density=0.1", "process.infill_density=0.3"),
+        ("process.walls=2", "process.walls=4"),
+        ("process.layer_height_mm=0.3", "process.layer_height_mm=0.15"),
+        ("process.infill_speed_mm_s=120", "process.infill_speed_mm_s=60"),
+        ("process.travel_speed_mm_s=200", "process.travel_speed_mm_s=20"),
+        ("process.least_layer_time_s=0", "process.least_layer_time_s=60"),
+        ("material.volumetric_limit_mm3_s=12", "material.volumetric_limit_mm3_s=2"),
+        ("process.acceleration_mm_s2=1500", "process.acceleration_mm_s2=300"),
+        ("process.support=none", "process.support=auto"),
+    ],
+)
+def test_what_asks_more_of_the_machine_takes_longer(less: str, more: str) -> None:
+    assert of(tee(), less).time_s < of(tee(), more).time_s
+
+
+def test_support_is_told_apart_and_there_only_where_something_hangs() -> None:
+    assert of(box()).support_mm3 == 0.0
+    bare = ("process.skirt_loops=0", "process.small_base_brim_mm=0")
+    supported, alone = of(tee(), *bare), of(tee(), *bare, "process.support=none")
+    assert supported.support_mm3 == pytest.approx((supported.filament_mm - alone.filament_mm) * FILAMENT_MM2, rel=0.05)
+    assert 300.0 < supported.support_mm3 < 3000.0
+
+
+def test_parts_add_up_and_each_later_one_costs_a_turn_of_the_table() -> None:
+    parts = cut(box(20, 20, 40), ((0.0, 0.0, 1.0), 20.0))
+    settings = profile(*SOLID)
+    both = estimate(parts, settings)
+    assert both.time_s == pytest.approx(sum(estimate(part, settings).time_s for part in parts))
+    assert both.time_s > of(box(20, 20, 40), *SOLID).time_s
+
+
+def test_no_parts_take_no_time() -> None:
+    assert estimate((), profile()) == Estimate(0.0, 0.0, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bracket", "tree"])
+def test_the_dry_run_of_a_demo_takes_as_long_as_estimated(name: str) -> None:
+    settings = profile("search.beam_width=1", "search.most_parts=3")
+    decomposition = decompose(read_mesh(locate(f"demo:{name}"))[0], name, settings)
+    run = build(decomposition, settings).run
+    expected = estimate(decomposition.parts, settings)
+    assert expected.time_s == pytest.approx(run.time_s, rel=0.15)
+    assert expected.filament_mm == pytest.approx(float(run.program.filament_mm.max()), rel=0.1)

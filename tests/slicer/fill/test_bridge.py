@@ -1,0 +1,144 @@
+"""Bridges: their direction against brute force, where their lines end, and how they are printed."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely.affinity import rotate
+
+from mdp.mesh import Mesh
+from slicer.fill.bridge import Bridge, find_bridge
+from slicer.geometry.polygons import Polygons, edges, offset
+from slicer.paths import Kind, Path
+from slicer.slice import slice_part
+from tests.shapes import box, standing
+from tests.slicer.hand import SOLID, as_shapely, cut, of_kind, profile, whole
+
+WIDTH = 0.45
+
+
+def gap(length: float, span: float, turn_deg: float) -> tuple[Polygons, Polygons]:
+    """A hanging rectangle between two banks along its long sides."""
+    hanging = Polygons.square((length, span), True).rotate(turn_deg)
+    sides = [Polygons.square((length, 4), True).translate((0, side * (span / 2 + 2))).rotate(turn_deg) for side in (-1, 1)]
+    return hanging, Polygons.compose(sides)
+
+
+def bridge_over(hanging: Polygons, banks: Polygons) -> Bridge:
+    span = find_bridge(hanging, edges(offset(banks, 0.25 * WIDTH)), WIDTH)
+    assert span is not None
+    return span
+
+
+def apart_deg(a: float, b: float) -> float:
+    return abs((a - b + 90) % 180 - 90)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(3, 30), st.floats(2, 30), st.floats(0, 180))
+def test_lines_cross_the_gap_at_right_angles_however_it_lies(length: float, span: float, turn: float) -> None:
+    over = bridge_over(*gap(length, span, turn))
+    assert apart_deg(over.angle_deg, turn + 90) < 0.1
+    assert over.longest_mm == pytest.approx(span, abs=0.01)
+    assert over.loose < 0.01
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.tuples(st.floats(0, 6.28), st.floats(3, 6)), min_size=5, max_size=9, unique_by=lambda p: round(p[0], 1)))
+def test_no_direction_has_shorter_squared_spans(corners: list[tuple[float, float]]) -> None:
+    points = np.array([[r * np.cos(a), r * np.sin(a)] for a, r in sorted(corners)])
+    hanging = Polygons.hull_points(points)
+    over = bridge_over(hanging, offset(hanging, 5) - hanging)
+    shape = as_shapely(hanging)
+    assert mean_span(shape, over.angle_deg) <= 1.02 * min(mean_span(shape, angle) for angle in range(0, 180, 3))
+
+
+def mean_span(shape: shapely.Geometry, angle: float) -> float:
+    """Mean length of lines across a shape, each weighted by itself."""
+    turned = rotate(shape, -angle, origin=(0, 0))
+    low, high = turned.bounds[1], turned.bounds[3]
+    spans = [shapely.LineString([(-99, y), (99, y)]).intersection(turned).length for y in np.arange(low + WIDTH / 2, high, WIDTH)]
+    return float(sum(s * s for s in spans) / sum(spans))
+
+
+def test_a_ledge_is_printed_outwards_from_its_only_bank() -> None:
+    hanging = Polygons.square((10, 3))
+    over = bridge_over(hanging, Polygons.square((10, 3)).translate((0, 3)))
+    assert apart_deg(over.angle_deg, 90) < 0.1
+    assert over.loose == 1.0
+    assert not over.carries(100)
+
+
+def test_nothing_to_hold_on_to_is_no_bridge() -> None:
+    banks = edges(Polygons.square((5, 5)).translate((20, 0)))
+    assert find_bridge(Polygons.square((5, 5)), banks, WIDTH) is None
+
+
+def portal(span: float) -> Mesh:
+    """Two posts and a plate across them."""
+    posts = m3.Manifold.cube((6, 10, 8)) + m3.Manifold.cube((6, 10, 8)).translate((6 + span, 0, 0))
+    return standing(posts + m3.Manifold.cube((12 + span, 10, 2)).translate((0, 0, 8)))
+
+
+def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks() -> None:
+    sliced = slice_part(whole(portal(5)), profile(*SOLID, "process.bridge_speed_mm_s=27", "process.bridge_flow=0.9"))
+    beads = of_kind(sliced, Kind.BRIDGE)
+    layer = next(layer for layer in sliced.layers if any(p in beads for p in layer.paths))
+    assert layer.z_mm == pytest.approx(8.2)
+    assert {p.speed_mm_s for p in beads} == {27.0}
+    ends = np.concatenate([p.points for p in beads])
+    assert np.abs(ends[:, 0]).min() > 2.5
+    assert np.abs(ends[:, 0]).max() < 2.5 + 4 * WIDTH
+    plain = of_kind(slice_part(whole(portal(5)), profile(*SOLID)), Kind.BRIDGE)
+    assert beads[0].flow == pytest.approx(0.9 * plain[0].flow)
+
+
+def test_a_plate_resting_on_plastic_is_no_bridge() -> None:
+    base, plate = cut(portal(0.0001), ((0, 0, 1), 8.0))
+    assert of_kind(slice_part(plate, profile(*SOLID), [base]), Kind.BRIDGE) == []
+
+
+def test_a_part_that_spans_two_posts_of_an_earlier_one_is_a_bridge_from_its_first_layer() -> None:
+    base, plate = cut(portal(5), ((0, 0, 1), 8.0))
+    sliced = slice_part(plate, profile(), [base])
+    assert Kind.BRIDGE in {p.kind for p in sliced.layers[0].paths}
+    assert Kind.BRIDGE not in {p.kind for p in sliced.layers[1].paths}
+
+
+def test_without_support_a_long_span_is_still_a_bridge() -> None:
+    beads = of_kind(slice_part(whole(portal(25)), profile(*SOLID)), Kind.BRIDGE)
+    steps = np.diff(max(beads, key=lambda p: p.length_mm).points, axis=0)
+    assert np.abs(steps[:, 1])[np.abs(steps[:, 0]) > 1].max() < 1e-6
+
+
+OWN = ("process.infill_bridge_speed_mm_s=33", "material.fan_infill_bridge=0.8", "process.infill_bridge_flow=1.1")
+
+
+def bridged_layers(*settings: str) -> dict[int, list[Path]]:
+    """Numbers of the layers of a box that have bridges, and those bridges."""
+    sliced = slice_part(whole(box(24, 24, 4)), profile("process.least_layer_time_s=0", *settings))
+    bridges = {k: [p for p in layer.paths if p.kind is Kind.BRIDGE] for k, layer in enumerate(sliced.layers)}
+    return {k: paths for k, paths in bridges.items() if paths}
+
+
+def test_the_first_skin_over_sparse_infill_is_a_bridge_with_speed_fan_and_flow_of_its_own() -> None:
+    ((layer, paths),) = bridged_layers(*OWN).items()
+    assert layer == 20 - 4
+    assert {(path.speed_mm_s, path.fan) for path in paths} == {(33.0, 0.8)}
+    assert max(path.flow for path in paths) == pytest.approx(1.1, abs=0.05)
+    assert sum(path.length_mm for path in paths) * 0.407 == pytest.approx((24 - 2 * 1.24) ** 2, rel=0.05)
+
+
+def test_bridges_over_sparse_lines_run_across_them() -> None:
+    layers = bridged_layers("process.infill_pattern=rectilinear", "process.infill_angle_deg=20")
+    ((layer, paths),) = layers.items()
+    steps = np.diff(max(paths, key=lambda path: path.length_mm).points[:2], axis=0)[0]
+    below_deg = 20 + 90 * ((layer - 1) % 2)
+    assert abs(steps @ [np.cos(np.radians(below_deg)), np.sin(np.radians(below_deg))]) < 0.05 * np.hypot(*steps)
+
+
+@pytest.mark.parametrize("density", [0.0, 0.6, 1.0])
+def test_skin_over_dense_infill_is_no_bridge(density: float) -> None:
+    assert (density > 0) == (not bridged_layers(f"process.infill_density={density}"))

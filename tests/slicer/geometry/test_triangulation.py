@@ -1,0 +1,61 @@
+"""Triangulations and chordal axes of polygons, judged by shapely's constrained Delaunay triangulation and by hand."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.mesh import Floats
+from slicer.geometry.chordal_axis import chordal_axis
+from slicer.geometry.polygons import Polygons, contours
+from slicer.geometry.triangulation import triangulate
+from tests.slicer.hand import as_shapely, ragged
+
+
+def corners(polygons: Polygons) -> Floats:
+    """(m, 3, 2) the triangles of our triangulation."""
+    triangulation = triangulate(contours(polygons))
+    assert triangulation is not None
+    return triangulation.points[triangulation.tails].reshape(-1, 3, 2)
+
+
+def as_rows(triangles: Floats) -> set[tuple[float, ...]]:
+    """Triangles as sets of rounded corners, wherever each begins and whichever way it turns."""
+    rounded = np.round(triangles, 6).tolist()
+    return {tuple(value for corner in sorted(map(tuple, triangle)) for value in corner) for triangle in rounded}
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 10**6))
+def test_the_triangles_are_those_of_shapely_s_constrained_delaunay_triangulation(seed: int) -> None:
+    star = ragged(seed)
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(as_shapely(star)))
+    expected = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    assert as_rows(corners(star)) == as_rows(expected)
+
+
+def test_a_polygon_without_area_has_no_triangulation() -> None:
+    assert triangulate([]) is None
+
+
+def test_the_axis_of_a_strip_runs_in_its_middle_with_its_width() -> None:
+    x = np.arange(0.0, 10.0, 0.5)
+    strip = np.concatenate([np.column_stack([x, 0 * x]), np.column_stack([x[::-1], 0 * x + 1.0])])
+    triangulation = triangulate([strip])
+    assert triangulation is not None
+    axis = chordal_axis(triangulation)
+    assert len(axis.starts) == 1
+    assert axis.points[:, 1] == pytest.approx(0.5)
+    assert axis.widths == pytest.approx(1.0)
+    assert axis.ends.tolist() == [[-1, -1]]
+    assert axis.areas == pytest.approx([9.5])
+
+
+def test_three_arms_meet_in_a_fork() -> None:
+    arm = Polygons.square((6.0, 1.0)).translate((0.0, -0.5))
+    star = arm + arm.rotate(120.0) + arm.rotate(240.0)
+    triangulation = triangulate(contours(star))
+    assert triangulation is not None
+    forks = chordal_axis(triangulation).ends.ravel()
+    assert sorted(np.unique(forks[forks >= 0], return_counts=True)[1].tolist())[-1] == 3

@@ -1,0 +1,57 @@
+"""Widths of the beads by kind and in part 1's first layer."""
+
+import numpy as np
+import pytest
+
+from slicer.paths import Kind
+from slicer.slice import slice_part
+from tests.shapes import box, tee
+from tests.slicer.hand import SOLID, cut, of_kind, profile, volume_mm3, whole
+
+WIDTHS = {Kind.OUTER_WALL: 0.35, Kind.INNER_WALL: 0.45, Kind.TOP_SKIN: 0.4, Kind.SKIN: 0.45, Kind.INFILL: 0.6, Kind.SUPPORT: 0.3}
+KEYS = ("outer_wall", "top_skin", "infill", "support")
+BY_KIND = [f"process.{key}_line_width_mm={WIDTHS[Kind[key.upper()]]}" for key in KEYS]
+
+
+def test_every_kind_of_bead_has_its_width() -> None:
+    sliced = slice_part(whole(tee()), profile("process.solid_below_mm2=0", *BY_KIND))
+    for kind, width in WIDTHS.items():
+        assert {path.width_mm for path in of_kind(sliced, kind)} == {width}
+
+
+def test_all_beads_of_part_ones_first_layer_have_one_width_and_those_of_later_parts_do_not() -> None:
+    chosen = profile("process.first_layer_line_width_mm=0.6", *BY_KIND)
+    base, top = (slice_part(part, chosen) for part in cut(box(10, 10, 6), ((0.0, 0.0, 1.0), 3.0)))
+    assert {path.width_mm for path in base.layers[0].paths if path.kind is not Kind.GAP} == {0.6}
+    assert {path.width_mm for path in top.layers[0].paths if path.kind is Kind.OUTER_WALL} == {0.35}
+
+
+@pytest.mark.parametrize("width", [0.3, 0.7])
+def test_an_outer_wall_runs_half_its_own_width_inside(width: float) -> None:
+    sliced = slice_part(whole(box(20, 20, 1)), profile(f"process.outer_wall_line_width_mm={width}"))
+    points = np.concatenate([path.points for path in of_kind(sliced, Kind.OUTER_WALL)])
+    assert np.abs(points).max() == pytest.approx(10 - 0.5 * width)
+
+
+@pytest.mark.parametrize("key", ["first_layer", "outer_wall", "top_skin"])
+@pytest.mark.parametrize("width", [0.3, 0.7])
+def test_a_solid_part_extrudes_its_volume_whatever_the_widths(key: str, width: float) -> None:
+    mesh = box(20, 15, 3)
+    sliced = slice_part(whole(mesh), profile(*SOLID, f"process.{key}_line_width_mm={width}"))
+    assert sliced.volume_mm3 == pytest.approx(mesh.volume_mm3, rel=0.015)
+
+
+def test_wide_infill_keeps_its_density() -> None:
+    plain, wide = (
+        slice_part(whole(box(40, 40, 6)), profile("process.infill_pattern=rectilinear", f"process.infill_line_width_mm={w}"))
+        for w in (0.45, 0.7)
+    )
+    assert volume_mm3(wide, Kind.INFILL) == pytest.approx(volume_mm3(plain, Kind.INFILL), rel=0.05)
+
+
+def test_the_first_layers_flow_is_its_own() -> None:
+    plain, rich = (slice_part(whole(box(20, 20, 1)), profile(f"process.first_layer_flow={f}")) for f in (1.0, 1.1))
+    ratios = [
+        sum(map(b.volume_mm3, b.paths)) / sum(map(a.volume_mm3, a.paths)) for a, b in zip(plain.layers, rich.layers, strict=True)
+    ]
+    assert ratios == pytest.approx([1.1, 1.0, 1.0, 1.0, 1.0])

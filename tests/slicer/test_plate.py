@@ -1,0 +1,107 @@
+"""Brims, skirts and the base: closed formulas of the section modulus, who needs a brim, the first layer's outline."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mdp.mesh import Mesh
+from slicer.geometry.polygons import Polygons
+from slicer.paths import Kind, Path
+from slicer.plate import compensate_elephant_foot, section_modulus_mm3, tips_over
+from slicer.slice import slice_part
+from tests.shapes import box, tee
+from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
+
+
+@given(st.floats(1, 50), st.floats(1, 50), st.integers(0, 35), st.floats(-90, 90))
+def test_the_section_modulus_of_a_rectangle(b: float, h: float, turn: int, x: float) -> None:
+    area = Polygons.square((b, h), True).rotate(5.0 * turn).translate((x, 2 * x))
+    weak, strong = min(b, h), max(b, h)
+    assert section_modulus_mm3(area) <= strong * weak**2 / 6 * (1 + 1e-6)
+    if turn % 18 == 0:
+        moduli = [b**3 * h / 12 * c * c + h**3 * b / 12 * s * s for c, s in turns()]
+        far = [b / 2 * abs(c) + h / 2 * abs(s) for c, s in turns()]
+        assert section_modulus_mm3(area) == pytest.approx(min(np.array(moduli) / far), rel=1e-6)
+
+
+def turns() -> list[tuple[float, float]]:
+    around = np.pi * np.arange(36) / 36
+    return list(zip(np.cos(around), np.sin(around), strict=True))
+
+
+def test_the_section_modulus_of_a_tube() -> None:
+    tube = Polygons.circle(10, 720) - Polygons.circle(8, 720)
+    assert section_modulus_mm3(tube) == pytest.approx(np.pi * (10**4 - 8**4) / 40, rel=1e-3)
+
+
+def test_feet_far_apart_hold_better_than_one() -> None:
+    foot = Polygons.square((4, 4), True)
+    four = Polygons.compose([foot.translate((x, y)) for x in (-20, 20) for y in (-20, 20)])
+    assert tips_over(foot, 30)
+    assert not tips_over(four, 30)
+
+
+def brim_of(mesh: Mesh, *settings: str) -> list[Path]:
+    return of_kind(slice_part(whole(mesh), profile(*settings)), Kind.SKIRT)
+
+
+def test_a_tall_part_on_a_small_base_gets_a_brim_and_a_stout_one_its_skirt() -> None:
+    thin, stout = brim_of(box(6, 6, 40)), brim_of(box(20, 20, 20))
+    assert min(np.abs(p.points).max() for p in thin) < 3.3
+    assert max(np.abs(p.points).max() for p in thin) == pytest.approx(8, abs=0.45)
+    assert min(np.abs(p.points).max() for p in stout) > 13
+
+
+def test_no_brim_where_it_is_not_wanted() -> None:
+    assert brim_of(box(6, 6, 40), *BARE, "process.small_base_brim_mm=0") == []
+
+
+def test_what_is_printed_later_on_top_counts_as_height() -> None:
+    base, top = cut(box(8, 8, 60), ((0, 0, 1), 5.0))
+    alone, both = (of_kind(slice_part(base, profile(), later=later), Kind.SKIRT) for later in ((), (top,)))
+    assert (len(alone), len(both)) == (1, 13)
+
+
+def test_the_gap_of_a_brim() -> None:
+    near = min(np.abs(p.points).max() for p in brim_of(box(10, 10, 2), "process.brim_mm=3", "process.brim_gap_mm=0.15"))
+    assert near == pytest.approx(5 + 0.15 + 0.5 * (0.45 - 0.2 * (1 - np.pi / 4)))
+
+
+def test_only_the_first_layer_is_smaller_against_the_elephants_foot() -> None:
+    layers = slice_part(whole(box(20, 20, 2)), profile(*BARE, "process.elephant_foot_mm=0.2")).layers
+    edges = [max(np.abs(p.points).max() for p in layer.paths) for layer in layers[:3]]
+    assert edges == pytest.approx([10 - 0.2 - 0.225, 10 - 0.225, 10 - 0.225])
+
+
+def test_a_part_on_plastic_has_no_elephants_foot() -> None:
+    base, top = cut(box(20, 20, 20), ((0, 0, 1), 10.0))
+    first = slice_part(top, profile(*BARE, "process.elephant_foot_mm=0.2", "process.interface_seam_mm=0"), [base]).layers[0]
+    assert max(np.abs(p.points).max() for p in first.paths) == pytest.approx(10 - 0.225)
+
+
+def test_thin_places_keep_their_width() -> None:
+    shape = Polygons.square((20, 20)) + Polygons.square((10, 0.6)).translate((20, 10))
+    less = as_shapely(compensate_elephant_foot(shape, 0.2, 0.45))
+    assert less.area == pytest.approx(19.6**2 + 10 * 0.6, abs=0.3)
+    assert less.bounds == pytest.approx((0.2, 0.2, 30, 19.8), abs=1e-6)
+    assert len(getattr(less, "geoms", [less])) == 1
+
+
+PLATE = "machine.table.radius_mm=14"
+
+
+def test_a_skirt_that_finds_no_room_on_the_plate_follows_its_edge() -> None:
+    wide = profile("process.skirt_loops=2", "process.small_base_brim_mm=0", "process.support=none", PLATE)
+    skirt = of_kind(slice_part(whole(box(18, 18, 2)), wide), Kind.SKIRT)
+    farthest = [np.hypot(*path.points.T).max() for path in skirt]
+    assert farthest == pytest.approx([14 - 0.225, 14 - 0.225 - 0.407], abs=0.01)
+    assert all(as_shapely(Polygons.square((18, 18), True)).distance(shapely.LineString(p.points)) > 0.2 for p in skirt)
+
+
+def test_support_stands_on_the_plate_only_and_leans_over_its_edge() -> None:
+    near, far = (slice_part(whole(tee()), profile(f"machine.table.radius_mm={radius}")) for radius in (100, 12))
+    reach = [np.hypot(*np.vstack([p.points for p in s.layers[0].paths]).T).max() for s in (near, far)]
+    assert reach[0] > 13 > 12 >= reach[1]
+    assert (near.unsupported_mm2, far.unsupported_mm2) == (0.0, 0.0)

@@ -1,0 +1,100 @@
+"""Order of beads, travels, seams, speeds."""
+
+import numpy as np
+import pytest
+
+from slicer.bead import Bead
+from slicer.geometry.polygons import Polygons
+from slicer.paths import Kind
+from slicer.slice import slice_part
+from slicer.speed import _slow_down
+from slicer.travel.order import order_beads
+from tests.shapes import box, tee
+from tests.slicer.hand import profile, whole
+
+STANDARD = profile().process
+STRAIGHT = profile("process.combing=false").process
+
+
+def line(x0: float, y0: float, x1: float, y1: float, rank: int = 3) -> Bead:
+    return Bead(Kind.INFILL, np.array([[x0, y0], [x1, y1]], dtype=float), 0.45, rank)
+
+
+def test_lines_are_visited_from_the_nearest_end() -> None:
+    beads = [line(0, 9, 9, 9), line(0, 0, 9, 0), line(0, 3, 9, 3)]
+    placed = order_beads(beads, Polygons.square((10, 10)), STANDARD, np.array([0.0, 0.0]))
+    assert [tuple(p.points[0]) for p in placed] == [(0, 0), (9, 3), (0, 9)]
+
+
+def test_an_island_is_finished_before_the_next_begins() -> None:
+    section = Polygons.square((10, 10), True) + Polygons.square((10, 10), True).translate((20, 0))
+    beads = [line(x, y, x + 1, y, rank) for rank in (-1, 0, 2) for x in (-3, 17) for y in (0, 2)]
+    placed = order_beads(beads, section, STANDARD, np.array([0.0, 0.0]))
+    assert [p.points[0][0] > 10 for p in placed] == [False] * 6 + [True] * 6
+    assert [p.bead.rank for p in placed] == [-1, -1, 0, 0, 2, 2] * 2
+
+
+def test_an_island_in_a_hole_is_an_island_of_its_own() -> None:
+    section = Polygons.square((30, 30), True) - Polygons.square((20, 20), True) + Polygons.square((6, 6), True)
+    beads = [line(-1, 0, 1, 0, 0), line(-13, -13, -13, 13, 0), line(-1, 1, 1, 1, 2), line(-12, -13, -12, 13, 2)]
+    placed = order_beads(beads, section, STANDARD, np.array([-13.0, -13.0]))
+    assert [p.points[0][0] < -10 for p in placed] == [True, True, False, False]
+
+
+def test_a_travel_inside_the_section_does_not_retract_and_one_across_a_hole_does() -> None:
+    section = Polygons.square((20, 20)) - Polygons.square((4, 4)).translate((8, 8))
+    beads = [line(1, 5, 5, 5), line(15, 5, 19, 5), line(15, 10, 19, 10, 4), line(1, 10, 5, 10, 5)]
+    placed = order_beads(beads, section, STRAIGHT, np.array([0.9, 5.0]))
+    assert [p.retract for p in placed] == [False, False, False, True]
+
+
+def test_a_short_travel_never_retracts() -> None:
+    apart = Polygons.square((2, 2)) + Polygons.square((2, 2)).translate((3, 0))
+    placed = order_beads([line(0.5, 1, 1.7, 1), line(3.1, 1, 4, 1)], apart, STANDARD, np.array([0.5, 1.0]))
+    assert [p.retract for p in placed] == [False, False]
+
+
+def test_a_part_begins_with_a_retracted_travel() -> None:
+    assert slice_part(whole(box(5, 5, 1)), profile()).layers[0].paths[0].retract
+
+
+def test_every_travel_without_retraction_is_short_or_inside_the_box() -> None:
+    sliced = slice_part(whole(box(12, 12, 2)), profile("process.skirt_loops=0"))
+    assert sum(path.retract for layer in sliced.layers for path in layer.paths) == 1
+
+
+def test_inner_walls_come_from_the_inside_out_then_the_outer_wall_then_the_fill() -> None:
+    kinds = [path.kind for path in slice_part(whole(box(20, 20, 4)), profile()).layers[10].paths]
+    assert kinds[:3] == [Kind.INNER_WALL, Kind.INNER_WALL, Kind.OUTER_WALL]
+    assert set(kinds[3:]) == {Kind.INFILL}
+
+
+def test_seams_of_a_tower_stand_over_each_other() -> None:
+    sliced = slice_part(whole(tee()), profile("process.support=none"))
+    seams = [p.points[0] for layer in sliced.layers[:140] for p in layer.paths if p.kind is Kind.OUTER_WALL]
+    assert np.ptp(seams, axis=0) == pytest.approx([0, 0], abs=1e-6)
+
+
+def test_a_small_layer_is_slowed_down_to_last_its_time() -> None:
+    sliced = slice_part(whole(box(8, 8, 4)), profile("process.least_layer_time_s=6", "process.travel_speed_mm_s=2000"))
+    layer = sliced.layers[10]
+    assert sum(path.length_mm / path.speed_mm_s for path in layer.paths) == pytest.approx(6, rel=0.02)
+
+
+def test_slowing_stops_at_the_least_speed() -> None:
+    sliced = slice_part(whole(box(4, 4, 4)), profile("process.least_layer_time_s=500"))
+    assert {path.speed_mm_s for path in sliced.layers[10].paths} == {10.0}
+
+
+def test_beads_at_the_floor_leave_the_waiting_to_the_others() -> None:
+    speeds, lengths = np.array([12.0, 100.0]), np.array([12.0, 100.0])
+    slowed = _slow_down(speeds, lengths, 6.0, 10.0)
+    assert slowed[0] == pytest.approx(10.0)
+    assert (lengths / slowed).sum() == pytest.approx(6.0, rel=1e-3)
+
+
+def test_no_bead_asks_for_more_than_the_hot_end_melts() -> None:
+    chosen = profile("process.infill_speed_mm_s=500", "material.volumetric_limit_mm3_s=5", "process.least_layer_time_s=0")
+    sliced = slice_part(whole(box(20, 20, 4)), chosen)
+    for layer in sliced.layers:
+        assert max(layer.volume_mm3(p) / p.length_mm * p.speed_mm_s for p in layer.paths) <= 5.0 + 1e-9

@@ -1,0 +1,102 @@
+"""Overhanging walls: which stretches, by how much of the bead lies on the layer below, and what becomes of the rest."""
+
+from itertools import pairwise
+from typing import Any
+
+import manifold3d as m3
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.mesh import Mesh
+from slicer.bead import Bead
+from slicer.geometry.polygons import Polygons
+from slicer.paths import Kind
+from slicer.slice import slice_part
+from slicer.travel.combing import NOWHERE
+from slicer.travel.order import Placed
+from slicer.walls.overhang import split_overhangs
+from tests.shapes import standing
+from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
+
+WIDTH = 0.45
+
+
+def placed(points: Any) -> Placed:
+    bead = Bead(Kind.OUTER_WALL, np.array(points, dtype=float), WIDTH, 0)
+    return Placed(bead, bead.points, True, np.array([[-1.0, -1.0]]))
+
+
+def square(side: float) -> list[tuple[float, float]]:
+    return [(0, 0), (side, 0), (side, side), (0, side), (0, 0)]
+
+
+def split(wall: Placed, section: Polygons, bank: Polygons | None, share: float = 0.5) -> list[Placed]:
+    return split_overhangs([wall], section, bank, profile(f"process.overhang_share={share}").process)
+
+
+def test_the_stretch_beyond_the_bank_overhangs_and_nothing_is_lost() -> None:
+    pieces = split(
+        placed(square(10)), Polygons.square((12, 12)).translate((-1, -1)), Polygons.square((6, 20)).translate((-1, -5))
+    )
+    assert [p.bead.kind for p in pieces] == [Kind.OUTER_WALL, Kind.OVERHANG, Kind.OUTER_WALL]
+    assert pieces[1].bead.length_mm == pytest.approx(5 + 10 + 5, abs=0.1)
+    assert sum(p.bead.length_mm for p in pieces) == pytest.approx(40)
+    assert all((a.points[-1] == b.points[0]).all() for a, b in pairwise(pieces))
+    assert [p.retract for p in pieces] == [True, False, False]
+    assert [len(p.approach) for p in pieces] == [1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("out", "share", "kind"), [(0.1, 0.5, Kind.OVERHANG), (-0.05, 0.5, Kind.OUTER_WALL), (0.1, 0.2, Kind.OUTER_WALL)]
+)
+def test_the_share_of_the_width_on_the_bank_decides(out: float, share: float, kind: Kind) -> None:
+    bank = Polygons.square((20, 10)).translate((0, -out))
+    (piece,) = split(placed([(0, 10), (20, 10)]), Polygons.square((20, 15)), bank, share)
+    assert piece.bead.kind is kind
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(3, 40), st.floats(3, 9), st.floats(0, 6), st.floats(0, 6))
+def test_the_overhanging_length_is_shapelys(corners: int, radius: float, x: float, y: float) -> None:
+    around = 2 * np.pi * np.arange(corners) / corners
+    loop = radius * np.column_stack([np.cos(around), np.sin(around)])
+    bank = Polygons.square((8, 8), True).translate((x, y))
+    wall, section = placed(np.vstack([loop, loop[:1]])), Polygons([loop * 1.3])
+    pieces = split_overhangs([wall], section, bank, profile().process)
+    hangs = shapely.LineString(wall.points).difference(as_shapely(bank).buffer(0.02, join_style="mitre"))
+    hanging_mm = sum(p.bead.length_mm for p in pieces if p.bead.kind is Kind.OVERHANG)
+    assert hanging_mm == pytest.approx(hangs.length, abs=4 * 2 * WIDTH)
+    assert sum(p.bead.length_mm for p in pieces) == pytest.approx(wall.bead.length_mm)
+
+
+def funnel(angle: float) -> Mesh:
+    return standing(m3.Manifold.cylinder(6, 5, 5 + 6 * np.tan(np.radians(angle)), 96))
+
+
+@pytest.mark.parametrize(("angle", "hangs"), [(40, False), (46, False), (51, True), (60, True)])
+def test_cones_overhang_from_the_angle_at_which_half_a_bead_is_free(angle: float, hangs: bool) -> None:
+    beads = of_kind(
+        slice_part(whole(funnel(angle)), profile(*BARE, "process.self_supporting_angle_deg=80", "process.least_layer_time_s=0")),
+        Kind.OVERHANG,
+    )
+    assert np.degrees(np.arctan(0.5 * WIDTH / 0.2)) == pytest.approx(48.4, abs=0.1)
+    assert bool(beads) is hangs
+    assert {p.speed_mm_s for p in beads} <= {20.0}
+
+
+def test_a_part_on_plastic_overhangs_where_its_base_reaches_beyond() -> None:
+    post = m3.Manifold.cube((10, 10, 10)) + m3.Manifold.cube((20, 10, 4)).translate((0, 0, 10))
+    base, plate = cut(standing(post), ((0, 0, 1), 10.0))
+    first, second = slice_part(plate, profile(*BARE, "process.walls=1", "process.interface_extra_walls=0"), [base]).layers[:2]
+    hanging = [p for p in first.paths if p.kind is Kind.OVERHANG]
+    assert min(p.points[:, 0].min() for p in hanging) == pytest.approx(0.0, abs=0.1)
+    assert sum(p.length_mm for p in hanging) == pytest.approx(2 * (10 - 0.225) + 10 - 0.45, abs=0.3)
+    assert Kind.OVERHANG not in {p.kind for p in second.paths}
+
+
+def test_nothing_overhangs_on_the_platform() -> None:
+    assert split(placed(square(10)), Polygons.square((12, 12)), None)[0].bead.kind is Kind.OUTER_WALL
+    assert len(NOWHERE) == 0

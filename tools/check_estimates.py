@@ -1,0 +1,82 @@
+"""Compare quick estimates with dry runs.
+
+    python tools/check_estimates.py MODEL [MODEL ...] [--parts N] [--process NAME] [--set KEY=VALUE ...]
+
+One row a model, in one piece as it stands and, with --parts, as the search cuts it into up to so many: minutes and metres of
+filament of the dry run and the estimate over each; cubic millimetres of support that the slicer prints and the estimate over
+them; seconds of one core that the estimate takes, once its kernels are compiled.
+"""
+
+import argparse
+from time import process_time
+
+from machine.app.pipeline.pipeline import build
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Mesh
+from mdp.plane import PLATFORM
+from mdp.pose import level, rotation
+from mdp.read import locate, read_mesh
+from mdp.search.search import decompose
+from profiles.errors import UserError
+from profiles.profile import Profile, load
+from slicer.estimate.estimate import estimate
+from slicer.paths import Kind
+
+HEAD = "model", "parts", "min", "estimated", "filament m", "estimated", "support mm3", "estimated", "core s"
+
+
+def main() -> None:
+    """Read the options, print the table."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("models", nargs="+", metavar="MODEL")
+    options.add_argument("--parts", type=int, default=1, metavar="N")
+    options.add_argument("--process", default="standard", metavar="NAME")
+    options.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    given = options.parse_args()
+    profile = load(process=given.process, settings=[f"search.most_parts={given.parts}", *given.set])
+    print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|")
+    for model in given.models:
+        mesh, _ = read_mesh(locate(model), profile.process.scale, profile.process.rotate_deg)
+        name = model.rsplit("/", 1)[-1]
+        choices = [in_one_piece(mesh, name, profile)]
+        if given.parts > 1:
+            choices.append(decompose(mesh, name, profile))
+        for decomposition in choices:
+            print(row(decomposition, profile), flush=True)
+
+
+def in_one_piece(mesh: Mesh, name: str, profile: Profile) -> Decomposition:
+    """The model as it stands."""
+    pose = level(profile.machine)
+    part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, 0.0)
+    return Decomposition(name, mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+
+
+def row(decomposition: Decomposition, profile: Profile) -> str:
+    """One line of the table."""
+    parts = decomposition.parts
+    cells: list[object] = [decomposition.name, len(parts)]
+    try:
+        program = build(decomposition, profile)
+    except UserError as error:
+        return "| " + " | ".join(map(str, [*cells, f"refused: {error}"])) + " |"
+    estimate(parts, profile)
+    began = process_time()
+    quick = estimate(parts, profile)
+    core_s = process_time() - began
+    filament_mm = float(program.run.program.filament_mm.max())
+    support_mm3 = sum(
+        layer.volume_mm3(path)
+        for part in program.sliced
+        for layer in part.layers
+        for path in layer.paths
+        if path.kind in (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
+    )
+    cells += [f"{program.run.time_s / 60:.1f}", f"{quick.time_s / program.run.time_s:.2f}"]
+    cells += [f"{filament_mm / 1000:.2f}", f"{quick.filament_mm / filament_mm:.2f}"]
+    cells += [f"{support_mm3:.0f}", f"{quick.support_mm3 / support_mm3:.2f}" if support_mm3 else "-", f"{core_s:.2f}"]
+    return "| " + " | ".join(map(str, cells)) + " |"
+
+
+if __name__ == "__main__":
+    main()
