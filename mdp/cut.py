@@ -6,7 +6,7 @@ from typing import TypeAlias
 import manifold3d as m3
 import numpy as np
 
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Floats, Ints, Mesh
 from mdp.plane import Plane
 from profiles.errors import MeshError
 
@@ -25,6 +25,15 @@ def mesh_of(solid: Solid) -> Mesh:
     """The solid's mesh, its vertices and faces in manifold3d's spatial order."""
     mesh = solid.to_mesh64()
     return Mesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))
+
+
+def run_faces(solid: Solid) -> list[tuple[int, Ints]]:
+    """The faces of a solid, as mesh_of orders them, in runs: manifold3d's number of the solid that a run was made in, and which
+    of that solid's faces each is a piece of. A cutter has a number of its own."""
+    mesh = solid.to_mesh64()
+    ends = np.asarray(mesh.run_index, dtype=np.int64) // 3
+    faces = np.asarray(mesh.face_id).astype(np.int32)
+    return [(int(origin), faces[a:b]) for origin, a, b in zip(mesh.run_original_id, ends[:-1], ends[1:], strict=True)]
 
 
 def cut(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:

@@ -12,9 +12,9 @@ from math import pi, radians, sin, sqrt
 import numpy as np
 
 from mdp.clearance import least_height_mm
+from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
-from mdp.search.cost import CostTerms
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
 from mdp.zone import Zone, spans_mm
 from profiles.machine import Machine

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from mdp.cost.cost import CostTerms, Seam, measure_seam
 from mdp.decomposition import FrontRow
-from mdp.search.cost import CostTerms, Seam, measure_seam
 from mdp.search.node import Node
 
 EQUAL = 0.01  # costs that differ by a smaller share are alike: then fewer parts, then shorter seams

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+from mdp.cost.cost import CostTerms
 from mdp.cut import Solid, above, mesh_of
 from mdp.overhang import risky_upright
 from mdp.plane import Plane
-from mdp.search.cost import CostTerms
 from mdp.sweep.sweep import Remainder
 
 

@@ -10,10 +10,10 @@ from math import cos, radians, sin
 
 import numpy as np
 
+from mdp.cost.forecast import Surface
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
-from mdp.search.forecast import Surface
 from mdp.search.node import Node
 from mdp.search.problem import Problem
 from mdp.search.ranking import rank_by_trade_off

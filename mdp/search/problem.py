@@ -6,12 +6,12 @@ from time import perf_counter
 import numpy as np
 
 from mdp.clearance import allowed_poses
+from mdp.cost.cost import cost_terms
 from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, standing, threshold
 from mdp.plane import Plane
 from mdp.search.candidates import Bounds, Feasibility, Reason, bounds, bounds_of, check, platform_disc, refusals, score_candidates
-from mdp.search.cost import cost_terms
 from mdp.search.features import Model
 from mdp.search.node import Cut, Node
 from mdp.search.ranking import CandidateTable

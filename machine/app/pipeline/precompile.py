@@ -18,14 +18,14 @@ from machine.dryrun.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan
+from mdp.cost.cost import CostTerms
+from mdp.cost.forecast import Surface
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
 from mdp.kernels.cache import mark
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
-from mdp.search.cost import CostTerms
-from mdp.search.forecast import Surface
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 from slicer.slice import slice_part

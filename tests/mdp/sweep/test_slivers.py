@@ -2,10 +2,10 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.search.candidates import Reason, bounds, check, score_candidates
-from mdp.search.cost import CostTerms
 from mdp.search.ranking import CandidateTable
 from mdp.sweep.sweep import Remainder
 from profiles.profile import load

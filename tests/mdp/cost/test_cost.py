@@ -6,13 +6,13 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mdp.cost.cost import CostTerms, measure_seam, rim_weights
+from mdp.cost.forecast import Surface
 from mdp.cut import below, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import Plane
-from mdp.search.cost import CostTerms, measure_seam, rim_weights
-from mdp.search.forecast import Surface
 from mdp.search.search import decompose
 from mdp.sweep.sweep import Gains, Remainder, gains
 from profiles.profile import load

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdp.cost.cost import ROUNDING_MM, CostTerms
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
-from mdp.search.cost import ROUNDING_MM, CostTerms
 from mdp.sweep.rims import COT_30
 from mdp.sweep.sweep import Remainder
 

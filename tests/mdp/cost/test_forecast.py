@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mdp.cost.cost import CostTerms
+from mdp.cost.forecast import Surface
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.mesh import Mesh
 from mdp.overhang import Mask, facing_down, risky_upright
 from mdp.plane import Plane
-from mdp.search.cost import CostTerms
-from mdp.search.forecast import Surface
 from mdp.sweep.sweep import Remainder
 from tests import shapes
 
