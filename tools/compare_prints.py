@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from machine.app.pipeline.comparison import alternatives_json, compare_with_one_part
-from machine.app.pipeline.pipeline import build, lay_down
+from machine.app.pipeline.pipeline import build, standing_still
 from mdp.mesh import Mesh
 from mdp.read import read_mesh
 from mdp.search.search import decompose
