@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from machine.reader.parsed import ParsedProgram
 from machine.view import findings, layers, paths, scene
-from machine.view.comparison import Alternative
+from machine.view.comparison import Alternative, front_records
 from machine.view.encoding import pack
+from machine.view.parts import page_colours
 from machine.view.program import Program
 from machine.view.report import parts_report, print_report
 from machine.view.thinning import shown_rows
@@ -26,7 +27,11 @@ def of_parts(decomposition: Decomposition, profile: Profile) -> bytes:
     """The parts alone: a page without paths."""
     parts = _with_colours(scene.solids(decomposition, profile))
     report = parts_report(decomposition, profile)
-    header = _head(decomposition.name, "model", profile, True) | {"parts": parts, "report": report}
+    header = _head(decomposition.name, "model", profile, True) | {
+        "parts": parts,
+        "front": front_records(decomposition),
+        "report": report,
+    }
     return pack(header, paths.NONE | layers.NONE | scene.surfaces(decomposition, profile))
 
 
@@ -54,6 +59,7 @@ def of_print(
         "layers_by": by_layer.by,
         "thinned": {"rows": count, "kept": len(shown)} if len(shown) < count else None,
         "parts": _with_colours(_parts(program, profile, by_layer, ends_s, shown)),
+        "front": [] if program.decomposition is None else front_records(program.decomposition),
         "findings": findings.finding_records(run, profile.machine, known, shown),
         "report": print_report(program, profile, by_layer, ends_s, alternatives, known, source != "foreign"),
     }
@@ -78,6 +84,7 @@ def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, An
         "types": [""],
         "layers_by": "comments",
         "thinned": None,
+        "front": [],
         "findings": [],
         "machine": scene.machine_bodies(profile.machine, known),
     }  # fmt: skip
@@ -120,4 +127,4 @@ def _pose(parsed: ParsedProgram, rows: NDArray[np.int64]) -> dict[str, float]:
 
 
 def _with_colours(parts: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [part | {"colour": colour} for part, colour in zip(parts, scene.colours(len(parts)), strict=True)]
+    return [part | {"colour": colour} for part, colour in zip(parts, page_colours(len(parts)), strict=True)]

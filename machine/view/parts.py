@@ -20,6 +20,11 @@ def part_colours(count: int) -> Floats:
     return colours
 
 
+def page_colours(count: int) -> list[str]:
+    """The same as #rrggbb."""
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(part_colours(count)).astype(int).tolist()]
+
+
 def residual_faces(part: Part, profile: Profile) -> NDArray[np.bool_]:
     """(m,) faces of a part that need support although it is printed in its own direction."""
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces

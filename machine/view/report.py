@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun, summary
 from machine.reader.parsed import MoveKind
-from machine.view.comparison import Alternative
+from machine.view.comparison import Alternative, why_chosen
 from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
 from machine.view.paths import PRIME, WIPE, page_kinds
@@ -36,7 +36,8 @@ def parts_report(decomposition: Decomposition, profile: Profile) -> dict[str, An
     """The report of a page of parts alone."""
     facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
     rows = [_solid(part, profile) for part in decomposition.parts]
-    tables = [_table("Parts", SOLID, rows, [RISKY]), _areas(decomposition, profile), *settings_tables(profile)]
+    parts = _table("Parts", SOLID, rows, [RISKY])
+    tables = [parts, *_front(decomposition), _areas(decomposition, profile), *settings_tables(profile)]
     return {"facts": facts, "tables": tables}
 
 
@@ -55,6 +56,7 @@ def print_report(
     """
     tables = [_parts(program, profile, layers, ends_s), _kinds(program.run, profile, "" if known else profile.machine.name)]
     if program.decomposition is not None:
+        tables += _front(program.decomposition)
         tables.append(_alternatives(alternatives) if alternatives else _areas(program.decomposition, profile))
     names = _names(profile) if ours else _assumptions(profile, known)
     facts = [*_figures(program.run, profile, layers), *names]
@@ -89,6 +91,23 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
         rows.append([*solids.get(index, [str(index) if index else "all"]), *figures])
     head = SOLID if solids else SOLID[:1]
     return _table("Parts", [*head, "layers", "time", "g"], rows, [RISKY] if solids else [])
+
+
+def _front(decomposition: Decomposition) -> list[Table]:
+    """The best decomposition for every number of parts; none where there is no choice."""
+    front = decomposition.front
+    if len(front) < 2:
+        return []
+    rows = []
+    for row in front:
+        time = "–" if row.time_s is None else duration(row.time_s)
+        filament = "–" if row.filament_mm is None else f"{row.filament_mm / 1000:.1f}"
+        areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.cost_mm2:.1f}"]
+        rows.append([f"{row.parts}{' (taken)' * row.chosen}", *areas, time, filament])
+    least_mm2 = min(row.cost_mm2 for row in front)
+    notes = [f"taken: {why_chosen(row, least_mm2)}" for row in front if row.chosen]
+    notes.append("--parts takes another row; time and filament are estimates")
+    return [_table("In how many parts", ["parts", "support mm²", "seams mm", "costs mm²", "about", "m"], rows, notes)]
 
 
 def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.view.encoding import Column
-from machine.view.parts import part_colours, residual_faces, risky_before, risky_before_mm2
+from machine.view.parts import residual_faces, risky_before, risky_before_mm2
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import unit
@@ -15,11 +15,6 @@ from profiles.profile import Profile
 
 RESIDUAL, UPRIGHT = 1, 2  # bits of face_marks
 FOOT_MM = 1e-3
-
-
-def colours(count: int) -> list[str]:
-    """Colours of parts 1, 2, ... as #rrggbb, those of the pictures."""
-    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in np.rint(part_colours(count)).astype(int).tolist()]
 
 
 def surfaces(decomposition: Decomposition | None, profile: Profile) -> dict[str, Column]:

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from machine.dryrun.dryrun import dry_run
@@ -15,6 +16,8 @@ from machine.link.protocol.events import Temperature
 from machine.view.live import serve
 from machine.view.page import parts_page, print_page
 from machine.view.program import Program
+from mdp.decomposition import FrontRow
+from mdp.plane import Plane
 from profiles.profile import load
 from tests.machine import hand
 from tests.machine.browser import CHROMIUM, Browser
@@ -220,6 +223,60 @@ def test_parts_are_drawn_apart_and_the_table_stands_as_for_one(browser: Browser,
     apart = page.value(PICTURE)
     put(page, "stand", 2)
     assert len({together, apart, page.value(PICTURE)}) == 3
+
+
+@pytest.fixture
+def choices(browser: Browser, tmp_path: Path) -> Browser:
+    """The post and the arm with a front of three rows: whole, as they are, and the post cut once more."""
+    profile, decomposition, _, _ = hand.printed()
+    post = Plane(np.array([0.0, 0.0, 1.0]), 30.0)
+    front = (
+        FrontRow((), 100.0, 0.0, 100.0),
+        FrontRow((hand.SIDE,), 0.0, 40.0, 24.0, chosen=True, time_s=4000.0, filament_mm=1234.0),
+        FrontRow((hand.SIDE, post), 0.0, 80.0, 48.0),
+    )
+    return opened(browser, tmp_path, parts_page(replace(decomposition, front=front), profile))
+
+
+def test_the_front_is_shown_with_dashes_where_nothing_is_estimated(choices: Browser) -> None:
+    lines = choices.value(
+        "[...document.querySelectorAll('#front tbody tr')].map((line) => [...line.cells].map((c) => c.textContent))"
+    )
+    assert lines[0] == ["1", "100.0", "0", "–", "–"]
+    assert lines[1] == ["2✓", "0.0", "40", "1h 7m", "1.2"]
+    assert text(choices, "front-told") == "✓ taken: the least cost."
+
+
+def test_another_row_of_the_front_shows_its_cuts_and_the_command_by_the_keyboard_alone(choices: Browser) -> None:
+    before = choices.value(PICTURE)
+    choices.value("document.querySelector('#front :checked').focus()")
+    choices.key("ArrowDown")
+    assert "tiltprint decompose 'post and arm' --parts 3" in text(choices, "front-told")
+    assert text(choices, "legend") == "as 3 parts123"
+    assert choices.value(PICTURE) != before
+    choices.key("ArrowUp")
+    assert choices.value(PICTURE) == before
+    assert choices.complaints == []
+
+
+def test_the_cuts_of_another_row_take_the_place_of_the_beads(browser: Browser, tmp_path: Path) -> None:
+    profile, printed = program()
+    assert printed.decomposition is not None
+    front = (FrontRow((), 100.0, 0.0, 100.0), FrontRow((hand.SIDE,), 0.0, 40.0, 24.0, chosen=True))
+    page = opened(
+        browser,
+        tmp_path,
+        print_page("post", replace(printed, decomposition=replace(printed.decomposition, front=front)), profile),
+    )
+    before = page.value(PICTURE)
+    page.click("#front tbody tr:first-child")
+    whole = page.value(PICTURE)
+    page.click("#show-beads")
+    assert page.value(PICTURE) == whole != before
+
+
+def test_where_there_is_no_choice_no_front_is_shown(page: Browser) -> None:
+    assert page.value("document.getElementById('front-field').hidden")
 
 
 def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:

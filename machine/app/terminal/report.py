@@ -6,10 +6,10 @@ from textwrap import wrap
 
 from machine.dryrun.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
+from machine.view.comparison import why_chosen
 from machine.view.parts import risky_before_mm2
 from machine.view.quantities import duration
 from mdp.decomposition import Decomposition, FrontRow
-from mdp.search.front import EQUAL
 from mdp.search.orientation import best_orientation, in_words
 
 WIDEST = 100  # characters of a line
@@ -53,19 +53,13 @@ def front_table(front: Sequence[FrontRow]) -> str:
         for row in front
     ]
     head, *lines = table(rows).splitlines()
-    taken = [row.chosen * ("  taken: " + _reason(row, least_mm2)) for row in front]
+    taken = [row.chosen * ("  taken: " + why_chosen(row, least_mm2)) for row in front]
     return "\n".join([head, *(line + reason for line, reason in zip(lines, taken, strict=True))]) + "\n"
 
 
 def _estimates(row: FrontRow) -> list[str]:
     time = "-" if row.time_s is None else duration(60.0 * round(row.time_s / 60.0)).removesuffix(" 0s")
     return [time, "-" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}"]
-
-
-def _reason(row: FrontRow, least_mm2: float) -> str:
-    if row.cost_mm2 <= least_mm2:
-        return "the least cost"
-    return "the fewest parts within 1 % of the least cost" if row.cost_mm2 <= least_mm2 * (1.0 + EQUAL) else "asked for"
 
 
 def _risky_areas(decomposition: Decomposition, angle_deg: float, count_platform_faces: bool) -> str:

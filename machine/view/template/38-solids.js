@@ -1,13 +1,16 @@
 // Solids: triangles with flat faces, drawn whole or as a ghost whose edges show and whose faces let the light through.
 
+const MOST_CUTS = 64; // as many fit into every graphics card's uniforms
+
 const SOLID_VERTEX = `
 in vec3 place;
 in vec4 colour;
 uniform mat4 toClip, toEye;
 uniform float behind;
-out vec3 seen;
+out vec3 seen, spot;
 out vec4 paint;
 void main() {
+  spot = place;
   vec4 p = toEye * vec4(place, 1.0);
   seen = p.xyz;
   paint = colour;
@@ -15,17 +18,32 @@ void main() {
   gl_Position.z += behind * gl_Position.w;
 }`;
 const SOLID_FRAGMENT = `
-in vec3 seen;
+in vec3 seen, spot;
 in vec4 paint;
+uniform int cuts; // at least 0: faces have the hues of the parts that so many planes would cut, in print order; -1: their own
+uniform vec4 planes[${MOST_CUTS}];
+uniform vec3 hues[${MOST_CUTS} + 1];
 uniform float ghost; // 0: whole; else how much of a ghost is seen face on
 uniform float strength;
 out vec4 colour;
 ${LIGHT}
+vec3 divided() {
+  vec3 hue = hues[0];
+  bool seam = false;
+  for (int k = 0; k < cuts; k++) {
+    float height = dot(planes[k].xyz, spot) - planes[k].w, width = 1.3 * fwidth(height);
+    if (height > 0.0) { hue = hues[k + 1]; seam = height < width; }
+    else seam = seam || height > -width;
+  }
+  return seam ? vec3(0.07, 0.08, 0.1) : hue;
+}
 void main() {
   vec3 n = normalize(cross(dFdx(seen), dFdy(seen)));
   float a = paint.a * strength;
+  vec3 face = cuts < 0 ? paint.rgb : divided();
+  if (paint.a > 0.998) face = paint.rgb; // red faces stay red
   if (ghost > 0.0) a *= ghost + (0.62 - ghost) * pow(1.0 - abs(dot(n, normalize(seen))), 2.0);
-  colour = vec4(lit(paint.rgb, n) * a, a);
+  colour = vec4(lit(face, n) * a, a);
 }`;
 
 /** Drawing for triangles {places, colours}, three corners each; a range of corners may be drawn alone. */
@@ -41,7 +59,7 @@ function solidOf(gl, { places, colours }) {
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, colours);
   };
   const pass = (first, count) => gl.drawArrays(gl.TRIANGLES, first, count);
-  const draw = (seen, { ghost = 0, strength = 1, behind = 0, range = [0, places.length / 3] } = {}) => {
+  const draw = (seen, { ghost = 0, strength = 1, behind = 0, cuts = null, range = [0, places.length / 3] } = {}) => {
     if (range[1] <= range[0]) return;
     program.use();
     gl.bindVertexArray(vao);
@@ -50,6 +68,11 @@ function solidOf(gl, { places, colours }) {
     gl.uniform1f(program.to("ghost"), ghost);
     gl.uniform1f(program.to("strength"), strength);
     gl.uniform1f(program.to("behind"), behind);
+    gl.uniform1i(program.to("cuts"), cuts ? cuts.count : -1);
+    if (cuts) {
+      if (cuts.count) gl.uniform4fv(program.to("planes"), cuts.planes);
+      gl.uniform3fv(program.to("hues"), cuts.hues);
+    }
     const through = ghost > 0 || strength < 1, count = range[1] - range[0];
     if (through) {
       gl.colorMask(false, false, false, false);

@@ -29,6 +29,15 @@ function surfaceColours({ marks, parts }, colourOf, risky) {
   return colours;
 }
 
+/** A row of the front for the drawing of solids: the colours of its parts, and the planes between them. */
+function cutsOf({ planes, colours }) {
+  return {
+    count: planes.length,
+    planes: new Float32Array(planes.flatMap(({ normal, offset_mm: offset }) => [...normal, offset])),
+    hues: new Float32Array(colours.flatMap((colour) => rgb(colour).map((x) => x / 255))),
+  };
+}
+
 /** Which way each part goes when the model is drawn apart: along its direction, and with what it stands on. Part -> vector. */
 function apartOf({ places, parts }) {
   const ways = new Map();

@@ -109,8 +109,11 @@ function paintRest(stage, print, scene, seen) {
   const { on } = scene, { work, cradle, head, below, lift } = seen;
   if (on.machine && !below) paintTable(stage.bodies, work, cradle, {});
   if (on.machine) stage.bodies.nozzle.draw(head);
-  paintPath(stage, seen.ranges, on, work.toClip, lift, seen.size);
-  paintModel(stage, print, scene, seen.seenAt, lift);
+  if (scene.tried) paintTried(stage.model, scene.tried, print.surfaces, work);
+  else {
+    paintPath(stage, seen.ranges, on, work.toClip, lift, seen.size);
+    paintModel(stage, print, scene, seen.seenAt, lift);
+  }
   if (on.machine && below) paintTable(stage.bodies, work, cradle, { strength: 0.18 }); // or it would hide everything
   if (on.machine) paintHead(stage.bodies, head);
 }
@@ -154,6 +157,12 @@ function paintModel(stage, print, scene, seenAt, lift) {
     stage.rims.draw(at.toClip, { first, end });
   }
   for (const [at, k] of above) stage.planes.draw(at, { strength: 0.3, range: piece(stage.planes, k) });
+}
+
+/** The whole model as another row of the front would cut it; cut into one part only it has the first colour. */
+function paintTried(model, row, { parts }, seen) {
+  const cuts = cutsOf(row);
+  for (const { range } of parts) model.draw(seen, { cuts, range });
 }
 
 function paintHead(bodies, seen) {

@@ -19,14 +19,17 @@ function compileAll(gl) {
 /** {canvas, ask, moved, rowAt}: the picture of the scene, drawn whenever a bell rings. */
 function pictureOf(gl, print, scene, camera, bells, showMarkers) {
   const { canvas } = gl, painter = painterOf(gl, print, scene, camera, showMarkers), pace = paceOf(gl, painter, print.rows.count);
+  let legend = null;
+  const tell = () => showLegend(print, scene, legend);
   const colour = () => {
     const { rows, path, header } = print, extra = { ...print, parts: header.parts, hidden: scene.hidden };
-    const { colours, legend } = coloured(scene.mode, rows, path, extra);
+    const { colours, legend: told } = coloured(scene.mode, rows, path, extra);
+    legend = told;
     painter.stage?.beads?.paint(colours);
     painter.stage?.coarse.paint(colours);
-    showLegend(print, scene.mode, legend);
+    tell();
   };
-  const reds = () => painter.stage?.model?.paint(surfaceColours(print.surfaces, (part) => rgb(part.colour), scene.risky));
+  const reds = () => painter.stage?.model?.paint(surfaceColours(print.surfaces, (part) => rgb(part.colour), redOf(scene)));
   const build = () => {
     painter.build();
     colour();
@@ -35,6 +38,7 @@ function pictureOf(gl, print, scene, camera, bells, showMarkers) {
   };
   bells.on("colours", () => { colour(); pace.ask(); });
   bells.on("model", () => { reds(); pace.ask(); });
+  bells.on("tried", () => { reds(); tell(); pace.ask(); });
   bells.on("theme", () => { painter.dress(); pace.ask(); });
   bells.on("row layers look", pace.ask);
   bells.on("moving", pace.moved);
@@ -75,14 +79,14 @@ function painterOf(gl, print, scene, camera, showMarkers) {
   painter.coarse = (k) => {
     const now = look(COARSE_SHARE);
     frames.moving.begin(...now.size);
-    if (scene.on.beads && painter.stage.beads) paintCoarse(painter.stage, print, now.seen, k);
+    if (scene.beads() && painter.stage.beads) paintCoarse(painter.stage, print, now.seen, k);
     paintRest(painter.stage, print, scene, now.seen);
     show(frames.moving, now.seen);
   };
   painter.begin = () => {
     const now = look(1);
     seen = now.seen;
-    left = scene.on.beads && painter.stage.beads ? [...seen.ranges] : [];
+    left = scene.beads() && painter.stage.beads ? [...seen.ranges] : [];
     frames.still.begin(...now.size);
   };
   painter.step = (beads) => {
@@ -96,12 +100,16 @@ function painterOf(gl, print, scene, camera, showMarkers) {
   };
   painter.left = () => left.reduce((sum, { first, end }) => sum + end - first, 0);
   painter.slotUnder = (event) => {
+    if (!scene.beads()) return -1;
     const box = canvas.getBoundingClientRect(), scale = canvas.width / box.width;
     const [x, y] = [event.clientX - box.left, event.clientY - box.top].map((part) => Math.floor(part * scale));
     return slotAt(gl, painter.stage, painter.shown, [x, canvas.height - 1 - y]);
   };
   return painter;
 }
+
+/** Which faces are red: what another row of the front leaves risky is not known face by face. */
+const redOf = ({ risky, tried }) => (tried && risky === "printed" ? "none" : risky);
 
 const countRows = (ranges) => ranges.reduce((sum, range) => sum + range.endRow - range.firstRow, 0);
 

@@ -6,7 +6,7 @@ function sceneOf(print, bells) {
     row: last, share: 1, place: restingPlace(header),
     part: null, others: "faint", low: 0, high: Math.max(rows.layers.length - 1, 0),
     riding: false, dark: false, mode: usualMode(print), hidden: new Set(),
-    model: rows.count ? "ghost" : "solid", risky: "printed", apart: 0,
+    model: rows.count ? "ghost" : "solid", risky: "printed", apart: 0, tried: null,
     on: {
       beads: true, travels: false, retractions: false, seams: false,
       machine: header.machine.known, planes: false, directions: false, findings: true,
@@ -41,6 +41,12 @@ function sceneOf(print, bells) {
     scene.part = index;
     [scene.low, scene.high] = [0, Math.max(scene.layers().length - 1, 0)];
     bells.ring("layers");
+  };
+  scene.beads = () => scene.on.beads && !scene.tried;
+  /** Look at the cuts of another row of the front; null: at what was made. */
+  scene.tryRow = (row) => {
+    scene.tried = row;
+    bells.ring("tried");
   };
   /** Without a path: the table stands as it does for a part, or level. */
   scene.standFor = (part) => {

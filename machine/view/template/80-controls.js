@@ -52,8 +52,12 @@ function swatch(colour) {
 
 const TITLES = { kind: "kind of line", layer: "layer time" }; // where the title is not the word itself
 
-function showLegend({ rows, header }, mode, legend) {
+function showLegend({ rows, header }, { mode, tried }, legend) {
   const box = $("legend");
+  if (tried) {
+    const entries = tried.colours.slice(0, 24).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`));
+    return box.replaceChildren(made("b", { text: `as ${inParts(tried.parts)}` }), ...entries);
+  }
   box.replaceChildren(made("b", { text: (TITLES[mode] || mode) + (legend ? `, ${legend.unit}` : "") }));
   if (legend) {
     const scale = made("div", { className: "scale" });

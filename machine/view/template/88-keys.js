@@ -37,6 +37,7 @@ function keysOf({ scene, camera, player, look, fit, toggleTheme }) {
 /** Keys that the element in focus needs itself: a list, a slider, a button. */
 function taken({ key, target: { tagName, type } }) {
   if (tagName === "SELECT") return key.length === 1 || /^(Arrow|Page|Home|End)/.test(key);
+  if (tagName === "INPUT" && type === "radio" && /^Arrow/.test(key)) return true;
   if (tagName === "INPUT" && type === "range" && /^(Arrow|Page|Home|End)/.test(key)) return true;
   return key === " " && ["BUTTON", "SUMMARY", "INPUT"].includes(tagName);
 }

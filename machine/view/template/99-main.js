@@ -9,6 +9,7 @@ async function main() {
   $("summary").textContent = summaryOf(header, rows);
   showReport(header);
   controlsOf(print, scene, ring);
+  frontOf(print, scene);
   readoutsOf(print, scene, ring);
   layerSliders(print, scene, ring);
   const toggleTheme = themeOf(scene, ring), player = courseOf(print, scene, ring);

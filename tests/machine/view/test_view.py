@@ -1,5 +1,6 @@
 """The page's bytes, read back by their description, against the program, its dry run and its parts."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -19,6 +20,8 @@ from machine.view.encoding import Column, pack
 from machine.view.layers import layers_of
 from machine.view.program import Program
 from machine.view.thinning import shown_rows
+from mdp.decomposition import FrontRow
+from mdp.plane import Plane
 from profiles.profile import Profile, load
 from tests.machine import hand
 from tests.machine.pages import Arrays, on_the_work, unpacked
@@ -196,6 +199,23 @@ def test_a_foot_is_covered_by_its_disc() -> None:
     base = header["parts"][1]["base"]
     np.testing.assert_allclose(base["centre_mm"], [5.0, 0.0, 55.0], atol=1e-6)
     assert base["radius_mm"] == pytest.approx(np.hypot(5, 5))
+
+
+def test_the_front_is_told_whole_with_its_planes_in_print_order() -> None:
+    side, top = (Plane(np.array(normal), 5.0) for normal in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    front = (
+        FrontRow((), 100.0, 0.0, 100.0, time_s=60.0, filament_mm=1000.0),
+        FrontRow((side,), 0.0, 40.0, 24.0, chosen=True),
+        FrontRow((top, side), 0.0, 40.0, 23.9),
+    )
+    profile, decomposition, _, _ = hand.printed()
+    header, _ = unpacked(of_parts(replace(decomposition, name="the arm.stl", front=front), profile))
+    whole, taken, more = header["front"]
+    assert (whole["planes"], whole["time_s"], whole["filament_mm"], whole["why"]) == ([], 60.0, 1000.0, "")
+    assert (taken["chosen"], taken["why"]) == (True, "the fewest parts within 1 % of the least cost")
+    assert (taken["time_s"], taken["filament_mm"]) == (None, None)
+    assert [plane["normal"] for plane in more["planes"]] == [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    assert more["command"] == "tiltprint decompose 'the arm.stl' --parts 3"
 
 
 def test_a_finding_stands_at_its_line() -> None:
