@@ -13,9 +13,11 @@ from profiles.errors import MeshError
 Solid: TypeAlias = m3.Manifold
 
 
-def solid_of(mesh: Mesh) -> Solid:
-    """The mesh as a manifold3d solid; MeshError when it is none."""
-    solid = m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64)))
+def solid_of(mesh: Mesh, apart: bool = False) -> Solid:
+    """The mesh as a manifold3d solid; apart: no cut ever joins two faces of a flat place, so that run_faces tells each for
+    itself. MeshError when it is none."""
+    own = np.arange(len(mesh.faces), dtype=np.uint64) if apart else None
+    solid = m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64), face_id=own))
     if solid.status() != m3.Error.NoError:
         raise MeshError(f"the mesh is not a valid solid ({solid.status().name})")
     return solid

@@ -28,11 +28,13 @@ def dot(vectors: Floats, direction: Floats) -> Floats:
 class Mesh:
     """A closed, consistently outward-oriented triangle mesh.
 
-    vertices: (n, 3) float64, mm; faces: (m, 3) int32, counter-clockwise seen from outside. Both arrays are read-only.
+    vertices: (n, 3) float64, mm; faces: (m, 3) int32, counter-clockwise seen from outside; colours: (m,) what the model's file
+    paints each face with, mdp.colour.NO_COLOUR: nothing; None: it paints none. The arrays are read-only.
     """
 
     vertices: Floats
     faces: Ints
+    colours: Ints | None = None
 
     def __post_init__(self) -> None:
         vertices = np.array(self.vertices, dtype=np.float64, order="C")
@@ -41,6 +43,10 @@ class Mesh:
         faces.setflags(write=False)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", faces)
+        if self.colours is not None:
+            colours = np.array(self.colours, dtype=np.int32)
+            colours.setflags(write=False)
+            object.__setattr__(self, "colours", colours)
 
     @cached_property
     def _crosses(self) -> Floats:
@@ -74,4 +80,5 @@ class Mesh:
 
     def transform(self, rotation: Any, shift_mm: Any = (0.0, 0.0, 0.0)) -> "Mesh":
         """The mesh with every vertex v at rotation @ v + shift_mm; rotation is (3, 3)."""
-        return Mesh(self.vertices @ np.asarray(rotation, dtype=np.float64).T + np.asarray(shift_mm, dtype=np.float64), self.faces)
+        vertices = self.vertices @ np.asarray(rotation, dtype=np.float64).T + np.asarray(shift_mm, dtype=np.float64)
+        return Mesh(vertices, self.faces, self.colours)

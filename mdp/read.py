@@ -11,6 +11,7 @@ from mdp.formats.surface import Surface
 from mdp.mesh import Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.pose import about
+from mdp.repair.colours import carry_colours
 from mdp.repair.edges import connected_components
 from mdp.repair.repair import repair
 from profiles.errors import MeshError
@@ -53,8 +54,9 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
     try:
         _check_size(surfaces, scale)
         if scale != 1.0:
-            surfaces = [Surface(surface.vertices * scale, surface.faces) for surface in surfaces]
+            surfaces = [Surface(surface.vertices * scale, surface.faces, surface.colours) for surface in surfaces]
         solid, notes = repair(surfaces)
+        solid = Surface(solid.vertices, solid.faces, carry_colours(surfaces, solid))
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     mesh = _place_on_platform(solid, rotate_deg)
@@ -118,4 +120,7 @@ def _place_on_platform(solid: Surface, rotate_deg: tuple[float, float, float]) -
         about_x, about_y, about_z = (about(axis, np.radians(angle)) for axis, angle in zip(np.eye(3), rotate_deg, strict=True))
         vertices = vertices @ np.round(about_z @ about_y @ about_x, 15).T  # rounded so that quarter turns are exact
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    return Mesh(vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]), solid.faces.astype(np.int32))
+    middle = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+    return Mesh(
+        vertices - middle, solid.faces.astype(np.int32), None if solid.colours is None else solid.colours.astype(np.int32)
+    )

@@ -1,4 +1,5 @@
-"""PLY, ASCII and binary: the elements `vertex` and `face`, whatever other properties they carry."""
+"""PLY, ASCII and binary: the elements `vertex` and `face`, their colours red, green and blue, whatever other properties they
+carry."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from mdp.colour import NO_COLOUR
 from mdp.formats.polygons import polygon_surface
-from mdp.formats.surface import Surface
+from mdp.formats.surface import Indices, Surface
 from profiles.errors import MeshError
 
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8"}
@@ -21,6 +23,8 @@ TYPES |= {
     "float32": "f4",
     "float64": "f8",
 }
+RGB = ("red", "green", "blue")
+OF_255 = {"f4": 255.0, "f8": 255.0, "u2": 255.0 / 65535.0}  # bytes count as they are
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -72,7 +76,41 @@ def read(path: Path) -> list[Surface]:
         raise MeshError(f"{path}: needs the elements `vertex` with x, y, z and `face` with a list vertex_indices")
     vertex, polygons = columns["vertex"], columns["face"][corners]
     vertices = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
-    return [polygon_surface(path, vertices, polygons)]
+    kinds = {(table.name, column.name): column.kind for table in elements for column in table.properties if not column.length}
+    painted = _colours(columns["face"], kinds, "face")
+    if painted is None:
+        painted = _corner_colours(_colours(vertex, kinds, "vertex"), polygons)
+    return [polygon_surface(path, vertices, polygons, painted)]
+
+
+def _colours(columns: dict[str, Any], kinds: dict[tuple[str, str], str], table: str) -> Indices | None:
+    """(n,) colours of the rows of a table; None where it has no columns red, green and blue."""
+    if not {(table, name) for name in RGB} <= kinds.keys():
+        return None
+    colours = np.zeros(len(columns[RGB[0]]), dtype=np.int64)
+    painted = np.ones(len(colours), dtype=np.bool_)
+    for name in RGB:
+        values = np.asarray(columns[name], dtype=np.float64) * OF_255.get(kinds[table, name], 1.0)
+        painted &= (values >= 0.0) & (values <= 255.0)
+        colours = 256 * colours + np.where(painted, np.rint(values), 0).astype(np.int64)
+    return np.where(painted, colours, NO_COLOUR)
+
+
+def _corner_colours(colours: Indices | None, polygons: list[list[int]] | Indices) -> Indices | None:
+    """(m,) colours of the polygons whose corners all have one; indices out of range are reported elsewhere."""
+    if colours is None:
+        return None
+
+    def colour_of(corners: list[int]) -> int:
+        each = {int(colours[corner]) for corner in corners if 0 <= corner < len(colours)}
+        return each.pop() if len(each) == 1 else NO_COLOUR
+
+    if not isinstance(polygons, np.ndarray):
+        return np.array([colour_of(corners) for corners in polygons], dtype=np.int64)
+    if not len(colours):
+        return None
+    a, b, c = colours[np.clip(polygons, 0, len(colours) - 1)].T
+    return np.where((a == b) & (b == c), a, NO_COLOUR)
 
 
 def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:

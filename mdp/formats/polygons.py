@@ -10,15 +10,17 @@ from mdp.mesh import Floats
 from profiles.errors import MeshError
 
 
-def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | Indices) -> Surface:
+def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | Indices, colours: Indices | None = None) -> Surface:
     """The surface of (n, 3) vertices and polygons, given as lists of corners or as (m, 3) triangles; triangles in their order.
+
+    colours: (m,) of the polygons, None: not known.
 
     Raises MeshError for a coordinate that is not finite, too few corners and an index out of range.
     """
     if isinstance(polygons, np.ndarray):
-        return check_surface(path, vertices, polygons)
+        return check_surface(path, vertices, polygons, colours)
     if all(len(polygon) == 3 for polygon in polygons):
-        return check_surface(path, vertices, np.array(polygons, dtype=np.int64))
+        return check_surface(path, vertices, np.array(polygons, dtype=np.int64), colours)
     check_vertices(path, vertices)
     triangles: list[Indices] = []
     for number, polygon in enumerate(polygons, 1):
@@ -29,7 +31,9 @@ def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | In
             worst = next(corner for corner in polygon if not 0 <= corner < len(vertices))
             raise MeshError(f"{path}: face {number} names vertex {worst} (counted from 0) of {len(vertices)} vertices")
         triangles.append(corners[triangulate(vertices[corners])])
-    return check_surface(path, vertices, np.concatenate(triangles))
+    if colours is not None:
+        colours = np.repeat(colours, [len(each) for each in triangles])
+    return check_surface(path, vertices, np.concatenate(triangles), colours)
 
 
 def triangulate(points: Floats) -> Indices:

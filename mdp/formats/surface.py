@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mdp.colour import NO_COLOUR
 from mdp.mesh import Floats
 from profiles.errors import MeshError
 
@@ -20,20 +21,22 @@ MOST_PLACED_FACES = 20_000_000
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """vertices: (n, 3) float64 in the file's coordinates; faces: (m, 3) int64, as wound in the file, maybe open or crossing."""
+    """vertices: (n, 3) float64 in the file's coordinates; faces: (m, 3) int64, as wound in the file, maybe open or crossing;
+    colours: (m,) what the file paints each face with, NO_COLOUR: nothing; None: it paints none, or they are not known."""
 
     vertices: Floats
     faces: Indices
+    colours: Indices | None = None
 
 
-def check_surface(path: Path, vertices: Any, faces: Any) -> Surface:
+def check_surface(path: Path, vertices: Any, faces: Any, colours: Indices | None = None) -> Surface:
     """A surface with finite coordinates and indices in range.
 
     Raises MeshError for no faces, a coordinate that is not a number and an index out of range.
     """
     with np.errstate(invalid="ignore"):  # a signalling NaN of the file is reported below
         positions = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
-    surface = Surface(positions, np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3))
+    surface = Surface(positions, np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3), colours)
     if not len(surface.faces):
         raise MeshError(f"{path}: holds no faces")
     check_vertices(path, positions)
@@ -77,7 +80,12 @@ def concatenate(pieces: list[Surface]) -> Surface:
         return pieces[0]
     shifts = np.cumsum([0] + [len(piece.vertices) for piece in pieces[:-1]])
     faces = [piece.faces + shift for piece, shift in zip(pieces, shifts, strict=True)]
-    return Surface(np.concatenate([piece.vertices for piece in pieces]), np.concatenate(faces))
+    colours = None
+    if any(piece.colours is not None for piece in pieces):
+        colours = np.concatenate(
+            [np.full(len(piece.faces), NO_COLOUR) if piece.colours is None else piece.colours for piece in pieces]
+        )
+    return Surface(np.concatenate([piece.vertices for piece in pieces]), np.concatenate(faces), colours)
 
 
 def check_placed(path: Path, placed: int, faces: int) -> None:

@@ -1,4 +1,5 @@
-"""3MF: the build items of the package with their transforms, components and unit, in mm (3MF Core Specification 1.3)."""
+"""3MF: the build items of the package with their transforms, components and unit, in mm (3MF Core Specification 1.3), and the
+colours of their triangles (Materials and Properties Extension 1.2)."""
 
 import lzma
 import struct
@@ -10,12 +11,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from mdp.formats.surface import Surface, check_placed, check_surface, parse_floats, parse_integers
+from mdp.colour import NO_COLOUR, parse_colour
+from mdp.formats.surface import Indices, Surface, check_placed, check_surface, parse_floats, parse_integers
 from mdp.mesh import Floats
 from profiles.errors import MeshError
 
 UNIT_MM = {"micron": 0.001, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+MATERIAL = "{http://schemas.microsoft.com/3dmanufacturing/material/2015/02}"
+COLOUR_GROUP = (f"{MATERIAL}colorgroup", f"{MATERIAL}color")
 PRODUCTION_PATH = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}path"
 RELATION = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
 MODEL_TYPE = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
@@ -38,10 +42,12 @@ _IDENTITY = np.vstack([np.eye(3), np.zeros(3)])
 
 @dataclass(frozen=True)
 class Model:
-    """A model part of the package: its root element, its objects by their numbers, and the surfaces made of them so far."""
+    """A model part of the package: its root element, its objects by their numbers, the colours of its groups of colours or of
+    materials, and the surfaces made of them so far."""
 
     root: ElementTree.Element
     objects: dict[str, ElementTree.Element]
+    palettes: dict[str, list[int]]
     surfaces: dict[str, Surface] = field(default_factory=dict)
 
 
@@ -68,7 +74,7 @@ class Package:
         if name not in self.models:
             root = self.parse(name)
             objects = {each.get("id", ""): each for each in reversed(root.findall(f"{CORE}resources/{CORE}object"))}
-            self.models[name] = Model(root, objects)
+            self.models[name] = Model(root, objects, _palettes(root))
         return self.models[name]
 
 
@@ -117,7 +123,7 @@ def _place_all(package: Package) -> list[Surface]:
         mesh = element.find(f"{CORE}mesh")
         if mesh is not None:
             if placement.identity not in model.surfaces:
-                model.surfaces[placement.identity] = _mesh_surface(package.path, mesh)
+                model.surfaces[placement.identity] = _mesh_surface(package.path, mesh, element.get("pid", ""), model.palettes)
             surface = model.surfaces[placement.identity]
             surfaces.append(_transformed(package.path, surface, placement.transform, _unit_mm(package.path, model.root)))
             faces += len(surface.faces)
@@ -150,10 +156,37 @@ def _unit_mm(path: Path, root: ElementTree.Element) -> float:
     return UNIT_MM[unit]
 
 
-def _mesh_surface(path: Path, mesh: ElementTree.Element) -> Surface:
+def _palettes(root: ElementTree.Element) -> dict[str, list[int]]:
+    """The colours of every group of colours or of materials, by its number; NO_COLOUR for one that is not understood."""
+    palettes = {}
+    for kind, entry, attribute in ((f"{CORE}basematerials", f"{CORE}base", "displaycolor"), (*COLOUR_GROUP, "color")):
+        for group in root.findall(f"{CORE}resources/{kind}"):
+            colours = (parse_colour(each.get(attribute, "")) for each in group.findall(entry))
+            palettes[group.get("id", "")] = [NO_COLOUR if colour is None else colour for colour in colours]
+    return palettes
+
+
+def _triangle_colours(triangles: list[ElementTree.Element], pid: str, palettes: dict[str, list[int]]) -> Indices | None:
+    """(m,) colours of the triangles that name one for themselves, the same at all corners; None where none does. pid: the
+    object's group, which a triangle may leave out; the object's own colour marks nothing."""
+
+    def colour_of(triangle: ElementTree.Element) -> int:
+        first = triangle.get("p1", "")
+        palette = palettes.get(triangle.get("pid", pid), [])
+        alike = {triangle.get(corner, first) for corner in ("p2", "p3")} == {first}
+        return palette[int(first)] if alike and first.isdecimal() and int(first) < len(palette) else NO_COLOUR
+
+    colours = np.array([colour_of(each) for each in triangles], dtype=np.int64) if palettes else np.zeros(0, dtype=np.int64)
+    return colours if (colours != NO_COLOUR).any() else None
+
+
+def _mesh_surface(path: Path, mesh: ElementTree.Element, pid: str, palettes: dict[str, list[int]]) -> Surface:
+    """The surface of an object's mesh. pid: the object's group of colours, palettes: all groups."""
     points = [(v.get("x", ""), v.get("y", ""), v.get("z", "")) for v in mesh.iter(f"{CORE}vertex")]
-    corners = [(t.get("v1", ""), t.get("v2", ""), t.get("v3", "")) for t in mesh.iter(f"{CORE}triangle")]
-    return check_surface(path, parse_floats(path, points, "a vertex"), parse_integers(path, corners, "a triangle"))
+    triangles = list(mesh.iter(f"{CORE}triangle"))
+    corners = [(t.get("v1", ""), t.get("v2", ""), t.get("v3", "")) for t in triangles]
+    vertices, faces = parse_floats(path, points, "a vertex"), parse_integers(path, corners, "a triangle")
+    return check_surface(path, vertices, faces, _triangle_colours(triangles, pid, palettes))
 
 
 def _transformed(path: Path, surface: Surface, transform: Floats, unit_mm: float) -> Surface:
@@ -161,9 +194,8 @@ def _transformed(path: Path, surface: Surface, transform: Floats, unit_mm: float
     if not np.array_equal(transform, _IDENTITY):
         vertices = vertices @ transform[:3] + transform[3]
     mirrored = np.linalg.det(transform[:3]) < 0
-    return check_surface(
-        path, vertices * unit_mm if unit_mm != 1.0 else vertices, surface.faces[:, ::-1] if mirrored else surface.faces
-    )
+    faces = surface.faces[:, ::-1] if mirrored else surface.faces
+    return check_surface(path, vertices * unit_mm if unit_mm != 1.0 else vertices, faces, surface.colours)
 
 
 def _transform(path: Path, element: ElementTree.Element) -> Floats:

@@ -41,3 +41,31 @@ def test_the_numbers_of_an_ascii_ply_may_stand_in_any_lines(tmp_path: Path) -> N
     header, _, body = files.ply(tee()).partition(b"end_header\n")
     mesh, _ = read_mesh(save(tmp_path / "a.ply", header + b"end_header\n\n" + body.replace(b" ", b"\n")))
     assert mesh.volume_mm3 == pytest.approx(tee().volume_mm3)
+
+
+def _tetrahedron(vertex: str, face: str, corners: list[str], sides: list[str]) -> bytes:
+    """A pyramid of four faces; property lines and what they hold for every vertex and every face."""
+    points = ["0 0 0", "9 0 0", "0 9 0", "0 0 9"]
+    faces = ["3 0 2 1", "3 0 1 3", "3 1 2 3", "3 0 3 2"]
+    header = f"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n{vertex}"
+    header += f"element face 4\nproperty list uchar int vertex_indices\n{face}end_header\n"
+    rows = [f"{place} {more}\n" for place, more in [*zip(points, corners, strict=True), *zip(faces, sides, strict=True)]]
+    return (header + "".join(rows)).encode()
+
+
+BYTES = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+SHARES = BYTES.replace("uchar", "float")
+
+
+def test_faces_of_a_ply_have_their_own_colours(tmp_path: Path) -> None:
+    sides = ["255 0 0", "0 255 0", "1 2 3", "0 0 300"]
+    mesh, _ = read_mesh(save(tmp_path / "a.ply", _tetrahedron("", BYTES, [""] * 4, sides)))
+    assert mesh.colours is not None
+    assert mesh.colours.tolist() == [0xFF0000, 0x00FF00, 0x010203, -1]
+
+
+@pytest.mark.parametrize(("kind", "red", "blue"), [(BYTES, "255 0 0", "0 0 255"), (SHARES, "1 0 0", "0 0 1")])
+def test_a_face_of_a_ply_has_the_colour_of_its_corners_where_all_have_it(tmp_path: Path, kind: str, red: str, blue: str) -> None:
+    mesh, _ = read_mesh(save(tmp_path / "a.ply", _tetrahedron(kind, "", [red, red, red, blue], [""] * 4)))
+    assert mesh.colours is not None
+    assert mesh.colours.tolist() == [0xFF0000, -1, -1, -1]

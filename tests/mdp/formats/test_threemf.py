@@ -72,3 +72,32 @@ def test_components_that_double_without_end_are_refused_before_they_are_placed(t
     objects = {1: files.threemf_mesh(tee()), **doubled}
     sentence = refusal(files.threemf(tmp_path / "a.3mf", objects, '<item objectid="30"/>'))
     assert sentence == "places more than 20000 objects or 20000000 faces by reference"
+
+
+def _painted(path: Path, resources: str, attributes: dict[int, str], of_object: str = "") -> list[int] | None:
+    """The colours of a box whose triangles have more attributes, beside resources of the model and attributes of the object."""
+    text = files.threemf_model({1: files.threemf_mesh(files.placed(9, 9, 9))}, '<item objectid="1"/>')
+    pieces = text.split("<triangle ")
+    pieces[1:] = [f"{attributes.get(k, '')} {piece}" for k, piece in enumerate(pieces[1:])]
+    text = "<triangle ".join(pieces).replace("<resources>", f"<resources>{resources}")
+    text = text.replace('<object id="1"', f'<object id="1" {of_object}')
+    text = text.replace("<model ", '<model xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02" ')
+    mesh, _ = read_mesh(files.threemf(path, {}, "", parts={"3D/a.model": text}))
+    return None if mesh.colours is None else mesh.colours.tolist()
+
+
+GROUP = '<m:colorgroup id="5"><m:color color="#FF0000FF"/><m:color color="#00FF00"/></m:colorgroup>'
+MATERIALS = '<basematerials id="6"><base name="a" displaycolor="#0000FFFF"/><base name="b" displaycolor="blue"/></basematerials>'
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_triangles_of_a_3mf_have_the_colours_that_they_name(tmp_path: Path) -> None:
+    named = {0: 'pid="5" p1="0"', 1: 'pid="5" p1="1" p2="1" p3="1"', 2: 'pid="6" p1="0"'}
+    named |= {3: 'pid="5" p1="0" p2="1"', 4: 'pid="5" p1="2"', 5: 'pid="6" p1="1"', 6: 'pid="7" p1="0"'}
+    assert _painted(tmp_path / "a.3mf", GROUP + MATERIALS, named) == [0xFF0000, 0x00FF00, 0x0000FF] + [-1] * 9
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_the_colour_of_a_whole_object_of_a_3mf_marks_none_of_its_triangles(tmp_path: Path) -> None:
+    assert _painted(tmp_path / "a.3mf", GROUP, {}, 'pid="5" pindex="0"') is None
+    assert _painted(tmp_path / "b.3mf", GROUP, {3: 'p1="1"'}, 'pid="5" pindex="0"') == [-1] * 3 + [0x00FF00] + [-1] * 8

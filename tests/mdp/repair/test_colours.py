@@ -1,0 +1,84 @@
+"""Colours follow the faces of a file through scaling, turning and repair."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdp.colour import NO_COLOUR, colour_text, parse_colour
+from mdp.formats.surface import Surface
+from mdp.mesh import Mesh
+from mdp.read import read_mesh
+from mdp.repair.colours import carry_colours
+from mdp.repair.repair import repair
+from tests.mdp import files
+
+RED, GREEN = 0xFF0000, 0x00FF00
+
+
+def _painted(mesh: Mesh, colours: object) -> Surface:
+    return Surface(mesh.vertices, mesh.faces.astype(np.int64), np.asarray(colours, dtype=np.int64))
+
+
+def _areas_mm2(solid: Surface, colours: object) -> dict[int, float]:
+    """The area of every colour."""
+    mesh, of = Mesh(solid.vertices, solid.faces.astype(np.int32)), np.asarray(colours)
+    return {int(colour): round(float(mesh.areas_mm2[of == colour].sum()), 6) for colour in np.unique(of)}
+
+
+def test_united_bodies_keep_the_colours_of_what_is_left_of_their_faces() -> None:
+    one = files.placed(10, 10, 10)
+    other = files.placed(10, 4, 4, (5.0, 3.0, 3.0))
+    painted = [_painted(one, [RED] * 12), _painted(other, [GREEN] * 12)]
+    solid, notes = repair(painted)
+    assert notes == ["united 2 bodies that overlap or touch"]
+    assert _areas_mm2(solid, carry_colours(painted, solid)) == {RED: 600.0 - 16.0, GREEN: 4 * 5 * 4 + 16.0}
+
+
+def test_a_face_that_fills_a_hole_has_no_colour() -> None:
+    box = files.placed(10, 10, 10)
+    open_one = files.without(box, 3)
+    painted = [_painted(open_one, [RED] * 11)]
+    solid, notes = repair(painted)
+    assert "filled 1 small hole" in notes[0]
+    assert _areas_mm2(solid, carry_colours(painted, solid)) == {NO_COLOUR: 50.0, RED: 550.0}
+
+
+def test_faces_turned_over_and_merged_keep_their_colours() -> None:
+    box = files.inside_out(files.placed(10, 10, 10))
+    soup = Surface(box.vertices[box.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3), np.arange(12))
+    solid, _ = repair([soup])
+    colours = carry_colours([soup], solid)
+    assert colours is not None
+    middles = {tuple(row): colour for row, colour in zip(box.vertices[box.faces].mean(axis=1).round(6), range(12), strict=True)}
+    assert [middles[tuple(row)] for row in solid.vertices[solid.faces].mean(axis=1).round(6)] == colours.tolist()
+
+
+def test_what_paints_nothing_has_no_colours() -> None:
+    box = files.placed(10, 10, 10)
+    plain = Surface(box.vertices, box.faces.astype(np.int64))
+    assert carry_colours([plain], repair([plain])[0]) is None
+
+
+@pytest.mark.parametrize(("text", "colour"), [("#FF0000", RED), ("#00ff0080", GREEN), ("red", None), ("#f00", None), ("", None)])
+def test_colours_are_read_as_they_are_written(text: str, colour: int | None) -> None:
+    assert parse_colour(text) == colour
+    assert colour is None or parse_colour(colour_text(colour)) == colour
+
+
+def test_a_mesh_that_is_scaled_and_turned_keeps_its_colours(tmp_path: Path) -> None:
+    box = files.placed(10, 20, 30)
+    content = files.ply(box).replace(b"property uchar red\nelement face", b"element face").replace(b" 7\n", b"\n")
+    content = content.replace(
+        b"vertex_indices\n", b"vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+    )
+    head, _, rows = content.partition(b"end_header\n")
+    lines = rows.splitlines()
+    lines[8:] = [line + (b" 255 0 0" if k == 4 else b" 9 9 9") for k, line in enumerate(lines[8:])]
+    path = files.save(tmp_path / "a.ply", head + b"end_header\n" + b"\n".join(lines) + b"\n")
+    mesh, _ = read_mesh(path, 2.0, (90.0, 0.0, 0.0))
+    assert mesh.colours is not None
+    assert mesh.colours.tolist() == [0x090909] * 4 + [RED] + [0x090909] * 7
+    turned = mesh.transform(np.eye(3))
+    assert turned.colours is not None
+    assert turned.colours.tolist() == mesh.colours.tolist()
