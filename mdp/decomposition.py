@@ -43,7 +43,7 @@ class Part:
 class FrontRow:
     """A decomposition: its planes in the order of the cuts, and what it costs.
 
-    seam_mm: length of the rims of all cuts; time_s, filament_mm: estimates, None where there is none.
+    seam_mm: length of the rims of all cuts; time_s, filament_mm: estimates, None where there is none; reason: why it is chosen.
     """
 
     planes: tuple[Plane, ...]
@@ -53,6 +53,7 @@ class FrontRow:
     chosen: bool = False
     time_s: float | None = None
     filament_mm: float | None = None
+    reason: str = ""
 
     @property
     def parts(self) -> int:

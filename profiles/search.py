@@ -36,6 +36,13 @@ class Search(Frozen):
         description="by how much more a seam counts where face and plane meet at less than 30 deg, times cot angle - cot 30: "
         "such edges are thin, warp and break",
     )
+    second_mm2: float = Field(
+        0.5,
+        ge=0,
+        le=1000,
+        description="what a second of printing counts in the choice between numbers of parts and orientations: so much surface "
+        "that a seam or support blemishes, mm2 (1 cm2 is worth 200 s); 0: time is free, as it is without support",
+    )
     polish: bool = Field(
         True,
         description="the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added",

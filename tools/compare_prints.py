@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from machine.app.pipeline.comparison import alternatives_json, compare_with_one_part
-from machine.app.pipeline.pipeline import build, standing_still
+from machine.app.pipeline.pipeline import best_way_down, build, standing_still
+from machine.app.pipeline.pricing import pricing
 from mdp.mesh import Mesh
 from mdp.read import read_mesh
 from mdp.search.search import decompose
@@ -67,7 +68,9 @@ def row(file: Path, profile: Profile, orient: bool) -> str:
     """One model's line of the table."""
     try:
         mesh = mesh_of(file, profile)
-        decomposition = decompose(lay_down(mesh, profile) if orient else mesh, file.name, profile)
+        turned = best_way_down(mesh, profile) if orient else None
+        mesh = mesh if turned is None else standing_still(mesh, turned)
+        decomposition = decompose(mesh, file.name, profile, price=pricing(profile))
         ours, *single = alternatives_json(compare_with_one_part(build(decomposition, profile), profile))
     except UserError as error:
         return f"| {file.name} | | | | | | | | {error} |"

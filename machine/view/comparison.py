@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from machine.view.parts import page_colours
-from mdp.decomposition import Decomposition, FrontRow
-from mdp.search.front import EQUAL
+from mdp.decomposition import Decomposition
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,6 @@ class Alternative:
 
 def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:
     """The rows of a front as the page knows them. planes: in print order, from part 2 on; why: of the chosen row, else ""."""
-    least_mm2 = min((row.cost_mm2 for row in decomposition.front), default=0.0)
     return [
         {
             "parts": row.parts,
@@ -39,17 +37,10 @@ def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:
             "time_s": row.time_s,
             "filament_mm": row.filament_mm,
             "chosen": row.chosen,
-            "why": why_chosen(row, least_mm2) if row.chosen else "",
+            "why": row.reason,
             "planes": [{"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm} for plane in reversed(row.planes)],
             "colours": page_colours(row.parts),
             "command": f"tiltprint decompose {shlex.quote(decomposition.name)} --parts {row.parts}",
         }
         for row in decomposition.front
     ]
-
-
-def why_chosen(row: FrontRow, least_mm2: float) -> str:
-    """Why a row of a front was taken. least_mm2: the least cost of the rows."""
-    if row.cost_mm2 <= least_mm2:
-        return "the least cost"
-    return "the fewest parts within 1 % of the least cost" if row.cost_mm2 <= least_mm2 * (1.0 + EQUAL) else "asked for"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun, summary
 from machine.reader.parsed import MoveKind
-from machine.view.comparison import Alternative, why_chosen
+from machine.view.comparison import Alternative
 from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
 from machine.view.paths import PRIME, WIPE, page_kinds
@@ -104,8 +104,7 @@ def _front(decomposition: Decomposition) -> list[Table]:
         filament = "–" if row.filament_mm is None else f"{row.filament_mm / 1000:.1f}"
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.cost_mm2:.1f}"]
         rows.append([f"{row.parts}{' (taken)' * row.chosen}", *areas, time, filament])
-    least_mm2 = min(row.cost_mm2 for row in front)
-    notes = [f"taken: {why_chosen(row, least_mm2)}" for row in front if row.chosen]
+    notes = [f"taken: {row.reason}" for row in front if row.chosen]
     notes.append("--parts takes another row; time and filament are estimates")
     return [_table("In how many parts", ["parts", "support mm²", "seams mm", "costs mm²", "about", "m"], rows, notes)]
 

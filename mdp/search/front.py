@@ -1,12 +1,26 @@
 """Front: the best decomposition for every number of parts that one search has met, and which of them to take."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from mdp.cost.cost import CostTerms, Seam, measure_seam
-from mdp.decomposition import FrontRow
+from mdp.decomposition import FrontRow, Part
 from mdp.search.node import Node
+from profiles.profile import Profile
 
 EQUAL = 0.01  # costs that differ by a smaller share are alike: then fewer parts, then shorter seams
+
+
+@dataclass(frozen=True)
+class Price:
+    """What parts take to print: seconds, and mm of filament."""
+
+    time_s: float
+    filament_mm: float
+
+
+LEAST_PARTS = "the fewest parts within 1 % of the least cost"
+Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be printed
 
 
 class Front:
@@ -30,21 +44,17 @@ class Front:
         """The nodes by their number of cuts."""
         return [self._best[count] for count in sorted(self._best)]
 
-    def choose(self, parts: int | None = None) -> Node:
-        """The node of the fewest parts among those whose cost is alike to the least; parts: that of the most parts up to so
-        many, or of the fewest where all have more."""
-        if parts is not None:
-            return self._best[max((count for count in self._best if count < parts), default=self._start)]
-        least_mm2 = min(node.cost_mm2 for node in self.nodes)
-        return next(node for node in self.nodes if node.cost_mm2 <= least_mm2 * (1.0 + EQUAL))
+    def up_to(self, parts: int) -> Node:
+        """The node of the most parts up to so many, or of the fewest where all have more."""
+        return self._best[max((count for count in self._best if count < parts), default=self._start)]
 
 
-def front_row(node: Node, terms: CostTerms, chosen: bool) -> FrontRow:
+def front_row(node: Node, terms: CostTerms) -> FrontRow:
     """A node with what it costs, the seams apart."""
     seams = _seams(node, terms)
     scars_mm2 = terms.seam_mm * sum(seam.weighted_mm for seam in seams)
     planes = tuple(cut.base for cut in node.cuts)
-    return FrontRow(planes, node.cost_mm2 - scars_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2, chosen)
+    return FrontRow(planes, node.cost_mm2 - scars_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2)
 
 
 def _seams(node: Node, terms: CostTerms) -> Sequence[Seam]:
@@ -54,3 +64,67 @@ def _seams(node: Node, terms: CostTerms) -> Sequence[Seam]:
         seams.append(measure_seam(node.parent.remainder.mesh, earlier, node.cuts[-1].base, terms.feather, terms.no_seam))
         node = node.parent
     return seams
+
+
+def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:
+    """A row with what its parts take to print, as it is where that is not known."""
+    known = price(parts)
+    return row if known is None else replace(row, time_s=known.time_s, filament_mm=known.filament_mm)
+
+
+def pays(rows: Sequence[FrontRow]) -> list[bool]:
+    """Whether each row, of ever more parts, costs less than all with fewer parts: nobody takes the others."""
+    return [all(row.cost_mm2 < fewer.cost_mm2 for fewer in rows[:place]) for place, row in enumerate(rows)]
+
+
+def price_of_second_mm2(profile: Profile) -> float:
+    """What a second of printing counts: nothing in the terms of the 2020 paper, and nothing where no support is printed, for
+    then time is no reason to leave a model whole."""
+    search = profile.search
+    scars = search.method == "best" and search.objective == "scar" and search.seam_mm > 0.0
+    return search.second_mm2 if scars and profile.process.support != "none" else 0.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The place of a row in a front and why it is taken; note: what another one would save, where its time speaks against it."""
+
+    place: int
+    reason: str
+    note: tuple[str, ...] = ()
+
+
+def choose(rows: Sequence[FrontRow], second_mm2: float) -> Choice:
+    """The row of the fewest parts among those whose cost is alike to the least. rows: by their number of parts.
+
+    second_mm2: every second that a row takes longer than the fastest one counts so much; 0 and where a row that may be taken has
+    no time: seconds do not count.
+    """
+    places = [place for place, good in enumerate(pays(rows)) if good]
+    scars = _first_alike([rows[place].cost_mm2 for place in places])
+    reason = "the least cost" if rows[places[scars]].cost_mm2 <= min(row.cost_mm2 for row in rows) else LEAST_PARTS
+    times_s = [time_s for place in places if (time_s := rows[place].time_s) is not None]
+    if second_mm2 <= 0.0 or len(times_s) < len(places):
+        return Choice(places[scars], reason)
+    totals = [rows[place].cost_mm2 + second_mm2 * (time_s - min(times_s)) for place, time_s in zip(places, times_s, strict=True)]
+    taken = _first_alike(totals)
+    if taken == scars:
+        return Choice(places[taken], reason)
+    reason = "the least cost with its time" if totals[taken] <= min(totals) else "the fewest parts, cost and time alike"
+    note = _given_up(rows[places[scars]], rows[places[taken]])
+    return Choice(places[taken], reason, note)
+
+
+def _first_alike(costs_mm2: Sequence[float]) -> int:
+    """The first cost that is alike to the least."""
+    return next(place for place, cost_mm2 in enumerate(costs_mm2) if cost_mm2 <= min(costs_mm2) * (1.0 + EQUAL))
+
+
+def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
+    """What the row with the fewest scars would save and cost beside the one that is taken."""
+    saved_mm2, longer_s = taken.cost_mm2 - fewest_scars.cost_mm2, (fewest_scars.time_s or 0.0) - (taken.time_s or 0.0)
+    if saved_mm2 <= 0.0 or longer_s <= 0.0:
+        return ()
+    longer = f"{longer_s / 60.0:.0f} min" if longer_s >= 60.0 else f"{longer_s:.0f} s"
+    parts = fewest_scars.parts
+    return (f"{parts} parts would save {saved_mm2:.0f} mm2 of scars but take {longer} longer: --parts {parts}",)

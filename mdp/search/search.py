@@ -7,34 +7,30 @@ bounds all descendants), two orders of the same cuts take one slot, the slots of
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from time import perf_counter
 
 import numpy as np
 
-from mdp.clearance import allowed_poses
-from mdp.cut import mesh_of
 from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
-from mdp.overhang import risky_above
 from mdp.pedestal import on_pedestal
 from mdp.plan_file import MOST_PARTS, PlanFile
-from mdp.plane import PLATFORM
-from mdp.pose import Pose, level, poses, rotation
-from mdp.pose_sequence import least_rotation
 from mdp.search.beam import Beam
 from mdp.search.by_hand import check_model, cut_by_hand
 from mdp.search.candidates import REASONS
-from mdp.search.front import Front, front_row
+from mdp.search.front import Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
+from mdp.search.parts import make_parts
 from mdp.search.polish import polish
 from mdp.search.problem import Problem
 from mdp.search.ranker import RANKERS
 from mdp.search.ranking import rank_classic
 from mdp.search.record import Trace
 from profiles.errors import PlanError
-from profiles.machine import Machine
 from profiles.profile import Profile
 
 MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
@@ -58,12 +54,13 @@ def decompose(
     on_record: Callable[[bytes], None] | None = None,
     by_hand: PlanFile | None = None,
     parts: int | None = None,
+    price: Pricing | None = None,
 ) -> Decomposition:
     """Find the parts of a closed mesh standing on the platform; one part when nothing is risky or no cut is feasible.
 
     on_record is given what the search looked at and what became of it, as the content of an .npz file. by_hand: planes that are
-    cut first and stay, and zones; parts: so many at most, instead of as many as pay. Raises PlanError for a plane by hand that
-    cannot be cut.
+    cut first and stay, and zones; parts: so many at most, instead of as many as pay; price: what parts take to print, for the
+    rows of the front and the choice between them. Raises PlanError for a plane by hand that cannot be cut.
     """
     began = perf_counter()
     if parts is not None:
@@ -87,20 +84,55 @@ def decompose(
         best, front, rounds = _search_beam(problem, ranker, trace, report)
     if on_record is not None and trace is not None:
         on_record(trace.to_bytes())
-    if parts is not None:
-        best = front.choose(parts)
-    rows = tuple(front_row(node, problem.terms, node is best) for node in front.nodes)
-    notes = (*_notes(problem, best, parts), *_no_seam_note(problem))
-    return _decomposition(problem, best, profile, Outcome(name, ranker, rounds, perf_counter() - began, rows, notes))
+    taken = _take(problem, front, best, profile, parts, price)
+    notes = (*_notes(problem, taken, parts), *_no_seam_note(problem))
+    return _decomposition(problem, taken, profile, Outcome(name, ranker, rounds, perf_counter() - began, notes))
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """The node that is taken, its parts, and the front with its row marked; note: what it gives up for its time."""
+
+    node: Node
+    parts: tuple[Part, ...]
+    front: tuple[FrontRow, ...]
+    note: tuple[str, ...] = ()
+
+
+def _take(problem: Problem, front: Front, best: Node, profile: Profile, wanted: int | None, price: Pricing | None) -> Taken:
+    """The decomposition of a front to take: of at most the wanted number of parts, else the one that costs least, with its time
+    where seconds cost anything; best: the one to take where seams cost nothing."""
+    nodes, made = front.nodes, cache(lambda node: make_parts(node, problem.machine, profile))
+    rows = [front_row(node, problem.terms) for node in nodes]
+    if price is not None:
+        rows = [
+            price_row(row, made(node), price) if good else row for row, node, good in zip(rows, nodes, pays(rows), strict=True)
+        ]
+    choice = choose(rows, price_of_second_mm2(profile))
+    if wanted is not None:
+        choice = Choice(nodes.index(front.up_to(wanted)), "asked for")
+    elif problem.terms.seam_mm <= 0.0:
+        choice = Choice(nodes.index(best), "the least risky area")
+    node, row = nodes[choice.place], rows[choice.place]
+    if price is not None and row.time_s is None:
+        row = price_row(row, made(node), price)
+    rows[choice.place] = replace(row, chosen=True, reason=choice.reason)
+    return Taken(node, made(node), tuple(rows), choice.note)
 
 
 def cut_by_plan(
-    mesh: Mesh, name: str, profile: Profile, plan: PlanFile, ranker: str = "classic", parts: int | None = None
+    mesh: Mesh,
+    name: str,
+    profile: Profile,
+    plan: PlanFile,
+    ranker: str = "classic",
+    parts: int | None = None,
+    price: Pricing | None = None,
 ) -> Decomposition:
     """The parts of a closed mesh by the planes of a plan, without a search; parts: of its row with at most so many.
 
-    The rows of the front are those of the plan, the one that is cut measured anew. Raises PlanError for a plan of another model
-    and for a plane that cannot be cut.
+    The rows of the front are those of the plan, the one that is cut measured anew; price: as for a search. Raises PlanError for
+    a plan of another model and for a plane that cannot be cut.
     """
     began = perf_counter()
     if parts is not None:
@@ -114,29 +146,48 @@ def cut_by_plan(
     check_model(plan, mesh, name)
     problem = Problem(mesh, profile, plan.zones)
     node = cut_by_hand(problem, plan)
+    made = make_parts(node, problem.machine, profile)
     others = {len(row.parts): row for row in plan.front}
     rows = {count: FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2) for count, row in others.items()}
-    rows[len(node.cuts)] = front_row(node, problem.terms, chosen=True)
-    front = tuple(rows[count] for count in sorted(rows))
+    rows[len(node.cuts)] = replace(front_row(node, problem.terms), chosen=True, reason="by the plan")
+    front = [rows[count] for count in sorted(rows)]
+    if price is not None:
+        front = _price_plan(problem, plan, front, made, profile, price)
     notes = _fewer_parts(parts, len(plan.parts) + 1, f"the plan {plan.name} holds")
-    return _decomposition(problem, node, profile, Outcome(name, ranker, 0, perf_counter() - began, front, notes))
+    taken = Taken(node, made, tuple(front))
+    return _decomposition(problem, taken, profile, Outcome(name, ranker, 0, perf_counter() - began, notes))
+
+
+def _price_plan(
+    problem: Problem, plan: PlanFile, rows: Sequence[FrontRow], made: tuple[Part, ...], profile: Profile, price: Pricing
+) -> list[FrontRow]:
+    """The rows of a plan's front with their prices, those that cannot be cut again as they are; made: the chosen row's parts."""
+    planned = {len(row.parts) + 1: row.parts for row in plan.front}
+    priced = []
+    for row, good in zip(rows, pays(rows), strict=True):
+        with suppress(PlanError):
+            if row.chosen:
+                row = price_row(row, made, price)
+            elif good:
+                node = cut_by_hand(problem, replace(plan, parts=planned[row.parts]))
+                row = price_row(row, make_parts(node, problem.machine, profile), price)
+        priced.append(row)
+    return priced
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a search, or a plan in its place, leaves beside the parts."""
+    """How a search, or a plan in its place, went."""
 
     name: str
     ranker: str
     rounds: int
     search_s: float
-    front: tuple[FrontRow, ...]
     notes: tuple[str, ...]
 
 
-def _decomposition(problem: Problem, node: Node, profile: Profile, outcome: Outcome) -> Decomposition:
-    mesh = problem.mesh
-    parts = _parts(node, problem.machine, profile.process.self_supporting_angle_deg, profile.search.clearance)
+def _decomposition(problem: Problem, taken: Taken, profile: Profile, outcome: Outcome) -> Decomposition:
+    mesh, parts = problem.mesh, taken.parts
     folded = folded_mm3(mesh, parts)
     return Decomposition(
         name=outcome.name,
@@ -149,9 +200,9 @@ def _decomposition(problem: Problem, node: Node, profile: Profile, outcome: Outc
         candidates_evaluated=problem.evaluated,
         rounds=outcome.rounds,
         search_s=outcome.search_s,
-        notes=(*_folded_note(folded), *outcome.notes),
+        notes=(*_folded_note(folded), *outcome.notes, *taken.note),
         folded_mm3=folded,
-        front=outcome.front,
+        front=taken.front,
     )
 
 
@@ -179,7 +230,7 @@ def _folded_note(folded: float) -> tuple[str, ...]:
 def _search_beam(
     problem: Problem, ranker: str, trace: Trace | None, report: Callable[[Progress], None]
 ) -> tuple[Node, Front, int]:
-    """The node to take of a beam, the finalists polished, the best for every number of parts, and after how many stages."""
+    """The best node of a beam, the finalists polished, the best for every number of parts, and after how many stages."""
     beam = Beam(problem, RANKERS[ranker], trace)
     stage = 0
     try:
@@ -188,8 +239,7 @@ def _search_beam(
             beam.advance()
             held = sum(node is not None for node in beam.nodes)
             report(Progress(stage, held, beam.best.cost_mm2 / problem.model.risky_mm2))
-        best = _polish_finalists(problem, beam, stage, report)
-        return best if problem.terms.seam_mm <= 0.0 else beam.front.choose(), beam.front, stage
+        return _polish_finalists(problem, beam, stage, report), beam.front, stage
     except KeyboardInterrupt:
         problem.stop()
         raise
@@ -240,14 +290,14 @@ def _continues(problem: Problem, stage: int) -> bool:
     return problem.model.risky_mm2 > 0 and cuts < problem.settings.most_parts - 1 and not problem.late()
 
 
-def _notes(problem: Problem, best: Node, wanted: int | None) -> tuple[str, ...]:
+def _notes(problem: Problem, taken: Taken, wanted: int | None) -> tuple[str, ...]:
     """What a person should know of the outcome."""
-    parts = len(best.cuts) + 1
+    parts = len(taken.parts)
     if problem.model.risky_mm2 <= 0 and parts == 1:
         return ("no face needs support: the model is printed straight up as one part",)
     if problem.late():
         return (f"search.time_limit_s = {problem.settings.time_limit_s:g} ended the search; the best so far is used",)
-    if parts > 1 or wanted == 1:
+    if len(taken.front) > 1 or parts > 1 or wanted == 1:
         return _fewer_parts(wanted, parts, "the search found")
     counts = problem.refusals()
     shares = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
@@ -261,31 +311,3 @@ def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
 def _no_seam_note(problem: Problem) -> tuple[str, ...]:
     free = problem.zones.no_seam and problem.terms.seam_mm <= 0.0
     return ("[[no_seam]] changes nothing where seams cost nothing (search.objective, search.seam_mm)",) if free else ()
-
-
-def _parts(node: Node, machine: Machine, angle_deg: float, clearance: bool) -> tuple[Part, ...]:
-    """Parts in print order: what remains first, then the cuts, last one first."""
-    solids = [(PLATFORM, node.remainder.mesh), *((c.base, mesh_of(c.solid)) for c in reversed(node.cuts))]
-    options = [[level(machine)]]
-    for base, mesh in solids[1:]:
-        options.append(allowed_poses(machine, base.normal, mesh.vertices) if clearance else poses(machine, base.normal))
-
-    def fits(position: int, pose: Pose) -> bool:
-        base, mesh = solids[position]
-        return not clearance or pose in allowed_poses(machine, base.normal, mesh.vertices, pose.turn_deg)
-
-    parts = []
-    for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options, fits), strict=True)):
-        risky = risky_above(mesh, base, angle_deg) if position else node.remainder.risky
-        parts.append(
-            Part(
-                index=position + 1,
-                mesh=mesh,
-                base=base,
-                pose=pose,
-                rotation=rotation(machine, pose),
-                volume_mm3=mesh.volume_mm3,
-                risky_area_mm2=float(mesh.areas_mm2[risky].sum()),
-            )
-        )
-    return tuple(parts)

@@ -7,7 +7,6 @@ from machine.app.pictures.picture import contact_sheet, parts_picture
 from machine.app.pictures.png import write_png
 from machine.app.pipeline.pipeline import decompose_model
 from machine.app.pipeline.precompile import compile_pictures
-from machine.app.pipeline.priced_front import price_front
 from machine.app.requests import ModelRequest, Outputs
 from machine.app.terminal.report import parts_table, show
 from machine.view.page import parts_page
@@ -24,7 +23,7 @@ def decompose(request: ModelRequest) -> int:
     outputs, profile = request.outputs, request.profile
     check_outputs(outputs)
     decomposed = decompose_model(request)
-    decomposition = price_front(decomposed.decomposition, profile)
+    decomposition = decomposed.decomposition
     figures = json_values(decomposition, decomposed.read_s, decomposed.total_s)
     if outputs.folder is not None:
         make_folder(outputs.folder)

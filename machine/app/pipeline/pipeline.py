@@ -9,6 +9,7 @@ from machine.app.output import write_bytes
 from machine.app.pictures.thumbnail import with_thumbnails
 from machine.app.pipeline.given_plan import read_given_plan
 from machine.app.pipeline.precompile import compile_pictures, compile_program, compile_search
+from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import reporting, say
 from machine.dryrun.dryrun import dry_run
@@ -20,6 +21,7 @@ from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.plan_file import PlanFile, plan_of
 from mdp.read import locate, read_mesh
+from mdp.search.front import price_of_second_mm2
 from mdp.search.orientation import best_orientation, in_words, resting_orientations
 from mdp.search.ranker import RANKERS
 from mdp.search.search import Progress, cut_by_plan
@@ -46,7 +48,8 @@ class Decomposed:
 def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed:
     """Read a model and find its parts; repairs and notes go to stderr.
 
-    to_build: `build` comes next, the first run may compile what it needs meanwhile.
+    to_build: `build` comes next, the first run may compile what it needs meanwhile, and the rows of the front that need not be
+    chosen from get no time.
     """
     if request.ranker not in RANKERS:
         raise ProfileError(f"--ranker {request.ranker}: this version knows {', '.join(RANKERS)}")
@@ -62,6 +65,8 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     if orientation is not None:
         mesh = standing_still(mesh, orientation)
     cuts, records = request.cuts, list[bytes]()
+    free = cuts.plan is not None or cuts.parts is not None or price_of_second_mm2(profile) <= 0.0
+    price = None if to_build and free else pricing(profile)
     on_record = None if record_file is None else records.append
     with reporting() as report:
 
@@ -70,9 +75,9 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
             report(f"searching parts: stage {progress.stage}, {progress.beam} in the beam, {left}")
 
         if given is not None and cuts.plan is not None:
-            decomposition = cut_by_plan(mesh, request.name, profile, given, request.ranker, cuts.parts)
+            decomposition = cut_by_plan(mesh, request.name, profile, given, request.ranker, cuts.parts, price)
         else:
-            decomposition = search_parts(mesh, request.name, profile, request.ranker, show, on_record, given, cuts.parts)
+            decomposition = search_parts(mesh, request.name, profile, request.ranker, show, on_record, given, cuts.parts, price)
     if record_file is not None:
         write_bytes(record_file, records[0])
     for note in (*decomposition.notes, *_hints(decomposition, request)):
@@ -85,16 +90,18 @@ def _orientation(mesh: Mesh, request: ModelRequest, given: PlanFile | None) -> F
     """The rotation that lays the model down: a plan's own, else the best where that is asked for; None: as it stands."""
     if given is not None:
         return None if given.orientation is None else np.array(given.orientation)
-    return _best_orientation(mesh, request.profile) if request.orient else None
+    return best_way_down(mesh, request.profile) if request.orient else None
 
 
-def _best_orientation(mesh: Mesh, profile: Profile) -> Floats | None:
-    """The rotation into the resting orientation where a quick search leaves the least risky area; None: as it stands."""
+def best_way_down(mesh: Mesh, profile: Profile) -> Floats | None:
+    """The rotation into the resting orientation where a quick search finds what costs least; None: as it stands."""
     quick = profile.model_copy(update={"search": profile.search.model_copy(update={"beam_width": 1})})
     resting = resting_orientations(mesh, profile.process.self_supporting_angle_deg, ORIENTATIONS_TRIED)
     choices = [mesh, *(standing_still(mesh, orientation.rotation) for orientation in resting)]
-    left = [search_parts(choice, "oriented", quick).residual_area_mm2 for choice in choices]
-    best = left.index(min(left))
+    price, second_mm2 = pricing(profile), price_of_second_mm2(profile)
+    rows = [search_parts(choice, "oriented", quick, price=price).chosen for choice in choices]
+    costs = [0.0 if row is None else row.cost_mm2 + second_mm2 * (row.time_s or 0.0) for row in rows]
+    best = costs.index(min(costs))
     say("the model is best printed as it stands" if best == 0 else f"the model is {in_words(resting[best - 1])}")
     return None if best == 0 else resting[best - 1].rotation
 

@@ -6,7 +6,6 @@ from textwrap import wrap
 
 from machine.dryrun.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
-from machine.view.comparison import why_chosen
 from machine.view.parts import risky_before_mm2
 from machine.view.quantities import duration
 from mdp.decomposition import Decomposition, FrontRow
@@ -46,14 +45,13 @@ def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_pla
 
 def front_table(front: Sequence[FrontRow]) -> str:
     """The best decomposition for every number of parts, the one taken marked and why."""
-    least_mm2 = min(row.cost_mm2 for row in front)
     rows = [["in parts", "needs support mm2", "seams mm", "costs mm2", "about", "filament m"]]
     rows += [
         [str(row.parts), _number(row.support_area_mm2), f"{row.seam_mm:.0f}", _number(row.cost_mm2), *_estimates(row)]
         for row in front
     ]
     head, *lines = table(rows).splitlines()
-    taken = [row.chosen * ("  taken: " + why_chosen(row, least_mm2)) for row in front]
+    taken = [row.chosen * f"  taken: {row.reason}" for row in front]
     return "\n".join([head, *(line + reason for line, reason in zip(lines, taken, strict=True))]) + "\n"
 
 

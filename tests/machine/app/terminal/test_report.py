@@ -54,7 +54,7 @@ def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
     rows = (
         FrontRow((), 300.0, 0.0, 300.0, time_s=3723.0, filament_mm=4040.0),
         FrontRow(planes[:1], 150.0, 40.0, 174.0),
-        FrontRow(planes, 30.0, 80.0, 78.0, chosen=True),
+        FrontRow(planes, 30.0, 80.0, 78.0, chosen=True, reason="the least cost"),
     )
     assert front_table(rows).splitlines() == [
         "in parts  needs support mm2  seams mm  costs mm2  about  filament m",

@@ -1,0 +1,22 @@
+"""Pricing: about how long parts print, and how much filament they take, for the search to choose by."""
+
+from collections.abc import Sequence
+
+from mdp.decomposition import Part
+from mdp.search.front import Price, Pricing
+from profiles.errors import UserError
+from profiles.profile import Profile
+from slicer.estimate.estimate import estimate
+
+
+def pricing(profile: Profile) -> Pricing:
+    """What parts take to print by this profile; None for parts that cannot be sliced."""
+
+    def price(parts: Sequence[Part]) -> Price | None:
+        try:
+            guess = estimate(parts, profile)
+        except UserError:
+            return None
+        return Price(guess.time_s, guess.filament_mm)
+
+    return price

@@ -1,0 +1,41 @@
+"""Parts of a node: its solids in print order, each at a pose, so that the table turns little."""
+
+from mdp.clearance import allowed_poses
+from mdp.cut import mesh_of
+from mdp.decomposition import Part
+from mdp.overhang import risky_above
+from mdp.plane import PLATFORM
+from mdp.pose import Pose, level, poses, rotation
+from mdp.pose_sequence import least_rotation
+from mdp.search.node import Node
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+
+def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ...]:
+    """Parts in print order: what remains first, then the cuts, last one first. machine: the profile's, or one without limits."""
+    angle_deg, clearance = profile.process.self_supporting_angle_deg, profile.search.clearance
+    solids = [(PLATFORM, node.remainder.mesh), *((c.base, mesh_of(c.solid)) for c in reversed(node.cuts))]
+    options = [[level(machine)]]
+    for base, mesh in solids[1:]:
+        options.append(allowed_poses(machine, base.normal, mesh.vertices) if clearance else poses(machine, base.normal))
+
+    def fits(position: int, pose: Pose) -> bool:
+        base, mesh = solids[position]
+        return not clearance or pose in allowed_poses(machine, base.normal, mesh.vertices, pose.turn_deg)
+
+    parts = []
+    for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options, fits), strict=True)):
+        risky = risky_above(mesh, base, angle_deg) if position else node.remainder.risky
+        parts.append(
+            Part(
+                index=position + 1,
+                mesh=mesh,
+                base=base,
+                pose=pose,
+                rotation=rotation(machine, pose),
+                volume_mm3=mesh.volume_mm3,
+                risky_area_mm2=float(mesh.areas_mm2[risky].sum()),
+            )
+        )
+    return tuple(parts)

@@ -1,0 +1,73 @@
+"""Which row of a front is taken: the fewest parts alike to the least cost, seconds counted by their price."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mdp.decomposition import FrontRow
+from mdp.plane import Plane
+from mdp.search.front import choose, pays, price_of_second_mm2
+from profiles.profile import load
+
+PLANE = Plane(np.array([0.0, 0.0, 1.0]), 5.0)
+
+
+def front(*costs_and_times: tuple[float, float | None]) -> list[FrontRow]:
+    """Rows of one part, two parts and so on, with these mm2 of scars and seconds."""
+    rows = enumerate(costs_and_times)
+    return [FrontRow((PLANE,) * count, cost_mm2, 0.0, cost_mm2, time_s=time_s) for count, (cost_mm2, time_s) in rows]
+
+
+# The bunny: cutting saves scars and takes time.
+BUNNY = front((1885.0, 10529.0), (1771.0, 10751.0), (1495.0, 11350.0), (1384.0, 11948.0), (1406.0, None))
+
+
+@pytest.mark.parametrize(("second_mm2", "parts"), [(0.0, 4), (0.1, 4), (0.3, 3), (0.45, 2), (0.6, 1), (100.0, 1)])
+def test_the_dearer_a_second_the_fewer_the_parts_that_take_long(second_mm2: float, parts: int) -> None:
+    assert choose(BUNNY, second_mm2).place + 1 == parts
+
+
+@given(st.lists(st.tuples(st.floats(0, 1e4), st.floats(1, 1e5)), min_size=1, max_size=8))
+def test_where_time_is_free_the_fewest_parts_within_one_percent_of_the_least_scars_are_taken(
+    values: list[tuple[float, float]],
+) -> None:
+    rows = front(*values)
+    least_mm2 = min(row.cost_mm2 for row in rows)
+    assert choose(rows, 0.0).place == next(place for place, row in enumerate(rows) if row.cost_mm2 <= 1.01 * least_mm2)
+
+
+@given(st.lists(st.tuples(st.floats(0, 1e4), st.floats(1, 1e5)), min_size=1, max_size=8))
+def test_where_only_time_counts_the_fastest_row_that_saves_scars_is_taken(values: list[tuple[float, float]]) -> None:
+    rows = front(*values)
+    fastest_s = min(row.time_s or 0.0 for row, good in zip(rows, pays(rows), strict=True) if good)
+    assert (rows[choose(rows, 1e9).place].time_s or 0.0) - fastest_s <= 1e-3
+
+
+def test_a_row_that_costs_more_than_one_with_fewer_parts_is_not_taken_however_fast() -> None:
+    assert choose(front((100.0, 900.0), (120.0, 1.0)), 1.0).place == 0
+
+
+def test_time_does_not_count_where_it_is_not_known_of_all() -> None:
+    assert choose(front((200.0, 900.0), (100.0, None)), 1.0).place == 1
+
+
+def test_what_is_given_up_for_time_is_told_with_figures() -> None:
+    choice = choose(BUNNY, 1.0)
+    assert choice.reason == "the least cost with its time"
+    assert choice.note == ("4 parts would save 501 mm2 of scars but take 24 min longer: --parts 4",)
+    assert choose(BUNNY, 0.0).note == ()
+
+
+@pytest.mark.parametrize(
+    ("setting", "price"),
+    [
+        ("process.support=auto", 0.3),
+        ("process.support=none", 0.0),
+        ("search.objective=risky", 0.0),
+        ("search.method=published", 0.0),
+        ("search.seam_mm=0", 0.0),
+    ],
+)
+def test_seconds_count_where_scars_do_and_support_is_printed(setting: str, price: float) -> None:
+    assert price_of_second_mm2(load(settings=["search.second_mm2=0.3", setting])) == price
