@@ -232,7 +232,7 @@ def choices(browser: Browser, tmp_path: Path) -> Browser:
     post = Plane(np.array([0.0, 0.0, 1.0]), 30.0)
     front = (
         FrontRow((), 100.0, 0.0, 100.0),
-        FrontRow((hand.SIDE,), 0.0, 40.0, 24.0, chosen=True, time_s=4000.0, filament_mm=1234.0),
+        FrontRow((hand.SIDE,), 0.0, 40.0, 24.0, chosen=True, time_s=4000.0, filament_mm=1234.0, reason="the least cost"),
         FrontRow((hand.SIDE, post), 0.0, 80.0, 48.0),
     )
     return opened(browser, tmp_path, parts_page(replace(decomposition, front=front), profile))
