@@ -23,7 +23,7 @@ class Search(Frozen):
         "the terms of the 2020 paper",
     )
     seam_mm: float = Field(
-        0.6,
+        0.8,
         ge=0,
         le=100,
         description="width of the scar that a seam leaves: a cut must make more surface safe than its rim takes, mm; 0: the "
@@ -42,6 +42,13 @@ class Search(Frozen):
         le=1000,
         description="what a second of printing counts in the choice between numbers of parts and orientations: so much surface "
         "that a seam or support blemishes, mm2 (1 cm2 is worth 200 s); 0: time is free, as it is without support",
+    )
+    hidden_seam_share: float = Field(
+        0.5,
+        gt=0,
+        le=1,
+        description="how much a seam counts deep in a crease or neck or out of sight, as a share of what it counts across a "
+        "smooth surface in plain sight; 1: the same everywhere",
     )
     polish: bool = Field(
         True,

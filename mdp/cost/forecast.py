@@ -11,16 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.cost.cost import ROUNDING_MM, CostTerms
+from mdp.cost.cost import CostTerms
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
-from mdp.sweep.rims import COT_30
+from mdp.sweep.rims import ROUNDING_MM, weigh_chord
 from mdp.sweep.sweep import Remainder
 
-STEEPEST_COT = 100.0  # a chord along a face parallel to the plane has no length of its own
+LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no length of its own
 
 
 class Surface(NamedTuple):
@@ -78,8 +78,8 @@ def _sum_left(surface: Surface, directions: Floats, offsets: Floats) -> float:
             below = 0.0
             if lowest < 0.0:
                 if len(surface.seam_mm) > 0 and highest > ROUNDING_MM and lowest < -ROUNDING_MM:
-                    facing = abs(_along(normals, face, directions, cut))
-                    total += surface.seam_mm[face] * _rim(polygon, heights, size) * _feather_factor(facing, surface.feather)
+                    cosine = _along(normals, face, directions, cut)
+                    total += surface.seam_mm[face] * _rim(polygon, heights, size) * _per_mm(cosine, surface.feather)
                 size = _clip_below(polygon, spare, heights, size)
                 polygon, spare = spare, polygon
                 below = _flat_area(polygon, size, normals, face)
@@ -120,11 +120,10 @@ def _rim(polygon: Floats, heights: Floats, size: int) -> float:
 
 
 @part
-def _feather_factor(cosine: float, feather: float) -> float:
-    """How much a rim counts where a face's normal has that cosine with the plane's; see rims._weigh_rims."""
+def _per_mm(cosine: float, feather: float) -> float:
+    """How much a mm of rim counts where a face's normal has that cosine with the plane's."""
     sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
-    cotangent = cosine / sine if cosine < STEEPEST_COT * sine else STEEPEST_COT
-    return float(1.0 + feather * max(cotangent - COT_30, 0.0))
+    return float(weigh_chord(cosine, feather) / max(sine, LEAST_SINE))
 
 
 @part

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdp.cut import Solid, run_faces
-from mdp.mesh import Ints, Mesh
+from mdp.cut import Solid, mesh_of, run_faces
+from mdp.mesh import Floats, Ints, Mesh
 
 MADE_BY_A_CUT = -1
 
@@ -30,3 +30,12 @@ class ModelSurface:
         """
         pieces = [np.where(origin == self.origin, faces, MADE_BY_A_CUT) for origin, faces in run_faces(solid)]
         return np.concatenate(pieces).astype(np.int32)
+
+    def by_source(self, solid: Solid, values: Floats) -> Floats:
+        """(M,) what is known of each face of the uncut model's solid (m,), to be looked up by source: of faces that one stands
+        for the mean by area. M may be a few more than the model's faces: manifold3d adds some where edges lie upon each other."""
+        sources, areas = self.sources(solid), mesh_of(solid).areas_mm2
+        size = len(self.mesh.faces)
+        total, area = np.bincount(sources, values * areas, size), np.bincount(sources, areas, size)
+        means: Floats = total / np.where(area > 0.0, area, 1.0)
+        return means

@@ -60,9 +60,9 @@ def front_row(node: Node, terms: CostTerms) -> FrontRow:
 def _seams(node: Node, terms: CostTerms) -> Sequence[Seam]:
     seams = []
     while node.parent is not None:
-        earlier = [cut.base for cut in node.parent.cuts]
-        seams.append(measure_seam(node.parent.remainder.mesh, earlier, node.cuts[-1].base, terms.feather, terms.no_seam))
-        node = node.parent
+        before, plane = node.parent, node.cuts[-1].base
+        seams.append(measure_seam(before.remainder.mesh, before.seam_weights, plane, terms.feather))
+        node = before
     return seams
 
 

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from mdp.cost.cost import CostTerms
+from mdp.cost.cost import CostTerms, SeamPlaces
 from mdp.cut import Solid, above, mesh_of
+from mdp.mesh import Floats
 from mdp.overhang import risky_upright
 from mdp.plane import Plane
 from mdp.sweep.sweep import Remainder
@@ -32,14 +33,21 @@ class Node:
     solid: Solid
     cuts: tuple[Cut, ...]
     terms: CostTerms
+    places: SeamPlaces
     parent: "Node | None" = None
 
     @cached_property
     def remainder(self) -> Remainder:
         """The remaining solid for the sweep."""
         mesh, terms = mesh_of(self.solid), self.terms
+        weights = self.seam_weights if terms.seam_mm > 0.0 else None
         risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
-        return Remainder(mesh, risky, terms.seam_weights(mesh, [cut.base for cut in self.cuts]), terms.feather)
+        return Remainder(mesh, risky, weights, terms.feather)
+
+    @cached_property
+    def seam_weights(self) -> Floats:
+        """(m,) how much a mm of rim counts on each face of what remains."""
+        return self.places.weights(self.solid)
 
     @cached_property
     def risky_mm2(self) -> float:

@@ -6,7 +6,8 @@ from time import perf_counter
 import numpy as np
 
 from mdp.clearance import allowed_poses
-from mdp.cost.cost import cost_terms
+from mdp.cost.cost import SeamPlaces, cost_terms
+from mdp.cost.model_surface import ModelSurface
 from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, standing, threshold
@@ -38,8 +39,12 @@ class Problem:
         self.settings = settings
         self.machine = profile.machine if settings.clearance else without_limits(profile.machine)
         self.mesh, self.zones = mesh, zones
-        self.terms = cost_terms(profile, settings, zones.no_seam)
-        self.root = self.start = Node(solid_of(mesh), (), self.terms)
+        solid = solid_of(mesh)
+        self.surface = ModelSurface.of(mesh, solid)
+        self.terms = cost_terms(profile, settings)
+        hidden_share = settings.hidden_seam_share if self.terms.seam_mm > 0.0 else 1.0
+        places = SeamPlaces.of(self.surface, solid, hidden_share, zones.no_seam)
+        self.root = self.start = Node(solid, (), self.terms, places)
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
         self.platform_disc = platform_disc(mesh, settings)
@@ -121,7 +126,7 @@ class Problem:
         if residual_mm2 is None:
             residual_mm2 = self._residual_mm2(node, plane)
         cuts = (*node.cuts, Cut(plane, node.solid, residual_mm2))
-        following = Node(rest, cuts, self.terms, node)
+        following = Node(rest, cuts, self.terms, node.places, node)
         if self.settings.clearance:
             lower = following.remainder.mesh.vertices
             corners = np.vstack([upper, lower[plane.heights_mm(lower) >= -BASE_TOLERANCE_MM]])

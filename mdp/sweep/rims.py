@@ -4,17 +4,20 @@ A face that a plane crosses gives its chord. The chord grows linearly with the o
 linearly beyond; its integral over the extent across the planes is the area times the sine of the angle between face and plane.
 """
 
+from math import cos, radians
 from typing import NamedTuple
 
 import numpy as np
 
 from mdp.kernels.arrays import floats, int_table, table
-from mdp.kernels.kernel import inlined, part, vector_part
-from mdp.mesh import Floats
+from mdp.kernels.kernel import inlined, kernel, part, vector_part
+from mdp.mesh import Floats, Ints
 from mdp.sweep.facets import Indices
 from mdp.sweep.integrals import AHEAD, BLOCK, Block, OffsetGrid, cut_block, dot, find_ramps, sort_heights
 
 COT_30 = 3.0**0.5
+FEATHER_COSINE = cos(radians(20.0))  # of face and plane: the edge between them is so thin that it is reported
+ROUNDING_MM = 1e-9  # a corner that a cut has made lies in its plane
 
 
 class Rims(NamedTuple):
@@ -28,16 +31,23 @@ class Rims(NamedTuple):
     feather: float
 
 
-@vector_part
-def _weigh_rims(cosines: Floats, areas: Floats, weights: Floats, feather: float, out: Floats) -> None:
-    """Twice the area times the sine of the angle between face and plane: the longest chord times the extent across the planes.
+@inlined
+def weigh_chord(cosine: float, feather: float) -> float:
+    """How much a chord counts where a face's normal has that cosine with the plane's, times the sine of the angle between.
 
     A feather edge, where face and plane meet at less than 30 degrees, counts 1 + feather (cot angle - cot 30) times.
     """
+    facing = abs(cosine)
+    sine: float = np.sqrt(max(1.0 - facing * facing, 0.0))
+    return sine + feather * max(facing - COT_30 * sine, 0.0)
+
+
+@vector_part
+def _weigh_rims(cosines: Floats, areas: Floats, weights: Floats, feather: float, out: Floats) -> None:
+    """Twice the area times the sine of the angle between face and plane: the longest chord times the extent across the planes;
+    weighted."""
     for k in range(len(out)):
-        cosine = abs(cosines[k])
-        sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
-        out[k] = 2.0 * areas[k] * weights[k] * (sine + feather * max(cosine - COT_30 * sine, 0.0))
+        out[k] = 2.0 * areas[k] * weights[k] * weigh_chord(cosines[k], feather)
 
 
 @inlined
@@ -88,3 +98,30 @@ def integrate_rim(surface: Rims, grid: OffsetGrid, rim: Floats) -> None:
         _add_rims(block, lengths, sums)
     for column in range(n):
         rim[column] = sums[column] / grid.step_mm
+
+
+class Rim(NamedTuple):
+    """The rim of one plane: its length on faces that count, that with their weights, and that of feather edges, mm."""
+
+    length: float
+    weighted: float
+    feathered: float
+
+
+@kernel
+def measure_rim(faces: Ints, heights: Floats, cosines: Floats, areas: Floats, weights: Floats, feather: float) -> Rim:
+    """The rim at height 0 of a mesh: vertices of its (m, 3) faces at (n,) heights; cosines (m,) of face and plane."""
+    length, weighted, feathered = 0.0, 0.0, 0.0
+    for f in range(len(faces)):
+        p, q, r = heights[faces[f, 0]], heights[faces[f, 1]], heights[faces[f, 2]]
+        low, high = min(p, q, r), max(p, q, r)
+        if weights[f] <= 0.0 or low >= -ROUNDING_MM or high <= ROUNDING_MM:
+            continue
+        middle = max(min(p, q), min(max(p, q), r))
+        share = -low / (middle - low) if middle > 0.0 else high / (high - middle)
+        chord = 2.0 * areas[f] * share / (high - low)
+        length += chord * weigh_chord(cosines[f], 0.0)
+        weighted += chord * weights[f] * weigh_chord(cosines[f], feather)
+        if abs(cosines[f]) > FEATHER_COSINE:
+            feathered += chord * weigh_chord(cosines[f], 0.0)
+    return Rim(length, weighted, feathered)

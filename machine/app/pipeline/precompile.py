@@ -18,8 +18,9 @@ from machine.dryrun.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan
-from mdp.cost.cost import CostTerms
+from mdp.cost.cost import CostTerms, measure_seam
 from mdp.cost.forecast import Surface
+from mdp.cost.hidden import hidden_shares
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
 from mdp.kernels.cache import mark
@@ -129,6 +130,8 @@ def _beside_sweep() -> None:
     remainder = _remainder()
     gains(remainder, LEANING[None], 1.0, threshold(45.0))
     remainder.thin_mm(PLANE)
+    hidden_shares(remainder.mesh)
+    measure_seam(remainder.mesh, remainder.mesh.areas_mm2, PLANE, 0.0)
     Surface.of(remainder, CostTerms(45.0, False)).left_mm2([PLANE])
 
 

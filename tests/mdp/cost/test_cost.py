@@ -1,4 +1,4 @@
-"""What a cut costs: its rim against exact sections, feather edges, faces that are hidden, and cuts that do not pay."""
+"""What a cut costs: its rim against exact sections, feather edges, faces that are free or hidden, and cuts that do not pay."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.cost.cost import CostTerms, measure_seam, rim_weights
+from mdp.cost.cost import CostTerms, Seam, SeamPlaces, measure_seam
 from mdp.cost.forecast import Surface
-from mdp.cut import below, mesh_of, solid_of
+from mdp.cost.model_surface import ModelSurface
+from mdp.cut import Solid, below, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
@@ -36,6 +37,16 @@ def _swept(mesh: Mesh, direction: Floats, feather: float = 0.0) -> Gains:
     return gains(_remainder(mesh, np.ones(len(mesh.faces)), feather), direction[None], 1.0, threshold(ANGLE_DEG))
 
 
+def _places(mesh: Mesh, hidden_share: float = 1.0) -> tuple[SeamPlaces, Solid]:
+    """Where seams cost how much on a model, and its solid."""
+    solid = solid_of(mesh)
+    return SeamPlaces.of(ModelSurface.of(mesh, solid), solid, hidden_share), solid
+
+
+def _seam(places: SeamPlaces, solid: Solid, plane: Plane, feather: float = 0.0) -> Seam:
+    return measure_seam(mesh_of(solid), places.weights(solid), plane, feather)
+
+
 def _section_mm(mesh: Mesh, plane: Plane) -> float:
     """Length of the outline of a section, by trimesh."""
     model = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
@@ -57,38 +68,55 @@ def test_the_rim_at_every_offset_is_the_outline_of_the_section(seed: int, lean: 
 def test_a_rim_counts_more_where_face_and_plane_meet_at_a_small_angle(lean_deg: float, weight: float) -> None:
     wedge = mesh_of(below(solid_of(shapes.box(20.0, 20.0, 40.0)), Plane(_direction((lean_deg, 0.0)), 15.0)))
     plane = Plane(np.array([0.0, 0.0, 1.0]), 14.0)
-    leaning = measure_seam(wedge, [], plane, 0.5).weighted_mm - measure_seam(wedge, [], plane, 0.0).weighted_mm
-    assert leaning == pytest.approx((weight - 1.0) * 20.0, abs=1e-4)  # one of the rim's four sides lies on the leaning face
+    leaning = _seam(*_places(wedge), plane, 0.5)
+    assert leaning.weighted_mm - leaning.length_mm == pytest.approx(
+        (weight - 1.0) * 20.0, abs=1e-4
+    )  # one of the rim's four sides
+
+
+@pytest.mark.parametrize(("lean_deg", "feathered_mm"), [(60.0, 0.0), (21.0, 0.0), (19.0, 20.0), (10.0, 20.0)])
+def test_an_edge_below_20_degrees_is_a_feather_edge(lean_deg: float, feathered_mm: float) -> None:
+    wedge = mesh_of(below(solid_of(shapes.box(20.0, 20.0, 40.0)), Plane(_direction((lean_deg, 0.0)), 15.0)))
+    assert _seam(*_places(wedge), Plane(np.array([0.0, 0.0, 1.0]), 15.0)).feathered_mm == pytest.approx(feathered_mm, abs=1e-4)
 
 
 def test_a_face_that_an_earlier_cut_laid_open_carries_no_seam() -> None:
     first, second = Plane(np.array([0.0, 0.0, 1.0]), 10.0), Plane(np.array([1.0, 0.0, 0.0]), 0.0)
-    rest = mesh_of(below(solid_of(shapes.box(20.0, 20.0, 30.0)), first))
-    assert measure_seam(rest, [], second, 0.0).length_mm == pytest.approx(20.0 + 10.0 + 10.0)  # the platform's side is free
-    assert measure_seam(rest, [first], second, 0.0).length_mm == pytest.approx(10.0 + 10.0)
+    places, whole = _places(shapes.box(20.0, 20.0, 30.0))
+    assert _seam(places, whole, second).length_mm == pytest.approx(20.0 + 30.0 + 30.0)  # the platform's side is free
+    assert _seam(places, below(whole, first), second).length_mm == pytest.approx(10.0 + 10.0)
+
+
+def test_a_seam_along_a_crease_counts_less_than_beside_it() -> None:
+    places, branch = _places(shapes.tee(), hidden_share=0.4)  # a bar whose underside is at 30 mm on a stem
+    crease, stem = (_seam(places, branch, Plane(np.array([0.0, 0.0, 1.0]), z)) for z in (29.9, 15.0))
+    assert crease.length_mm == stem.length_mm == pytest.approx(40.0)
+    assert 0.4 * 40.0 <= crease.weighted_mm < stem.weighted_mm <= 40.0
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 50), LEAN, st.floats(2.0, 30.0))
 def test_the_seam_of_one_plane_is_the_sweep_s_rim(seed: int, lean: tuple[float, float], offset_mm: float) -> None:
     mesh, plane = random_solid(seed), Plane(_direction(lean), offset_mm)
-    remainder = _remainder(mesh, rim_weights(mesh, []), 0.5)
+    places, solid = _places(mesh, hidden_share=0.4)
+    remainder = _remainder(mesh_of(solid), places.weights(solid), 0.5)
     swept = gains(remainder, plane.normal[None], offset_mm, threshold(ANGLE_DEG))
     column = 1 - int(swept.first[0])
     if 0 <= column < swept.columns[0]:
-        assert swept.rim_mm[0, column] == pytest.approx(measure_seam(mesh, [], plane, 0.5).weighted_mm, rel=1e-9, abs=1e-9)
+        assert swept.rim_mm[0, column] == pytest.approx(_seam(places, solid, plane, 0.5).weighted_mm, rel=1e-9, abs=1e-9)
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.tuples(LEAN, st.floats(5.0, 35.0)), min_size=1, max_size=4))
 def test_the_forecast_counts_every_seam_as_it_is_after_cutting(leans: list[tuple[tuple[float, float], float]]) -> None:
-    mesh, terms = shapes.branch(), CostTerms(ANGLE_DEG, False, seam_mm=0.6, feather=0.5)
+    places, rest = _places(shapes.branch(), hidden_share=0.4)
+    mesh, terms = mesh_of(rest), CostTerms(ANGLE_DEG, False, seam_mm=0.6, feather=0.5)
     planes = [Plane(_direction(lean), offset_mm) for lean, offset_mm in leans]
-    with_seams = Surface.of(_remainder(mesh, rim_weights(mesh, []), 0.5), terms).left_mm2(planes)
+    with_seams = Surface.of(_remainder(mesh, places.weights(rest), 0.5), terms).left_mm2(planes)
     without = Surface.of(Remainder(mesh, risky_upright(mesh, ANGLE_DEG)), CostTerms(ANGLE_DEG, False)).left_mm2(planes)
-    seams_mm, rest = 0.0, solid_of(mesh)
-    for position, plane in enumerate(planes):
-        seams_mm += measure_seam(mesh_of(rest), planes[:position], plane, 0.5).weighted_mm
+    seams_mm = 0.0
+    for plane in planes:
+        seams_mm += _seam(places, rest, plane, 0.5).weighted_mm
         rest = below(rest, plane)
         if rest.is_empty():
             break

@@ -12,7 +12,9 @@ from tests import shapes
 
 
 def _problem(width: int, shape: str = "tee") -> Problem:
-    return Problem(getattr(shapes, shape)(), load(settings=("search.directions=150", f"search.beam_width={width}")))
+    return Problem(
+        getattr(shapes, shape)(), load(settings=("search.directions=150", f"search.beam_width={width}", "search.seam_mm=0.6"))
+    )
 
 
 def _beam(width: int, stages: int, shape: str = "tee") -> Beam:

@@ -237,7 +237,7 @@ def test_seams_keep_out_of_a_zone_where_they_weigh_a_hundred_times() -> None:
     by_hand = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0), zones=Zones(no_seam=(everywhere,))))
     free = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0)))
     assert by_hand.seam_mm == free.seam_mm == pytest.approx(100.0)
-    assert by_hand.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.6 * 100.0)
+    assert by_hand.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.8 * 100.0)
 
 
 def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:

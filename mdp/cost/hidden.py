@@ -1,0 +1,165 @@
+"""Hidden places: where on a model a seam is seen less, worked out once for every face.
+
+A seam in a crease or a neck is taken for a part of the shape, and one in an occluded place is out of sight. How concave the
+surface is comes from the curvature tensor of Cohen-Steiner and Morvan (2003): over a neighbourhood every edge adds its
+dihedral angle times its length along the edge, so single noisy edges cancel out. How occluded a place is comes from
+rays over the hemisphere, spread so that each stands for the same share of the light.
+"""
+
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import floats, ints
+from mdp.kernels.kernel import kernel, part
+from mdp.kernels.threads import in_threads
+from mdp.mesh import Floats, Ints, Mesh
+from mdp.sweep.rays import TriangleTree, first_hit, triangle_tree
+
+NEIGHBOURHOOD = 0.03  # radius over which the surface is looked at, as a share of the model's diagonal
+FULL_BEND = 0.6  # radians by which a place bends inward over such a radius where it counts as hidden altogether
+RAYS = 12
+REACH = 0.3  # of a ray that sees nothing, as a share of the model's diagonal
+OPEN = 0.1  # share of the rays that may be blocked where a place still counts as open
+MOST_NEIGHBOURS = 512  # faces of a neighbourhood; a finer mesh is looked at within a smaller radius
+LIFT = 1e-6  # of a ray's start above its face, as a share of the model's diagonal
+ANY_FACE = -2.0  # no cosine is less
+
+
+class Neighbourhood(NamedTuple):
+    """A surface for looking around a face: middles (m, 3), normals (m, 3) and areas (m,) of the faces, the faces across their
+    edges (m, 3), and for every edge its length times its dihedral angle, positive where concave, and its direction (m, 3, 3)."""
+
+    middles: Floats
+    normals: Floats
+    areas_mm2: Floats
+    across: Ints
+    bends: Floats
+    directions: Floats
+
+
+def hidden_shares(mesh: Mesh) -> Floats:
+    """(m,) how hidden each face of a closed mesh in spatial order is: 0 in plain sight, 1 deep in a crease or out of sight."""
+    diagonal_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
+    surface = _look_around(mesh)
+    occluded, hidden = np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
+    in_threads(_occlude, len(mesh.faces), triangle_tree(mesh), surface.middles, _hemisphere(), diagonal_mm, occluded)
+    in_threads(_hide, len(mesh.faces), surface, NEIGHBOURHOOD * diagonal_mm, occluded, hidden)
+    return hidden
+
+
+def _hemisphere() -> Floats:
+    """(RAYS, 3) unit vectors around +z, each for the same share of the light that a matt face receives (Malley)."""
+    share, turn = (np.arange(RAYS) + 0.5) / RAYS, np.arange(RAYS) * pi * (3.0 - 5.0**0.5)
+    return np.stack([np.sqrt(share) * np.cos(turn), np.sqrt(share) * np.sin(turn), np.sqrt(1.0 - share)], axis=1)
+
+
+def _look_around(mesh: Mesh) -> Neighbourhood:
+    corners = mesh.vertices[mesh.faces]
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.linalg.norm(edges, axis=2)
+    directions = edges / np.where(lengths > 0.0, lengths, 1.0)[..., None]
+    across, normals = _faces_across(mesh), mesh.normals
+    beyond = normals[across]
+    sine = np.einsum("mki,mki->mk", np.cross(normals[:, None], beyond), directions)
+    angles = np.arctan2(-sine, np.einsum("mi,mki->mk", normals, beyond))
+    return Neighbourhood(corners.mean(axis=1), normals, mesh.areas_mm2, across, angles * lengths, directions)
+
+
+def _faces_across(mesh: Mesh) -> Ints:
+    """(m, 3) the face on the other side of the edge from each corner to the next."""
+    starts, ends = mesh.faces.astype(np.int64).ravel(), np.roll(mesh.faces, -1, axis=1).astype(np.int64).ravel()
+    size = len(mesh.vertices)
+    rising, falling = np.flatnonzero(starts < ends), np.flatnonzero(starts > ends)
+    rising = rising[np.argsort(starts[rising] * size + ends[rising], kind="stable")]
+    falling = falling[np.argsort(ends[falling] * size + starts[falling], kind="stable")]
+    across = np.repeat(np.arange(len(mesh.faces), dtype=np.int32), 3)
+    across[rising], across[falling] = falling // 3, rising // 3
+    return across.reshape(-1, 3)
+
+
+@kernel
+def _occlude(begin: int, end: int, tree: TriangleTree, middles: Floats, rays: Floats, diagonal: float, out: Floats) -> None:
+    """The share of a hemisphere of rays from every face that meets the surface again."""
+    origin, ray = floats(3, 0.0), floats(3, 0.0)
+    normals = tree.normals
+    for f in range(begin, end):
+        x, y, z = normals[f, 0], normals[f, 1], normals[f, 2]
+        # A basis around the normal (Duff et al. 2017).
+        sign = 1.0 if z >= 0.0 else -1.0
+        a = -1.0 / (sign + z)
+        b = x * y * a
+        for axis in range(3):
+            origin[axis] = middles[f, axis] + LIFT * diagonal * normals[f, axis]
+        blocked = 0
+        for k in range(len(rays)):
+            u, v, w = rays[k, 0], rays[k, 1], rays[k, 2]
+            ray[0] = u * (1.0 + sign * x * x * a) + v * b + w * x
+            ray[1] = u * sign * b + v * (sign + y * y * a) + w * y
+            ray[2] = -u * sign * x - v * y + w * z
+            blocked += int(first_hit(tree, origin, ray, REACH * diagonal, -1, ANY_FACE) >= 0)
+        out[f] = blocked / len(rays)
+
+
+@kernel
+def _hide(begin: int, end: int, surface: Neighbourhood, radius: float, occluded: Floats, out: Floats) -> None:
+    """How hidden every face is, by what lies within a radius of it."""
+    seen, near, tensor = ints(len(surface.areas_mm2), -1), ints(MOST_NEIGHBOURS, 0), floats(6, 0.0)
+    for f in range(begin, end):
+        count = _gather(surface, f, radius, seen, near)
+        area, dark = 0.0, 0.0
+        for k in range(6):
+            tensor[k] = 0.0
+        for at in range(count):
+            g = near[at]
+            area += surface.areas_mm2[g]
+            dark += surface.areas_mm2[g] * occluded[g]
+            for e in range(3):
+                bend = 0.5 * surface.bends[g, e]  # an edge is met from both of its faces
+                p, q, r = surface.directions[g, e, 0], surface.directions[g, e, 1], surface.directions[g, e, 2]
+                tensor[0] += bend * p * p
+                tensor[1] += bend * q * q
+                tensor[2] += bend * r * r
+                tensor[3] += bend * p * q
+                tensor[4] += bend * q * r
+                tensor[5] += bend * r * p
+        if area > 0.0:
+            concave = min(1.0, max(0.0, _most_bend(tensor) / area) * radius / FULL_BEND)
+            shade = min(1.0, max(0.0, dark / area - OPEN) / (1.0 - OPEN))
+            out[f] = 1.0 - (1.0 - concave) * (1.0 - shade)
+
+
+@part
+def _gather(surface: Neighbourhood, face: int, radius: float, seen: Ints, near: Ints) -> int:
+    """Put the faces around one into `near`, nearest rings first, as far as their middles lie within the radius; their number."""
+    middles = surface.middles
+    near[0], count, at = face, 1, 0
+    seen[face] = face
+    while at < count:
+        for e in range(3):
+            g = surface.across[near[at], e]
+            if seen[g] == face or count == MOST_NEIGHBOURS:
+                continue
+            seen[g] = face
+            x, y, z = middles[g, 0] - middles[face, 0], middles[g, 1] - middles[face, 1], middles[g, 2] - middles[face, 2]
+            if x * x + y * y + z * z <= radius * radius:
+                near[count] = g
+                count += 1
+        at += 1
+    return count
+
+
+@part
+def _most_bend(tensor: Floats) -> float:
+    """The largest eigenvalue of a symmetric tensor xx, yy, zz, xy, yz, zx (Smith 1961)."""
+    xx, yy, zz, xy, yz, zx = tensor[0], tensor[1], tensor[2], tensor[3], tensor[4], tensor[5]
+    mean = (xx + yy + zz) / 3.0
+    off = xy * xy + yz * yz + zx * zx
+    size = np.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2.0 * off) / 6.0)
+    if size <= 0.0:
+        return float(mean)
+    a, b, c = (xx - mean) / size, (yy - mean) / size, (zz - mean) / size
+    d, e, f = xy / size, yz / size, zx / size
+    half = 0.5 * (a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f))
+    return float(mean + 2.0 * size * np.cos(np.arccos(min(1.0, max(-1.0, half))) / 3.0))
