@@ -9,15 +9,17 @@ orientation. --log appends each row at once and skips the models that the file a
 """
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from machine.app.pipeline.comparison import alternatives_json, compare_with_one_part
-from machine.app.pipeline.pipeline import best_way_down, build, standing_still
+from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.pricing import pricing
 from mdp.mesh import Mesh
 from mdp.read import read_mesh
+from mdp.search.laying import lay_down
 from mdp.search.search import decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
@@ -68,9 +70,8 @@ def row(file: Path, profile: Profile, orient: bool) -> str:
     """One model's line of the table."""
     try:
         mesh = mesh_of(file, profile)
-        turned = best_way_down(mesh, profile) if orient else None
-        mesh = mesh if turned is None else standing_still(mesh, turned)
-        decomposition = decompose(mesh, file.name, profile, price=pricing(profile))
+        search = partial(decompose, name=file.name, profile=profile, price=pricing(profile))
+        decomposition = lay_down(mesh, profile, pricing, search).decomposition if orient else search(mesh)
         ours, *single = alternatives_json(compare_with_one_part(build(decomposition, profile), profile))
     except UserError as error:
         return f"| {file.name} | | | | | | | | {error} |"

@@ -19,6 +19,7 @@ from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
 
 LEAN_DEG = 5.0  # a model that rests may be leaned by this much before it tips over
 SAME_FACET_DEG = 0.5
+LYING_DEG = 15.0  # a model that leans less lies on a side
 SPREAD = 1000
 MOST_FACETS = 1000
 EQUAL_MM2 = 1e-6  # areas that differ less are equal but for rounding
@@ -27,13 +28,14 @@ SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 3
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """A model turned as a whole: rotation (3, 3), what is risky then, whether it rests without tipping over, and the area
-    of its faces that stand on the platform."""
+    """A model turned as a whole: rotation (3, 3), what is risky then, whether it rests without tipping over, the area of its
+    faces that stand on the platform, and how high it stands."""
 
     rotation: Floats
     risky_mm2: float
     stable: bool
     base_mm2: float
+    height_mm: float
 
     @property
     def turns_deg(self) -> tuple[float, float]:
@@ -48,18 +50,30 @@ def best_orientation(mesh: Mesh, angle_deg: float, resting: bool = True) -> Orie
     As the model stands counts as well, so the result is never worse than printing it straight up. Among equal areas one that
     rests is taken, then the least turned. A model that rests nowhere (a ball) is taken as it comes.
     """
-    candidates = _measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)]))
+    candidates = _on_facets(mesh, angle_deg)
     resting_ones = [orientation for orientation in candidates if orientation.stable]
     if resting and resting_ones:
         return min(resting_ones, key=_rank)
     return min([*candidates, *_measure(mesh, angle_deg, spread(SPREAD))], key=_rank)
 
 
-def resting_orientations(mesh: Mesh, angle_deg: float, most: int) -> list[Orientation]:
-    """Up to `most` orientations in which the model rests on a facet of its hull, least risky first; the present one is
-    among those looked at when it rests."""
-    candidates = _measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)]))
-    return sorted((orientation for orientation in candidates if orientation.stable), key=_rank)[:most]
+def resting_orientations(mesh: Mesh, angle_deg: float) -> list[Orientation]:
+    """The orientations in which the model rests on a facet of its hull, least risky first; the present one is among them when it
+    rests."""
+    return sorted((orientation for orientation in _on_facets(mesh, angle_deg) if orientation.stable), key=_rank)
+
+
+def measure_upright(mesh: Mesh, angle_deg: float) -> Orientation:
+    """The model as it stands."""
+    return _measure(mesh, angle_deg, UP[None])[0]
+
+
+def standing_still(mesh: Mesh, rotation: Floats) -> Mesh:
+    """The mesh turned, then set on z = 0 and centred about the turn axis."""
+    turned = mesh.transform(rotation)
+    low, high = turned.bounds_mm
+    middle = 0.5 * (low + high)
+    return turned.transform(np.eye(3), (-middle[0], -middle[1], -low[2]))
 
 
 def spread(count: int) -> Floats:
@@ -88,11 +102,19 @@ def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> tuple[Float
     return np.maximum(facing_down - standing, 0.0), standing
 
 
+@lru_cache(maxsize=4)
+def _on_facets(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
+    """As the model stands, and on each facet of its hull."""
+    return tuple(_measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)])))
+
+
 def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:
     risky, standing = risky_areas(mesh, directions, angle_deg)
-    rests = _rests(mesh, directions)
+    rests, corners = _rests(mesh, directions), convex_hull(mesh.vertices).vertices
     return [
-        Orientation(_rotation(direction), float(risky[k]), bool(rests[k]), float(standing[k]))
+        Orientation(
+            _rotation(direction), float(risky[k]), bool(rests[k]), float(standing[k]), float(np.ptp(dot(corners, direction)))
+        )
         for k, direction in enumerate(directions)
     ]
 
@@ -158,6 +180,15 @@ def _rotation(direction: Floats) -> Floats:
     about_y = np.array([[cos(y), 0.0, sin(y)], [0.0, 1.0, 0.0], [-sin(y), 0.0, cos(y)]])
     rotation: Floats = about_y @ about_x
     return rotation
+
+
+def side_in_words(orientation: Orientation) -> str:
+    """The side that the model lies on then, seen by somebody in front of it as it stands now; "" where it leans."""
+    faces = {(0, 0, 1): "upside down", (0, 0, -1): "as it stands", (1, 0, 0): "on its right side", (-1, 0, 0): "on its left side"}
+    faces |= {(0, 1, 0): "on its back", (0, -1, 0): "on its front"}
+    down = -orientation.rotation[2]
+    side = max(faces, key=lambda face: float(np.dot(down, face)))
+    return faces[side] if float(np.dot(down, side)) >= cos(radians(LYING_DEG)) else ""
 
 
 def in_words(orientation: Orientation) -> str:

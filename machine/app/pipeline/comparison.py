@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from machine.app.pipeline.pipeline import build, standing_still
+from machine.app.pipeline.pipeline import build
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import table
 from machine.view.comparison import Alternative
@@ -15,7 +15,7 @@ from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level, rotation
-from mdp.search.orientation import best_orientation, in_words
+from mdp.search.orientation import best_orientation, in_words, standing_still
 from profiles.errors import UserError
 from profiles.profile import Profile
 from slicer.paths import Kind

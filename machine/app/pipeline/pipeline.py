@@ -11,38 +11,37 @@ from machine.app.pipeline.given_plan import read_given_plan
 from machine.app.pipeline.precompile import compile_pictures, compile_program, compile_search
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
-from machine.app.terminal.progress import reporting, say
+from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.limits import check_parts
 from machine.planning.plan import plan
 from machine.view.program import Program
+from machine.view.quantities import minutes
 from mdp.decomposition import Decomposition
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Mesh
 from mdp.plan_file import PlanFile, plan_of
 from mdp.read import locate, read_mesh
 from mdp.search.front import price_of_second_mm2
-from mdp.search.orientation import best_orientation, in_words, resting_orientations
+from mdp.search.laying import OtherWay, find_better_way, lay_down
+from mdp.search.orientation import in_words, side_in_words, standing_still
 from mdp.search.ranker import RANKERS
-from mdp.search.search import Progress, cut_by_plan
-from mdp.search.search import decompose as search_parts
+from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import ProfileError
 from profiles.profile import Profile
 from slicer.parts import slice_parts
 
-ORIENTATIONS_TRIED = 4
-WELL_REDUCED = 0.9
-
 
 @dataclass(frozen=True, eq=False)
 class Decomposed:
-    """A decomposition, the plan that cuts it again, and how long its steps took."""
+    """A decomposition, the plan that cuts it again, how long its steps took, and what a person should rather do."""
 
     decomposition: Decomposition
     plan: PlanFile
     read_s: float
     total_s: float
+    better: OtherWay | None = None
 
 
 def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed:
@@ -61,68 +60,80 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     for repair in repairs:
         say(f"{request.name}: {repair}")
     compile_search(to_build)
-    orientation = _orientation(mesh, request, given)
+    orientation = None if given is None or given.orientation is None else np.array(given.orientation)
     if orientation is not None:
         mesh = standing_still(mesh, orientation)
-    cuts, records = request.cuts, list[bytes]()
-    free = cuts.plan is not None or cuts.parts is not None or price_of_second_mm2(profile) <= 0.0
-    price = None if to_build and free else pricing(profile)
-    on_record = None if record_file is None else records.append
+    better: OtherWay | None = None
+    notes: tuple[str, ...]
     with reporting() as report:
-
-        def show(progress: Progress) -> None:
-            left = f"{100 * progress.best_share:.1f} % of the risky area left"
-            report(f"searching parts: stage {progress.stage}, {progress.beam} in the beam, {left}")
-
-        if given is not None and cuts.plan is not None:
-            decomposition = cut_by_plan(mesh, request.name, profile, given, request.ranker, cuts.parts, price)
+        asked = _Search(request, given, to_build, report)
+        if request.orient and given is None:
+            lying = lay_down(mesh, profile, pricing, asked.search)
+            decomposition, chosen = lying.decomposition, lying.orientation
+            orientation = None if chosen is None else chosen.rotation
+            notes = ("the model is best printed as it stands" if chosen is None else f"the model is {in_words(chosen)}",)
         else:
-            decomposition = search_parts(mesh, request.name, profile, request.ranker, show, on_record, given, cuts.parts, price)
+            decomposition = asked.search(mesh)
+            better = find_better_way(mesh, decomposition, profile, pricing) if given is None else None
+            notes = _hint(decomposition, better)
     if record_file is not None:
-        write_bytes(record_file, records[0])
-    for note in (*decomposition.notes, *_hints(decomposition, request)):
+        write_bytes(record_file, asked.record_of(decomposition))
+    for note in (*decomposition.notes, *notes):
         say(f"{request.name}: {note}")
-    zones = NO_ZONES if given is None else given.zones
-    return Decomposed(decomposition, plan_of(decomposition, zones, orientation), read_s, perf_counter() - began)
+    plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation)
+    return Decomposed(decomposition, plan, read_s, perf_counter() - began, better)
 
 
-def _orientation(mesh: Mesh, request: ModelRequest, given: PlanFile | None) -> Floats | None:
-    """The rotation that lays the model down: a plan's own, else the best where that is asked for; None: as it stands."""
-    if given is not None:
-        return None if given.orientation is None else np.array(given.orientation)
-    return best_way_down(mesh, request.profile) if request.orient else None
+class _Search:
+    """The search of one request, for a mesh that lies one way or another, or the plan that takes its place."""
+
+    def __init__(self, request: ModelRequest, given: PlanFile | None, to_build: bool, report: Report) -> None:
+        self._request, self._given, self._report = request, given, report
+        cuts, profile = request.cuts, request.profile
+        free = cuts.plan is not None or cuts.parts is not None or price_of_second_mm2(profile) <= 0.0
+        self._price = None if to_build and free and not request.orient else pricing(profile)
+        self._records: list[tuple[Decomposition, list[bytes]]] = []
+
+    def search(self, mesh: Mesh) -> Decomposition:
+        """The parts of a mesh."""
+        request, given, cuts = self._request, self._given, self._request.cuts
+        if given is not None and cuts.plan is not None:
+            return cut_by_plan(mesh, request.name, request.profile, given, request.ranker, cuts.parts, self._price)
+        record: list[bytes] = []
+        decomposition = decompose(
+            mesh,
+            request.name,
+            request.profile,
+            request.ranker,
+            self._show,
+            None if request.outputs.record is None else record.append,
+            given,
+            cuts.parts,
+            self._price,
+        )
+        self._records.append((decomposition, record))
+        return decomposition
+
+    def record_of(self, decomposition: Decomposition) -> bytes:
+        """What was recorded of the search that ended with a decomposition."""
+        return next(record[0] for found, record in self._records if found is decomposition)
+
+    def _show(self, progress: Progress) -> None:
+        left = f"{100 * progress.best_share:.1f} % of the risky area left"
+        self._report(f"searching parts: stage {progress.stage}, {progress.beam} in the beam, {left}")
 
 
-def best_way_down(mesh: Mesh, profile: Profile) -> Floats | None:
-    """The rotation into the resting orientation where a quick search finds what costs least; None: as it stands."""
-    quick = profile.model_copy(update={"search": profile.search.model_copy(update={"beam_width": 1})})
-    resting = resting_orientations(mesh, profile.process.self_supporting_angle_deg, ORIENTATIONS_TRIED)
-    choices = [mesh, *(standing_still(mesh, orientation.rotation) for orientation in resting)]
-    price, second_mm2 = pricing(profile), price_of_second_mm2(profile)
-    rows = [search_parts(choice, "oriented", quick, price=price).chosen for choice in choices]
-    costs = [0.0 if row is None else row.cost_mm2 + second_mm2 * (row.time_s or 0.0) for row in rows]
-    best = costs.index(min(costs))
-    say("the model is best printed as it stands" if best == 0 else f"the model is {in_words(resting[best - 1])}")
-    return None if best == 0 else resting[best - 1].rotation
-
-
-def standing_still(mesh: Mesh, rotation: Floats) -> Mesh:
-    """The mesh turned, then set on z = 0 and centred about the turn axis."""
-    turned = mesh.transform(rotation)
-    low, high = turned.bounds_mm
-    middle = 0.5 * (low + high)
-    return turned.transform(np.eye(3), (-middle[0], -middle[1], -low[2]))
-
-
-def _hints(decomposition: Decomposition, request: ModelRequest) -> tuple[str, ...]:
-    """What might do better than these parts."""
-    asked = request.orient or request.cuts.plan is not None
-    if asked or decomposition.reduction > WELL_REDUCED or decomposition.risky_area_mm2 <= 0:
+def _hint(decomposition: Decomposition, better: OtherWay | None) -> tuple[str, ...]:
+    """What costs much less than these parts."""
+    chosen = decomposition.chosen
+    if better is None or chosen is None:
         return ()
-    single = best_orientation(decomposition.mesh, request.profile.process.self_supporting_angle_deg)
-    if single.risky_mm2 >= decomposition.residual_area_mm2:
-        return ()
-    return (f"{in_words(single)} it would leave {single.risky_mm2:.0f} mm2 risky even in one part: try --orient",)
+    side = side_in_words(better.orientation)
+    lying = f"{side} ({in_words(better.orientation)})" if side else in_words(better.orientation)
+    figures = [f"leaves {better.row.cost_mm2:.0f} mm2 of scars instead of {chosen.cost_mm2:.0f}"]
+    if better.row.time_s is not None and chosen.time_s is not None:
+        figures.append(f"takes {minutes(better.row.time_s)} instead of {minutes(chosen.time_s)}")
+    return (f"{lying} in one piece it {' and '.join(figures)}: try --orient",)
 
 
 def build(decomposition: Decomposition, profile: Profile, pictures: bool = False) -> Program:

@@ -28,7 +28,7 @@ SearchName = Annotated[
 ]
 TimeLimit = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")]
 RankerName = Annotated[str, typer.Option("--ranker", metavar="classic", help="which candidates the beam follows")]
-Orient = Annotated[bool, typer.Option("--orient", help="first lay the model down the way that needs least support")]
+Orient = Annotated[bool, typer.Option("--orient", help="lay the model down the way that costs least, chosen with its parts")]
 PlanGiven = Annotated[Path | None, typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search")]
 PartsGiven = Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")]
 Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]

@@ -7,7 +7,7 @@ from textwrap import wrap
 from machine.dryrun.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.view.parts import risky_before_mm2
-from machine.view.quantities import duration
+from machine.view.quantities import duration, minutes
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.search.orientation import best_orientation, in_words
 
@@ -56,8 +56,10 @@ def front_table(front: Sequence[FrontRow]) -> str:
 
 
 def _estimates(row: FrontRow) -> list[str]:
-    time = "-" if row.time_s is None else duration(60.0 * round(row.time_s / 60.0)).removesuffix(" 0s")
-    return [time, "-" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}"]
+    return [
+        "-" if row.time_s is None else minutes(row.time_s),
+        "-" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}",
+    ]
 
 
 def _risky_areas(decomposition: Decomposition, angle_deg: float, count_platform_faces: bool) -> str:

@@ -44,7 +44,7 @@ def test_a_cone_on_its_point_is_turned_over() -> None:
 
 
 def test_a_box_rests_on_each_of_its_faces_and_nowhere_else() -> None:
-    resting = resting_orientations(box(20, 30, 40), ANGLE_DEG, 100)
+    resting = resting_orientations(box(20, 30, 40), ANGLE_DEG)
     directions = sorted(tuple(np.round(o.rotation[2]).astype(int)) for o in resting)
     assert directions == [(-1, 0, 0), (0, -1, 0), (0, 0, -1), (0, 0, 1), (0, 1, 0), (1, 0, 0)]
 
@@ -52,15 +52,15 @@ def test_a_box_rests_on_each_of_its_faces_and_nowhere_else() -> None:
 def test_a_pole_does_not_rest_on_its_end() -> None:
     pole = set_down(box(4, 60, 4), about(np.array([1.0, 0.0, 0.0]), np.pi / 2))
     assert pole.bounds_mm[1, 2] == pytest.approx(60)
-    assert len(resting_orientations(pole, ANGLE_DEG, 100)) == 4
+    assert len(resting_orientations(pole, ANGLE_DEG)) == 4
 
 
-def test_the_least_risky_come_first_and_no_more_than_asked() -> None:
-    resting = resting_orientations(branch(), ANGLE_DEG, 5)
+def test_the_least_risky_come_first() -> None:
+    resting = resting_orientations(branch(), ANGLE_DEG)
     areas = [orientation.risky_mm2 for orientation in resting]
-    assert len(resting) == 5
+    assert len(resting) > 4
     assert areas == sorted(areas)
-    again = [orientation.rotation.tobytes() for orientation in resting_orientations(branch(), ANGLE_DEG, 5)]
+    again = [orientation.rotation.tobytes() for orientation in resting_orientations(branch(), ANGLE_DEG)]
     assert [orientation.rotation.tobytes() for orientation in resting] == again
 
 
@@ -78,13 +78,13 @@ def test_the_best_is_never_worse_than_straight_up() -> None:
 
 @pytest.mark.parametrize("mesh", [tee(), branch(), hollow(), cone()], ids=["tee", "branch", "hollow", "cone"])
 def test_the_area_is_what_the_turned_model_has(mesh: Mesh) -> None:
-    for orientation in [best_orientation(mesh, ANGLE_DEG, resting=False), *resting_orientations(mesh, ANGLE_DEG, 3)]:
+    for orientation in [best_orientation(mesh, ANGLE_DEG, resting=False), *resting_orientations(mesh, ANGLE_DEG)[:3]]:
         turned = set_down(mesh, orientation.rotation)
         assert orientation.risky_mm2 == pytest.approx(turned.areas_mm2[risky_upright(turned, ANGLE_DEG)].sum(), abs=1e-6)
 
 
 def test_the_turns_are_the_rotation() -> None:
-    for orientation in resting_orientations(branch(), ANGLE_DEG, 20):
+    for orientation in resting_orientations(branch(), ANGLE_DEG):
         x, y = np.radians(orientation.turns_deg)
         assert about(np.eye(3)[1], y) @ about(np.eye(3)[0], x) == pytest.approx(orientation.rotation, abs=1e-12)
 

@@ -1,0 +1,68 @@
+"""Orientation and parts are chosen together, by what both cost with their time."""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+import pytest
+
+from mdp.decomposition import Part
+from mdp.mesh import Mesh
+from mdp.search.front import Price, Pricing
+from mdp.search.laying import Lying, distinct_orientations, find_better_way, lay_down, total_mm2
+from mdp.search.orientation import measure_upright, side_in_words
+from mdp.search.search import decompose
+from profiles.profile import Profile, load
+from tests.shapes import box, branch, tee
+
+PROFILE = load(settings=["search.directions=20", "search.polish=false"])
+
+
+def by_height(profile: Profile) -> Pricing:
+    """A printer that takes 10 s for every mm of height."""
+
+    def price(parts: Sequence[Part]) -> Price:
+        return Price(sum(10.0 * float(np.ptp(part.in_part_frame().vertices[:, 2])) for part in parts), 1000.0)
+
+    return price
+
+
+def laid_down(mesh: Mesh) -> Lying:
+    return lay_down(mesh, PROFILE, by_height, partial(decompose, name="mesh", profile=PROFILE, price=by_height(PROFILE)))
+
+
+@pytest.mark.parametrize(("sides", "others"), [((20, 20, 20), 0), ((20, 20, 40), 1), ((20, 30, 40), 2)])
+def test_orientations_that_a_symmetry_makes_alike_count_once(sides: tuple[int, int, int], others: int) -> None:
+    assert len(distinct_orientations(box(*sides), PROFILE)) == others
+
+
+def test_a_tee_is_laid_on_its_side_where_nothing_needs_support() -> None:
+    found = laid_down(tee())
+    assert found.orientation is not None
+    assert (len(found.decomposition.parts), found.decomposition.cost_mm2) == (1, 0.0)
+    assert found.total_mm2 == pytest.approx(0.5 * 10.0 * 10.0)
+
+
+def test_what_lies_best_stays_as_it_stands() -> None:
+    assert laid_down(box(40, 30, 10)).orientation is None
+
+
+@pytest.mark.parametrize("mesh", [tee(), branch(), box(10, 20, 60)], ids=["tee", "branch", "box"])
+def test_laid_down_it_costs_no_more_than_as_it_stands(mesh: Mesh) -> None:
+    upright = decompose(mesh, "mesh", PROFILE, price=by_height(PROFILE))
+    assert laid_down(mesh).total_mm2 <= total_mm2(upright.chosen, 0.5)
+
+
+def test_an_orientation_that_costs_a_fifth_less_is_told_and_one_that_costs_more_is_not() -> None:
+    standing = decompose(tee(), "tee", PROFILE, price=by_height(PROFILE))
+    better = find_better_way(tee(), standing, PROFILE, by_height)
+    assert better is not None
+    assert (better.row.parts, better.row.cost_mm2, better.row.time_s) == (1, 0.0, pytest.approx(100.0))
+    flat = box(40, 30, 10)
+    assert find_better_way(flat, decompose(flat, "box", PROFILE, price=by_height(PROFILE)), PROFILE, by_height) is None
+
+
+def test_the_side_that_a_model_lies_on_has_a_name() -> None:
+    assert side_in_words(measure_upright(tee(), 45.0)) == "as it stands"
+    sides = {side_in_words(orientation) for orientation in distinct_orientations(box(20, 30, 40), PROFILE)}
+    assert sides <= {"on its front", "on its back", "on its left side", "on its right side", "upside down"}
