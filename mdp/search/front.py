@@ -19,6 +19,7 @@ class Price:
     filament_mm: float
 
 
+ASKED, BY_PLAN = "asked for", "by the plan"
 LEAST_PARTS = "the fewest parts within 1 % of the least cost"
 Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be printed
 

@@ -22,7 +22,7 @@ from mdp.plan_file import MOST_PARTS, PlanFile
 from mdp.search.beam import Beam
 from mdp.search.by_hand import check_model, cut_by_hand
 from mdp.search.candidates import REASONS
-from mdp.search.front import Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
+from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
 from mdp.search.polish import polish
@@ -110,7 +110,7 @@ def _take(problem: Problem, front: Front, best: Node, profile: Profile, wanted: 
         ]
     choice = choose(rows, price_of_second_mm2(profile))
     if wanted is not None:
-        choice = Choice(nodes.index(front.up_to(wanted)), "asked for")
+        choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
     elif problem.terms.seam_mm <= 0.0:
         choice = Choice(nodes.index(best), "the least risky area")
     node, row = nodes[choice.place], rows[choice.place]
@@ -149,7 +149,7 @@ def cut_by_plan(
     made = make_parts(node, problem.machine, profile)
     others = {len(row.parts): row for row in plan.front}
     rows = {count: FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2) for count, row in others.items()}
-    rows[len(node.cuts)] = replace(front_row(node, problem.terms), chosen=True, reason="by the plan")
+    rows[len(node.cuts)] = replace(front_row(node, problem.terms), chosen=True, reason=BY_PLAN)
     front = [rows[count] for count in sorted(rows)]
     if price is not None:
         front = _price_plan(problem, plan, front, made, profile, price)

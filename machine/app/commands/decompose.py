@@ -8,6 +8,7 @@ from machine.app.pictures.png import write_png
 from machine.app.pipeline.pipeline import decompose_model
 from machine.app.pipeline.precompile import compile_pictures
 from machine.app.requests import ModelRequest, Outputs
+from machine.app.terminal.advice import advice
 from machine.app.terminal.report import parts_table, show
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
@@ -40,7 +41,8 @@ def decompose(request: ModelRequest) -> int:
     if outputs.json is not None:
         write_json(outputs.json, figures)
     if outputs.json != STDOUT:
-        show(parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces))
+        made = parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
+        show(made + advice(decomposition, decomposed.better, profile))
     return 0
 
 

@@ -9,7 +9,6 @@ from machine.dryrun.dryrun import DryRun, summary
 from machine.view.parts import risky_before_mm2
 from machine.view.quantities import duration, minutes
 from mdp.decomposition import Decomposition, FrontRow
-from mdp.search.orientation import best_orientation, in_words
 
 WIDEST = 100  # characters of a line
 NO_BREAK = "\u00a0"  # a space at which no line ends
@@ -26,7 +25,7 @@ def table(rows: list[list[str]]) -> str:
 
 
 def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_platform_faces: bool = False) -> str:
-    """The parts in print order, what would be risky of their faces straight up and what is, and what the whole saves.
+    """The parts in print order, what would be risky of their faces straight up and what is; then the front.
 
     angle_deg and count_platform_faces as the search had them.
     """
@@ -36,18 +35,18 @@ def parts_table(decomposition: Decomposition, angle_deg: float = 45.0, count_pla
         share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
         areas = [_number(risky_before_mm2(part, angle_deg, count_platform_faces)), _number(part.risky_area_mm2)]
         rows.append([str(part.index), *angles, f"{part.volume_mm3:.0f}", share, *areas])
-    front = front_table(decomposition.front) + "\n" if len(decomposition.front) > 1 else ""
+    front = "\n" + front_table(decomposition.front) if len(decomposition.front) > 1 else ""
     effort = f"{decomposition.candidates_evaluated} candidates in {decomposition.search_s:.1f} s\n"
     if decomposition.candidates_evaluated == 0 and len(decomposition.parts) > 1:
         effort = f"cut by a plan in {decomposition.search_s:.1f} s\n"
-    return table(rows) + "\n" + front + _risky_areas(decomposition, angle_deg, count_platform_faces) + effort
+    return table(rows) + effort + front + "\n"
 
 
 def front_table(front: Sequence[FrontRow]) -> str:
     """The best decomposition for every number of parts, the one taken marked and why."""
     rows = [["in parts", "needs support mm2", "seams mm", "costs mm2", "about", "filament m"]]
     rows += [
-        [str(row.parts), _number(row.support_area_mm2), f"{row.seam_mm:.0f}", _number(row.cost_mm2), *_estimates(row)]
+        [str(row.parts), _number(row.support_area_mm2), f"{row.seam_mm:.0f}", _number(row.cost_mm2), *estimates(row)]
         for row in front
     ]
     head, *lines = table(rows).splitlines()
@@ -55,29 +54,12 @@ def front_table(front: Sequence[FrontRow]) -> str:
     return "\n".join([head, *(line + reason for line, reason in zip(lines, taken, strict=True))]) + "\n"
 
 
-def _estimates(row: FrontRow) -> list[str]:
+def estimates(row: FrontRow) -> list[str]:
+    """About how long a decomposition prints, and metres of filament; dashes where that is not known."""
     return [
         "-" if row.time_s is None else minutes(row.time_s),
         "-" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}",
     ]
-
-
-def _risky_areas(decomposition: Decomposition, angle_deg: float, count_platform_faces: bool) -> str:
-    """Straight up, in the best single orientation, in parts: risky area and how much less that is."""
-    best = best_orientation(decomposition.mesh, angle_deg)
-    single = best.risky_mm2 + (best.base_mm2 if count_platform_faces else 0.0)
-    areas = [
-        ("straight up", decomposition.risky_area_mm2, ""),
-        ("best single orientation", single, f"  {in_words(best)}"),
-        (f"in {_count(len(decomposition.parts), 'parts')}", decomposition.residual_area_mm2, ""),
-    ]
-    rows = [["risky area", "mm2", "less"]]
-    for name, area, _ in areas:
-        less = 1.0 - area / decomposition.risky_area_mm2 if decomposition.risky_area_mm2 > 0 else 0.0
-        rows.append([name, _number(area), f"{round(100 * less, 1) + 0.0:.1f} %"])
-    rows[1][2] = ""
-    head, *lines = table(rows).splitlines()
-    return "\n".join([head, *(line + note for line, (_, _, note) in zip(lines, areas, strict=True))]) + "\n"
 
 
 def _number(area_mm2: float) -> str:

@@ -1,0 +1,50 @@
+"""The ways to print a model stand side by side, and the last line names the best."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from machine.app.terminal.advice import advice
+from mdp.decomposition import FrontRow
+from mdp.plane import Plane
+from mdp.search.laying import OtherWay
+from mdp.search.orientation import best_orientation
+from profiles.profile import load
+from tests.machine.app.terminal.test_report import alone, tee_in_parts
+from tests.shapes import box, hollow, tee
+
+PROFILE = load()
+PLANES = (Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0))
+WHOLE = FrontRow((), 300.0, 0.0, 300.0, time_s=3723.0, filament_mm=4040.0)
+CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, time_s=3600.0, filament_mm=3900.0)
+
+
+def test_what_was_chosen_is_advised() -> None:
+    decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="the least cost")))
+    assert advice(decomposition, None, PROFILE).splitlines() == [
+        "print it      support mm2    less  seams mm  about  filament m",
+        "in one piece        300.0                 0  1h 2m         4.0",
+        "in 3 parts           30.0  90.0 %        80  1h 0m         3.9",
+        "advice: print it in 3 parts",
+    ]
+
+
+def test_whoever_asked_for_other_parts_is_told_which_cost_less() -> None:
+    decomposition = replace(alone(tee(), 300.0), front=(replace(WHOLE, chosen=True, reason="asked for"), CUT))
+    assert advice(decomposition, None, PROFILE).splitlines()[-1] == "advice: print it in 3 parts: --parts 3"
+
+
+def test_an_orientation_that_costs_much_less_is_advised() -> None:
+    decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="the least cost")))
+    lying = OtherWay(best_orientation(tee(), 45.0), FrontRow((), 0.0, 0.0, 0.0, time_s=1800.0, filament_mm=3000.0), 900.0)
+    lines = advice(decomposition, lying, PROFILE).splitlines()
+    assert lines[3].split() == ["on", "its", "front", "0.0", "100.0", "%", "0", "30m", "3.0"]
+    assert lines[4] == "advice: lay it on its front (turned 90 about x) and print it in one piece: --orient"
+
+
+def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:
+    assert advice(alone(box(), 0.0), None, PROFILE).splitlines()[1].split() == ["in", "one", "piece", "0.0", "0", "-", "-"]
+
+
+def test_a_rounding_error_is_no_negative_share() -> None:
+    assert "-0.0" not in advice(alone(hollow(), 100.0 - 1e-9), None, PROFILE)
