@@ -19,6 +19,7 @@ class Part:
 
     mesh lies in the workpiece frame. rotation (3, 3) turns the workpiece frame into the part frame's orientation at
     the pose, so rotation @ direction = +z and a point w has part coordinates rotation @ w - (0, 0, base.offset_mm).
+    feather_share is the share of its base's rim, where that is seen, at which base and surface meet at less than 20 degrees.
     """
 
     index: int
@@ -28,6 +29,7 @@ class Part:
     rotation: Floats
     volume_mm3: float
     risky_area_mm2: float
+    feather_share: float = 0.0
 
     @property
     def direction(self) -> Floats:

@@ -84,6 +84,7 @@ def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> 
                 "turn_deg": part.pose.turn_deg,
                 "volume_mm3": part.volume_mm3,
                 "risky_area_mm2": part.risky_area_mm2,
+                "feather_share": part.feather_share,
                 "faces": len(part.mesh.faces),
                 "file": part_file(part.index),
             }

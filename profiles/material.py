@@ -35,6 +35,13 @@ class Material(Frozen):
         le=1000,
         description="layer of part 1 from which the fan may blow fully; it rises evenly from fan_off_layers to there",
     )
+    interlayer_strength_mpa: float = Field(
+        20.0,
+        gt=0,
+        le=500,
+        description="tensile strength across layers, MPa; PLA printed well reaches 34, 3D Print. Addit. Manuf. 2020; ordinary "
+        "prints and other filaments bond less",
+    )
     flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on all extruded volume")
     retract_mm: float = Field(ge=0, le=15, description="filament pulled back before a travel that crosses outside, mm")
     retract_speed_mm_s: float = Field(35.0, gt=0, le=200, description="speed of retraction and priming, mm/s")

@@ -66,6 +66,19 @@ class Search(Frozen):
     least_interface_mm2: float = Field(
         4.0, ge=0, le=1e6, description="least area that a part, and each of its pieces that is no crumb, stands on, mm2"
     )
+    nozzle_load_n: float = Field(
+        5.0,
+        ge=0,
+        le=1000,
+        description="push of the nozzle against the top of a part, sideways, that its base must bear while it is printed, N; 0: "
+        "strength is not looked at",
+    )
+    strength_safety: float = Field(
+        1.25,
+        ge=1,
+        le=100,
+        description="by how many times material.interlayer_strength_mpa must exceed the stress of a base under that push",
+    )
     fragile_mm: float = Field(
         0.3, ge=0, le=100, description="no plane leaves a sliver thinner than this, a layer and a half or so, mm"
     )

@@ -69,7 +69,11 @@ def _refusal(problem: Problem, node: Node, plane: Plane) -> str | None:
         return missed
     limits = _limits(problem, plane.normal[None])
     checked = problem.check_plane(node, plane, limits)
-    return _explain(problem, plane, limits, Reason(int(checked.reason[0])), float(checked.fragile_mm[0]))
+    reason = Reason(int(checked.reason[0]))
+    if reason == Reason.WEAK:
+        stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
+        return f"{REASONS[reason]}: {problem.load_n:g} N at its top are {stress}"
+    return _explain(problem, plane, limits, reason, float(checked.fragile_mm[0]))
 
 
 def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:

@@ -38,6 +38,7 @@ class Reason(IntEnum):
     FRAGILE = 7
     GAIN = 8
     KEEP = 9
+    WEAK = 10
 
 
 REASONS = {
@@ -50,6 +51,7 @@ REASONS = {
     Reason.FRAGILE: "the plane would leave a sliver (search.fragile_mm)",
     Reason.GAIN: "it would make too little safe for the seam it leaves (search.seam_mm, search.least_gain)",
     Reason.KEEP: "the plane would pass through a box that stays whole ([[keep]])",
+    Reason.WEAK: "the nozzle could break the part or a piece of it off its base (search.nozzle_load_n)",
 }
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from mdp.cost.cost import CostTerms, Seam, measure_seam
+from mdp.cost.cost import CostTerms
 from mdp.decomposition import FrontRow, Part
 from mdp.search.node import Node
 from profiles.profile import Profile
@@ -52,19 +52,10 @@ class Front:
 
 def front_row(node: Node, terms: CostTerms) -> FrontRow:
     """A node with what it costs, the seams apart."""
-    seams = _seams(node, terms)
+    seams = node.seams
     scars_mm2 = terms.seam_mm * sum(seam.weighted_mm for seam in seams)
     planes = tuple(cut.base for cut in node.cuts)
     return FrontRow(planes, node.cost_mm2 - scars_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2)
-
-
-def _seams(node: Node, terms: CostTerms) -> Sequence[Seam]:
-    seams = []
-    while node.parent is not None:
-        before, plane = node.parent, node.cuts[-1].base
-        seams.append(measure_seam(before.remainder.mesh, before.seam_weights, plane, terms.feather))
-        node = before
-    return seams
 
 
 def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from mdp.cost.cost import CostTerms, SeamPlaces
+from mdp.cost.cost import CostTerms, Seam, SeamPlaces, measure_seam
 from mdp.cut import Solid, above, mesh_of
 from mdp.mesh import Floats
 from mdp.overhang import risky_upright
@@ -48,6 +48,15 @@ class Node:
     def seam_weights(self) -> Floats:
         """(m,) how much a mm of rim counts on each face of what remains."""
         return self.places.weights(self.solid)
+
+    @cached_property
+    def seams(self) -> tuple[Seam, ...]:
+        """The seams of the cuts."""
+        before = self.parent
+        if before is None:
+            return ()
+        seam = measure_seam(before.remainder.mesh, before.seam_weights, self.cuts[-1].base, self.terms.feather)
+        return (*before.seams, seam)
 
     @cached_property
     def risky_mm2(self) -> float:

@@ -24,6 +24,7 @@ def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ..
         base, mesh = solids[position]
         return not clearance or pose in allowed_poses(machine, base.normal, mesh.vertices, pose.turn_deg)
 
+    feathered = (0.0, *(seam.feather_share for seam in reversed(node.seams)))
     parts = []
     for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options, fits), strict=True)):
         risky = risky_above(mesh, base, angle_deg) if position else node.remainder.risky
@@ -36,6 +37,7 @@ def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ..
                 rotation=rotation(machine, pose),
                 volume_mm3=mesh.volume_mm3,
                 risky_area_mm2=float(mesh.areas_mm2[risky].sum()),
+                feather_share=feathered[position],
             )
         )
     return tuple(parts)

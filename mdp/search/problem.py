@@ -1,6 +1,7 @@
 """Problem: what one search holds fixed, which planes may cut a node, and what a cut makes of it."""
 
 from collections.abc import Sequence
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -16,6 +17,7 @@ from mdp.search.candidates import Bounds, Feasibility, Reason, bounds, bounds_of
 from mdp.search.features import Model
 from mdp.search.node import Cut, Node
 from mdp.search.ranking import CandidateTable
+from mdp.sweep.bending import stress_per_newton
 from mdp.sweep.sweep import gains
 from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
@@ -52,6 +54,8 @@ class Problem:
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         savable_mm2 = self._savable_mm2()
         self.least_gain_mm2 = settings.least_gain * savable_mm2
+        self.load_n = settings.nozzle_load_n if settings.objective == "scar" else 0.0
+        self.bearable_mpa = profile.material.interlayer_strength_mpa / settings.strength_safety
         self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
         self._evaluated: list[int] = []  # appended to by several threads
         self._began = perf_counter()
@@ -92,7 +96,8 @@ class Problem:
             return check(node.remainder, self.limits, self.settings, direction, offset_mm)
 
         saved_mm2 = self.model.risky_mm2 - node.cost_mm2
-        return CandidateTable(scored, self.limits, saved_mm2, node.residual_mm2, check_planes, self.least_gain_mm2)
+        enough_mm2, is_weak = self.least_gain_mm2, partial(self.is_weak, node)
+        return CandidateTable(scored, self.limits, saved_mm2, node.residual_mm2, check_planes, enough_mm2, is_weak)
 
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""
@@ -112,7 +117,18 @@ class Problem:
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
         """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""
         own = self.settings.model_copy(update={"offset_step_mm": self.step_mm(plane.offset_mm)})
-        return check(node.remainder, limits, own, np.zeros(1, np.int32), np.array([plane.offset_mm]))
+        checked = check(node.remainder, limits, own, np.zeros(1, np.int32), np.array([plane.offset_mm]))
+        if checked.reason[0] == Reason.FEASIBLE and self.is_weak(node, plane):
+            checked.reason[0] = Reason.WEAK
+        return checked
+
+    def is_weak(self, node: Node, plane: Plane) -> bool:
+        """Whether what lies above a plane could break off while it is printed."""
+        return self.load_n > 0.0 and self.stress_mpa(node, plane) > self.bearable_mpa
+
+    def stress_mpa(self, node: Node, plane: Plane) -> float:
+        """The stress at the base of what lies above a plane when the nozzle pushes its top."""
+        return self.load_n * stress_per_newton(node.remainder.mesh, plane, self.limits.crumb_mm)
 
     def cut(self, node: Node, plane: Plane, residual_mm2: float | None = None) -> Node | None:
         """The node after a cut; None when nothing is cut off or no pose serves the part.

@@ -40,11 +40,13 @@ class CandidateTable:
         residual_mm2: float,
         check: Callable[[Ints, Floats], Feasibility],
         least_gain_mm2: float = 0.0,
+        is_weak: Callable[[Plane], bool] = lambda plane: False,
     ) -> None:
-        """least_gain_mm2: what gains less is for parts of the preferred volume only."""
+        """least_gain_mm2: what gains less is for parts of the preferred volume only; is_weak: whether a plane that can be cut
+        leaves too weak a base, asked for only where a row's turn comes."""
         self.scored, self.limits, self.least_gain_mm2 = scored, limits, least_gain_mm2
         self.saved_mm2, self.residual_mm2 = saved_mm2, residual_mm2
-        self._check = check
+        self._check, self._is_weak, self._strong = check, is_weak, set[int]()
         self.reason = np.full(len(scored.gain_mm2), UNKNOWN, np.int32)
         self.volume_mm3, self._fragile_mm = np.zeros(len(scored.gain_mm2)), np.zeros(len(scored.gain_mm2))
         self._rankings: dict[float, _TradeOffRanking] = {}
@@ -76,6 +78,15 @@ class CandidateTable:
         checked = self._check(self.scored.direction[alike], self.scored.offset_mm[alike])
         self.reason[alike], self.volume_mm3[alike] = checked.reason, checked.volume_mm3
         self._fragile_mm[alike] = checked.fragile_mm
+
+    def feasible(self, row: int) -> bool:
+        """Whether a checked row can be cut, its base strong enough."""
+        if self.reason[row] == FEASIBLE and row not in self._strong:
+            if self._is_weak(self.plane(row)):
+                self.reason[row] = Reason.WEAK
+            else:
+                self._strong.add(row)
+        return bool(self.reason[row] == FEASIBLE)
 
     def plane(self, row: int) -> Plane:
         """The plane of a row."""
@@ -134,7 +145,7 @@ class _TradeOffRanking:
             return
         if self._table.reason[row] == UNKNOWN:
             self._table.check_rows(self._order[self._next : self._next + LOOK_AHEAD])
-        if self._table.reason[row] == FEASIBLE:
+        if self._table.feasible(row):
             self._feasible.append(row)
             self._planes.append(plane)
 
@@ -210,7 +221,7 @@ class _ClassicRanking:
                 if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
                     continue
                 plane = table.plane(row)
-                if not any(nearly_equal(plane, other) for other in near[index]):
+                if not any(nearly_equal(plane, other) for other in near[index]) and table.feasible(row):
                     near[index].append(plane)
                     best = max(best, float(sorted_round.reduction[position]))
                     yield RankedCandidate(index, row, number)

@@ -33,6 +33,7 @@ from mdp.search.record import Trace
 from profiles.errors import PlanError
 from profiles.profile import Profile
 
+MOST_FEATHERED = 0.1  # share of a seam; a person is told of more
 MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 
 
@@ -200,7 +201,7 @@ def _decomposition(problem: Problem, taken: Taken, profile: Profile, outcome: Ou
         candidates_evaluated=problem.evaluated,
         rounds=outcome.rounds,
         search_s=outcome.search_s,
-        notes=(*_folded_note(folded), *outcome.notes, *taken.note),
+        notes=(*_folded_note(folded), *_feather_notes(parts), *outcome.notes, *taken.note),
         folded_mm3=folded,
         front=taken.front,
     )
@@ -225,6 +226,15 @@ def folded_mm3(mesh: Mesh, parts: Sequence[Part]) -> float:
 def _folded_note(folded: float) -> tuple[str, ...]:
     text = f"the surface passes through itself: {folded:.3g} mm3 that it winds around twice or inside out are counted once"
     return (text,) if folded > 0 else ()
+
+
+def _feather_notes(parts: Sequence[Part]) -> tuple[str, ...]:
+    """Parts that end in thin edges along much of their seam."""
+    return tuple(
+        f"part {part.index}: {part.feather_share:.0%} of its seam is a feather edge, base and surface meet at less than 20 deg"
+        for part in parts
+        if part.feather_share > MOST_FEATHERED
+    )
 
 
 def _search_beam(

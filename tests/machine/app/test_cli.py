@@ -158,7 +158,7 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
         "candidates_evaluated", "rounds", "parts", "cost_mm2", "seam_mm", "front",
     }  # fmt: skip
     assert set(told["parts"][0]) == {
-        "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "faces", "file",
+        "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "feather_share", "faces", "file",
     }  # fmt: skip
     assert sum(part["volume_mm3"] for part in told["parts"]) == pytest.approx(told["volume_mm3"], rel=1e-6)
     files = {part["file"] for part in told["parts"]} | {"decomposition.3mf", "decomposition.json", "plan.toml"}

@@ -8,9 +8,11 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.cut import below, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plan_file import PlanFile, PlannedPart, plan_of, plan_text, read_plan
+from mdp.plane import Plane
 from mdp.save import stl
 from mdp.search.search import cut_by_plan, decompose
 from mdp.zone import Zone, Zones
@@ -250,3 +252,39 @@ def test_the_published_search_starts_from_planes_by_hand_too() -> None:
     profile = _profile("search.method=published", FREE)
     found = decompose(shapes.tee(), "shape", profile, by_hand=_by_hand((LEANING, 30.0)))
     assert np.allclose(found.parts[-1].base.normal, LEANING)
+
+
+POST_MM = (4.0, 6.0)
+# The post's corner bears the stresses of both axes: M / (b h^2 / 6) and M / (h b^2 / 6), as the sides of a right angle.
+STRESS_PER_NMM = float(np.hypot(6.0 / (4.0 * 6.0**2), 6.0 / (6.0 * 4.0**2)))
+
+
+def _post(length_mm: float) -> Mesh:
+    """A post on a plate 5 mm thick, so long above z = 6."""
+    plate = m3.Manifold.cube((40, 40, 5), True).translate((0, 0, 2.5))
+    return shapes.standing(plate + m3.Manifold.cube((*POST_MM, 6.0 + length_mm), True).translate((0, 0, 3.0 + length_mm / 2)))
+
+
+def test_a_post_is_cut_off_as_long_as_its_base_bears_the_push_of_the_nozzle() -> None:
+    most_mm = 20.0 / 1.25 / (5.0 * STRESS_PER_NMM)  # MPa over N
+    assert len(_cut(_post(0.98 * most_mm), (UP, 6.0)).parts) == 2
+    refusal = _refusal(_post(1.02 * most_mm), (UP, 6.0))
+    assert "the nozzle could break the part or a piece of it off its base" in refusal
+    assert "5 N at its top are 16.3 MPa at its base, 16 are allowed" in refusal
+
+
+@pytest.mark.parametrize(
+    ("load_n", "objective", "parts"), [(5, "scar", 2), (1000, "scar", 1), (1000, "risky", 2), (0, "scar", 2)]
+)
+def test_a_search_leaves_no_base_that_the_nozzle_could_break(load_n: int, objective: str, parts: int) -> None:
+    settings = (f"search.nozzle_load_n={load_n}", f"search.objective={objective}")
+    assert len(decompose(shapes.branch(), "shape", _profile(*settings)).parts) == parts
+
+
+def test_a_part_with_a_feather_edge_is_told() -> None:
+    wedge = mesh_of(
+        below(solid_of(shapes.box(20.0, 20.0, 40.0)), Plane(np.array([0.0, np.sin(0.2), np.cos(0.2)]), 30.0 * np.cos(0.2)))
+    )
+    cut = _cut(wedge, (UP, 30.0), profile=_profile("search.nozzle_load_n=0"))
+    assert cut.parts[1].feather_share == pytest.approx(20.0 / 60.0)
+    assert any(note.startswith("part 2: 33% of its seam") and "feather edge" in note for note in cut.notes)
