@@ -54,6 +54,9 @@ def decompose(
     sheet: Annotated[
         Path | None, typer.Option("--sheet", metavar="FILE", help="picture of the print order, tilted as printed")
     ] = None,
+    front: Annotated[
+        Path | None, typer.Option("--front", metavar="FILE", help="picture of how every number of parts would cut the model")
+    ] = None,
     html: HtmlFile = None,
     record: Annotated[
         Path | None, typer.Option("--record", metavar="FILE", help="what the search saw, as .npz for training")

@@ -33,7 +33,8 @@ def check_outputs(outputs: Outputs) -> None:
     if outputs.folder is not None:
         check_folder(outputs.folder)
     streams = (None if file == STDOUT else file for file in (outputs.gcode, outputs.json))
-    for file in (outputs.png, outputs.sheet, outputs.record, outputs.html, outputs.svg, outputs.plan, *streams):
+    files = (outputs.png, outputs.sheet, outputs.front, outputs.record, outputs.html, outputs.svg, outputs.plan)
+    for file in (*files, *streams):
         if file is not None:
             check_writable(file)
 

@@ -15,8 +15,8 @@ SIMULATED = "sim"  # the port that stands for the simulated printer
 class Outputs:
     """Files to write; None: not asked for. For gcode and json the path - stands for standard output.
 
-    folder: for parts, decomposition and plan; sheet: picture of the print order; record: what the search saw; plan: what a later
-    run cuts without a search; layer: which one the svg shows, as PART:LAYER.
+    folder: for parts, decomposition and plan; sheet: picture of the print order; front: picture of every number of parts; record:
+    what the search saw; plan: what a later run cuts without a search; layer: which one the svg shows, as PART:LAYER.
     """
 
     folder: Path | None = None
@@ -25,6 +25,7 @@ class Outputs:
     html: Path | None = None
     png: Path | None = None
     sheet: Path | None = None
+    front: Path | None = None
     svg: Path | None = None
     layer: str | None = None
     record: Path | None = None

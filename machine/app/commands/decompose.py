@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from machine.app.output import STDOUT, check_outputs, make_folder, write_bytes, write_json
+from machine.app.pictures.front_picture import front_picture
 from machine.app.pictures.picture import contact_sheet, parts_picture
 from machine.app.pictures.png import write_png
 from machine.app.pipeline.pipeline import decompose_model
@@ -52,10 +53,12 @@ def _is_same(file: Path, plan: Path | None) -> bool:
 
 
 def _draw(outputs: Outputs, decomposition: Decomposition, profile: Profile) -> None:
-    png, sheet = outputs.png, outputs.sheet
-    if png is not None or sheet is not None:
+    png, sheet, front = outputs.png, outputs.sheet, outputs.front
+    if png is not None or sheet is not None or front is not None:
         compile_pictures()
     if png is not None:
         write_png(png, parts_picture(decomposition, profile))
     if sheet is not None:
         write_png(sheet, contact_sheet(decomposition, profile.machine))
+    if front is not None:
+        write_png(front, front_picture(decomposition, profile))

@@ -31,7 +31,7 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
     angle = profile.process.self_supporting_angle_deg
     model, parts = decomposition.mesh, decomposition.parts
     risky = risky_upright(model, angle, profile.search.count_platform_faces)
-    floor, view, half = _floor(model), _best_view(model, risky), (size[0] // 2, size[1])
+    floor, view, half = floor_of(model), best_view(model, risky), (size[0] // 2, size[1])
     plain = draw([floor, model], [FLOOR, PLAIN], [None, risky], view, half)
     gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     apart = [part.mesh.transform(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
@@ -45,7 +45,7 @@ def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[i
     angle = profile.process.self_supporting_angle_deg
     risky = risky_upright(decomposition.mesh, angle, profile.search.count_platform_faces)
     parts = [part.mesh for part in decomposition.parts]
-    return draw(parts, list(part_colours(len(parts))), None, _best_view(decomposition.mesh, risky), size)
+    return draw(parts, list(part_colours(len(parts))), None, best_view(decomposition.mesh, risky), size)
 
 
 def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: int = 480) -> Image:
@@ -55,7 +55,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
     """
     parts, model = decomposition.parts, decomposition.mesh
     view = _along_the_tilt_axis(parts, machine)
-    floor, nozzle = _floor(model), _nozzle(machine)
+    floor, nozzle = floor_of(model), _nozzle(machine)
     span = 1.1 * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     frames = []
     for part, colour in zip(parts, part_colours(len(parts)), strict=True):
@@ -64,7 +64,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
         paints = [FLOOR, *([PRINTED] * (part.index - 1)), colour, NOZZLE]
         frame = draw(meshes, paints, None, view, (frame_pixels, frame_pixels), span)
         frames.append(_label(frame, part, machine))
-    return _add_title(_tile(frames), decomposition.name, frame_pixels)
+    return add_title(tile(frames), decomposition.name, frame_pixels)
 
 
 def _shifts(parts: tuple[Part, ...], gap_mm: float) -> list[Floats]:
@@ -77,7 +77,7 @@ def _shifts(parts: tuple[Part, ...], gap_mm: float) -> list[Floats]:
     return shifts
 
 
-def _best_view(model: Mesh, risky: NDArray[np.bool_]) -> View:
+def best_view(model: Mesh, risky: NDArray[np.bool_]) -> View:
     """The side that shows most of the model's outline and of its risky faces, a little from above."""
     azimuths = np.arange(-180.0, 180.0, 10.0)
     toward = np.stack([np.cos(np.radians(azimuths)), np.sin(np.radians(azimuths)), np.zeros(len(azimuths))])
@@ -97,7 +97,7 @@ def _along_the_tilt_axis(parts: tuple[Part, ...], machine: Machine) -> View:
     return seen_from(float(np.degrees(np.arctan2(axis[1], axis[0]))) + aside, 14.0)
 
 
-def _floor(model: Mesh) -> Mesh:
+def floor_of(model: Mesh) -> Mesh:
     """A disc that suggests the platform: as wide as the model reaches."""
     reach = float(np.hypot(*model.vertices[:, :2].T).max())
     return _revolve([(0.0, -0.03 * reach), (reach, -0.03 * reach), (reach, -0.01), (0.0, -0.01)])
@@ -130,7 +130,7 @@ def _revolve(outline: list[tuple[float, float]]) -> Mesh:
     return Mesh(rings.reshape(-1, 3), np.concatenate(faces))
 
 
-def _tile(frames: list[Image]) -> Image:
+def tile(frames: list[Image]) -> Image:
     """Frames in rows, white where none is left."""
     rows = max(1, round(sqrt(len(frames) / 1.6)))
     columns = ceil(len(frames) / rows)
@@ -139,7 +139,7 @@ def _tile(frames: list[Image]) -> Image:
     return np.concatenate([np.concatenate(filled[row * columns : (row + 1) * columns], axis=1) for row in range(rows)], axis=0)
 
 
-def _add_title(sheet: Image, name: str, frame_pixels: int) -> Image:
+def add_title(sheet: Image, name: str, frame_pixels: int) -> Image:
     """The sheet below a line with the model's name."""
     height = frame_pixels // 12
     title = np.full((height, *sheet.shape[1:]), 255, dtype=np.uint8)

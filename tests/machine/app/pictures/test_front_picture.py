@@ -1,0 +1,24 @@
+"""The front as a picture: a frame for every number of parts, the parts in colour, the one taken in a border."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from machine.app.pictures.front_picture import BORDER, front_picture
+from machine.view.parts import part_colours
+from mdp.decomposition import FrontRow
+from tests.machine.app.pictures.test_picture import PROFILE, example, share_like
+
+PIXELS, TITLE = 240, 20
+
+
+def test_every_row_has_a_frame_with_its_parts_in_colour_and_the_one_taken_a_border() -> None:
+    cut = example().front[-1]
+    rows = (FrontRow((), 100.0, 0.0, 100.0), replace(cut, chosen=True))
+    sheet = front_picture(replace(example(), front=rows), PROFILE, PIXELS)
+    assert sheet.shape == (PIXELS + TITLE, 2 * PIXELS, 3)
+    whole, parts = sheet[TITLE:, :PIXELS], sheet[TITLE:, PIXELS:]
+    second = part_colours(2)[1]
+    assert (share_like(whole, second), share_like(parts, second) > 0.01) == (0.0, True)
+    assert np.array_equal(parts[0], np.full((PIXELS, 3), BORDER))
+    assert (whole[0] == 255).all()
