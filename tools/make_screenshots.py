@@ -1,15 +1,17 @@
-"""Makes the pictures of the page for README and docs: `python tools/make_screenshots.py [FOLDER [DEMO ...]]`; needs Chromium.
+"""Makes the pictures of the page for README and docs: `python tools/make_screenshots.py [FOLDER [PICTURE ...]]`; needs Chromium.
 
-One picture a demo model, each at another moment and with other choices, so that together they show what the page can do.
+Each picture is of another model, at another moment or with other choices, so that together they show what the page can do.
 """
 
 import json
 import sys
 import tempfile
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 from machine.app.pipeline.pipeline import build, decompose_model
-from machine.app.requests import ModelRequest
+from machine.app.requests import Cuts, ModelRequest
 from machine.view.page import print_page
 from profiles.profile import load
 from tests.machine.browser import Browser
@@ -18,19 +20,35 @@ FOLDER = Path(__file__).resolve().parents[1] / "docs"
 SIZE = (1040, 640)
 PAUSE = "new Promise((done) => setTimeout(done, 400))"  # until the page thinks that nothing moves any more
 STILL = "document.documentElement.dataset.picture === 'idle'"
-# What is chosen for each demo: a share of the rows, values of lists and sliders, boxes clicked, keys pressed.
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A demo model and what is chosen: into how many parts at most (None: the program's own choice), a share of the rows, values
+    of lists and sliders, elements clicked, keys pressed."""
+
+    demo: str
+    parts: int | None = None
+    share: float = 1.0
+    choices: dict[str, str] = field(default_factory=dict)
+    clicks: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ()
+
+
 SHOTS = {
-    "figure": (0.52, {"colour-by": "part"}, ("show-travels",), ("+",)),
-    "tree": (0.71, {"colour-by": "kind", "model": "hide", "frame": "workpiece"}, (), ("ArrowUp",)),
-    "bracket": (0.86, {"colour-by": "speed"}, (), ("d",)),
-    "lattice": (1.0, {"colour-by": "layer", "model": "hide"}, ("show-machine",), ("d", "-")),
+    "figure": Shot("figure", 4, 0.52, {"colour-by": "part"}, ("#show-travels",), ("+",)),
+    "front": Shot("tree", None, 1.0, {}, ("#front tbody tr:nth-child(3)",), ()),
+    "tree": Shot("tree", None, 0.71, {"colour-by": "kind", "model": "hide", "frame": "workpiece"}, (), ("ArrowUp",)),
+    "bracket": Shot("bracket", None, 0.86, {"colour-by": "speed"}, (), ("d",)),
+    "lattice": Shot("lattice", None, 1.0, {"colour-by": "layer", "model": "hide"}, ("#show-machine",), ("d", "-")),
 }
 
 
-def content(demo: str) -> bytes:
+@cache
+def content(demo: str, parts: int | None) -> bytes:
     """The page of a demo model, sliced for the usual machine."""
     profile = load()
-    found = decompose_model(ModelRequest(f"demo:{demo}", profile))
+    found = decompose_model(ModelRequest(f"demo:{demo}", profile, cuts=Cuts(parts=parts)))
     return print_page(f"demo:{demo}", build(found.decomposition, profile), profile)
 
 
@@ -42,31 +60,28 @@ def choose(browser: Browser, name: str, value: object) -> None:
     )
 
 
-def shoot(browser: Browser, demo: str, folder: Path, page: Path) -> Path:
-    """Open a page, choose what is told for this demo, and keep what is seen."""
-    share, choices, boxes, keys = SHOTS[demo]
+def shoot(browser: Browser, shot: Shot, path: Path, page: Path) -> None:
+    """Open a page, choose what is told for this picture, and keep what is seen."""
     browser.open(page.as_uri())
-    choose(browser, "position", round(share * int(browser.value("document.getElementById('position').max"))))
-    for name, value in choices.items():
+    choose(browser, "position", round(shot.share * int(browser.value("document.getElementById('position').max"))))
+    for name, value in shot.choices.items():
         choose(browser, name, value)
-    for box in boxes:
-        browser.click(f"#{box}")
-    for key in ("f", *keys):
+    for element in shot.clicks:
+        browser.click(element)
+    for key in ("f", *shot.keys):
         browser.key(key)
     browser.value(PAUSE)
     browser.wait(STILL)
-    path = folder / f"view-{demo}.png"
     browser.screenshot(path)
-    return path
 
 
-def main(folder: Path, demos: list[str]) -> None:
+def main(folder: Path, names: list[str]) -> None:
     with Browser(SIZE) as browser, tempfile.TemporaryDirectory() as work:
         browser.prefer("light")
-        for demo in demos or SHOTS:
-            page = Path(work) / f"{demo}.html"
-            page.write_bytes(content(demo))
-            path = shoot(browser, demo, folder, page)
+        for name in names or SHOTS:
+            shot, path, page = SHOTS[name], folder / f"view-{name}.png", Path(work) / f"{name}.html"
+            page.write_bytes(content(shot.demo, shot.parts))
+            shoot(browser, shot, path, page)
             print(f"{path} {path.stat().st_size // 1000} kB, complaints: {browser.complaints or 'none'}")
 
 

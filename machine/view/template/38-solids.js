@@ -31,9 +31,8 @@ vec3 divided() {
   vec3 hue = hues[0];
   bool seam = false;
   for (int k = 0; k < cuts; k++) {
-    float height = dot(planes[k].xyz, spot) - planes[k].w, width = 1.3 * fwidth(height);
-    if (height > 0.0) { hue = hues[k + 1]; seam = height < width; }
-    else seam = seam || height > -width;
+    float height = dot(planes[k].xyz, spot) - planes[k].w, width = 2.5 * fwidth(height);
+    if (height > 0.0) { hue = hues[k + 1]; seam = height < width; } // drawn on the upper part: what a plane only touches has none
   }
   return seam ? vec3(0.07, 0.08, 0.1) : hue;
 }

@@ -28,8 +28,9 @@ function findingsOf(print, scene, bells, camera, stop) {
   };
   const markers = markersOf(press);
   return (toClip, canvas) => {
-    $("markers").hidden = !scene.on.findings;
-    if (scene.on.findings) markers(groupsOf(findings, placed, toClip, canvas), findings, chosen);
+    const shown = scene.on.findings && !scene.tried;
+    $("markers").hidden = !shown;
+    if (shown) markers(groupsOf(findings, placed, toClip, canvas), findings, chosen);
   };
 }
 

@@ -19,15 +19,18 @@ function frontOf(print, scene) {
     showChoice(row, drawable(row));
   };
   const head = made("tr", {}, ...["parts", ...FRONT.map(([name]) => name)].map((text) => made("th", { text, scope: "col" })));
-  $("front").append(made("thead", {}, head), made("tbody", {}, ...front.map((row) => lineOf(row, choose))));
+  $("front").append(made("thead", {}, head), made("tbody", {}, ...front.map((row, k) => lineOf(row, !row.chosen && !pays(row, front.slice(0, k)), choose))));
   showChoice(front.find((row) => row.chosen) || null);
 }
 
-function lineOf(row, choose) {
+/** Whether a row costs less than all with fewer parts. */
+const pays = (row, fewer) => fewer.every(({ cost_mm2: cost }) => row.cost_mm2 < cost);
+
+function lineOf(row, idle, choose) {
   const mark = made("input", { type: "radio", name: "front", value: row.parts, checked: row.chosen });
   mark.addEventListener("change", () => choose(row));
   const first = made("td", {}, made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `taken: ${row.why}` })] : [])));
-  const line = made("tr", { className: row.chosen ? "taken" : "" }, first, ...FRONT.map(([, of]) => made("td", { text: of(row) })));
+  const line = made("tr", { className: idle ? "idle" : "" }, first, ...FRONT.map(([, of]) => made("td", { text: of(row) })));
   line.addEventListener("click", (event) => {
     if (first.contains(event.target) || mark.checked) return;
     mark.click();
@@ -39,6 +42,6 @@ function lineOf(row, choose) {
 /** What to know of the row that is looked at. */
 function showChoice(row, drawn) {
   const told = !row ? ["Cut by a plan: none of these rows."] : row.chosen ? [`✓ taken: ${row.why}.`]
-    : [drawn ? "This is how it would be cut; " : "It was not made; ", made("code", { text: row.command }), " takes it, and --parts goes with every other command too."];
+    : [drawn ? "This is how it would be cut; " : "It was not made; ", made("code", { text: row.command }), " takes it, and ", made("code", { text: "--parts", className: "whole" }), " goes with every other command too."];
   $("front-told").replaceChildren(...told);
 }
