@@ -3,8 +3,9 @@
 import manifold3d as m3
 import numpy as np
 
-from mdp.cut import mesh_of, solid_of
-from mdp.mesh import Mesh
+from mdp.colour import NO_COLOUR
+from mdp.cut import mesh_of, run_faces, solid_of
+from mdp.mesh import Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.errors import MeshError
 
@@ -22,13 +23,21 @@ def on_pedestal(mesh: Mesh, height_mm: float) -> Mesh:
     """
     if height_mm <= 0.0:
         return mesh
-    solid = solid_of(mesh)
+    solid = solid_of(mesh, apart=mesh.colours is not None)
     sunk_mm = min(PLATFORM_TOLERANCE_MM, 0.5 * float(mesh.bounds_mm[1, 2]))
     pedestal = m3.Manifold.extrude(_outline(solid, sunk_mm), height_mm + sunk_mm)
     joined = solid.translate((0.0, 0.0, height_mm)) + pedestal
     if joined.status() != m3.Error.NoError:
         raise MeshError(f"the model cannot be put on a pedestal of {height_mm:g} mm ({joined.status().name})")
-    return mesh_of(joined)
+    lifted = mesh_of(joined)
+    return lifted if mesh.colours is None else Mesh(lifted.vertices, lifted.faces, _colours(mesh.colours, solid, joined))
+
+
+def _colours(colours: Ints, solid: m3.Manifold, joined: m3.Manifold) -> Ints:
+    """(n,) colours of the faces of a solid that another one was made part of; the rest has none."""
+    own = run_faces(solid)[0][0]
+    pieces = [colours[faces] if origin == own else np.full(len(faces), NO_COLOUR) for origin, faces in run_faces(joined)]
+    return np.concatenate(pieces).astype(np.int32)
 
 
 def _outline(solid: m3.Manifold, height_mm: float) -> m3.CrossSection:

@@ -13,6 +13,9 @@
     min_mm = [-5.0, -5.0, 20.0]
     max_mm = [5.0, 5.0, 30.0]
 
+    [[no_seam]]                         # seams here count a hundred times: a box, or the faces of a colour of the model's file
+    colour = "#00ff00"
+
     [[front]]                           # the best decomposition of every other number of parts, for --parts
     planes = [[0.0, 0.0, 1.0, 40.0]]    # normal and offset_mm of part 2, 3, ...
 
@@ -30,10 +33,11 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from mdp.colour import colour_text, parse_colour
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
-from mdp.zone import NO_ZONES, Zone, Zones
+from mdp.zone import NO_ZONES, Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.machine import Vector
 
@@ -45,7 +49,7 @@ UNIT = 1e-12  # a normal whose length differs less from 1 is left as it is, so t
 GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
 KEYS = ("version", "model", "sha256", "orientation", "part", "keep", "no_seam", "front")
 PART_KEYS = ("normal", "offset_mm")
-ZONE_KEYS = ("min_mm", "max_mm")
+ZONE_KEYS = ("min_mm", "max_mm", "colour")
 ROW_KEYS = ("planes", "support_area_mm2", "seam_mm", "cost_mm2")
 
 
@@ -140,7 +144,7 @@ def plan_text(plan: PlanFile) -> str:
     )
     for key, zones in (("keep", plan.zones.keep), ("no_seam", plan.zones.no_seam)):
         if zones:
-            document[key] = _tables([_table({"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm)}) for zone in zones])
+            document[key] = _tables([_table(_zone_values(zone)) for zone in zones])
     if plan.front:
         document["front"] = _tables([_row_table(row) for row in plan.front])
     return tomlkit.dumps(document)
@@ -201,16 +205,28 @@ class _Reader:
         support, seam, cost = (self._number(table.get(key, 0.0), where + key, 1e15) for key in ROW_KEYS[1:])
         return PlannedRow(tuple(parts), support, seam, cost)
 
-    def _zones(self, table: dict[str, Any], key: str) -> tuple[Zone, ...]:
-        zones = []
+    def _zones(self, table: dict[str, Any], key: str) -> tuple[Zone | Painted, ...]:
+        zones: list[Zone | Painted] = []
         for number, values in enumerate(self._list(table, key, MOST_ZONES), start=1):
             where = f"{key} {number}: "
             self._only(values, ZONE_KEYS, where)
-            low, high = (self._vector(values.get(corner), where + corner) for corner in ZONE_KEYS)
+            if "colour" in values:
+                zones.append(self._painted(values, where))
+                continue
+            low, high = (self._vector(values.get(corner), where + corner) for corner in ZONE_KEYS[:2])
             if not all(least < most for least, most in zip(low, high, strict=True)):
                 raise self._error(f"{where}min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
             zones.append(Zone(low, high))
         return tuple(zones)
+
+    def _painted(self, values: dict[str, Any], where: str) -> Painted:
+        if len(values) > 1:
+            raise self._error(f"{where}has a colour and a box: one of them is allowed")
+        text = values["colour"]
+        colour = parse_colour(text) if isinstance(text, str) else None
+        if colour is None:
+            raise self._error(f'{where}colour is {_show(text)}: # and six hexadecimal digits are expected, as "#ff0000"')
+        return Painted(colour)
 
     def _orientation(self, table: dict[str, Any]) -> tuple[Vector, ...] | None:
         given = table.get("orientation")
@@ -290,6 +306,12 @@ def _row(row: FrontRow) -> PlannedRow:
 def _vector(values: Floats) -> Vector:
     x, y, z = (float(value) for value in values)
     return x, y, z
+
+
+def _zone_values(zone: Zone | Painted) -> dict[str, Any]:
+    if isinstance(zone, Painted):
+        return {"colour": colour_text(zone.colour)}
+    return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm)}
 
 
 def _table(values: dict[str, Any]) -> tomlkit.items.Table:

@@ -13,10 +13,10 @@ from mdp.cost.hidden import hidden_shares
 from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface
 from mdp.cut import Solid, mesh_of
 from mdp.mesh import Floats, Mesh, dot
-from mdp.overhang import standing
+from mdp.overhang import Mask, standing
 from mdp.plane import Plane
 from mdp.sweep.rims import measure_rim
-from mdp.zone import Zone, touched
+from mdp.zone import NOWHERE, Zone, ZonesOnModel, touched
 from profiles.profile import Profile
 from profiles.search import Search
 
@@ -26,25 +26,31 @@ NO_SEAM_WEIGHT = 100.0  # of a rim where a person wants no seam
 @dataclass(frozen=True, eq=False)
 class SeamPlaces:
     """Where on a model seams cost how much. by_source: (m,) how much a mm of rim counts on each of the model's faces; no_seam:
-    zones in which it counts NO_SEAM_WEIGHT times."""
+    boxes in which it counts NO_SEAM_WEIGHT times; no_seam_faces: the faces on which it does."""
 
     surface: ModelSurface
     by_source: Floats
-    no_seam: Sequence[Zone] = ()
+    no_seam: Sequence[Zone]
+    no_seam_faces: Mask
 
     @classmethod
-    def of(cls, surface: ModelSurface, solid: Solid, hidden_share: float, no_seam: Sequence[Zone] = ()) -> "SeamPlaces":
+    def of(cls, surface: ModelSurface, solid: Solid, hidden_share: float, zones: ZonesOnModel = NOWHERE) -> "SeamPlaces":
         """The places of an uncut model; hidden_share: how much a rim counts where it is hidden altogether."""
         mesh = mesh_of(solid)
         hidden = hidden_shares(mesh) if hidden_share < 1.0 else np.zeros(len(mesh.faces))
-        return cls(surface, 1.0 - (1.0 - hidden_share) * surface.by_source(solid, hidden), no_seam)
+        by_source = 1.0 - (1.0 - hidden_share) * surface.by_source(solid, hidden)
+        faces = np.zeros(len(by_source), dtype=np.bool_)
+        if zones.no_seam_faces is not None:
+            faces[: len(zones.no_seam_faces)] = zones.no_seam_faces
+        return cls(surface, by_source, zones.no_seam, faces)
 
     def weights(self, solid: Solid) -> Floats:
         """(m,) how much a mm of rim counts on each face of what cuts have left of the model: 0 on faces that they laid open,
         which the parts on them cover, and on those that stand on the platform."""
         mesh, sources = mesh_of(solid), self.surface.sources(solid)
         free = (sources == MADE_BY_A_CUT) | standing(mesh)
-        return np.where(free, 0.0, self.by_source[sources] * zone_weights(mesh, self.no_seam))
+        unwanted = touched(mesh, self.no_seam) | self.no_seam_faces[sources]
+        return np.where(free, 0.0, self.by_source[sources] * np.where(unwanted, NO_SEAM_WEIGHT, 1.0))
 
 
 @dataclass(frozen=True)
@@ -63,11 +69,6 @@ def cost_terms(profile: Profile, settings: Search) -> CostTerms:
     seam_mm = settings.seam_mm if settings.objective == "scar" else 0.0
     angle_deg, platform_faces = profile.process.self_supporting_angle_deg, settings.count_platform_faces
     return CostTerms(angle_deg, platform_faces, seam_mm, settings.feather_weight)
-
-
-def zone_weights(mesh: Mesh, no_seam: Sequence[Zone]) -> Floats:
-    """(m,) by how much more a rim counts on faces that reach into a zone without seams."""
-    return np.where(touched(mesh, no_seam), NO_SEAM_WEIGHT, 1.0)
 
 
 @dataclass(frozen=True)

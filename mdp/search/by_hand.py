@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from mdp.clearance import find_obstacle, lowest_body
+from mdp.colour import NO_COLOUR, colour_text
 from mdp.cut import above, mesh_of
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import threshold
@@ -20,9 +21,11 @@ from mdp.search.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, r
 from mdp.search.node import Node
 from mdp.search.problem import FINEST, Problem
 from mdp.sweep.sweep import gains
+from mdp.zone import Painted
 from profiles.errors import PlanError
 
 EQUAL_MM2 = 1e-6
+MOST_SHOWN = 8  # colours in a message
 
 
 def check_model(plan: PlanFile, mesh: Mesh, name: str) -> None:
@@ -33,6 +36,21 @@ def check_model(plan: PlanFile, mesh: Mesh, name: str) -> None:
             "(the file has changed, or process.scale, process.rotate_deg or search.pedestal_mm; without the line sha256 the "
             "planes are tried all the same)"
         )
+
+
+def check_colours(plan: PlanFile, mesh: Mesh, name: str) -> None:
+    """Raise PlanError where a plan means faces of a colour that the model has none of."""
+    for key, zones in (("keep", plan.zones.keep), ("no_seam", plan.zones.no_seam)):
+        for number, zone in enumerate(zones, start=1):
+            if not isinstance(zone, Painted):
+                continue
+            label = f"plan {plan.name}: {key} {number}: colour is {colour_text(zone.colour)}"
+            if mesh.colours is None:
+                raise PlanError(f"{label}, but {name} paints no face: a 3MF or a PLY file with colours is expected")
+            used = [colour for colour in np.unique(mesh.colours).tolist() if colour != NO_COLOUR]
+            if zone.colour not in used:
+                shown = ", ".join(map(colour_text, used[:MOST_SHOWN])) + (", ..." if len(used) > MOST_SHOWN else "")
+                raise PlanError(f"{label}, but no face of {name} is painted so; its colours are {shown}")
 
 
 def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
@@ -110,9 +128,7 @@ def _explain(problem: Problem, plane: Plane, limits: Bounds, reason: Reason, fra
             least_mm = max(problem.settings.fragile_mm, COPLANAR_MM)
             return f"its plane would leave a sliver {fragile_mm:.2g} mm thin: {least_mm:g} is the least (search.fragile_mm)"
         case Reason.KEEP:
-            spans = limits.keep_mm[0]
-            number = int(np.argmax((spans[:, 0] < plane.offset_mm) & (plane.offset_mm < spans[:, 1]))) + 1
-            return f"its plane would pass through box {number} of [[keep]], which stays whole"
+            return f"its plane would pass through zone {problem.zones.crossed(plane)} of [[keep]], which stays whole"
     return REASONS[reason]
 
 

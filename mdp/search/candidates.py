@@ -16,7 +16,7 @@ from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
-from mdp.zone import Zone, spans_mm
+from mdp.zone import Patches, Zone, spans_mm
 from profiles.machine import Machine
 from profiles.search import Search
 
@@ -50,7 +50,7 @@ REASONS = {
     Reason.INTERFACE: "the part or a piece of it would hang on too small an area (search.least_interface_mm2)",
     Reason.FRAGILE: "the plane would leave a sliver (search.fragile_mm)",
     Reason.GAIN: "it would make too little safe for the seam it leaves (search.seam_mm, search.least_gain)",
-    Reason.KEEP: "the plane would pass through a box that stays whole ([[keep]])",
+    Reason.KEEP: "the plane would pass through a zone that stays whole ([[keep]])",
     Reason.WEAK: "the nozzle could break the part or a piece of it off its base (search.nozzle_load_n)",
 }
 
@@ -66,7 +66,7 @@ def directions(search: Search) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """What every direction must respect, worked out once a search: (k,) arrays. keep_mm: (k, zones, 2) offsets between which a
+    """What every direction must respect, worked out once a search: (k,) arrays. keep_mm: (k, spans, 2) offsets between which a
     plane passes through a zone; crumb_mm: a piece that is lower is a crumb."""
 
     directions: Floats
@@ -78,7 +78,9 @@ class Bounds:
     crumb_mm: float
 
 
-def bounds(mesh: Mesh, machine: Machine, search: Search, fixed: Floats | None = None, keep: Sequence[Zone] = ()) -> Bounds:
+def bounds(
+    mesh: Mesh, machine: Machine, search: Search, fixed: Floats | None = None, keep: Sequence[Zone | Patches] = ()
+) -> Bounds:
     """Bounds of a model's search for the sampled directions, or for `fixed` ones."""
     chosen = directions(search) if fixed is None else fixed
     return bounds_of(chosen, platform_disc(mesh, search), mesh.volume_mm3, machine, search, keep)
@@ -90,7 +92,7 @@ def bounds_of(
     volume_mm3: float,
     machine: Machine,
     search: Search,
-    keep: Sequence[Zone] = (),
+    keep: Sequence[Zone | Patches] = (),
 ) -> Bounds:
     """Bounds for (k, 3) directions, a disc that every plane must clear, a model's volume and the zones that stay whole."""
     centre, radius = disc

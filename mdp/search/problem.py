@@ -40,17 +40,17 @@ class Problem:
             settings = settings.model_copy(update=PUBLISHED)
         self.settings = settings
         self.machine = profile.machine if settings.clearance else without_limits(profile.machine)
-        self.mesh, self.zones = mesh, zones
-        solid = solid_of(mesh)
+        self.mesh, self.zones = mesh, zones.on(mesh)
+        solid = solid_of(mesh, apart=self.zones.no_seam_faces is not None)
         self.surface = ModelSurface.of(mesh, solid)
         self.terms = cost_terms(profile, settings)
         hidden_share = settings.hidden_seam_share if self.terms.seam_mm > 0.0 else 1.0
-        places = SeamPlaces.of(self.surface, solid, hidden_share, zones.no_seam)
+        places = SeamPlaces.of(self.surface, solid, hidden_share, self.zones)
         self.root = self.start = Node(solid, (), self.terms, places)
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
         self.platform_disc = platform_disc(mesh, settings)
-        self.limits: Bounds = bounds(mesh, self.machine, settings, keep=zones.keep)
+        self.limits: Bounds = bounds(mesh, self.machine, settings, keep=self.zones.keep)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         savable_mm2 = self._savable_mm2()
         self.least_gain_mm2 = settings.least_gain * savable_mm2

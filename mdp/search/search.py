@@ -20,7 +20,7 @@ from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
 from mdp.plan_file import MOST_PARTS, PlanFile
 from mdp.search.beam import Beam
-from mdp.search.by_hand import check_model, cut_by_hand
+from mdp.search.by_hand import check_colours, check_model, cut_by_hand
 from mdp.search.candidates import REASONS
 from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
@@ -71,6 +71,7 @@ def decompose(
     mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     planned = PlanFile("") if by_hand is None else by_hand
     check_model(planned, mesh, name)
+    check_colours(planned, mesh, name)
     problem = Problem(mesh, profile, planned.zones)
     problem.start = cut_by_hand(problem, planned)
     if parts is not None and parts <= len(problem.start.cuts):
@@ -145,6 +146,7 @@ def cut_by_plan(
             raise PlanError(f"plan {plan.name}: part {number} has no {missing}: decompose --planes {plan.name} has it found")
     mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     check_model(plan, mesh, name)
+    check_colours(plan, mesh, name)
     problem = Problem(mesh, profile, plan.zones)
     node = cut_by_hand(problem, plan)
     made = make_parts(node, problem.machine, profile)
@@ -319,5 +321,5 @@ def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
 
 
 def _no_seam_note(problem: Problem) -> tuple[str, ...]:
-    free = problem.zones.no_seam and problem.terms.seam_mm <= 0.0
+    free = problem.zones.keep_seams_away and problem.terms.seam_mm <= 0.0
     return ("[[no_seam]] changes nothing where seams cost nothing (search.objective, search.seam_mm)",) if free else ()

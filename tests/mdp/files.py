@@ -79,6 +79,18 @@ def ply(mesh: Mesh, order: str = "ascii") -> bytes:
     return header.encode() + b"".join(rows + [struct.pack(sign + "Biii", 3, *face) for face in mesh.faces.tolist()])
 
 
+def painted_ply(mesh: Mesh) -> bytes:
+    """The mesh with the colours of its faces."""
+    header = (
+        f"ply\nformat ascii 1.0\nelement vertex {len(mesh.vertices)}\nproperty double x\nproperty double y\nproperty double z\n"
+    )
+    header += f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\n"
+    header += "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+    assert mesh.colours is not None
+    parts = [mesh.faces, mesh.colours[:, None] >> np.array([16, 8, 0]) & 255]
+    return (header + _rows(mesh.vertices) + _rows(np.concatenate(parts, axis=1), "3 ")).encode()
+
+
 def _rows(table: object, start: str = "") -> str:
     return "".join(start + " ".join(map(repr, row)) + "\n" for row in np.asarray(table).tolist())
 

@@ -4,7 +4,9 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from mdp.colour import NO_COLOUR
 from mdp.cut import solid_of
+from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.pedestal import on_pedestal
 from tests import shapes
@@ -45,3 +47,12 @@ def test_two_feet_stand_on_one_pedestal() -> None:
 def test_no_height_leaves_the_model_alone() -> None:
     mesh = shapes.tee()
     assert on_pedestal(mesh, 0.0) is mesh
+
+
+def test_faces_keep_their_colours_and_the_pedestal_has_none() -> None:
+    box = shapes.box(20, 20, 20)
+    red = Mesh(box.vertices, box.faces, np.where(box.normals[:, 2] > 0.9, 0xFF0000, 7).astype(np.int32))
+    lifted = on_pedestal(red, 9.0)
+    assert lifted.areas_mm2[lifted.colours == 0xFF0000].sum() == pytest.approx(400.0)
+    assert lifted.areas_mm2[lifted.colours == 7].sum() == pytest.approx(4 * 20 * 19.7)
+    assert lifted.vertices[lifted.faces[lifted.colours == NO_COLOUR]][:, :, 2].max() <= 9.3 + 1e-9

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.plan_file import PlanFile, PlannedPart, PlannedRow, mesh_sha256, plan_text, read_plan
-from mdp.zone import Zone, Zones
+from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.machine import Vector
 from tests import shapes
@@ -30,6 +30,7 @@ OPEN = st.builds(
 ROWS = st.builds(PlannedRow, st.lists(WHOLE, max_size=3).map(tuple), st.floats(0, 1e9), st.floats(0, 1e9), st.floats(0, 1e9))
 CORNERS = st.tuples(*[st.floats(-9e4, 9e4)] * 3)
 ZONES = CORNERS.map(lambda low: Zone(low, (low[0] + 1.0, low[1] + 20.0, low[2] + 300.0)))
+COLOURS = st.builds(Painted, st.integers(0, 0xFFFFFF))
 TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 PLANS = st.builds(
     PlanFile,
@@ -38,7 +39,7 @@ PLANS = st.builds(
     sha256=st.text("0123456789abcdef", max_size=64),
     orientation=st.sampled_from([None, TURNED]),
     parts=st.lists(OPEN, max_size=5).map(tuple),
-    zones=st.builds(Zones, st.lists(ZONES, max_size=2).map(tuple), st.lists(ZONES, max_size=2).map(tuple)),
+    zones=st.builds(Zones, *[st.lists(ZONES | COLOURS, max_size=2).map(tuple)] * 2),
     front=st.lists(ROWS, max_size=3, unique_by=lambda row: len(row.parts)).map(tuple),
 )
 
@@ -80,6 +81,12 @@ REFUSED = [
     ("version = 1\n[[keep]]\nmin_mm = [0, 0, 0]", "keep 1: max_mm is missing: 3 numbers in brackets are expected"),
     ("version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 0, 1]", "each number of min_mm must be less"),
     ("version = 1\n[[no_seam]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, inf, 1]", "no_seam 1: max_mm is [1, inf, 1]"),
+    (
+        "version = 1\n[[keep]]\ncolour = 'red'",
+        "keep 1: colour is 'red': # and six hexadecimal digits are expected, as \"#ff0000\"",
+    ),
+    ("version = 1\n[[no_seam]]\ncolour = 0xff0000", "no_seam 1: colour is 16711680: # and six hexadecimal digits are expected"),
+    ("version = 1\n[[keep]]\ncolour = '#ff0000'\nmin_mm = [0, 0, 0]", "keep 1: has a colour and a box: one of them is allowed"),
     ("version = 1\n[keep]\nmin_mm = [0, 0, 0]", "[[keep]] tables are expected"),
     ("version = 1\n[[front]]\nplanes = 4", "front 1: planes is 4: a list of [x, y, z, offset_mm] is expected"),
     ("version = 1\n[[front]]\nplanes = [[0, 0, 1]]", "front 1: planes is [0, 0, 1]: 4 numbers in brackets are expected"),

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from mdp.plan_file import KEYS, PlannedPart, read_plan
-from mdp.zone import Zone, Zones
+from mdp.zone import Painted, Zone, Zones
 
 PAGE = Path(__file__).parents[2] / "docs" / "plan.md"
 
@@ -15,7 +15,7 @@ def test_the_example_of_the_page_is_read_as_the_page_says(tmp_path: Path) -> Non
     plan = read_plan(tmp_path / "mine.toml")
     assert plan.parts == (PlannedPart((0.0, 0.6, 0.8), 31.0), PlannedPart((-0.6, 0.0, 0.8), None))
     seams, whole = Zone((-20.0, -30.0, 30.0), (20.0, -10.0, 80.0)), Zone((-8.0, -14.0, 40.0), (8.0, -6.0, 52.0))
-    assert plan.zones == Zones(keep=(whole,), no_seam=(seams,))
+    assert plan.zones == Zones(keep=(whole, Painted(0xFF0000)), no_seam=(seams, Painted(0x00FF00)))
 
 
 def test_the_page_explains_every_key() -> None:

@@ -1,12 +1,14 @@
-"""Zones: which faces reach into a box and between which offsets a plane passes through it."""
+"""Zones: which faces reach into a box, and between which offsets a plane passes through it or through faces of a colour."""
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.mesh import Mesh
-from mdp.zone import Zone, spans_mm, touched
+from mdp.plane import Plane
+from mdp.zone import Painted, Zone, Zones, spans_mm, touched
 from tests import shapes
+from tests.mdp.files import both
 from tests.mdp.solids import random_direction, random_solid
 
 
@@ -41,3 +43,43 @@ def test_a_plane_passes_through_a_zone_between_its_lowest_and_its_highest_corner
     direction, zone = random_direction(height, around), Zone((-1.0, 2.0, 3.0), (4.0, 5.0, 9.0))
     corners = np.array([[x, y, z] for x in (-1.0, 4.0) for y in (2.0, 5.0) for z in (3.0, 9.0)]) @ direction
     np.testing.assert_allclose(spans_mm(direction[None], [zone])[0], [[corners.min(), corners.max()]], atol=1e-12)
+
+
+RED = 0xFF0000
+
+
+def painted(seed: int, share: float = 0.1) -> Mesh:
+    """A solid, some of its faces red."""
+    mesh = random_solid(seed)
+    red = np.random.default_rng(seed).random(len(mesh.faces)) < share
+    return Mesh(mesh.vertices, mesh.faces, np.where(red, RED, 0x123456).astype(np.int32))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 50), st.integers(1, 999), st.integers(1, 999))
+def test_a_plane_passes_through_a_colour_where_it_has_corners_of_one_of_its_faces_on_both_sides(
+    seed: int, height: int, around: int
+) -> None:
+    mesh, direction = painted(seed), random_direction(height, around)
+    heights = (mesh.vertices @ direction)[mesh.faces[mesh.colours == RED]]
+    (spans,) = spans_mm(direction[None], Zones(keep=(Painted(RED),)).on(mesh).keep)
+    for offset_mm in np.linspace(mesh.vertices.min(), mesh.vertices.max(), 301):
+        passes = ((heights.min(axis=1) < offset_mm) & (heights.max(axis=1) > offset_mm)).any()
+        assert passes == ((spans[:, 0] < offset_mm) & (offset_mm < spans[:, 1])).any()
+
+
+def test_directions_with_fewer_spans_than_others_end_in_spans_that_no_plane_is_in() -> None:
+    two = both(shapes.box(), shapes.box().transform(np.eye(3), (50.0, 0.0, 0.0)))
+    red = Mesh(two.vertices, two.faces, np.full(len(two.faces), RED, dtype=np.int32))
+    spans = spans_mm(np.eye(3), Zones(keep=(Painted(RED),)).on(red).keep)
+    np.testing.assert_allclose(spans[:, 0], [[-10.0, 10.0], [-10.0, 10.0], [0.0, 20.0]], atol=2e-6)
+    np.testing.assert_allclose(spans[:, 1], [[40.0, 60.0], [np.inf, np.inf], [np.inf, np.inf]], atol=2e-6)
+
+
+def test_a_plane_may_lie_in_a_flat_face_of_a_colour_and_touch_its_edges() -> None:
+    box = shapes.box()
+    top = Mesh(box.vertices, box.faces, np.where(box.normals[:, 2] > 0.9, RED, 0).astype(np.int32))
+    zones = Zones(keep=(Painted(RED),)).on(top)
+    assert zones.crossed(Plane(np.array([0.0, 0.0, 1.0]), 20.0)) is None
+    assert zones.crossed(Plane(np.array([1.0, 0.0, 0.0]), 10.0)) is None
+    assert zones.crossed(Plane(np.array([1.0, 0.0, 0.0]), 9.9)) == 1

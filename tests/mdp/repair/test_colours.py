@@ -68,17 +68,11 @@ def test_colours_are_read_as_they_are_written(text: str, colour: int | None) -> 
 
 def test_a_mesh_that_is_scaled_and_turned_keeps_its_colours(tmp_path: Path) -> None:
     box = files.placed(10, 20, 30)
-    content = files.ply(box).replace(b"property uchar red\nelement face", b"element face").replace(b" 7\n", b"\n")
-    content = content.replace(
-        b"vertex_indices\n", b"vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
-    )
-    head, _, rows = content.partition(b"end_header\n")
-    lines = rows.splitlines()
-    lines[8:] = [line + (b" 255 0 0" if k == 4 else b" 9 9 9") for k, line in enumerate(lines[8:])]
-    path = files.save(tmp_path / "a.ply", head + b"end_header\n" + b"\n".join(lines) + b"\n")
+    colours = np.array([0x090909] * 4 + [RED] + [0x090909] * 7, dtype=np.int32)
+    path = files.save(tmp_path / "a.ply", files.painted_ply(Mesh(box.vertices, box.faces, colours)))
     mesh, _ = read_mesh(path, 2.0, (90.0, 0.0, 0.0))
     assert mesh.colours is not None
-    assert mesh.colours.tolist() == [0x090909] * 4 + [RED] + [0x090909] * 7
+    assert mesh.colours.tolist() == colours.tolist()
     turned = mesh.transform(np.eye(3))
     assert turned.colours is not None
     assert turned.colours.tolist() == mesh.colours.tolist()

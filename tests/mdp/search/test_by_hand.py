@@ -15,7 +15,7 @@ from mdp.plan_file import PlanFile, PlannedPart, plan_of, plan_text, read_plan
 from mdp.plane import Plane
 from mdp.save import stl
 from mdp.search.search import cut_by_plan, decompose
-from mdp.zone import Zone, Zones
+from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.machine import Vector
 from profiles.profile import Profile, load
@@ -23,6 +23,7 @@ from tests import shapes
 
 UP, TO_X, FROM_X = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
 LEANING = (0.6, 0.0, 0.8)
+RED, GREEN, BLUE = 0xFF0000, 0x00FF00, 0x0000FF
 FREE = "search.clearance=false"
 
 
@@ -224,10 +225,10 @@ def test_no_plane_passes_through_a_zone_that_stays_whole() -> None:
     kept = decompose(tee, "shape", _profile(), by_hand=_by_hand(zones=Zones(keep=(zone,))))
     free = decompose(tee, "shape", _profile())
     for part in kept.parts[1:]:
-        low, high = zone.spans_mm(part.base.normal[None])[0]
+        low, high = zone.spans_mm(part.base.normal[None])[0, 0]
         assert not low < part.base.offset_mm < high
     assert len(free.parts) > len(kept.parts) or kept.cost_mm2 >= free.cost_mm2
-    with pytest.raises(PlanError, match=r"its plane would pass through box 1 of \[\[keep\]\], which stays whole"):
+    with pytest.raises(PlanError, match=r"its plane would pass through zone 1 of \[\[keep\]\], which stays whole"):
         cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0), zones=Zones(keep=(zone,))))
 
 
@@ -240,6 +241,53 @@ def test_seams_keep_out_of_a_zone_where_they_weigh_a_hundred_times() -> None:
     free = cut_by_plan(tee, "shape", _profile(), _by_hand((UP, 35.0)))
     assert by_hand.seam_mm == free.seam_mm == pytest.approx(100.0)
     assert by_hand.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.8 * 100.0)
+
+
+def _painted_tee() -> Mesh:
+    """A tee in triangles of some 5 mm: the underside of one arm is red, the head green, the rest blue."""
+    tee = shapes.from_manifold(solid_of(shapes.tee()).refine_to_length(5.0))
+    middles = tee.vertices[tee.faces].mean(axis=1)
+    under = (tee.normals[:, 2] < -0.9) & (middles[:, 0] < -6.0)
+    return Mesh(tee.vertices, tee.faces, np.select([under, middles[:, 2] > 30.1], [RED, GREEN], BLUE).astype(np.int32))
+
+
+def test_no_plane_passes_through_faces_of_a_colour_that_stay_whole() -> None:
+    tee = _painted_tee()
+    zones = Zones(keep=(Painted(RED),))
+    kept = decompose(tee, "shape", _profile(), by_hand=_by_hand(zones=zones))
+    red = tee.vertices[tee.faces[tee.colours == RED]]
+    assert len(kept.parts) > 1
+    for part in kept.parts[1:]:
+        heights = red @ part.base.normal - part.base.offset_mm
+        assert not ((heights.min(axis=1) < -1e-5) & (heights.max(axis=1) > 1e-5)).any()
+    with pytest.raises(PlanError, match=r"its plane would pass through zone 1 of \[\[keep\]\], which stays whole"):
+        cut_by_plan(tee, "shape", _profile(), _by_hand(((-0.6, 0.0, 0.8), 31.2), zones=zones))
+
+
+def test_seams_weigh_a_hundred_times_on_faces_of_a_colour_alone_whatever_earlier_cuts_left_of_them() -> None:
+    around = np.array([(-10, -10), (0, -10), (10, -10), (10, 10), (0, 10), (-10, 10)], dtype=np.float64)
+    corners = np.concatenate([np.column_stack([around, np.full(6, z)]) for z in (0.0, 20.0)])
+    cap, following = np.array([(0, 1, 5), (1, 4, 5), (1, 2, 4), (2, 3, 4)]), np.roll(np.arange(6), -1)
+    sides = [(k, n, n + 6) for k, n in enumerate(following)] + [(k, n + 6, k + 6) for k, n in enumerate(following)]
+    faces = np.concatenate([cap[:, ::-1], cap + 6, sides])
+    green_half = (corners[faces].mean(axis=1)[:, 0] < 0.0) & (np.arange(20) >= 8)
+    painted = Mesh(corners, faces, np.where(green_half, GREEN, BLUE).astype(np.int32))
+    profile, planes = _profile("search.hidden_seam_share=1", "search.seam_mm=0.6"), ((UP, 7.0), (UP, 13.0))
+    green = cut_by_plan(painted, "shape", profile, _by_hand(*planes, zones=Zones(no_seam=(Painted(GREEN),))))
+    free = cut_by_plan(painted, "shape", profile, _by_hand(*planes))
+    assert green.seam_mm == free.seam_mm == pytest.approx(160.0)
+    assert green.cost_mm2 - free.cost_mm2 == pytest.approx(99 * 0.6 * 80.0)
+
+
+def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:
+    zones = Zones(no_seam=(Painted(GREEN), Painted(0xABCDEF)))
+    with pytest.raises(
+        PlanError, match=r"^plan mine.toml: no_seam 1: colour is #00ff00, but shape paints no face: a 3MF or a PLY"
+    ):
+        decompose(shapes.tee(), "shape", _profile(), by_hand=_by_hand(zones=zones))
+    unknown = "no_seam 2: colour is #abcdef, but no face of shape is painted so; its colours are #0000ff, #00ff00, #ff0000$"
+    with pytest.raises(PlanError, match=unknown):
+        cut_by_plan(_painted_tee(), "shape", _profile(), _by_hand((UP, 35.0), zones=zones))
 
 
 def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:

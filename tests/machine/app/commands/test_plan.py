@@ -4,9 +4,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from machine.app.cli import main
+from mdp.cut import solid_of
+from mdp.mesh import Mesh
+from tests import shapes
+from tests.mdp.files import painted_ply
 
 FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.4"]
 FAST += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6", "--set", "process.infill_density=0.05"]
@@ -98,3 +103,17 @@ def test_planes_by_hand_are_in_the_plan_with_their_zones(folder: Path) -> None:
     Path("mine.toml").write_text(f"version = 1\n[[part]]\n[[part]]\nnormal = {last['normal']}\noffset_mm = {last['offset_mm']}\n")
     _run("decompose", "demo:tree", "--planes", "mine.toml", "--json", "planes.json")
     assert _values("planes.json")["parts"][-1]["base"] == last
+
+
+def test_a_planes_file_says_what_the_colours_of_a_model_mean_and_the_plan_keeps_it(folder: Path) -> None:
+    tee = shapes.from_manifold(solid_of(shapes.tee()).refine_to_length(5.0))
+    most = tee.vertices[tee.faces].mean(axis=1)[:, 2] > 2.0
+    Path("tee.ply").write_bytes(painted_ply(Mesh(tee.vertices, tee.faces, np.where(most, 0x00FF00, 0x808080).astype(np.int32))))
+    Path("marks.toml").write_text('version = 1\n[[no_seam]]\ncolour = "#00FF00"\n')
+    _run("decompose", "tee.ply", "--json", "free.json")
+    _run("decompose", "tee.ply", "--planes", "marks.toml", "-o", "a", "--json", "a.json")
+    assert len(_values("free.json")["parts"]) > 1
+    assert len(_values("a.json")["parts"]) == 1
+    assert '[[no_seam]]\ncolour = "#00ff00"\n' in Path("a/plan.toml").read_text()
+    _run("decompose", "tee.ply", "--plan", "a/plan.toml", "--json", "again.json")
+    assert _values("again.json")["cost_mm2"] == pytest.approx(_values("a.json")["cost_mm2"])
