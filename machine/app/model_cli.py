@@ -71,7 +71,8 @@ def decompose(
 
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit))
     known = plan is not None and exists(plan)
-    outputs = Outputs(folder=out, json=json, html=html, png=png, sheet=sheet, record=record, plan=None if known else plan)
+    written = None if known else plan
+    outputs = Outputs(folder=out, json=json, html=html, png=png, sheet=sheet, front=front, record=record, plan=written)
     cuts = Cuts(plan if known else None, parts, planes)
     return decompose(ModelRequest(model, profile, ranker=ranker, orient=orient, outputs=outputs, cuts=cuts))
 

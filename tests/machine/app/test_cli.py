@@ -150,7 +150,7 @@ def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.Monkey
 
 
 def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
-    wanted = ["-o", "parts", "--json", "out.json", "--png", "parts.png", "--sheet", "sheet.png"]
+    wanted = ["-o", "parts", "--json", "out.json", "--png", "parts.png", "--sheet", "sheet.png", "--front", "front.png"]
     assert main(["decompose", "demo:bracket", *FAST, *wanted]) == 0
     told = json.loads(Path("out.json").read_text())
     assert set(told) == {
@@ -163,7 +163,7 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     assert sum(part["volume_mm3"] for part in told["parts"]) == pytest.approx(told["volume_mm3"], rel=1e-6)
     files = {part["file"] for part in told["parts"]} | {"decomposition.3mf", "decomposition.json", "plan.toml"}
     assert {file.name for file in Path("parts").iterdir()} == files
-    assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png"))
+    assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png", "front.png"))
 
 
 def test_options_of_the_search_are_its_profile_keys(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
