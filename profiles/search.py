@@ -50,6 +50,13 @@ class Search(Frozen):
         description="how much a seam counts deep in a crease or neck or out of sight, as a share of what it counts across a "
         "smooth surface in plain sight; 1: the same everywhere",
     )
+    unsupportable_weight: float = Field(
+        5.0,
+        ge=1,
+        le=1000,
+        description="how many times an area counts that needs support and has nothing but air beneath it along its part's "
+        "direction: no support can stand there, and what leans there from the side holds badly",
+    )
     polish: bool = Field(
         True,
         description="the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added",

@@ -16,6 +16,7 @@ from mdp.search.candidates import bounds
 from mdp.sweep.components import View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas
 from mdp.sweep.integrals import (
+    Needs,
     OffsetGrid,
     Overhangs,
     dot,
@@ -62,10 +63,11 @@ def pieces_of_work(
     heights, counts = _all_heights(rows.points, directions, step)
     cosines = np.ascontiguousarray(directions @ rows.vertex_normals)
     surface = Overhangs(facets.points, facets.corners, facets.normals, facets.mesh.areas_mm2, facets.risky, angle)
+    needs = remainder.needs(directions)
     grids = (directions, heights, counts, step, columns)
     return {
         "heights": lambda: _all_heights(rows.points, directions, step),
-        "risky areas (gains)": lambda: _risks(surface, grids),
+        "risky areas (gains)": lambda: _risks(surface, needs, grids),
         "section and volume": lambda: _volumes(rows, grids),
         "lowest point": lambda: _lowest(rows, grids, watched),
         "slivers": lambda: _slivers(rows, grids, cosines),
@@ -90,11 +92,12 @@ def _all_heights(points, directions, step):  # type: ignore[no-untyped-def]
 
 
 @numba.njit
-def _risks(surface, grids):  # type: ignore[no-untyped-def]
+def _risks(surface, needs, grids):  # type: ignore[no-untyped-def]
     directions, heights, counts, step, columns = grids
     up, residual, scratch = np.zeros(columns), np.zeros(columns), np.zeros((2, len(surface.risky) + 1), np.int32)
     for k in range(len(directions)):
-        integrate_risky_area(surface, OffsetGrid(directions[k], heights[k], counts[k], step), scratch, up, residual)
+        grid = OffsetGrid(directions[k], heights[k], counts[k], step)
+        integrate_risky_area(surface, Needs(needs.sources, needs.classes[k], needs.weight), grid, scratch, up, residual)
 
 
 @numba.njit

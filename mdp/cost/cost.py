@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.cost.hidden import hidden_shares
+from mdp.cost.model_need import ModelNeed
 from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface
 from mdp.cut import Solid, mesh_of
 from mdp.mesh import Floats, Mesh, dot
@@ -56,12 +57,14 @@ class SeamPlaces:
 @dataclass(frozen=True)
 class CostTerms:
     """What a search counts. seam_mm: width of the scar along a rim, 0: seams cost nothing; feather: by how much more a rim
-    counts where face and plane meet at a small angle."""
+    counts where face and plane meet at a small angle; need: what needs support, None: every face that overhangs, the paper's
+    terms."""
 
     angle_deg: float
     count_platform_faces: bool
     seam_mm: float = 0.0
     feather: float = 0.0
+    need: ModelNeed | None = None
 
 
 def cost_terms(profile: Profile, settings: Search) -> CostTerms:

@@ -6,6 +6,7 @@ planes before its own have left.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import sqrt
 from typing import NamedTuple
 
@@ -14,19 +15,21 @@ import numpy as np
 from mdp.cost.cost import CostTerms
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, part
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
+from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
 from mdp.sweep.rims import ROUNDING_MM, weigh_chord
 from mdp.sweep.sweep import Remainder
 
 LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no length of its own
 
 
-class Surface(NamedTuple):
-    """A solid's surface: (m, 3, 3) corners, (m, 3) normals, (m,) areas, which faces are risky upright, the cosine of normal and
-    direction below which a face is risky along that direction; (m,) mm2 that a mm of rim costs on each face, (0,) where
-    seams cost nothing, and by how much more on a feather edge."""
+class Faces(NamedTuple):
+    """Faces of a solid: (m, 3, 3) corners, (m, 3) normals, (m,) areas, which are risky upright, the cosine of normal and
+    direction below which a face is risky along that direction; (m,) mm2 that a mm of rim costs on each, (0,) where seams cost
+    nothing, by how much more on a feather edge; of which faces of the model they are pieces, see integrals.Needs, and how many
+    times what is unsupportable counts."""
 
     corners: Floats
     normals: Floats
@@ -35,6 +38,16 @@ class Surface(NamedTuple):
     risky_below: float
     seam_mm: Floats
     feather: float
+    sources: Ints
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """What remains of a model, its faces that count laid out."""
+
+    remainder: Remainder
+    faces: Faces
 
     @classmethod
     def of(cls, remainder: Remainder, terms: CostTerms) -> "Surface":
@@ -47,17 +60,33 @@ class Surface(NamedTuple):
             counted = np.ones(len(risky), dtype=np.bool_)
             seam_mm = terms.seam_mm * remainder.seam_weights
         corners = mesh.vertices[mesh.faces[counted]]
-        return cls(corners, mesh.normals[counted], mesh.areas_mm2[counted], risky[counted], least, seam_mm, terms.feather)
+        pieces = remainder.pieces
+        sources = np.zeros(0, np.int32) if pieces is None else pieces.sources[counted]
+        weight = 1.0 if pieces is None else pieces.need.weight
+        areas, normals = mesh.areas_mm2[counted], mesh.normals[counted]
+        faces = Faces(corners, normals, areas, risky[counted], least, seam_mm, terms.feather, sources, weight)
+        return cls(remainder, faces)
 
-    def left_mm2(self, planes: Sequence[Plane]) -> float:
-        """What cuts along the planes, in this order, would cost: the risky area left, and the seams."""
-        normals = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
+    def classes(self, planes: Sequence[Plane]) -> Classes:
+        """(k, n) what the faces of the model need along the planes' normals."""
+        pieces = self.remainder.pieces
+        return np.zeros((len(planes), 0), np.uint8) if pieces is None else pieces.need.along(_normals(planes))
+
+    def left_mm2(self, planes: Sequence[Plane], classes: Classes | None = None) -> float:
+        """What cuts along the planes, in this order, would cost: the area left that needs support, and the seams.
+
+        classes: those of planes that lean a little otherwise; absent: the planes' own.
+        """
         offsets = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
-        return _sum_left(self, normals, offsets)
+        return _sum_left(self.faces, _normals(planes), offsets, self.classes(planes) if classes is None else classes)
+
+
+def _normals(planes: Sequence[Plane]) -> Floats:
+    return np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
 
 
 @kernel
-def _sum_left(surface: Surface, directions: Floats, offsets: Floats) -> float:
+def _sum_left(surface: Faces, directions: Floats, offsets: Floats, classes: Classes) -> float:
     """Risky area and seams of the planes (directions, offsets), cut in their order."""
     corners, normals, areas, risky = surface.corners, surface.normals, surface.areas_mm2, surface.risky
     polygon, spare = table(len(offsets) + 4, 3), table(len(offsets) + 4, 3)
@@ -84,13 +113,22 @@ def _sum_left(surface: Surface, directions: Floats, offsets: Floats) -> float:
                 polygon, spare = spare, polygon
                 below = _flat_area(polygon, size, normals, face)
             if _along(normals, face, directions, cut) < surface.risky_below:
-                total += area - below
+                total += (area - below) * _weight(surface, classes, cut, face)
             area = below
             if lowest >= 0.0:
                 break
         if risky[face]:
             total += area
     return total
+
+
+@part
+def _weight(surface: Faces, classes: Classes, cut: int, face: int) -> float:
+    """How many times a face counts that is risky along the normal of a cut."""
+    if len(surface.sources) == 0 or surface.sources[face] < 0:
+        return 1.0
+    of_face = classes[cut, surface.sources[face]]
+    return surface.weight if of_face == UNSUPPORTABLE else 1.0 if of_face == NEEDS_SUPPORT else 0.0
 
 
 @part

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from mdp.cost.cost import CostTerms
+from mdp.cost.model_need import unsupportable_mm2
 from mdp.decomposition import FrontRow, Part
 from mdp.search.node import Node
 from profiles.profile import Profile
@@ -25,50 +26,47 @@ Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be 
 
 
 class Front:
-    """The best node met for every number of cuts: of those whose cost is alike to the least the one with the shortest seams;
-    where seams cost nothing the one that costs least."""
+    """The best node met for every number of cuts."""
 
     def __init__(self, start: Node) -> None:
         self._start = len(start.cuts)
-        self._alike: dict[int, list[Node]] = {self._start: [start]}
-        self._equal = EQUAL if start.terms.seam_mm > 0.0 else 0.0
+        self._best: dict[int, Node] = {self._start: start}
 
     def offer(self, node: Node) -> None:
         """Take note of a node and of all that led to it from the start."""
         step: Node | None = node
         while step is not None and len(step.cuts) >= self._start:
-            held = self._alike.setdefault(len(step.cuts), [])
-            if step not in held:
-                most_mm2 = min(other.cost_mm2 for other in (step, *held)) * (1.0 + self._equal)
-                held[:] = [other for other in (*held, step) if other.cost_mm2 <= most_mm2]
+            held = self._best.get(len(step.cuts))
+            if held is None or step.cost_mm2 < held.cost_mm2:
+                self._best[len(step.cuts)] = step
             step = step.parent
-
-    def replace(self, node: Node, other: Node) -> None:
-        """Put another node, alike in cost, in the place of one."""
-        self._alike[len(node.cuts)] = [other]
 
     @property
     def nodes(self) -> list[Node]:
         """The nodes by their number of cuts."""
-        return [self._best(count) for count in sorted(self._alike)]
+        return [self._best[count] for count in sorted(self._best)]
 
     def up_to(self, parts: int) -> Node:
         """The node of the most parts up to so many, or of the fewest where all have more."""
-        return self._best(max((count for count in self._alike if count < parts), default=self._start))
-
-    def _best(self, count: int) -> Node:
-        alike = self._alike[count]
-        if self._equal <= 0.0 or len(alike) == 1:
-            return alike[0]
-        return min(alike, key=lambda node: sum(seam.length_mm for seam in node.seams))
+        return self._best[max((count for count in self._best if count < parts), default=self._start)]
 
 
 def front_row(node: Node, terms: CostTerms) -> FrontRow:
-    """A node with what it costs, the seams apart."""
+    """A node with what it costs, the seams apart. An area over air counts once in the area that needs support."""
     seams = node.seams
     scars_mm2 = terms.seam_mm * sum(seam.weighted_mm for seam in seams)
     planes = tuple(cut.base for cut in node.cuts)
-    return FrontRow(planes, node.cost_mm2 - scars_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2)
+    over_mm2 = 0.0 if terms.need is None else (terms.need.need.weight - 1.0) * _over_air_mm2(node)
+    return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2)
+
+
+def _over_air_mm2(node: Node) -> float:
+    """Area that needs support and can hardly get any."""
+    if node.parent is None:
+        return 0.0
+    before = node.parent.remainder
+    here_mm2 = 0.0 if before.pieces is None else unsupportable_mm2(before.mesh, before.pieces, node.cuts[-1].base)
+    return here_mm2 + _over_air_mm2(node.parent)
 
 
 def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:

@@ -42,7 +42,10 @@ class Node:
         mesh, terms = mesh_of(self.solid), self.terms
         weights = self.seam_weights if terms.seam_mm > 0.0 else None
         risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
-        return Remainder(mesh, risky, weights, terms.feather)
+        pieces = None if terms.need is None else terms.need.pieces(self.solid)
+        if pieces is not None:
+            risky = risky & pieces.upright
+        return Remainder(mesh, risky, weights, terms.feather, pieces)
 
     @cached_property
     def seam_weights(self) -> Floats:
@@ -60,7 +63,7 @@ class Node:
 
     @cached_property
     def risky_mm2(self) -> float:
-        """Risky area of what remains when it is printed straight up."""
+        """Area of what remains that needs support when it is printed straight up."""
         return float(self.remainder.mesh.areas_mm2[self.remainder.risky].sum())
 
     @cached_property

@@ -1,20 +1,23 @@
 """Parts of a node: its solids in print order, each at a pose, so that the table turns little."""
 
 from mdp.clearance import allowed_poses
+from mdp.cost.cost import CostTerms
 from mdp.cut import mesh_of
 from mdp.decomposition import Part
-from mdp.overhang import risky_above
+from mdp.mesh import Mesh
+from mdp.overhang import Mask, risky_above
 from mdp.plane import PLATFORM
 from mdp.pose import Pose, level, poses, rotation
 from mdp.pose_sequence import least_rotation
-from mdp.search.node import Node
+from mdp.search.node import Cut, Node
+from mdp.support_need.patches import CARRIES_ITSELF
 from profiles.machine import Machine
 from profiles.profile import Profile
 
 
 def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ...]:
     """Parts in print order: what remains first, then the cuts, last one first. machine: the profile's, or one without limits."""
-    angle_deg, clearance = profile.process.self_supporting_angle_deg, profile.search.clearance
+    clearance = profile.search.clearance
     solids = [(PLATFORM, node.remainder.mesh), *((c.base, mesh_of(c.solid)) for c in reversed(node.cuts))]
     options = [[level(machine)]]
     for base, mesh in solids[1:]:
@@ -27,7 +30,7 @@ def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ..
     feathered = (0.0, *(seam.feather_share for seam in reversed(node.seams)))
     parts = []
     for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options, fits), strict=True)):
-        risky = risky_above(mesh, base, angle_deg) if position else node.remainder.risky
+        risky = _needing(node.cuts[-position], mesh, node.terms) if position else node.remainder.risky
         parts.append(
             Part(
                 index=position + 1,
@@ -41,3 +44,12 @@ def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ..
             )
         )
     return tuple(parts)
+
+
+def _needing(cut: Cut, mesh: Mesh, terms: CostTerms) -> Mask:
+    """(m,) faces of a part that need support."""
+    risky = risky_above(mesh, cut.base, terms.angle_deg)
+    if terms.need is None:
+        return risky
+    needing: Mask = risky & (terms.need.pieces(cut.solid).along(cut.base.normal) != CARRIES_ITSELF)
+    return needing

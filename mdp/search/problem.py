@@ -1,6 +1,7 @@
 """Problem: what one search holds fixed, which planes may cut a node, and what a cut makes of it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from time import perf_counter
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import SeamPlaces, cost_terms
+from mdp.cost.model_need import ModelNeed
 from mdp.cost.model_surface import ModelSurface
 from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
@@ -17,6 +19,7 @@ from mdp.search.candidates import Bounds, Feasibility, Reason, bounds, bounds_of
 from mdp.search.features import Model
 from mdp.search.node import Cut, Node
 from mdp.search.ranking import CandidateTable
+from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
 from mdp.sweep.sweep import gains
 from mdp.zone import NO_ZONES, Zones
@@ -44,6 +47,9 @@ class Problem:
         solid = solid_of(mesh, apart=self.zones.no_seam_faces is not None)
         self.surface = ModelSurface.of(mesh, solid)
         self.terms = cost_terms(profile, settings)
+        if settings.objective == "scar":
+            need = SupportNeed.of(mesh, profile.process, settings.unsupportable_weight)
+            self.terms = replace(self.terms, need=ModelNeed(self.surface, need))
         hidden_share = settings.hidden_seam_share if self.terms.seam_mm > 0.0 else 1.0
         places = SeamPlaces.of(self.surface, solid, hidden_share, self.zones)
         self.root = self.start = Node(solid, (), self.terms, places)

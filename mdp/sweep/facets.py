@@ -51,11 +51,13 @@ class Rows(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Facets:
     """Made once a solid. mesh has its vertices and faces in spatial order; risky (m,) tells which faces are risky upright,
-    seam_weights (m,) how much a mm of rim counts on each, (0,): not at all."""
+    seam_weights (m,) how much a mm of rim counts on each, (0,): not at all; sources (m,) of which face of the model each is a
+    piece, (0,): not known."""
 
     mesh: Mesh
     risky: Mask
     seam_weights: Floats
+    sources: Ints
 
     @cached_property
     def points(self) -> Floats:
@@ -129,7 +131,7 @@ class Facets:
         )
 
 
-def lay_out(mesh: Mesh, risky: Mask, seam_weights: Floats | None = None) -> Facets:
+def lay_out(mesh: Mesh, risky: Mask, seam_weights: Floats | None = None, sources: Ints | None = None) -> Facets:
     """The surface of a solid along a space-filling curve."""
     low = mesh.bounds_mm[0]
     scale = (2**GRID_BITS - 1) / max(float((mesh.bounds_mm[1] - low).max()), 1e-12)
@@ -138,7 +140,8 @@ def lay_out(mesh: Mesh, risky: Mask, seam_weights: Floats | None = None) -> Face
     number[order] = np.arange(len(order), dtype=np.int32)
     turn = np.argsort(_morton(mesh.vertices[mesh.faces].mean(axis=1), low, scale), kind="stable")
     weights = np.zeros(0) if seam_weights is None else np.ascontiguousarray(seam_weights[turn])
-    return Facets(Mesh(mesh.vertices[order], number[mesh.faces[turn]]), risky[turn], weights)
+    origins = np.zeros(0, np.int32) if sources is None else np.ascontiguousarray(sources[turn])
+    return Facets(Mesh(mesh.vertices[order], number[mesh.faces[turn]]), risky[turn], weights, origins)
 
 
 @kernel

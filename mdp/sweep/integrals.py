@@ -13,11 +13,13 @@ from mdp.kernels.arrays import floats, int_table, table
 from mdp.kernels.kernel import inlined, part, vector_part
 from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask
+from mdp.support_need.patches import NEEDS_SUPPORT, Classes
 from mdp.sweep.facets import Indices, Rows
 
 BLOCK = 128
 AHEAD = 3  # columns of a face that are worked out for the whole block; the few faces that cross more are finished singly
 THIRD = 1.0 / 3.0
+KINDS = 6  # of faces, see _select; the first is none
 
 
 class OffsetGrid(NamedTuple):
@@ -40,6 +42,16 @@ class Overhangs(NamedTuple):
     areas_mm2: Floats
     risky: Mask
     risky_below: float
+
+
+class Needs(NamedTuple):
+    """What of the risky faces needs support along a direction: of which face of the model each is a piece (m,), below 0: a cut
+    laid it open, (0,): every risky face counts once; the classes (n,) of the model's faces, and how many times the
+    unsupportable count."""
+
+    sources: Ints
+    classes: Classes
+    weight: float
 
 
 class Block(NamedTuple):
@@ -199,8 +211,9 @@ def integrate_volume(rows: Rows, grid: OffsetGrid, section: Floats, volume: Floa
 
 
 @part
-def _select(surface: Overhangs, d: Floats, chosen: Ints, kind: Ints) -> int:
-    """The faces that are risky either way, with 1: upright only, 2: along d only, 3: both; returns how many."""
+def _select(surface: Overhangs, needs: Needs, d: Floats, chosen: Ints, kind: Ints) -> int:
+    """The faces that need support either way, with 1: upright only, 2: along d only, 3: both, 4 and 5: as 2 and 3, and along d
+    they are unsupportable; returns how many."""
     normals, risky, risky_below = surface.normals, surface.risky, surface.risky_below
     cosines = floats(BLOCK, 0.0)
     many = 0
@@ -208,10 +221,17 @@ def _select(surface: Overhangs, d: Floats, chosen: Ints, kind: Ints) -> int:
         end = min(begin + BLOCK, normals.shape[1])
         dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], d, cosines[: end - begin])
         for f in range(begin, end):
-            code = int(risky[f]) + 2 * int(cosines[f - begin] < risky_below)
+            code = int(risky[f]) + 2 * (_class(needs, f) if cosines[f - begin] < risky_below else 0)
             chosen[many], kind[many] = f, code
             many += int(code > 0)
     return many
+
+
+@inlined
+def _class(needs: Needs, f: int) -> int:
+    """What a face that is risky along the direction needs."""
+    sources = needs.sources
+    return int(needs.classes[sources[f]]) if len(sources) > 0 and sources[f] >= 0 else NEEDS_SUPPORT
 
 
 @vector_part
@@ -251,15 +271,15 @@ def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> N
 
 
 @part
-def integrate_risky_area(surface: Overhangs, grid: OffsetGrid, scratch: Ints, up: Floats, residual: Floats) -> None:
-    """Risky areas above each offset: printed straight up, and along the direction; only faces that are risky either way count.
+def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scratch: Ints, up: Floats, residual: Floats) -> None:
+    """Risky areas above each offset: printed straight up, and along the direction, there weighted by what the faces need.
 
     scratch: (2, m + 1) whole numbers to work in.
     """
     n = grid.columns
-    integrals = table(n + AHEAD + 1, 8)
+    integrals = table(n + AHEAD + 1, 2 * KINDS)
     chosen, kind = scratch[0], scratch[1]
-    many = _select(surface, grid.direction, chosen, kind)
+    many = _select(surface, needs, grid.direction, chosen, kind)
     values, shares, places = table(6, BLOCK), table(AHEAD, BLOCK), int_table(2, BLOCK)
     picked = np.empty((3, BLOCK), np.uint32)
     for begin in range(0, many, BLOCK):
@@ -272,13 +292,15 @@ def integrate_risky_area(surface: Overhangs, grid: OffsetGrid, scratch: Ints, up
         for ahead in range(AHEAD):
             _cover(float(ahead), block, shares[ahead, :size])
         _add_areas(kind[begin:end], block, shares, integrals)
-    whole = floats(4, 0.0)
+    whole = floats(KINDS, 0.0)
     for column in range(n - 1, -1, -1):
-        for which in range(1, 4):
+        for which in range(1, KINDS):
             whole[which] += integrals[column + 1, 2 * which]
         both = integrals[column, 7] + whole[3]
-        up[column] = integrals[column, 3] + whole[1] + both
-        residual[column] = integrals[column, 5] + whole[2] + both
+        airy_both = integrals[column, 11] + whole[5]
+        up[column] = integrals[column, 3] + whole[1] + both + airy_both
+        airy = integrals[column, 9] + whole[4] + airy_both
+        residual[column] = integrals[column, 5] + whole[2] + both + needs.weight * airy
 
 
 @part

@@ -21,10 +21,21 @@ from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
+from mdp.support_need.need import ModelPieces
+from mdp.support_need.patches import Classes
 from mdp.sweep.components import UNKNOWN, Topology, View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas
 from mdp.sweep.facets import Facets, Rows, lay_out
-from mdp.sweep.integrals import OffsetGrid, Overhangs, dot, find_heights, find_lowest, integrate_risky_area, integrate_volume
+from mdp.sweep.integrals import (
+    Needs,
+    OffsetGrid,
+    Overhangs,
+    dot,
+    find_heights,
+    find_lowest,
+    integrate_risky_area,
+    integrate_volume,
+)
 from mdp.sweep.rays import TriangleTree, triangle_tree
 from mdp.sweep.rims import Rims, integrate_rim
 from mdp.sweep.slivers import SLIVER_COSINE, THIN_MM, find_slivers, least_distance_mm, thin_faces
@@ -34,7 +45,8 @@ class Gains(NamedTuple):
     """Values for each of k directions (rows) and its offsets c = (first + column) * step; those beyond `columns` are unused.
 
     up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along the
-    direction; rim_mm: weighted length of the rim that a cut leaves, 0 where the remainder counts no seams.
+    direction, weighted by what support each face needs; rim_mm: weighted length of the rim that a cut leaves, 0 where the
+    remainder counts no seams.
     """
 
     first: Ints
@@ -64,20 +76,37 @@ class Sweep(NamedTuple):
     contact_area_mm2: Floats
 
 
+class NeedsTable(NamedTuple):
+    """integrals.Needs with a row of classes (k, n) for each direction."""
+
+    sources: Ints
+    classes: Classes
+    weight: float
+
+
 @dataclass(frozen=True, eq=False)
 class Remainder:
     """What the sweep needs to know of a solid, made once for all directions: its mesh, which faces are risky upright, and how
-    much a mm of a seam's rim counts on each face (m,), feather edges more; None: seams do not count."""
+    much a mm of a seam's rim counts on each face (m,), feather edges more; None: seams do not count. pieces: of which faces of
+    the model its own are pieces; None: every risky face needs support."""
 
     mesh: Mesh
     risky: Mask
     seam_weights: Floats | None = None
     feather: float = 0.0
+    pieces: ModelPieces | None = None
 
     @cached_property
     def facets(self) -> Facets:
         """The surface laid out for sweeping."""
-        return lay_out(self.mesh, self.risky, self.seam_weights)
+        return lay_out(self.mesh, self.risky, self.seam_weights, None if self.pieces is None else self.pieces.sources)
+
+    def needs(self, directions: Floats) -> NeedsTable:
+        """What the risky faces need along (k, 3) directions."""
+        if self.pieces is None:
+            return NeedsTable(self.facets.sources, np.zeros((len(directions), 0), np.uint8), 1.0)
+        need = self.pieces.need
+        return NeedsTable(self.facets.sources, need.along(directions), need.weight)
 
     @cached_property
     def triangles(self) -> TriangleTree:
@@ -115,6 +144,7 @@ class Scars(NamedTuple):
     """What blemishes a surface: areas that need support, and the rims of cuts."""
 
     overhangs: Overhangs
+    needs: NeedsTable
     rims: Rims
 
 
@@ -136,7 +166,9 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     shape = (len(directions), remainder.most_columns(step_mm))
     swept = Gains(np.zeros(shape[0], np.int32), np.zeros(shape[0], np.int32), np.zeros(shape), np.zeros(shape), np.zeros(shape))
     rims = Rims(facets.corners, facets.normals, facets.mesh.areas_mm2, facets.seam_weights, remainder.feather)
-    in_threads(_gains, shape[0], Scars(surface, rims), np.ascontiguousarray(directions), step_mm, swept)
+    in_threads(
+        _gains, shape[0], Scars(surface, remainder.needs(directions), rims), np.ascontiguousarray(directions), step_mm, swept
+    )
     return swept
 
 
@@ -172,7 +204,7 @@ def sweep(
 
 @kernel
 def _gains(begin_row: int, end_row: int, scars: Scars, directions: Floats, step_mm: float, out: Gains) -> None:
-    surface, rims = scars
+    surface, table, rims = scars
     points = surface.points
     heights, scratch = floats(points.shape[1], 0.0), int_table(2, len(surface.areas_mm2) + 1)
     for row in range(begin_row, end_row):
@@ -181,7 +213,8 @@ def _gains(begin_row: int, end_row: int, scars: Scars, directions: Floats, step_
         out.first[row], out.columns[row] = first, n
         if n > 0:
             grid = OffsetGrid(d, heights, n, step_mm)
-            integrate_risky_area(surface, grid, scratch, out.up_mm2[row], out.residual_mm2[row])
+            needs = Needs(table.sources, table.classes[row], table.weight)
+            integrate_risky_area(surface, needs, grid, scratch, out.up_mm2[row], out.residual_mm2[row])
             if len(rims.weights) > 0:
                 integrate_rim(rims, grid, out.rim_mm[row])
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
+from mdp.support_need.need import needs_support
 from profiles.process import Process
 from slicer.bead import with_line_width
 from slicer.estimate.shell import NOTHING, Extent, extent_of
@@ -44,7 +45,7 @@ NONE = ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons())
 
 def thick_support(mesh: Mesh, heights: Heights, process: Process, on_platform: bool, floor: Polygons) -> ThickSupport:
     """The support of a mesh in its part frame; parts printed later are not looked at."""
-    risky = _hanging(mesh, process)
+    risky = _hanging(mesh, process, on_platform)
     hanging_mm2 = -float((mesh.normals[risky, 2] * mesh.areas_mm2[risky]).sum())
     if process.support == "none" or hanging_mm2 <= process.support_least_mm2:
         return NONE
@@ -62,10 +63,11 @@ def thick_support(mesh: Mesh, heights: Heights, process: Process, on_platform: b
     return ThickSupport(thick.tip_mm, thick.height_mm, areas, contacts, walls, supports.areas[0])
 
 
-def _hanging(mesh: Mesh, process: Process) -> Mask:
-    """(m,) risky faces, without those that rest on the base plane."""
+def _hanging(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
+    """(m,) risky faces that need support, without those that rest on the base plane."""
     lifted = mesh.vertices[mesh.faces, 2].max(axis=1) > PLATFORM_TOLERANCE_MM
-    risky: Mask = (mesh.normals[:, 2] < threshold(process.self_supporting_angle_deg)) & lifted
+    down = mesh.normals[:, 2] < threshold(process.self_supporting_angle_deg)
+    risky: Mask = down & lifted & needs_support(mesh, process, on_platform)
     return risky
 
 

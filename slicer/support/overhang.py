@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, radians, sin
+from math import inf
 
 import numpy as np
 
 from mdp.mesh import Floats, Mesh
+from mdp.overhang import UP, Mask, facing_down
+from mdp.support_need.need import needs_support
 from profiles.process import Process
 from slicer.fill.bridge import LEAST, Bridge, find_bridge
 from slicer.geometry.polygons import Polygons, edges, offset
 
-RISKY_MARGIN = 1e-4  # faces at exactly the self-supporting angle count as safe whatever the rounding, as in the search
 RIM_MM = 0.04  # neighbouring strips of a slope overlap by this so that they unite
 
 
@@ -28,19 +29,31 @@ def detect_overhangs(
 ) -> list[Overhang]:
     """For every layer the part of its outline above a risky face.
 
-    mesh and cuts_mm: part frame. below: plastic under the first layer, None: the platform, on which it may lie. Without
+    mesh and cuts_mm: part frame. below: plastic under the first layer, None: the platform, on which it may lie. What carries
+    itself by the search's definition (mdp.support_need) does not hang, what bridges layer by layer does not either. Without
     support whatever has a bank to hold on to is printed as a bridge, however long.
     """
     longest_mm = inf if process.support == "none" else process.bridge_longest_mm
     overhangs = [Overhang(Polygons(), ())] * len(outlines)
-    for i, triangles in _risky(mesh, cuts_mm, process.self_supporting_angle_deg).items():
+    risky = facing_down(mesh, UP, process.self_supporting_angle_deg)
+    needing = _by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, below is None))
+    for i, triangles in _by_layer(mesh, cuts_mm, risky).items():
         if i == 0 and below is None:
             continue
         bank = outlines[i - 1] if i else offset(below, RIM_MM)
         hanging = (outlines[i] - bank) ^ offset(Polygons(triangles), 0.5 * RIM_MM)
         if not hanging.is_empty():
             overhangs[i] = _sort_islands(hanging, bank, process.line_width_mm, longest_mm)
+            if len(needing.get(i, ())) < len(triangles):
+                overhangs[i] = _limit(overhangs[i], needing.get(i, []))
     return overhangs
+
+
+def _limit(overhang: Overhang, needing: list[Floats]) -> Overhang:
+    """What of a layer hangs above those faces."""
+    if overhang.hanging.is_empty() or not needing:
+        return Overhang(Polygons(), overhang.bridges)
+    return Overhang(overhang.hanging ^ offset(Polygons(needing), 0.5 * RIM_MM), overhang.bridges)
 
 
 def _sort_islands(hanging: Polygons, bank: Polygons, width_mm: float, longest_mm: float) -> Overhang:
@@ -59,10 +72,9 @@ def _sort_islands(hanging: Polygons, bank: Polygons, width_mm: float, longest_mm
     return Overhang(Polygons.compose(rest) if rest else Polygons(), tuple(spans))
 
 
-def _risky(mesh: Mesh, cuts_mm: Floats, angle_deg: float) -> dict[int, list[Floats]]:
-    """Risky faces seen from above, (3, 2) counter-clockwise, by the layers whose strip of the surface they belong to."""
-    risky = np.flatnonzero(mesh.normals[:, 2] < -(sin(radians(angle_deg)) + RISKY_MARGIN))
-    corners = mesh.vertices[mesh.faces[risky]]
+def _by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
+    """Chosen faces seen from above, (3, 2) counter-clockwise, by the layers whose strip of the surface they belong to."""
+    corners = mesh.vertices[mesh.faces[chosen]]
     first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1))
     last = np.minimum(np.searchsorted(cuts_mm, corners[:, :, 2].max(axis=1)), len(cuts_mm) - 1)
     masks: dict[int, list[Floats]] = {}

@@ -27,6 +27,7 @@ from mdp.kernels.cache import mark
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
+from mdp.support_need.need import SupportNeed
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 from slicer.slice import slice_part
@@ -131,6 +132,7 @@ def _beside_sweep() -> None:
     gains(remainder, LEANING[None], 1.0, threshold(45.0))
     remainder.thin_mm(PLANE)
     hidden_shares(remainder.mesh)
+    SupportNeed.of(remainder.mesh, load().process, 1.0).along(LEANING[None])
     measure_seam(remainder.mesh, remainder.mesh.areas_mm2, PLANE, 0.0)
     Surface.of(remainder, CostTerms(45.0, False)).left_mm2([PLANE])
 

@@ -142,8 +142,23 @@ def test_a_short_bridge_needs_no_support_and_a_long_one_does() -> None:
     assert len(of_kind(slice_part(whole(table(5)), profile("process.bridge_longest_mm=0")), *PROPS)) > 10
 
 
+@pytest.mark.parametrize(("diameter", "hangs"), [(4.0, False), (8.0, False), (12.0, True)])
+def test_the_crown_of_a_level_hole_is_supported_only_where_the_search_counts_it(diameter: float, hangs: bool) -> None:
+    drill = m3.Manifold.cylinder(30, diameter / 2, -1, 64, True).rotate((90, 0, 0)).translate((10, 10, 10))
+    values, supports = supported(whole(standing(m3.Manifold.cube((20, 20, 20)) - drill)))
+    assert (sum(place.area() for place in values["hanging"]) > 1.0) == hangs
+    assert any(not area.is_empty() for area in supports.areas) == hangs
+
+
+@pytest.mark.parametrize(("depth", "hangs"), [(0.8, False), (5.0, True), (10.0, True)])
+def test_a_ledge_is_supported_unless_it_is_narrow(depth: float, hangs: bool) -> None:
+    ledge = m3.Manifold.cube((10, 20, 20)) + m3.Manifold.cube((depth, 20, 3)).translate((10, 0, 12))
+    values, _ = supported(whole(standing(ledge)), "process.support_least_mm2=0")
+    assert sum(place.area() for place in values["hanging"]) == pytest.approx(20 * depth if hangs else 0.0, rel=0.02)
+
+
 def test_a_tiny_overhang_needs_no_support() -> None:
-    nose = m3.Manifold.cube((10, 10, 10)) + m3.Manifold.cube((0.6, 0.6, 1)).translate((10, 4, 5))
+    nose = m3.Manifold.cube((10, 10, 10)) + m3.Manifold.cube((1.0, 0.9, 1)).translate((10, 4, 5))
     assert of_kind(slice_part(whole(standing(nose)), profile()), *PROPS) == []
     assert of_kind(slice_part(whole(standing(nose)), profile("process.support_least_mm2=0")), *PROPS) != []
 

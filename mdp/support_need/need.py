@@ -1,0 +1,131 @@
+"""Need: what of a surface cannot do without support along a direction, for the search and for the slicer."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from mdp.kernels.threads import in_threads
+from mdp.mesh import Floats, Ints, Mesh
+from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, threshold
+from mdp.support_need.beneath import coarse_directions, find_over_air
+from mdp.support_need.linked_faces import LinkedFaces, flat_places, link
+from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, Classes, Limits, classify
+from profiles.process import Process
+
+MOST_KEPT = 256  # single directions whose classes are kept; a polished plane comes back to the same few again and again
+LEVEL_LAYERS = 2.0  # a patch no higher than this is printed as one bridge
+NO_GROUND_MM = -np.inf
+FEW = 16  # directions that are kept singly
+
+
+def limits_of(process: Process, ground_mm: float) -> Limits:
+    """What carries itself with a process. ground_mm: height along the direction up to which a surface rests on something."""
+    return Limits(
+        risky_below=threshold(process.self_supporting_angle_deg),
+        ground_mm=ground_mm,
+        level_mm=LEVEL_LAYERS * process.layer_height_mm,
+        bridge_mm=process.bridge_longest_mm,
+        arch_mm=process.arch_longest_mm,
+        width_mm=process.line_width_mm,
+        least_mm2=process.support_least_mm2,
+    )
+
+
+def needs_support(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
+    """(m,) False for the faces of a part, in its part frame, that overhang but carry themselves."""
+    limits = limits_of(process, PLATFORM_TOLERANCE_MM if on_platform else BASE_TOLERANCE_MM)
+    return _needing_upright(link(mesh), limits)
+
+
+@dataclass(frozen=True, eq=False)
+class SupportNeed:
+    """Of a whole model, for all directions a search asks for. weight: how many times an area over air counts, which support can
+    only be given by leaning, if at all."""
+
+    surface: LinkedFaces
+    process: Process
+    weight: float
+    _kept: dict[bytes, Classes] = field(default_factory=dict)
+    _tables: dict[bytes, Classes] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, mesh: Mesh, process: Process, weight: float) -> "SupportNeed":
+        """The need of a model that stands on the platform."""
+        return cls(link(mesh), process, weight)
+
+    @cached_property
+    def upright(self) -> Mask:
+        """(m,) False for the faces that overhang printed straight up but carry themselves. Support stands on the platform."""
+        limits = limits_of(self.process, PLATFORM_TOLERANCE_MM)
+        return _needing_upright(self.surface, limits)
+
+    def along(self, directions: Floats) -> Classes:
+        """(k, m) for each of (k, 3) unit directions: CARRIES_ITSELF, NEEDS_SUPPORT or UNSUPPORTABLE, meant for the faces that are
+        risky along it. Planes of later cuts are not looked at: what a face needs depends on nothing but face and direction."""
+        if len(directions) > FEW:
+            key = directions.tobytes()
+            table = self._tables.get(key)
+            return table if table is not None else self._tables.setdefault(key, self._classes(directions))
+        rows = [self._row(direction) for direction in directions]
+        return np.stack(rows) if rows else np.zeros((0, len(self.surface.faces)), np.uint8)
+
+    def _row(self, direction: Floats) -> Classes:
+        """(m,) for one direction; kept for a while."""
+        key = direction.tobytes()
+        row = self._kept.get(key)
+        if row is None:
+            row = self._classes(direction[None])[0]
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
+            self._kept[key] = row
+        return row
+
+    def _classes(self, directions: Floats) -> Classes:
+        over_air = self._over_air[np.argmax(directions @ coarse_directions().T, axis=1)]
+        return _classify(self.surface, directions, limits_of(self.process, NO_GROUND_MM), NEEDS_SUPPORT + over_air)
+
+    @cached_property
+    def _over_air(self) -> Classes:
+        """(COUNT, m) which faces are over air along each of the coarse directions, flat places as a whole: of their faces what
+        cuts leave remembers but one."""
+        directions = coarse_directions()
+        over_air = np.zeros((len(directions), len(self.surface.faces)), np.uint8)
+        in_threads(find_over_air, len(directions), self.surface, directions, over_air)
+        places, areas = flat_places(self.surface), self.surface.areas_mm2
+        half = 0.5 * np.bincount(places, areas)
+        for row in over_air:
+            row[:] = (np.bincount(places, areas * row) > half)[places]
+        return over_air
+
+
+def _classify(surface: LinkedFaces, directions: Floats, limits: Limits, classes: Classes) -> Classes:
+    """The classes with CARRIES_ITSELF filled in."""
+    in_threads(classify, len(directions), surface, np.ascontiguousarray(directions), limits, classes)
+    return classes
+
+
+def _needing_upright(surface: LinkedFaces, limits: Limits) -> Mask:
+    """(m,) False for the faces that overhang straight up but carry themselves."""
+    classes = np.full((1, len(surface.faces)), NEEDS_SUPPORT, np.uint8)
+    needing: Mask = np.not_equal(_classify(surface, UP[None], limits, classes)[0], CARRIES_ITSELF)
+    return needing
+
+
+@dataclass(frozen=True, eq=False)
+class ModelPieces:
+    """What a model's faces need, and (m,) of which of them each face of something cut from it is a piece, below 0: a cut laid it
+    open."""
+
+    need: SupportNeed
+    sources: Ints
+
+    @property
+    def upright(self) -> Mask:
+        """(m,) False for the faces that carry themselves printed straight up."""
+        return (self.sources < 0) | self.need.upright[self.sources]
+
+    def along(self, direction: Floats) -> Classes:
+        """(m,) the classes of the faces along a unit direction."""
+        row = self.need.along(direction[None])[0]
+        return np.where(self.sources < 0, np.uint8(NEEDS_SUPPORT), row[self.sources])

@@ -1,0 +1,111 @@
+"""Spans: whether straight lines over a hanging place, all in one direction, reach from bank to bank and are short enough."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.arrays import floats, ints
+from mdp.kernels.kernel import part
+from mdp.kernels.sorting import argsort
+from mdp.mesh import Floats, Ints
+
+TURNS = 8  # directions tried over half a turn, besides those of the place's own sides
+BINS = 36  # of directions of the sides, over half a turn
+LINES = 24  # over a place at most; else one every line width
+HOPELESS = 0.2  # share of the ends of lines that lie on no bank, beyond which lines need not be drawn
+TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place, as for the slicer's bridges
+
+
+class Sides(NamedTuple):
+    """The rim of a hanging place seen along the direction, mm: ends (n, 4) x, y, x, y, which sides are banks (n,), and edges
+    (n, 2) the faces they belong to and the corner each begins at."""
+
+    ends: Floats
+    banked: Ints
+    edges: Ints
+
+
+@part
+def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> bool:
+    """Whether lines of one direction span a place of that area, none longer than that; they lie a line width apart or further."""
+    if longest_mm <= 0.0 or len(sides.banked) == 0:
+        return False
+    angles = _angles(sides.ends)
+    for a in range(len(angles)):
+        cos, sin = np.cos(angles[a]), np.sin(angles[a])
+        across_mm, loose_mm = _across(sides, cos, sin)
+        if (
+            area_mm2 <= 0.5 * longest_mm * across_mm  # else the mean line is too long
+            and loose_mm <= HOPELESS * across_mm
+            and _spans_along(sides, cos, sin, longest_mm, width_mm)
+        ):
+            return True
+    return False
+
+
+@part
+def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
+    """How far the sides reach across lines at an angle, all together and those that are no banks."""
+    ends, whole, loose = sides.ends, 0.0, 0.0
+    for e in range(len(ends)):
+        reach = abs((ends[e, 3] - ends[e, 1]) * cos - (ends[e, 2] - ends[e, 0]) * sin)
+        whole += reach
+        loose += 0.0 if sides.banked[e] > 0 else reach
+    return whole, loose
+
+
+@part
+def _angles(ends: Floats) -> Floats:
+    """Directions worth trying, radians: along and across the two that most of the rim runs in, and others evenly."""
+    length, turned = floats(BINS, 0.0), floats(BINS, 0.0)
+    for e in range(len(ends)):
+        x, y = ends[e, 2] - ends[e, 0], ends[e, 3] - ends[e, 1]
+        angle, size = np.arctan2(y, x), np.sqrt(x * x + y * y)
+        angle += np.pi if angle < 0.0 else 0.0
+        b = min(int(angle / np.pi * BINS), BINS - 1)
+        length[b] += size
+        turned[b] += size * angle
+    angles = floats(TURNS + 4, 0.0)
+    for own in range(2):
+        b = 0
+        for other in range(1, BINS):
+            if length[other] > length[b]:
+                b = other
+        angle = turned[b] / length[b] if length[b] > 0.0 else 0.1 * own
+        angles[2 * own], angles[2 * own + 1] = angle + 0.5 * np.pi, angle
+        length[b] = 0.0
+    for k in range(TURNS):
+        angles[4 + k] = np.pi * k / TURNS
+    return angles
+
+
+@part
+def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_mm: float) -> bool:
+    """Whether lines at an angle span the place. The middle line is tried first, it tells the most."""
+    ends, count = sides.ends, len(sides.banked)
+    low, high = np.inf, -np.inf
+    for e in range(count):
+        y = ends[e, 1] * cos - ends[e, 0] * sin
+        low, high = min(low, y), max(high, y)
+    lines = max(min(int((high - low) / width_mm), LINES), 1)
+    places, banked = floats(count, 0.0), ints(count, 0)
+    total, loose = 0.0, 0.0
+    for k in range(lines):
+        y = low + (high - low) * (((lines // 2 + k) % lines) + 0.5) / lines
+        crossed = 0
+        for e in range(count):
+            begin, end = ends[e, 1] * cos - ends[e, 0] * sin - y, ends[e, 3] * cos - ends[e, 2] * sin - y
+            if (begin < 0.0) != (end < 0.0):
+                share = begin / (begin - end)
+                x = ends[e, 0] + share * (ends[e, 2] - ends[e, 0])
+                places[crossed] = x * cos + (ends[e, 1] + share * (ends[e, 3] - ends[e, 1])) * sin
+                banked[crossed] = sides.banked[e]
+                crossed += 1
+        order = argsort(places[:crossed])
+        for c in range(0, crossed - 1, 2):
+            span = places[order[c + 1]] - places[order[c]]
+            if span > longest_mm:
+                return False
+            total += span
+            loose += 0.0 if banked[order[c]] > 0 and banked[order[c + 1]] > 0 else span
+    return loose <= TOLERATED * total

@@ -1,0 +1,81 @@
+"""What needs support, as the search counts it: sums over a sweep, a forecast and the parts, held against meshes that are cut."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdp.cost.forecast import Surface
+from mdp.cut import above, mesh_of, solid_of
+from mdp.mesh import Mesh
+from mdp.overhang import facing_down, risky_upright, threshold
+from mdp.plane import Plane
+from mdp.search.front import front_row
+from mdp.search.parts import make_parts
+from mdp.search.problem import Problem
+from mdp.support_need.need import ModelPieces, SupportNeed
+from mdp.support_need.patches import CARRIES_ITSELF, UNSUPPORTABLE
+from mdp.sweep.sweep import Remainder, gains
+from profiles.profile import load
+from tests.mdp.solids import area_vectors_above, random_direction, random_solid
+from tests.shapes import standing
+
+PROFILE = load(settings=["search.clearance=false"])
+WEIGHT = PROFILE.search.unsupportable_weight
+
+
+def cap_on_a_stem() -> Mesh:
+    """A round cap on a stem, drilled across so that a crown carries itself."""
+    cap = m3.Manifold.sphere(20, 48).translate((0, 0, 34))
+    drill = m3.Manifold.cylinder(60, 3, 3, 32, True).rotate((90, 0, 0)).translate((0, 0, 36))
+    return standing(m3.Manifold.cylinder(20, 8, 8, 48) + cap - drill)
+
+
+@given(st.integers(0, 10_000), st.tuples(st.integers(1, 999), st.integers(1, 999)))
+@settings(max_examples=15, deadline=None)
+def test_a_sweep_adds_up_the_weights_of_the_faces_above_every_offset(seed: int, place: tuple[int, int]) -> None:
+    direction, mesh = random_direction(*place), random_solid(seed)
+    pieces = ModelPieces(SupportNeed.of(mesh, PROFILE.process, WEIGHT), np.arange(len(mesh.faces), dtype=np.int32))
+    weights = np.array([0.0, 1.0, WEIGHT])[pieces.along(direction)] * facing_down(mesh, direction, 45.0)
+    upright = risky_upright(mesh, 45.0) & pieces.upright
+    swept = gains(Remainder(mesh, upright, pieces=pieces), direction[None], 1.3, threshold(45.0))
+    for column in range(0, swept.columns[0], 3):
+        plane = Plane(direction, (swept.first[0] + column) * 1.3)
+        areas = np.linalg.norm(area_vectors_above(mesh, plane), axis=1)
+        assert swept.residual_mm2[0, column] == pytest.approx((areas * weights).sum(), rel=1e-9, abs=1e-8)
+        assert swept.up_mm2[0, column] == pytest.approx(areas[upright].sum(), rel=1e-9, abs=1e-8)
+
+
+@pytest.mark.parametrize("lean", [0.2, 0.5, 0.8])
+def test_forecast_front_and_parts_agree_on_what_a_cut_leaves(lean: float) -> None:
+    problem = Problem(cap_on_a_stem(), PROFILE)
+    plane = Plane(np.array([lean, 0.0, np.sqrt(1 - lean * lean)]), 18.4)
+    node = problem.cut(problem.root, plane)
+    assert node is not None
+    row, parts = front_row(node, problem.terms), make_parts(node, problem.machine, PROFILE)
+    assert row.support_area_mm2 == pytest.approx(sum(part.risky_area_mm2 for part in parts), rel=1e-6)
+    assert Surface.of(problem.root.remainder, problem.terms).left_mm2([plane]) == pytest.approx(node.cost_mm2, rel=1e-6)
+
+
+def test_what_is_over_air_costs_more_than_its_area() -> None:
+    problem = Problem(cap_on_a_stem(), PROFILE)
+    plane = Plane(np.array([0.5, 0.0, np.sqrt(0.75)]), 12.4)
+    node = problem.cut(problem.root, plane)
+    assert node is not None
+    part, pieces = mesh_of(above(solid_of(cap_on_a_stem()), plane)), problem.terms.need.pieces(node.cuts[0].solid)
+    risky, classes = facing_down(part, plane.normal, 45.0), pieces.along(plane.normal)
+    over_air_mm2 = part.areas_mm2[risky & (classes == UNSUPPORTABLE)].sum()
+    needing_mm2 = part.areas_mm2[risky & (classes != CARRIES_ITSELF) & (pieces.sources >= 0)].sum()
+    row = front_row(node, problem.terms)
+    seams_mm2 = row.cost_mm2 - row.support_area_mm2 - (WEIGHT - 1.0) * over_air_mm2
+    assert 0.0 < over_air_mm2 < needing_mm2
+    assert seams_mm2 == pytest.approx(problem.terms.seam_mm * row.seam_mm, rel=0.5)
+
+
+def test_the_paper_s_terms_count_every_face() -> None:
+    paper = load(settings=["search.objective=risky"])
+    mesh = cap_on_a_stem()
+    whole, ours = Problem(mesh, paper).root.risky_mm2, Problem(mesh, PROFILE).root.risky_mm2
+    assert whole == pytest.approx(mesh.areas_mm2[risky_upright(mesh, 45.0)].sum())
+    assert ours < whole

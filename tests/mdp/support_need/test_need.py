@@ -1,0 +1,113 @@
+"""What needs support: bridges, arches, ledges and spikes of known size, what lies beneath a mushroom's cap, one core and two."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.mesh import Mesh
+from mdp.overhang import facing_down, risky_upright
+from mdp.search.candidates import directions
+from mdp.support_need.need import SupportNeed, needs_support
+from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE
+from profiles.profile import load
+from tests.shapes import standing
+
+PROCESS = load().process
+UP_DEG = 45.0
+
+
+def needing_mm2(solid: m3.Manifold) -> float:
+    """Area that needs support straight up on the platform."""
+    mesh = standing(solid)
+    return float(mesh.areas_mm2[risky_upright(mesh, UP_DEG) & needs_support(mesh, PROCESS, True)].sum())
+
+
+def block(x: float, y: float, z: float, at: tuple[float, float, float]) -> m3.Manifold:
+    return m3.Manifold.cube((x, y, z), True).translate((at[0], at[1], at[2] + z / 2))
+
+
+def bridge(length: float) -> m3.Manifold:
+    """A deck 8 mm wide over two pillars."""
+    pillars = [block(5, 8, 12, (side * (length + 5) / 2, 0, 0)) for side in (-1, 1)]
+    return block(length + 10, 8, 3, (0, 0, 10)) + pillars[0] + pillars[1]
+
+
+def drilled(diameter: float) -> m3.Manifold:
+    """A block with a level hole through it."""
+    return block(20, 20, 20, (0, 0, 0)) - m3.Manifold.cylinder(30, diameter / 2, -1, 64, True).rotate((90, 0, 0)).translate(
+        (0, 0, 10)
+    )
+
+
+def ledge(depth: float) -> m3.Manifold:
+    return block(10, 20, 20, (0, 0, 0)) + block(2 * depth, 20, 3, (5, 0, 12))
+
+
+def hanging(piece: m3.Manifold) -> m3.Manifold:
+    """A table, and under its top, 20 mm over the platform, something that hangs down; the top bridges nothing, it is thick."""
+    return (
+        block(4, 4, 20, (-4.8, 0, 0)) + block(4, 4, 20, (4.8, 0, 0)) + block(13.6, 4, 3, (0, 0, 20)) + piece.translate((0, 0, 20))
+    )
+
+
+@pytest.mark.parametrize(("length", "area"), [(5.0, 0.0), (7.0, 56.0)])
+def test_a_level_bridge_carries_itself_up_to_the_longest_span(length: float, area: float) -> None:
+    assert PROCESS.bridge_longest_mm == 6.0
+    assert needing_mm2(bridge(length)) == pytest.approx(area)
+
+
+def test_a_deck_over_one_pillar_is_no_bridge() -> None:
+    one_sided = bridge(5.0) - block(7, 10, 10, (5, 0, 0))
+    assert needing_mm2(one_sided) == pytest.approx(5.0 * 8 + 5 * 8, rel=0.1)
+
+
+@pytest.mark.parametrize(("diameter", "needs"), [(4.0, False), (8.0, False), (12.0, True)])
+def test_the_crown_of_a_small_level_hole_carries_itself(diameter: float, needs: bool) -> None:
+    assert (needing_mm2(drilled(diameter)) > 0.0) == needs
+
+
+@pytest.mark.parametrize(("depth", "area"), [(0.8, 0.0), (5.0, 100.0), (10.0, 200.0)])
+def test_a_ledge_needs_support_unless_it_is_narrower_than_two_lines(depth: float, area: float) -> None:
+    assert needing_mm2(ledge(depth)) == pytest.approx(area)
+
+
+def test_what_begins_in_mid_air_needs_support_however_narrow() -> None:
+    spike = m3.Manifold.cylinder(8, 0.7, 0.7, 24).translate((0, 0, -8))
+    assert needing_mm2(hanging(spike)) == pytest.approx(np.pi * 0.49, rel=0.02)
+
+
+def test_a_ridge_that_hangs_in_the_air_is_no_bank() -> None:
+    shallow, deep = block(1, 4, 0.6, (0, 0, -0.5)), block(1, 4, 2.1, (0, 0, -2.0))
+    assert needing_mm2(hanging(shallow)) == pytest.approx(5.6 * 4)
+    assert needing_mm2(hanging(deep)) == pytest.approx(1.0 * 4)
+
+
+def mushroom() -> Mesh:
+    """A stem under a cap whose underside is a cone nearly flat."""
+    return standing(m3.Manifold.cylinder(20, 8, 8, 64) + m3.Manifold.cylinder(2, 8, 20, 64).translate((0, 0, 20)))
+
+
+def test_a_mushrooms_cap_has_its_stem_beneath_it_on_one_side_and_air_on_the_other() -> None:
+    mesh, lean = mushroom(), np.array([0.5, 0.0, np.sqrt(0.75)])
+    classes = SupportNeed.of(mesh, PROCESS, 5.0).along(lean[None])[0]
+    middles, cap = (
+        mesh.vertices[mesh.faces].mean(axis=1),
+        facing_down(mesh, lean, UP_DEG) & ~(mesh.vertices[mesh.faces, 2] < 1).any(axis=1),
+    )
+    near = cap & (np.abs(middles[:, 1]) < 5)
+    assert set(classes[near & (middles[:, 0] > 8)]) == {NEEDS_SUPPORT}
+    assert set(classes[near & (middles[:, 0] < -8)]) == {UNSUPPORTABLE}
+
+
+def test_upright_the_platform_lies_beneath_everything() -> None:
+    mesh = mushroom()
+    assert SupportNeed.of(mesh, PROCESS, 5.0).upright.all()
+
+
+def test_one_core_and_two_give_the_same_classes(monkeypatch: pytest.MonkeyPatch) -> None:
+    sampled, tables = directions(load().search), []
+    for threads in (1, 2):
+        monkeypatch.setattr("mdp.kernels.threads.THREADS", threads)
+        tables.append(SupportNeed.of(standing(drilled(8.0)), PROCESS, 5.0).along(sampled))
+    assert np.array_equal(*tables)
+    assert np.array_equal(SupportNeed.of(standing(drilled(8.0)), PROCESS, 5.0).along(sampled[7:8])[0], tables[0][7])
