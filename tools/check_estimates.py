@@ -11,11 +11,10 @@ import argparse
 from time import process_time
 
 from machine.app.pipeline.pipeline import build
-from mdp.decomposition import Decomposition, Part
+from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
-from mdp.plane import PLATFORM
-from mdp.pose import level, rotation
 from mdp.read import locate, read_mesh
+from mdp.search.parts import one_piece
 from mdp.search.search import decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
@@ -47,9 +46,7 @@ def main() -> None:
 
 def in_one_piece(mesh: Mesh, name: str, profile: Profile) -> Decomposition:
     """The model as it stands."""
-    pose = level(profile.machine)
-    part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, 0.0)
-    return Decomposition(name, mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    return Decomposition(name, mesh, (one_piece(mesh, profile.machine),), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
 
 
 def row(decomposition: Decomposition, profile: Profile) -> str:

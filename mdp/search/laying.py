@@ -12,6 +12,7 @@ from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
 from mdp.search.front import EQUAL, Pricing, price_of_second_mm2
 from mdp.search.orientation import Orientation, measure_upright, resting_orientations, standing_still
+from mdp.search.parts import one_piece
 from mdp.search.search import decompose
 from profiles.profile import Profile
 
@@ -55,9 +56,12 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
     for orientation in distinct_orientations(mesh, profile)[:PRICED]:
         turned = standing_still(mesh, orientation.rotation)
         least_mm2 = second_mm2 * _bare_s(turned, profile, pricing) if second_mm2 > 0.0 else 0.0
-        if least_mm2 < best.total_mm2 and len(promising) < SEARCHED:
-            least_mm2 += min(row.cost_mm2 for row in decompose(turned, upright.name, quick).front)
+        if least_mm2 < best.total_mm2:
+            rows, supported_mm2 = decompose(turned, upright.name, quick).front, second_mm2 * SUPPORT_S_MM2
+            least_mm2 += min(row.cost_mm2 + supported_mm2 * row.support_area_mm2 for row in rows)
             promising.append((least_mm2, len(promising), orientation, turned))
+        if len(promising) == SEARCHED:
+            break
     if promising and min(promising)[0] < (1.0 - EQUAL) * best.total_mm2:
         _, _, orientation, turned = min(promising)
         found = search(turned)
@@ -129,9 +133,9 @@ def _guess(profile: Profile) -> Callable[[Orientation], float]:
 
 def _bare_s(mesh: Mesh, profile: Profile, pricing: PricingBy) -> float:
     """Seconds that a mesh in one piece takes without any support, which hardly any decomposition goes below."""
-    process = profile.process.model_copy(update={"support": "none"})
-    bare = _with_search(profile.model_copy(update={"process": process}), most_parts=1)
-    return decompose(mesh, "", bare, price=pricing(bare)).front[0].time_s or 0.0
+    bare = profile.model_copy(update={"process": profile.process.model_copy(update={"support": "none"})})
+    price = pricing(bare)((one_piece(mesh, profile.machine),))
+    return 0.0 if price is None else price.time_s
 
 
 def _with_search(profile: Profile, **settings: object) -> Profile:

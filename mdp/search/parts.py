@@ -15,6 +15,12 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 
+def one_piece(mesh: Mesh, machine: Machine) -> Part:
+    """A model as it stands, uncut; what needs support of it is not looked at."""
+    pose = level(machine)
+    return Part(1, mesh, PLATFORM, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
+
+
 def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ...]:
     """Parts in print order: what remains first, then the cuts, last one first. machine: the profile's, or one without limits."""
     clearance = profile.search.clearance

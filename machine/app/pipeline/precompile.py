@@ -27,9 +27,11 @@ from mdp.kernels.cache import mark
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
+from mdp.search.parts import one_piece
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
+from slicer.estimate.estimate import estimate
 from slicer.slice import slice_part
 
 SEARCH, PROGRAM, DRY_RUN, PICTURE = "search", "program", "dry-run", "picture"
@@ -127,7 +129,9 @@ def _sweep() -> None:
 
 
 def _beside_sweep() -> None:
-    """The other kernels of the search."""
+    """The other kernels of the search, and those of the estimate that it chooses by."""
+    profile = load()
+    estimate(one_piece(mesh_of(_tee()), profile.machine), profile)
     remainder = _remainder()
     gains(remainder, LEANING[None], 1.0, threshold(45.0))
     remainder.thin_mm(PLANE)
