@@ -10,14 +10,16 @@ from math import ceil
 
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
-from mdp.search.front import EQUAL, Pricing, price_of_second_mm2
+from mdp.search.front import EQUAL, Pricing, front_row, price_of_second_mm2, price_row
 from mdp.search.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.search.parts import one_piece
+from mdp.search.problem import Problem
 from mdp.search.search import decompose
 from profiles.profile import Profile
 
 RESTING = 20  # orientations that are ranked, those that a symmetry makes alike counted once
 PRICED, SEARCHED = 6, 2  # of them whose bare time is looked at, and that a narrow search cuts
+COARSER = 3  # fewer directions in the narrow search
 WORTH_TELLING = 0.8  # of the cost: an orientation that costs no more than this is told unasked
 ROUGH = 0.9  # of the cost: guessed to be worth a closer look
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
@@ -51,23 +53,50 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
     """
     second_mm2, upright = price_of_second_mm2(profile), search(mesh)
     best = Lying(None, upright, total_mm2(upright.chosen, second_mm2))
-    quick = _with_search(profile, beam_width=1)
-    promising: list[tuple[float, int, Orientation, Mesh]] = []
+    orientation = _most_promising(mesh, profile, pricing, best.total_mm2)
+    if orientation is None:
+        return best
+    found = search(standing_still(mesh, orientation.rotation))
+    other = Lying(orientation, found, total_mm2(found.chosen, second_mm2))
+    return other if other.total_mm2 < (1.0 - EQUAL) * best.total_mm2 else best
+
+
+@dataclass(frozen=True, eq=False)
+class _Glimpse:
+    """A model in some orientation: what its time costs without any support, hardly any decomposition less, and what it costs in
+    one piece, roughly."""
+
+    orientation: Orientation
+    mesh: Mesh
+    bare_mm2: float
+    whole_mm2: float
+
+
+def _most_promising(mesh: Mesh, profile: Profile, pricing: PricingBy, limit_mm2: float) -> Orientation | None:
+    """The orientation that is likely to cost least when it is cut; None where none is likely to cost less than the limit."""
+    second_mm2 = price_of_second_mm2(profile)
+    scar_mm2 = 1.0 + second_mm2 * SUPPORT_S_MM2  # of a mm2 that needs support, with the time that this takes
+    glimpses = []
     for orientation in distinct_orientations(mesh, profile)[:PRICED]:
         turned = standing_still(mesh, orientation.rotation)
-        least_mm2 = second_mm2 * _bare_s(turned, profile, pricing) if second_mm2 > 0.0 else 0.0
-        if least_mm2 < best.total_mm2:
-            rows, supported_mm2 = decompose(turned, upright.name, quick).front, second_mm2 * SUPPORT_S_MM2
-            least_mm2 += min(row.cost_mm2 + supported_mm2 * row.support_area_mm2 for row in rows)
-            promising.append((least_mm2, len(promising), orientation, turned))
-        if len(promising) == SEARCHED:
-            break
-    if promising and min(promising)[0] < (1.0 - EQUAL) * best.total_mm2:
-        _, _, orientation, turned = min(promising)
-        found = search(turned)
-        other = Lying(orientation, found, total_mm2(found.chosen, second_mm2))
-        best = other if other.total_mm2 < (1.0 - EQUAL) * best.total_mm2 else best
-    return best
+        bare_mm2 = second_mm2 * _bare_s(turned, profile, pricing) if second_mm2 > 0.0 else 0.0
+        glimpses.append(_Glimpse(orientation, turned, bare_mm2, bare_mm2 + scar_mm2 * orientation.risky_mm2))
+    best = min(glimpses, key=lambda each: each.whole_mm2, default=None)
+    if best is None:
+        return None
+    chosen = None
+    if best.whole_mm2 < limit_mm2:
+        chosen, limit_mm2 = best.orientation, best.whole_mm2
+    others = [each for each in glimpses if each is not best and each.bare_mm2 < limit_mm2]
+    if chosen is not None and not others:
+        return chosen  # in one piece already it costs less than the others may
+    quick = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER))
+    for each in sorted([best, *others], key=lambda each: each.whole_mm2)[:SEARCHED]:
+        rows = decompose(each.mesh, "", quick).front
+        cost_mm2 = each.bare_mm2 + min(row.cost_mm2 + (scar_mm2 - 1.0) * row.support_area_mm2 for row in rows)
+        if cost_mm2 < limit_mm2:
+            chosen, limit_mm2 = each.orientation, cost_mm2
+    return chosen
 
 
 def find_better_way(mesh: Mesh, decomposition: Decomposition, profile: Profile, pricing: PricingBy) -> OtherWay | None:
@@ -83,14 +112,12 @@ def find_better_way(mesh: Mesh, decomposition: Decomposition, profile: Profile, 
     chosen_mm2, whole_mm2 = total_mm2(decomposition.chosen, second_mm2), total_mm2(whole, second_mm2)
     guess = _guess(profile)
     upright_mm2 = guess(measure_upright(mesh, profile.process.self_supporting_angle_deg))
-    one_piece = _with_search(profile, most_parts=1)
     ways = []
     for orientation in distinct_orientations(mesh, profile)[:SEARCHED]:
         if whole_mm2 - upright_mm2 + guess(orientation) > ROUGH * chosen_mm2:
             continue
         turned = standing_still(mesh, orientation.rotation)
-        price = pricing(profile) if second_mm2 > 0.0 else None
-        row = decompose(turned, decomposition.name, one_piece, price=price).front[0]
+        row = _row_of_one_piece(turned, profile, pricing)
         ways.append(OtherWay(orientation, row, total_mm2(row, second_mm2)))
     best = min(ways, key=lambda way: way.total_mm2, default=None)
     return best if best is not None and best.total_mm2 <= WORTH_TELLING * chosen_mm2 else None
@@ -129,6 +156,12 @@ def _guess(profile: Profile) -> Callable[[Orientation], float]:
         return orientation.risky_mm2 + second_mm2 * (SUPPORT_S_MM2 * orientation.risky_mm2 + LAYER_S * layers)
 
     return cost_mm2
+
+
+def _row_of_one_piece(mesh: Mesh, profile: Profile, pricing: PricingBy) -> FrontRow:
+    """What a mesh costs uncut. Where seams may hide and how the head may come near matters to cuts only, so it is left out."""
+    problem = Problem(mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))
+    return price_row(front_row(problem.root, problem.terms), (one_piece(mesh, profile.machine),), pricing(profile))
 
 
 def _bare_s(mesh: Mesh, profile: Profile, pricing: PricingBy) -> float:
