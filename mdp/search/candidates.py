@@ -4,7 +4,7 @@ Criteria of the 2020 paper: I (self-supported above the plane) is the search's r
 platform), III (the platform lies below the plane), IV (a large volume above the plane).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import pi, radians, sin, sqrt
@@ -15,6 +15,7 @@ from mdp.clearance import least_height_mm
 from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
+from mdp.plane import Plane
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
 from mdp.zone import Patches, Zone, spans_mm
 from profiles.machine import Machine
@@ -201,12 +202,23 @@ def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints,
     return Feasibility(reason, *(column[at] for column in columns))
 
 
-def refusals(remainder: Remainder, limits: Bounds, search: Search, terms: CostTerms, least_gain_mm2: float) -> dict[Reason, int]:
-    """How many of all candidates of a solid each reason takes, to report why nothing can be cut."""
+def refusals(
+    remainder: Remainder,
+    limits: Bounds,
+    search: Search,
+    terms: CostTerms,
+    least_gain_mm2: float,
+    is_weak: Callable[[Plane], bool],
+) -> dict[Reason, int]:
+    """How many of all candidates of a solid each reason takes, to report why nothing can be cut; is_weak: asked for those that
+    nothing else forbids."""
     swept = gains(remainder, limits.directions, search.offset_step_mm, threshold(terms.angle_deg))
     direction, column = np.nonzero(np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None])
     offset: Floats = (swept.first[direction] + column) * np.float64(search.offset_step_mm)
     reason = check(remainder, limits, search, direction.astype(np.int32), offset).reason
     gain = (swept.up_mm2 - residual_mm2(swept, terms))[direction, column]
     reason[(reason == Reason.FEASIBLE) & (gain < least_gain_mm2)] = Reason.GAIN
+    for row in np.flatnonzero(reason == Reason.FEASIBLE):
+        if is_weak(Plane(limits.directions[direction[row]], float(offset[row]))):
+            reason[row] = Reason.WEAK
     return {why: int((reason == why).sum()) for why in Reason}

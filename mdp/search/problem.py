@@ -107,7 +107,8 @@ class Problem:
 
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""
-        return refusals(self.root.remainder, self.limits, self.settings, self.terms, self.least_gain_mm2)
+        root, is_weak = self.root, partial(self.is_weak, self.root)
+        return refusals(root.remainder, self.limits, self.settings, self.terms, self.least_gain_mm2, is_weak)
 
     def allowed(self, node: Node, plane: Plane) -> bool:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""

@@ -326,7 +326,9 @@ def test_a_post_is_cut_off_as_long_as_its_base_bears_the_push_of_the_nozzle() ->
 )
 def test_a_search_leaves_no_base_that_the_nozzle_could_break(load_n: int, objective: str, parts: int) -> None:
     settings = (f"search.nozzle_load_n={load_n}", f"search.objective={objective}")
-    assert len(decompose(shapes.branch(), "shape", _profile(*settings)).parts) == parts
+    found = decompose(shapes.branch(), "shape", _profile(*settings))
+    assert len(found.parts) == parts
+    assert any("because the nozzle could break the part" in note for note in found.notes) == (parts == 1)
 
 
 def test_a_part_with_a_feather_edge_is_told() -> None:
