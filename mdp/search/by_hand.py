@@ -1,8 +1,8 @@
 """Planes by hand: a person's cuts made in turn, completed by the search where they are left open, or refused with the reason.
 
 Only what cannot be printed forbids a person's plane: it misses the model, cuts the platform, lets something float, is out of
-the machine's reach, lets the head meet the table, leaves a sliver or passes through a zone that stays whole. That a cut gains
-little, makes a small part or a long seam is the person's to judge.
+the machine's reach, lets the head meet the table, leaves a sliver or a base that the nozzle could break, or passes through a zone
+that stays whole. That a cut gains little, makes a small part or a long seam is the person's to judge.
 """
 
 from dataclasses import replace
