@@ -20,6 +20,7 @@ from profiles.profile import Profile
 RESTING = 20  # orientations that are ranked, those that a symmetry makes alike counted once
 PRICED, SEARCHED = 6, 2  # of them whose bare time is looked at, and that a narrow search cuts
 COARSER = 3  # fewer directions in the narrow search
+CLEARLY = 0.95  # of the cost: estimates are not good enough to turn a model over for less
 WORTH_TELLING = 0.8  # of the cost: an orientation that costs no more than this is told unasked
 ROUGH = 0.9  # of the cost: guessed to be worth a closer look
 # Fitted to estimates of 8 models in 92 orientations, mean error 330 s.
@@ -53,12 +54,12 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
     """
     second_mm2, upright = price_of_second_mm2(profile), search(mesh)
     best = Lying(None, upright, total_mm2(upright.chosen, second_mm2))
-    orientation = _most_promising(mesh, profile, pricing, best.total_mm2)
+    orientation = _most_promising(mesh, profile, pricing, CLEARLY * best.total_mm2)
     if orientation is None:
         return best
     found = search(standing_still(mesh, orientation.rotation))
     other = Lying(orientation, found, total_mm2(found.chosen, second_mm2))
-    return other if other.total_mm2 < (1.0 - EQUAL) * best.total_mm2 else best
+    return other if other.total_mm2 < CLEARLY * best.total_mm2 else best
 
 
 @dataclass(frozen=True, eq=False)
