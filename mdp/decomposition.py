@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.mesh import Floats, Mesh
+from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.pose import Pose
 from profiles.errors import DecompositionError
@@ -20,6 +21,8 @@ class Part:
     mesh lies in the workpiece frame. rotation (3, 3) turns the workpiece frame into the part frame's orientation at
     the pose, so rotation @ direction = +z and a point w has part coordinates rotation @ w - (0, 0, base.offset_mm).
     feather_share is the share of its base's rim, where that is seen, at which base and surface meet at less than 20 degrees.
+    needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
+    up in one piece; None: all that overhang.
     """
 
     index: int
@@ -30,6 +33,8 @@ class Part:
     volume_mm3: float
     risky_area_mm2: float
     feather_share: float = 0.0
+    needing: Mask | None = None
+    needing_upright: Mask | None = None
 
     @property
     def direction(self) -> Floats:

@@ -27,12 +27,16 @@ def page_colours(count: int) -> list[str]:
 
 def residual_faces(part: Part, profile: Profile) -> NDArray[np.bool_]:
     """(m,) faces of a part that need support although it is printed in its own direction."""
+    if part.needing is not None:
+        return part.needing
     angle, counted = profile.process.self_supporting_angle_deg, profile.search.count_platform_faces
     return risky_upright(part.mesh, angle, counted) if part.index == 1 else risky_above(part.mesh, part.base, angle)
 
 
 def risky_before(part: Part, angle_deg: float, count_platform_faces: bool) -> NDArray[np.bool_]:
     """(m,) what is risky of a part's own faces, the cut below it left out, when the model is printed straight up."""
+    if part.needing_upright is not None:
+        return part.needing_upright
     down = risky_upright(part.mesh, angle_deg, count_platform_faces)
     cut = np.all(np.abs(part.base.heights_mm(part.mesh.vertices))[part.mesh.faces] <= ORDER_TOLERANCE_MM, axis=1)
     return down & ~cut if part.index > 1 else down

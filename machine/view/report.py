@@ -18,9 +18,10 @@ from machine.view.paths import PRIME, WIPE, page_kinds
 from machine.view.program import Program
 from machine.view.quantities import duration, filament_g
 from machine.view.settings import settings_tables
+from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
-from mdp.search.orientation import best_orientation, in_words
+from mdp.search.orientation import best_orientation, in_words, standing_still
 from profiles.profile import Profile
 
 Table = dict[str, Any]
@@ -139,7 +140,8 @@ def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
 def _areas(decomposition: Decomposition, profile: Profile) -> Table:
     """Risky area straight up, in the best single orientation, in parts."""
     best = best_orientation(decomposition.mesh, profile.process.self_supporting_angle_deg)
-    single = best.risky_mm2 + (best.base_mm2 if profile.search.count_platform_faces else 0.0)
+    turned = standing_still(decomposition.mesh, best.rotation)
+    single = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
     risky_mm2 = [
         ("straight up", decomposition.risky_area_mm2),
         ("best single orientation", single),

@@ -7,10 +7,11 @@ import numpy as np
 from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface
 from mdp.cut import Solid
 from mdp.mesh import Mesh, dot
-from mdp.overhang import threshold
+from mdp.overhang import Mask, risky_upright, threshold
 from mdp.plane import Plane
-from mdp.support_need.need import ModelPieces, SupportNeed
+from mdp.support_need.need import ModelPieces, SupportNeed, needs_support
 from mdp.support_need.patches import UNSUPPORTABLE
+from profiles.profile import Profile
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +26,16 @@ class ModelNeed:
         they count as made by a cut."""
         sources = self.surface.sources(solid)
         return ModelPieces(self.need, np.where(sources < len(self.surface.mesh.faces), sources, np.int32(MADE_BY_A_CUT)))
+
+
+def needing_upright(mesh: Mesh, profile: Profile) -> Mask:
+    """(m,) faces of a whole model that need support printed straight up, by the terms of the profile's search."""
+    search = profile.search
+    risky = risky_upright(mesh, profile.process.self_supporting_angle_deg, search.count_platform_faces)
+    if search.objective != "scar" or search.method == "published":
+        return risky
+    needing: Mask = risky & needs_support(mesh, profile.process, on_platform=True)
+    return needing
 
 
 def unsupportable_mm2(mesh: Mesh, pieces: ModelPieces, plane: Plane) -> float:

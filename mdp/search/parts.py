@@ -5,11 +5,12 @@ from mdp.cost.cost import CostTerms
 from mdp.cut import mesh_of
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
-from mdp.overhang import Mask, risky_above
-from mdp.plane import PLATFORM
+from mdp.overhang import Mask, risky_above, risky_upright
+from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, level, poses, rotation
 from mdp.pose_sequence import least_rotation
-from mdp.search.node import Cut, Node
+from mdp.search.node import Node
+from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import CARRIES_ITSELF
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -34,9 +35,10 @@ def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ..
         return not clearance or pose in allowed_poses(machine, base.normal, mesh.vertices, pose.turn_deg)
 
     feathered = (0.0, *(seam.feather_share for seam in reversed(node.seams)))
-    parts = []
+    need, parts = node.terms.need, []
     for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options, fits), strict=True)):
-        risky = _needing(node.cuts[-position], mesh, node.terms) if position else node.remainder.risky
+        pieces = None if need is None else need.pieces(node.cuts[-position].solid if position else node.solid)
+        risky = _needing(mesh, base, pieces, node.terms) if position else node.remainder.risky
         parts.append(
             Part(
                 index=position + 1,
@@ -47,15 +49,24 @@ def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ..
                 volume_mm3=mesh.volume_mm3,
                 risky_area_mm2=float(mesh.areas_mm2[risky].sum()),
                 feather_share=feathered[position],
+                needing=None if pieces is None else risky,
+                needing_upright=None if pieces is None else _needing_upright(mesh, pieces, node.terms),
             )
         )
     return tuple(parts)
 
 
-def _needing(cut: Cut, mesh: Mesh, terms: CostTerms) -> Mask:
+def _needing(mesh: Mesh, base: Plane, pieces: ModelPieces | None, terms: CostTerms) -> Mask:
     """(m,) faces of a part that need support."""
-    risky = risky_above(mesh, cut.base, terms.angle_deg)
-    if terms.need is None:
+    risky = risky_above(mesh, base, terms.angle_deg)
+    if pieces is None:
         return risky
-    needing: Mask = risky & (terms.need.pieces(cut.solid).along(cut.base.normal) != CARRIES_ITSELF)
+    needing: Mask = risky & (pieces.along(base.normal) != CARRIES_ITSELF)
+    return needing
+
+
+def _needing_upright(mesh: Mesh, pieces: ModelPieces, terms: CostTerms) -> Mask:
+    """(m,) faces of a part that would need it if the model were printed straight up; those of cuts are not the model's."""
+    risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
+    needing: Mask = risky & pieces.upright & (pieces.sources >= 0)
     return needing

@@ -1,6 +1,6 @@
 """Beneath: which faces have, along a direction, nothing of the solid beneath them, only air (a numba kernel).
 
-Support leans, so a few directions spread evenly stand for those next to them. For each a grid of cells across it keeps the lowest
+Support leans, so a few directions spread evenly stand for those between them. For each a grid of cells across it keeps the lowest
 surface that looks up; a face is over air where none in its cell lies lower than itself.
 """
 
@@ -14,7 +14,7 @@ from mdp.mesh import Floats
 from mdp.support_need.linked_faces import LinkedFaces
 from mdp.support_need.patches import Classes, frame_across
 
-COUNT = 61  # directions over the half sphere: about 18 degrees apart, less than half of what support leans
+COUNT = 37  # directions over the half sphere, some 24 degrees apart
 CELLS = 96  # of a grid along its longer side
 LEAST_COSINE = 0.05  # of a surface that looks up and the direction
 

@@ -16,6 +16,7 @@ from profiles.process import Process
 MOST_KEPT = 256  # single directions whose classes are kept; a polished plane comes back to the same few again and again
 LEVEL_LAYERS = 2.0  # a patch no higher than this is printed as one bridge
 NO_GROUND_MM = -np.inf
+LEANS = 3  # coarse directions nearest to a direction; support that leans reaches what lies beneath along any of them
 FEW = 16  # directions that are kept singly
 
 
@@ -82,7 +83,10 @@ class SupportNeed:
         return row
 
     def _classes(self, directions: Floats) -> Classes:
-        over_air = self._over_air[np.argmax(directions @ coarse_directions().T, axis=1)]
+        nearest = np.argsort(-(directions @ coarse_directions().T), axis=1, kind="stable")[:, :LEANS].T
+        over_air = self._over_air[nearest[0]]
+        for other in nearest[1:]:
+            over_air &= self._over_air[other]
         return _classify(self.surface, directions, limits_of(self.process, NO_GROUND_MM), NEEDS_SUPPORT + over_air)
 
     @cached_property

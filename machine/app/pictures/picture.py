@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from machine.app.pictures.lettering import write_text
 from machine.app.pictures.raster import Image, View, draw, seen_from
 from machine.view.parts import part_colours, residual_faces
+from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import risky_upright
 from mdp.pose import UP, unit
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -28,9 +28,8 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
 
     Returns (h, w, 3), uint8; size is width and height in pixels.
     """
-    angle = profile.process.self_supporting_angle_deg
     model, parts = decomposition.mesh, decomposition.parts
-    risky = risky_upright(model, angle, profile.search.count_platform_faces)
+    risky = needing_upright(model, profile)
     floor, view, half = floor_of(model), best_view(model, risky), (size[0] // 2, size[1])
     plain = draw([floor, model], [FLOOR, PLAIN], [None, risky], view, half)
     gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
@@ -42,8 +41,7 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
 
 def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[int, int]) -> Image:
     """The parts in colour where they belong. Returns (h, w, 3), uint8; size is width and height in pixels."""
-    angle = profile.process.self_supporting_angle_deg
-    risky = risky_upright(decomposition.mesh, angle, profile.search.count_platform_faces)
+    risky = needing_upright(decomposition.mesh, profile)
     parts = [part.mesh for part in decomposition.parts]
     return draw(parts, list(part_colours(len(parts))), None, best_view(decomposition.mesh, risky), size)
 

@@ -11,6 +11,7 @@ from machine.app.terminal.report import table
 from machine.view.comparison import Alternative
 from machine.view.program import Program
 from machine.view.quantities import duration, filament_g
+from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
@@ -42,8 +43,8 @@ def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternati
     if np.allclose(best.rotation, np.eye(3), atol=1e-9):
         return in_parts, up, replace(up, name="best single orientation")
     say("comparing: best single orientation")
-    risky = best.risky_mm2 + (best.base_mm2 if profile.search.count_platform_faces else 0.0)
     turned = standing_still(ours.mesh, best.rotation)
+    risky = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
     return in_parts, up, _in_one_part("best single orientation", in_words(best), turned, risky, supported)
 
 

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.cost.forecast import Surface
+from mdp.cost.model_need import needing_upright
 from mdp.cut import above, mesh_of, solid_of
 from mdp.mesh import Mesh
 from mdp.overhang import facing_down, risky_upright, threshold
@@ -55,6 +56,8 @@ def test_forecast_front_and_parts_agree_on_what_a_cut_leaves(lean: float) -> Non
     assert node is not None
     row, parts = front_row(node, problem.terms), make_parts(node, problem.machine, PROFILE)
     assert row.support_area_mm2 == pytest.approx(sum(part.risky_area_mm2 for part in parts), rel=1e-6)
+    upright_mm2 = sum(part.mesh.areas_mm2[part.needing_upright].sum() for part in parts if part.needing_upright is not None)
+    assert upright_mm2 == pytest.approx(problem.root.risky_mm2, rel=1e-6)
     assert Surface.of(problem.root.remainder, problem.terms).left_mm2([plane]) == pytest.approx(node.cost_mm2, rel=1e-6)
 
 
@@ -77,5 +80,7 @@ def test_the_paper_s_terms_count_every_face() -> None:
     paper = load(settings=["search.objective=risky"])
     mesh = cap_on_a_stem()
     whole, ours = Problem(mesh, paper).root.risky_mm2, Problem(mesh, PROFILE).root.risky_mm2
+    assert whole == pytest.approx(mesh.areas_mm2[needing_upright(mesh, paper)].sum())
     assert whole == pytest.approx(mesh.areas_mm2[risky_upright(mesh, 45.0)].sum())
+    assert ours == pytest.approx(mesh.areas_mm2[needing_upright(mesh, PROFILE)].sum())
     assert ours < whole
