@@ -9,7 +9,7 @@ from mdp.decomposition import FrontRow, Part
 from mdp.search.node import Node
 from profiles.profile import Profile
 
-EQUAL = 0.01  # costs that differ by a smaller share are alike: then fewer parts, then shorter seams
+EQUAL = 0.01  # costs that differ by a smaller share of the uncut model's are alike: then fewer parts, then shorter seams
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Price:
 
 
 ASKED, BY_PLAN = "asked for", "by the plan"
-LEAST_PARTS = "the fewest parts within 1 % of the least cost"
+LEAST_PARTS = "the fewest parts, cost alike to the least"
 Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be printed
 
 
@@ -119,8 +119,9 @@ def choose(rows: Sequence[FrontRow], second_mm2: float) -> Choice:
 
 
 def _first_alike(costs_mm2: Sequence[float]) -> int:
-    """The first cost that is alike to the least."""
-    return next(place for place, cost_mm2 in enumerate(costs_mm2) if cost_mm2 <= min(costs_mm2) * (1.0 + EQUAL))
+    """The first cost that is alike to the least; the very first is that of the fewest parts."""
+    limit_mm2 = min(costs_mm2) + EQUAL * costs_mm2[0]
+    return next(place for place, cost_mm2 in enumerate(costs_mm2) if cost_mm2 <= limit_mm2)
 
 
 def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
