@@ -28,13 +28,12 @@ SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 3
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """A model turned as a whole: rotation (3, 3), what is risky then, whether it rests without tipping over, the area of its
-    faces that stand on the platform, and how high it stands."""
+    """A model turned as a whole: rotation (3, 3), what is risky then, whether it rests without tipping over, and how high it
+    stands."""
 
     rotation: Floats
     risky_mm2: float
     stable: bool
-    base_mm2: float
     height_mm: float
 
     @property
@@ -85,8 +84,8 @@ def spread(count: int) -> Floats:
     return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
 
 
-def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> tuple[Floats, Floats]:
-    """(k,) risky and standing areas, mm2, of the model printed as a whole along (k, 3) unit directions."""
+def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
+    """(k,) risky areas, mm2, of the model printed as a whole along (k, 3) unit directions."""
     facing_down, standing = np.zeros(len(directions)), np.zeros(len(directions))
     limit, areas = threshold(angle_deg), mesh.areas_mm2
     normals, points = np.ascontiguousarray(mesh.normals.T), np.ascontiguousarray(mesh.vertices.T)
@@ -99,7 +98,7 @@ def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> tuple[Float
         faces = np.concatenate([order[starts[v] : starts[v + 1]] for v in np.flatnonzero(low)])
         stands = faces[low[mesh.faces[faces]].all(axis=1) & down[faces]]
         facing_down[k], standing[k] = areas[down].sum(), areas[stands].sum()
-    return np.maximum(facing_down - standing, 0.0), standing
+    return np.maximum(facing_down - standing, 0.0)
 
 
 @lru_cache(maxsize=4)
@@ -109,12 +108,10 @@ def _on_facets(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
 
 
 def _measure(mesh: Mesh, angle_deg: float, directions: Floats) -> list[Orientation]:
-    risky, standing = risky_areas(mesh, directions, angle_deg)
+    risky = risky_areas(mesh, directions, angle_deg)
     rests, corners = _rests(mesh, directions), convex_hull(mesh.vertices).vertices
     return [
-        Orientation(
-            _rotation(direction), float(risky[k]), bool(rests[k]), float(standing[k]), float(np.ptp(dot(corners, direction)))
-        )
+        Orientation(_rotation(direction), float(risky[k]), bool(rests[k]), float(np.ptp(dot(corners, direction))))
         for k, direction in enumerate(directions)
     ]
 

@@ -27,14 +27,12 @@ def test_a_box_stays_as_it_stands() -> None:
     best = best_orientation(box(20, 30, 40), ANGLE_DEG)
     assert np.allclose(best.rotation, np.eye(3))
     assert (best.risky_mm2, best.stable) == (0.0, True)
-    assert best.base_mm2 == pytest.approx(600.0)
 
 
 def test_a_tee_lies_on_its_side() -> None:
     best = best_orientation(tee(), ANGLE_DEG)
     assert best.turns_deg == pytest.approx((90.0, 0.0))
     assert best.risky_mm2 == 0.0
-    assert best.base_mm2 == pytest.approx(10 * 40 + 10 * 30)
 
 
 def test_a_cone_on_its_point_is_turned_over() -> None:
@@ -109,7 +107,7 @@ def test_one_direction_is_what_brute_force_gives(vector: tuple[float, float, flo
         for area, normal, face in zip(mesh.areas_mm2, mesh.normals, mesh.faces, strict=True)
         if normal @ up < -(np.sin(np.radians(ANGLE_DEG)) + 1e-4) and max(heights[k] for k in face) > 0.3
     )
-    assert risky_areas(mesh, up[None], ANGLE_DEG)[0][0] == pytest.approx(risky, abs=1e-9)
+    assert risky_areas(mesh, up[None], ANGLE_DEG)[0] == pytest.approx(risky, abs=1e-9)
 
 
 def test_the_spread_directions_are_unit_and_have_no_bias() -> None:
