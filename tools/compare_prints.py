@@ -11,10 +11,11 @@ orientation. --log appends each row at once and skips the models that the file a
 import argparse
 from functools import partial
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
-from machine.app.pipeline.comparison import alternatives_json, compare_with_one_part
+from machine.app.pipeline.comparison import best_lying, in_parts, straight_up
 from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.pricing import pricing
 from mdp.mesh import Mesh
@@ -44,9 +45,23 @@ def main() -> None:
             continue
         text = row(file, profile, given.orient)
         print(text, flush=True)
+        done += text + "\n"
         if given.log:
             with given.log.open("a") as log:
                 log.write(text + "\n")
+    print(summary(done.splitlines()))
+
+
+def summary(rows: list[str]) -> str:
+    """Time and filament of what was cut, over those of one piece."""
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+    cut = [row for row in cells if row[1].isdigit() and int(row[1]) > 1 and row[2]]
+    if not cut:
+        return f"{len(rows)} models, none cut"
+    time, filament = ([float(row[column]) for row in cut] for column in (2, 3))
+    dear = sum(max(pair) > 1.05 for pair in zip(time, filament, strict=True))
+    medians = f"median time {median(time):.3f} (most {max(time):.3f}), filament {median(filament):.3f} (most {max(filament):.3f})"
+    return f"{len(rows)} models, {len(cut)} cut: {medians}, {dear} above 1.05 of either"
 
 
 def files(models: list[Path], every: int) -> list[Path]:
@@ -72,22 +87,25 @@ def row(file: Path, profile: Profile, orient: bool) -> str:
         mesh = mesh_of(file, profile)
         search = partial(decompose, name=file.name, profile=profile, price=pricing(profile))
         decomposition = lay_down(mesh, profile, pricing, search).decomposition if orient else search(mesh)
-        ours, *single = alternatives_json(compare_with_one_part(build(decomposition, profile), profile))
+        if len(decomposition.parts) == 1 and not orient:
+            return f"| {file.name} | 1 | 1 | 1 | | {decomposition.risky_area_mm2:.0f} | | | stays whole |"
+        program = build(decomposition, profile)
+        other = best_lying(mesh, profile) if orient else straight_up(decomposition, profile)
+        ours = in_parts(program, profile)
     except UserError as error:
         return f"| {file.name} | | | | | | | | {error} |"
-    other = single[1] if orient else single[0]
-    if other["time_s"] is None:
-        return f"| {file.name} | {ours['parts']} | | | | | | | one piece: {other['message']} |"
+    if other.time_s is None:
+        return f"| {file.name} | {ours.parts} | | | | | | | one piece: {other.message} |"
     cells = [
         file.name,
-        str(ours["parts"]),
-        f"{ours['time_s'] / other['time_s']:.3f}",
-        f"{ours['filament_mm'] / other['filament_mm']:.3f}",
-        f"{ours['support_mm3'] / 1000:.2f} / {other['support_mm3'] / 1000:.2f}",
-        f"{ours['support_area_mm2']:.0f} / {other['support_area_mm2']:.0f}",
-        f"{ours['unsupported_area_mm2']:.0f} / {other['unsupported_area_mm2']:.0f}",
-        f"{ours['seam_mm']:.0f}",
-        ours["message"],
+        str(ours.parts),
+        f"{ours.time_s / other.time_s:.3f}",
+        f"{ours.filament_mm / other.filament_mm:.3f}",
+        f"{ours.support_mm3 / 1000:.2f} / {other.support_mm3 / 1000:.2f}",
+        f"{ours.risky_mm2:.0f} / {other.risky_mm2:.0f}",
+        f"{ours.unsupported_mm2:.0f} / {other.unsupported_mm2:.0f}",
+        f"{ours.seam_mm:.0f}",
+        ours.message,
     ]
     return "| " + " | ".join(cells) + " |"
 

@@ -16,11 +16,12 @@ from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level, rotation
-from mdp.search.orientation import best_orientation, in_words, standing_still
+from mdp.search.orientation import Orientation, best_orientation, in_words, standing_still
 from profiles.errors import UserError
 from profiles.profile import Profile
 from slicer.paths import Kind
 
+BEST = "best single orientation"
 NAMES = ("parts", "upright", "oriented")  # as scripts know the alternatives
 SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 
@@ -30,22 +31,44 @@ def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternati
 
     An alternative that the machine cannot print stays in the list, with the reason.
     """
-    ours = program.decomposition
-    if ours is None:
+    if program.decomposition is None:
         return ()
-    process = profile.process
-    supported = profile.model_copy(update={"process": process.model_copy(update={"support": "auto"})})
-    best = best_orientation(ours.mesh, process.self_supporting_angle_deg)
-    count = len(ours.parts)
-    in_parts = _figures(f"in {count} part{'s' * (count > 1)}", "", count, program, ours.residual_area_mm2, profile)
+    mesh = program.decomposition.mesh
     say("comparing: straight up")
-    up = _in_one_part("straight up", "as it stands", ours.mesh, ours.risky_area_mm2, supported)
-    if np.allclose(best.rotation, np.eye(3), atol=1e-9):
-        return in_parts, up, replace(up, name="best single orientation")
-    say("comparing: best single orientation")
-    turned = standing_still(ours.mesh, best.rotation)
+    up = straight_up(program.decomposition, profile)
+    if np.allclose(_best(mesh, profile).rotation, np.eye(3), atol=1e-9):
+        return in_parts(program, profile), up, replace(up, name=BEST)
+    say(f"comparing: {BEST}")
+    return in_parts(program, profile), up, best_lying(mesh, profile)
+
+
+def in_parts(program: Program, profile: Profile) -> Alternative:
+    """The print that is exported. program: of a decomposition."""
+    ours = program.decomposition
+    assert ours is not None  # programs of other slicers have nothing to compare with
+    count = len(ours.parts)
+    return _figures(f"in {count} part{'s' * (count > 1)}", "", count, program, ours.residual_area_mm2, profile)
+
+
+def straight_up(ours: Decomposition, profile: Profile) -> Alternative:
+    """The model of a decomposition in one part as it stands."""
+    return _in_one_part("straight up", "as it stands", ours.mesh, ours.risky_area_mm2, _with_support(profile))
+
+
+def best_lying(mesh: Mesh, profile: Profile) -> Alternative:
+    """A model in one part, laid down so that least needs support."""
+    best = _best(mesh, profile)
+    turned = standing_still(mesh, best.rotation)
     risky = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
-    return in_parts, up, _in_one_part("best single orientation", in_words(best), turned, risky, supported)
+    return _in_one_part(BEST, in_words(best), turned, risky, _with_support(profile))
+
+
+def _best(mesh: Mesh, profile: Profile) -> Orientation:
+    return best_orientation(mesh, profile.process.self_supporting_angle_deg)
+
+
+def _with_support(profile: Profile) -> Profile:
+    return profile.model_copy(update={"process": profile.process.model_copy(update={"support": "auto"})})
 
 
 def _in_one_part(name: str, orientation: str, mesh: Mesh, risky_mm2: float, profile: Profile) -> Alternative:
