@@ -16,7 +16,7 @@ class Search(Frozen):
     method: Literal["best", "published"] = Field(
         "best", description="published: the authors' stop rule and bookkeeping, for comparisons; best: ours"
     )
-    beam_width: int = Field(2, ge=1, le=1000, description="how many decompositions are followed at a time")
+    beam_width: int = Field(4, ge=1, le=1000, description="how many decompositions are followed at a time")
     objective: Literal["scar", "risky"] = Field(
         "scar",
         description="scar: area that needs support and the seams of the cuts, each as wide as its scar; risky: the area alone, "
@@ -35,6 +35,13 @@ class Search(Frozen):
         le=100,
         description="by how much more a seam counts where face and plane meet at less than 30 deg, times cot angle - cot 30: "
         "such edges are thin, warp and break",
+    )
+    cut_mm2: float = Field(
+        20.0,
+        ge=0,
+        le=10000,
+        description="what a cut costs beside its seam: one more turn, one more joint that can fail, mm2; a cut that saves less "
+        "than its seam and this is not made",
     )
     second_mm2: float = Field(
         0.5,

@@ -57,13 +57,14 @@ class SeamPlaces:
 @dataclass(frozen=True)
 class CostTerms:
     """What a search counts. seam_mm: width of the scar along a rim, 0: seams cost nothing; feather: by how much more a rim
-    counts where face and plane meet at a small angle; need: what needs support, None: every face that overhangs, the paper's
-    terms."""
+    counts where face and plane meet at a small angle; cut_mm2: what a cut costs beside its seam; need: what needs support,
+    None: every face that overhangs, the paper's terms."""
 
     angle_deg: float
     count_platform_faces: bool
     seam_mm: float = 0.0
     feather: float = 0.0
+    cut_mm2: float = 0.0
     need: ModelNeed | None = None
 
 
@@ -71,7 +72,8 @@ def cost_terms(profile: Profile, settings: Search) -> CostTerms:
     """The terms of a search; settings: the profile's, or those of the published search."""
     seam_mm = settings.seam_mm if settings.objective == "scar" else 0.0
     angle_deg, platform_faces = profile.process.self_supporting_angle_deg, settings.count_platform_faces
-    return CostTerms(angle_deg, platform_faces, seam_mm, settings.feather_weight)
+    cut_mm2 = settings.cut_mm2 if seam_mm > 0.0 else 0.0
+    return CostTerms(angle_deg, platform_faces, seam_mm, settings.feather_weight, cut_mm2)
 
 
 @dataclass(frozen=True)

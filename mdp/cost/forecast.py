@@ -48,6 +48,7 @@ class Surface:
 
     remainder: Remainder
     faces: Faces
+    cut_mm2: float
 
     @classmethod
     def of(cls, remainder: Remainder, terms: CostTerms) -> "Surface":
@@ -65,7 +66,7 @@ class Surface:
         weight = 1.0 if pieces is None else pieces.need.weight
         areas, normals = mesh.areas_mm2[counted], mesh.normals[counted]
         faces = Faces(corners, normals, areas, risky[counted], least, seam_mm, terms.feather, sources, weight)
-        return cls(remainder, faces)
+        return cls(remainder, faces, terms.cut_mm2)
 
     def classes(self, planes: Sequence[Plane]) -> Classes:
         """(k, n) what the faces of the model need along the planes' normals."""
@@ -73,12 +74,13 @@ class Surface:
         return np.zeros((len(planes), 0), np.uint8) if pieces is None else pieces.need.along(_normals(planes))
 
     def left_mm2(self, planes: Sequence[Plane], classes: Classes | None = None) -> float:
-        """What cuts along the planes, in this order, would cost: the area left that needs support, and the seams.
+        """What cuts along the planes, in this order, would cost: the area left that needs support, the seams, and each cut.
 
         classes: those of planes that lean a little otherwise; absent: the planes' own.
         """
         offsets = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
-        return _sum_left(self.faces, _normals(planes), offsets, self.classes(planes) if classes is None else classes)
+        needs = self.classes(planes) if classes is None else classes
+        return _sum_left(self.faces, _normals(planes), offsets, needs) + self.cut_mm2 * len(planes)
 
 
 def _normals(planes: Sequence[Plane]) -> Floats:

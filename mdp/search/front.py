@@ -52,9 +52,9 @@ class Front:
 
 
 def front_row(node: Node, terms: CostTerms) -> FrontRow:
-    """A node with what it costs, the seams apart. An area over air counts once in the area that needs support."""
+    """A node with what it costs, the cuts apart. An area over air counts once in the area that needs support."""
     seams = node.seams
-    scars_mm2 = terms.seam_mm * sum(seam.weighted_mm for seam in seams)
+    scars_mm2 = sum(terms.seam_mm * seam.weighted_mm + terms.cut_mm2 for seam in seams)
     planes = tuple(cut.base for cut in node.cuts)
     over_mm2 = 0.0 if terms.need is None else (terms.need.need.weight - 1.0) * _over_air_mm2(node)
     return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2)

@@ -15,7 +15,18 @@ from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, standing, threshold
 from mdp.plane import Plane
-from mdp.search.candidates import Bounds, Feasibility, Reason, bounds, bounds_of, check, platform_disc, refusals, score_candidates
+from mdp.search.candidates import (
+    Bounds,
+    Feasibility,
+    Reason,
+    bounds,
+    bounds_of,
+    check,
+    platform_disc,
+    refusals,
+    residual_mm2,
+    score_candidates,
+)
 from mdp.search.features import Model
 from mdp.search.node import Cut, Node
 from mdp.search.ranking import CandidateTable
@@ -158,11 +169,11 @@ class Problem:
         return following
 
     def _residual_mm2(self, node: Node, plane: Plane) -> float:
-        """What a cut costs for ever: what stays risky on the part, and its seam."""
+        """What a cut costs for ever, see candidates.residual_mm2."""
         step_mm = self.step_mm(plane.offset_mm)
         swept = gains(node.remainder, plane.normal[None], step_mm, threshold(self.terms.angle_deg))
         column = round(plane.offset_mm / step_mm) - int(swept.first[0])
-        return float(swept.residual_mm2[0, column] + self.terms.seam_mm * swept.rim_mm[0, column])
+        return float(residual_mm2(swept, self.terms)[0, column])
 
     def step_mm(self, offset_mm: float) -> float:
         """Step of a grid of offsets that an offset lies on, near that of the candidates' grid."""

@@ -32,7 +32,9 @@ def _rod(cells: int) -> m3.Manifold:
 
 def test_a_lattice_of_thousands_of_handles_is_cut_into_parts_that_hang_together() -> None:
     solid = _lattice(11)
-    found = _decomposed(shapes.standing(solid), "clearance=false", "objective=risky")  # its struts are bridges that need no support
+    found = _decomposed(
+        shapes.standing(solid), "clearance=false", "objective=risky"
+    )  # its struts are bridges that need no support
     assert solid.genus() > 3000
     assert len(found.parts) == 3
     assert len(solid_of(found.parts[0].mesh).decompose()) == 1
