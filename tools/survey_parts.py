@@ -3,9 +3,9 @@
     python tools/survey_parts.py FOLDER_OR_FILE ... [--every N] [--set KEY=VALUE ...] [--published] --log FILE
 
 One line of JSON a model is appended to FILE, models that it has are skipped: parts, area that needs support, seams, cost, the
-estimated time and filament over those of one piece straight up, processor seconds. --published: also the parts and the area that
---search published leaves, and the fewest parts that our search needs for that area on the same terms. The last lines printed sum
-the file up; models that failed are named.
+largest share of a cut's rim that is a feather edge, the estimated time and filament over those of one piece straight up,
+processor seconds. --published: also the parts and the area that --search published leaves, and the fewest parts that our search
+needs for that area on the same terms. The last lines printed sum the file up; models that failed are named.
 """
 
 import argparse
@@ -76,6 +76,7 @@ def figures(decomposition: Decomposition) -> dict[str, Any]:
         "support_whole_mm2": whole.support_area_mm2,
         "seam_mm": chosen.seam_mm,
         "cost_mm2": chosen.cost_mm2,
+        "feather_share": max(part.feather_share for part in decomposition.parts),
         "time": chosen.time_s / whole.time_s if timed else None,
         "filament": chosen.filament_mm / whole.filament_mm if timed else None,
     }
@@ -87,6 +88,9 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
     cut = [row for row in good if row["parts"] > 1]
     timed = [row for row in cut if row["time"] is not None]
     lines = [f"{row['model']}: {row['error']}" for row in failed]
+    lines += [
+        f"{row['model']}: {row['feather_share']:.0%} of a rim is a feather edge" for row in good if row["feather_share"] > 0.1
+    ]
     lines.append(f"{len(good)} models, mean parts {mean(row['parts'] for row in good):.2f}, {len(cut)} cut")
     if timed:
         for what in ("time", "filament"):

@@ -13,7 +13,8 @@ from tests import shapes
 
 def _problem(width: int, shape: str = "tee") -> Problem:
     return Problem(
-        getattr(shapes, shape)(), load(settings=("search.directions=150", f"search.beam_width={width}", "search.seam_mm=0.6", "search.cut_mm2=0"))
+        getattr(shapes, shape)(),
+        load(settings=("search.directions=150", f"search.beam_width={width}", "search.seam_mm=0.6", "search.cut_mm2=0")),
     )
 
 

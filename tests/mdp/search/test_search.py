@@ -79,6 +79,13 @@ def _area_in_plane(mesh: Mesh, plane: Plane, looking: float) -> float:
     return float(mesh.areas_mm2[inside & (mesh.normals @ plane.normal * looking > 0.5)].sum())
 
 
+def test_each_cut_costs_its_price_beside_its_seam_and_one_that_saves_less_is_not_made() -> None:
+    free, priced, dear = (_decompose(shapes.branch(), f"search.cut_mm2={price}") for price in (0, 7, 1000))
+    assert [len(found.parts) for found in (free, priced, dear)] == [2, 2, 1]
+    assert priced.front[1].cost_mm2 == pytest.approx(free.front[1].cost_mm2 + 7.0, abs=1e-6)
+    assert priced.front[1].support_area_mm2 == pytest.approx(free.front[1].support_area_mm2, abs=1e-6)
+
+
 def test_a_box_is_one_part_and_says_why() -> None:
     decomposition = _decompose(shapes.box())
     assert len(decomposition.parts) == 1
