@@ -36,11 +36,11 @@ class Shot:
 
 
 SHOTS = {
-    "figure": Shot("figure", 4, 0.52, {"colour-by": "part"}, ("#show-travels",), ("+",)),
-    "front": Shot("tree", None, 1.0, {}, ("#front tbody tr:nth-child(3)",), ()),
-    "tree": Shot("tree", None, 0.71, {"colour-by": "kind", "model": "hide", "frame": "workpiece"}, (), ("ArrowUp",)),
+    "figure": Shot("figure", 4, 0.93, {"colour-by": "part"}),
+    "front": Shot("tree", None, 1.0, {}, ("#front tbody tr:nth-child(3)", "#show-machine"), ("-",)),
+    "tree": Shot("tree", None, 0.71, {"colour-by": "kind", "model": "hide", "frame": "workpiece"}, (), ("ArrowUp", "-")),
     "bracket": Shot("bracket", None, 0.86, {"colour-by": "speed"}, (), ("d",)),
-    "lattice": Shot("lattice", None, 1.0, {"colour-by": "layer", "model": "hide"}, ("#show-machine",), ("d", "-")),
+    "lattice": Shot("lattice", None, 1.0, {"colour-by": "layer", "model": "hide"}, ("#show-machine",), ("d", "-", "-")),
 }
 
 
