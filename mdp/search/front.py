@@ -26,29 +26,42 @@ Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be 
 
 
 class Front:
-    """The best node met for every number of cuts."""
+    """The best node met for every number of cuts: of those whose cost is alike to the least the one with the shortest seams;
+    where seams cost nothing the one that costs least."""
 
     def __init__(self, start: Node) -> None:
         self._start = len(start.cuts)
-        self._best: dict[int, Node] = {self._start: start}
+        self._alike: dict[int, list[Node]] = {self._start: [start]}
+        self._equal = EQUAL if start.terms.seam_mm > 0.0 else 0.0
 
     def offer(self, node: Node) -> None:
         """Take note of a node and of all that led to it from the start."""
         step: Node | None = node
         while step is not None and len(step.cuts) >= self._start:
-            held = self._best.get(len(step.cuts))
-            if held is None or step.cost_mm2 < held.cost_mm2:
-                self._best[len(step.cuts)] = step
+            held = self._alike.setdefault(len(step.cuts), [])
+            if step not in held:
+                most_mm2 = min(other.cost_mm2 for other in (step, *held)) * (1.0 + self._equal)
+                held[:] = [other for other in (*held, step) if other.cost_mm2 <= most_mm2]
             step = step.parent
+
+    def replace(self, node: Node, other: Node) -> None:
+        """Put another node, alike in cost, in the place of one."""
+        self._alike[len(node.cuts)] = [other]
 
     @property
     def nodes(self) -> list[Node]:
         """The nodes by their number of cuts."""
-        return [self._best[count] for count in sorted(self._best)]
+        return [self._best(count) for count in sorted(self._alike)]
 
     def up_to(self, parts: int) -> Node:
         """The node of the most parts up to so many, or of the fewest where all have more."""
-        return self._best[max((count for count in self._best if count < parts), default=self._start)]
+        return self._best(max((count for count in self._alike if count < parts), default=self._start))
+
+    def _best(self, count: int) -> Node:
+        alike = self._alike[count]
+        if self._equal <= 0.0 or len(alike) == 1:
+            return alike[0]
+        return min(alike, key=lambda node: sum(seam.length_mm for seam in node.seams))
 
 
 def front_row(node: Node, terms: CostTerms) -> FrontRow:

@@ -6,14 +6,17 @@ plane may still be cut, and where that made room further cuts are added. What co
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import cos, radians, sin
 
 import numpy as np
 
 from mdp.cost.forecast import Surface
+from mdp.cost.symmetry import Mirror
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
+from mdp.search.front import EQUAL
 from mdp.search.node import Node
 from mdp.search.problem import Problem
 from mdp.search.ranking import rank_by_trade_off
@@ -23,6 +26,7 @@ ROUNDS = 4  # moves by one step before the next smaller one
 TRIES = 2  # moved planes that are cut before one stays where it is
 ENOUGH = 1e-3  # a move that saves a smaller share of the risky area is not worth a cut
 SAME_MM2 = 1e-6
+PARTNER_COSINE, PARTNER_MM = cos(radians(20.0)), 5.0  # two planes so near to each other's image are meant to be it
 TRADE_OFF = 4.0  # of further cuts, as the beam's second slot
 
 
@@ -58,6 +62,39 @@ def polish(problem: Problem, node: Node) -> Node:
     if len(longer.nodes) > len(best.nodes):
         longer = _move_planes(problem, _drop_cuts(problem, longer))
     return min((node, best.nodes[-1], longer.nodes[-1]), key=lambda last: (last.cost_mm2, len(last.cuts)))
+
+
+def make_symmetric(problem: Problem, node: Node, mirrors: Sequence[Mirror]) -> Node:
+    """The node with its planes more symmetric about a model's mirror planes, as far as it stays alike in cost: planes that lean a
+    little across a mirror stand upright on it, and of two that are nearly each other's image one becomes it."""
+    most_mm2 = node.cost_mm2 * (1.0 + EQUAL)
+    best = Chain.to(node)
+    for change, mirror in product((_stand_upright, _pair), mirrors):
+        for position in range(len(problem.start.cuts), len(best.planes)):
+            for planes in change(best, position, mirror):
+                changed = None if problem.late() else _recut(problem, best, position, planes)
+                if changed is not None and changed.cost_mm2 <= most_mm2:
+                    best = changed
+                    break
+    return best.nodes[-1]
+
+
+def _stand_upright(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
+    """The planes from a position on, the first of them upright on a mirror where it nearly is."""
+    here, *later = chain.planes[position:]
+    upright = mirror.upright(here, _middle(chain.nodes[position + 1]))
+    if upright is not None:
+        yield [upright, *later]
+
+
+def _pair(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
+    """The planes from a position on, one that is nearly the first one's image made its image, or the other way round."""
+    here, *later = chain.planes[position:]
+    image = mirror.image(here)
+    for number, other in enumerate(later):
+        if float(other.normal @ image.normal) > PARTNER_COSINE and abs(other.offset_mm - image.offset_mm) < PARTNER_MM:
+            yield [here, *later[:number], image, *later[number + 1 :]]
+            yield [mirror.image(other), *later]
 
 
 def _drop_cuts(problem: Problem, best: Chain) -> Chain:

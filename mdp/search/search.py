@@ -14,6 +14,7 @@ from time import perf_counter
 
 import numpy as np
 
+from mdp.cost.symmetry import find_mirrors
 from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
@@ -25,7 +26,7 @@ from mdp.search.candidates import REASONS
 from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
-from mdp.search.polish import polish
+from mdp.search.polish import make_symmetric, polish
 from mdp.search.problem import Problem
 from mdp.search.ranker import RANKERS
 from mdp.search.ranking import rank_classic
@@ -251,7 +252,10 @@ def _search_beam(
             beam.advance()
             held = sum(node is not None for node in beam.nodes)
             report(Progress(stage, held, beam.best.cost_mm2 / problem.model.risky_mm2))
-        return _polish_finalists(problem, beam, stage, report), beam.front, stage
+        best = _polish_finalists(problem, beam, stage, report)
+        if problem.settings.polish and problem.terms.seam_mm > 0.0:
+            _prefer_symmetry(problem, beam.front)
+        return best, beam.front, stage
     except KeyboardInterrupt:
         problem.stop()
         raise
@@ -269,6 +273,15 @@ def _polish_finalists(problem: Problem, beam: Beam, stage: int, report: Callable
         best = min(best, polished, key=lambda node: (node.cost_mm2, len(node.cuts)))
         report(Progress(stage, 1, best.cost_mm2 / problem.model.risky_mm2))
     return best
+
+
+def _prefer_symmetry(problem: Problem, front: Front) -> None:
+    """Make the rows of a front that may be taken as symmetric as they can be at the same cost, where the model is symmetric."""
+    nodes = [node for node in front.nodes if all(node.cost_mm2 < fewer.cost_mm2 for fewer in front.nodes[: len(node.cuts)])]
+    cut = [node for node in nodes if len(node.cuts) > len(problem.start.cuts)]
+    mirrors = find_mirrors(problem.mesh) if cut else []
+    for node in cut if mirrors else []:
+        front.replace(node, make_symmetric(problem, node, mirrors))
 
 
 def _search_as_published(problem: Problem, report: Callable[[Progress], None]) -> tuple[Node, int]:

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from mdp.cost.symmetry import find_mirrors
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.mesh import Floats
 from mdp.overhang import risky_above, risky_upright
 from mdp.plane import Plane
 from mdp.search.node import Node
-from mdp.search.polish import polish
+from mdp.search.polish import make_symmetric, polish
 from mdp.search.problem import Problem
 from profiles.profile import load
 from tests import shapes
@@ -93,3 +94,21 @@ def test_a_plane_a_hairs_breadth_from_the_origin_is_refused_and_one_through_it_i
     assert not problem.allowed(problem.root, beside)
     assert not problem.allowed(problem.root, through)  # it would cut the platform
     assert problem.allowed(problem.root, _through(30.0, 9.0))
+
+
+def _leaning(x: float, y: float) -> Floats:
+    """A unit normal some 15 degrees above the horizon."""
+    normal = np.array([x, y, np.sin(np.radians(15.0))])
+    return normal / np.linalg.norm(normal)
+
+
+def test_cuts_that_are_nearly_symmetric_become_so_where_the_model_is() -> None:
+    problem = _problem("search.objective=scar")
+    askew = [_through(30.0, 5.5, _leaning(0.96, 0.05)), _through(30.0, -5.7, _leaning(-0.95, 0.02))]
+    node = _after(problem, *askew)
+    even = make_symmetric(problem, node, find_mirrors(problem.mesh))
+    first, second = (cut.base for cut in even.cuts)
+    assert second.normal == pytest.approx(first.normal * [-1.0, 1.0, 1.0])  # each other's image across x
+    assert second.offset_mm == pytest.approx(first.offset_mm)
+    assert first.normal[1] == pytest.approx(0.0)  # and each its own across y
+    assert even.cost_mm2 <= 1.01 * node.cost_mm2

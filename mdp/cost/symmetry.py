@@ -1,0 +1,114 @@
+"""Symmetry: the upright planes in which a model is its own mirror image, and what planes look like in such a mirror.
+
+A mirror plane holds the centroid of the surface and lies across one of its principal axes, most often x or y. Moments that are
+odd across it vanish; where they do, the surface itself is laid on its mirror image.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from math import radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.mesh import Floats, Mesh
+from mdp.plane import Plane
+
+UPRIGHT = 0.02  # most z of a mirror plane's normal: the table is below, so only upright planes are of use
+ODD = 0.02  # odd moments, as shares of the even ones of their order, of a model that may be symmetric
+SAMPLES, TRIED = 10000, 2000  # points on the surface, and how many of them are looked for in the mirror
+CELL = 0.012  # of the diagonal: so far off may a surface be from its mirror image
+ALIKE_SHARE = 0.97  # of the surface that has its mirror image
+DIRECTIONS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.5**0.5, 0.5**0.5, 0.0], [0.5**0.5, -(0.5**0.5), 0.0]])
+OFF_DEG = 15.0  # a plane that leans less across a mirror plane is meant to stand on it
+
+
+@dataclass(frozen=True, eq=False)
+class Mirror:
+    """A mirror plane: its unit normal and its place along it."""
+
+    normal: Floats
+    offset_mm: float
+
+    def image(self, plane: Plane) -> Plane:
+        """A plane's mirror image."""
+        across = float(plane.normal @ self.normal)
+        return Plane(plane.normal - 2.0 * across * self.normal, plane.offset_mm - 2.0 * across * self.offset_mm)
+
+    def upright(self, plane: Plane, middle: Floats) -> Plane | None:
+        """The plane next to a given one that is its own image and meets it at a point; None where it leans far across."""
+        across = float(plane.normal @ self.normal)
+        if not 0.0 < abs(across) < sin(radians(OFF_DEG)):
+            return None
+        normal = plane.normal - across * self.normal
+        on_plane = middle - plane.heights_mm(middle[None])[0] * plane.normal
+        normal = normal / np.linalg.norm(normal)
+        return Plane(normal, float(normal @ on_plane))
+
+
+def find_mirrors(mesh: Mesh) -> list[Mirror]:
+    """The upright mirror planes of a model, of a round one some; those across x and y come first."""
+    points, areas = _quadrature(mesh)
+    centre = (points * areas[:, None]).sum(axis=0) / areas.sum()
+    around = points - centre
+    _, axes = np.linalg.eigh((around * areas[:, None]).T @ around)
+    found: list[Mirror] = []
+    for axis in (*DIRECTIONS, *axes.T):
+        fresh = all(abs(float(axis @ other.normal)) < 1.0 - 1e-3 for other in found)
+        if abs(axis[2]) < UPRIGHT and fresh and _is_even(around, areas, axis) and _is_mirrored(mesh, centre, axis):
+            found.append(Mirror(axis, float(axis @ centre)))
+    return found
+
+
+def _quadrature(mesh: Mesh) -> tuple[Floats, Floats]:
+    """(4 m, 3) points and (4 m,) areas whose sums are the surface's moments up to the third order, four points a face (Strang and
+    Fix 1973)."""
+    corners = mesh.vertices[mesh.faces]
+    shares = np.array([[1 / 3, 1 / 3, 1 / 3], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
+    points = np.einsum("pk,mki->pmi", shares, corners).reshape(-1, 3)
+    areas: Floats = np.outer([-27 / 48, 25 / 48, 25 / 48, 25 / 48], mesh.areas_mm2).ravel()
+    return points, areas
+
+
+def _is_even(around: Floats, areas: Floats, axis: Floats) -> bool:
+    """Whether the moments of the surface that are odd along an axis nearly vanish."""
+    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    side = side / np.linalg.norm(side)
+    x, y, z = around @ axis, around @ side, around @ np.cross(axis, side)
+    for odd in (x * y, x * z, x**3, x * y * y, x * z * z, x * y * z):
+        if abs(float((odd * areas).sum())) > ODD * float((np.abs(odd) * np.abs(areas)).sum()):
+            return False
+    return True
+
+
+def _is_mirrored(mesh: Mesh, centre: Floats, axis: Floats) -> bool:
+    """Whether nearly every point of the surface has its mirror image in a cell of space that holds surface, or in the next."""
+    points = _spread(mesh) - centre
+    size_mm = CELL * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
+    image = points[:: SAMPLES // TRIED]
+    image = image - 2.0 * (image @ axis)[:, None] * axis
+    held = np.unique(_cells(points, size_mm))
+    near = np.zeros(len(image), dtype=np.bool_)
+    for shift in product((-1, 0, 1), repeat=3):
+        near |= np.isin(_cells(image + size_mm * np.array(shift), size_mm), held)
+    return float(near.mean()) >= ALIKE_SHARE
+
+
+def _cells(points: Floats, size_mm: float) -> NDArray[np.int64]:
+    """(n,) the number of each point's cell."""
+    cells = np.floor(points / size_mm).astype(np.int64) + 1024
+    numbers: NDArray[np.int64] = cells @ np.array([1, 4096, 4096 * 4096])
+    return numbers
+
+
+def _spread(mesh: Mesh) -> Floats:
+    """(SAMPLES, 3) points spread over the surface, evenly by area and always the same."""
+    along = np.cumsum(mesh.areas_mm2)
+    index = np.arange(SAMPLES) + 0.5
+    face = np.minimum(np.searchsorted(along, index / SAMPLES * along[-1]), len(along) - 1)
+    u, v = (index * 0.7548776662466927) % 1.0, (index * 0.5698402909980532) % 1.0  # the sequence R2 of Roberts
+    folded = u + v > 1.0
+    u, v = np.where(folded, 1.0 - u, u), np.where(folded, 1.0 - v, v)
+    a, b, c = (mesh.vertices[mesh.faces[face, k]] for k in range(3))
+    points: Floats = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return points
