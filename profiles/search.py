@@ -64,6 +64,13 @@ class Search(Frozen):
         description="how many times an area counts that needs support and has nothing but air beneath it along its part's "
         "direction: no support can stand there, and what leans there from the side holds badly",
     )
+    most_longer: float = Field(
+        0.05,
+        ge=0,
+        le=1000,
+        description="share by which the chosen parts may take more time or filament than one piece, by the estimate; "
+        "where more would save scars that is told, and --parts N takes it",
+    )
     polish: bool = Field(
         True,
         description="the best results of a beam of two or more are shortened, their planes moved off the grid and cuts added",

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 from mdp.cost.cost import CostTerms
 from mdp.cost.model_need import unsupportable_mm2
@@ -110,11 +111,11 @@ class Choice:
     note: tuple[str, ...] = ()
 
 
-def choose(rows: Sequence[FrontRow], second_mm2: float) -> Choice:
+def choose(rows: Sequence[FrontRow], second_mm2: float, most_longer: float = inf) -> Choice:
     """The row of the fewest parts among those whose cost is alike to the least. rows: by their number of parts.
 
     second_mm2: every second that a row takes longer than the fastest one counts so much; 0 and where a row that may be taken has
-    no time: seconds do not count.
+    no time: seconds do not count. most_longer: share by which a row may take more time, or filament, than the first.
     """
     places = [place for place, good in enumerate(pays(rows)) if good]
     scars = _first_alike([rows[place].cost_mm2 for place in places])
@@ -122,13 +123,19 @@ def choose(rows: Sequence[FrontRow], second_mm2: float) -> Choice:
     times_s = [time_s for place in places if (time_s := rows[place].time_s) is not None]
     if second_mm2 <= 0.0 or len(times_s) < len(places):
         return Choice(places[scars], reason)
-    totals = [rows[place].cost_mm2 + second_mm2 * (time_s - min(times_s)) for place, time_s in zip(places, times_s, strict=True)]
+    allowed = [place for place in places if _is_quick(rows[place], rows[0], most_longer)]
+    totals = [rows[place].cost_mm2 + second_mm2 * ((rows[place].time_s or 0.0) - min(times_s)) for place in allowed]
     taken = _first_alike(totals)
-    if taken == scars:
-        return Choice(places[taken], reason)
+    if allowed[taken] == places[scars]:
+        return Choice(places[scars], reason)
     reason = "the least cost with its time" if totals[taken] <= min(totals) else "the fewest parts, cost and time alike"
-    note = _given_up(rows[places[scars]], rows[places[taken]])
-    return Choice(places[taken], reason, note)
+    return Choice(allowed[taken], reason, _given_up(rows[places[scars]], rows[allowed[taken]]))
+
+
+def _is_quick(row: FrontRow, first: FrontRow, most_longer: float) -> bool:
+    """Whether a row takes little more time and filament than the first, as far as that is known."""
+    pairs = ((row.time_s, first.time_s), (row.filament_mm, first.filament_mm))
+    return all(own is None or its is None or own <= (1.0 + most_longer) * its for own, its in pairs)
 
 
 def _first_alike(costs_mm2: Sequence[float]) -> int:

@@ -111,7 +111,7 @@ def _take(problem: Problem, front: Front, best: Node, profile: Profile, wanted: 
         rows = [
             price_row(row, made(node), price) if good else row for row, node, good in zip(rows, nodes, pays(rows), strict=True)
         ]
-    choice = choose(rows, price_of_second_mm2(profile))
+    choice = choose(rows, price_of_second_mm2(profile), profile.search.most_longer)
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
     elif problem.terms.seam_mm <= 0.0:

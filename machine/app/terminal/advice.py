@@ -35,7 +35,7 @@ def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
     chosen, front = decomposition.chosen, decomposition.front
     if chosen is None or chosen.reason not in (ASKED, BY_PLAN):
         return chosen
-    return front[choose(front, price_of_second_mm2(profile)).place]
+    return front[choose(front, price_of_second_mm2(profile), profile.search.most_longer).place]
 
 
 def _without_front(decomposition: Decomposition) -> list[FrontRow]:

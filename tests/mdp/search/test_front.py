@@ -49,6 +49,13 @@ def test_where_only_time_counts_the_fastest_row_that_saves_scars_is_taken(values
     assert (rows[choose(rows, 1e9).place].time_s or 0.0) - fastest_s <= 1e-3
 
 
+@pytest.mark.parametrize(("most_longer", "parts"), [(0.0, 1), (0.05, 2), (0.1, 3), (0.2, 4)])
+def test_what_takes_much_longer_than_one_piece_is_told_and_not_taken(most_longer: float, parts: int) -> None:
+    choice = choose(BUNNY, 0.1, most_longer)
+    assert choice.place + 1 == parts
+    assert bool(choice.note) == (parts < 4)
+
+
 def test_a_row_that_costs_more_than_one_with_fewer_parts_is_not_taken_however_fast() -> None:
     assert choose(front((100.0, 900.0), (120.0, 1.0)), 1.0).place == 0
 
