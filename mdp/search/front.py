@@ -10,7 +10,9 @@ from mdp.decomposition import FrontRow, Part
 from mdp.search.node import Node
 from profiles.profile import Profile
 
-EQUAL = 0.01  # costs that differ by a smaller share of the uncut model's are alike: then fewer parts, then shorter seams
+EQUAL = (
+    0.01  # costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams
+)
 
 
 @dataclass(frozen=True)
@@ -147,8 +149,10 @@ def _first_alike(costs_mm2: Sequence[float]) -> int:
 def _given_up(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
     """What the row with the fewest scars would save and cost beside the one that is taken."""
     saved_mm2, longer_s = taken.cost_mm2 - fewest_scars.cost_mm2, (fewest_scars.time_s or 0.0) - (taken.time_s or 0.0)
-    if saved_mm2 <= 0.0 or longer_s <= 0.0:
+    more_mm = (fewest_scars.filament_mm or 0.0) - (taken.filament_mm or 0.0)
+    if saved_mm2 <= 0.0 or max(longer_s, more_mm) <= 0.0:
         return ()
-    longer = f"{longer_s / 60.0:.0f} min" if longer_s >= 60.0 else f"{longer_s:.0f} s"
+    longer = f"{longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f"{longer_s:.0f} s longer"
+    price = longer if longer_s > 0.0 else f"{more_mm / 1000.0:.1f} m more filament"
     parts = fewest_scars.parts
-    return (f"{parts} parts would save {saved_mm2:.0f} mm2 of scars but take {longer} longer: --parts {parts}",)
+    return (f"{parts} parts would save {saved_mm2:.0f} mm2 of scars but take {price}: --parts {parts}",)

@@ -1,5 +1,7 @@
 """Which row of a front is taken: the fewest parts alike to the least cost, seconds counted by their price."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -54,6 +56,14 @@ def test_what_takes_much_longer_than_one_piece_is_told_and_not_taken(most_longer
     choice = choose(BUNNY, 0.1, most_longer)
     assert choice.place + 1 == parts
     assert bool(choice.note) == (parts < 4)
+
+
+def test_what_takes_much_more_filament_is_told_and_not_taken_however_fast() -> None:
+    rows = front((1000.0, 900.0), (500.0, 800.0))
+    rows = [replace(row, filament_mm=filament_mm) for row, filament_mm in zip(rows, (10_000.0, 12_000.0), strict=True)]
+    choice = choose(rows, 0.5, 0.05)
+    assert choice.place == 0
+    assert choice.note == ("2 parts would save 500 mm2 of scars but take 2.0 m more filament: --parts 2",)
 
 
 def test_a_row_that_costs_more_than_one_with_fewer_parts_is_not_taken_however_fast() -> None:
