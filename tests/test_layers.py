@@ -26,7 +26,7 @@ CONFINED = {
     ),
     "numba": ("mdp/kernels/kernel",),
     "shapely": (),
-    "onnxruntime": ("mdp/search/ranker",),
+    "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),
     "pydantic": ("profiles/",),
     "rich": ("machine/app/",),

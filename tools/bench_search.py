@@ -17,8 +17,8 @@ import mdp.kernels.threads
 from mdp.cut import mesh_of, solid_of
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright, threshold
+from mdp.ranking.candidates import Bounds, bounds
 from mdp.read import locate, read_mesh
-from mdp.search.candidates import Bounds, bounds
 from mdp.search.search import decompose
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load

@@ -11,8 +11,8 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
+from mdp.ranking.candidates import bounds
 from mdp.read import locate, read_mesh
-from mdp.search.candidates import bounds
 from mdp.sweep.components import View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas
 from mdp.sweep.integrals import (

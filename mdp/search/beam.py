@@ -13,12 +13,12 @@ from math import isqrt
 
 from mdp.kernels.threads import ahead
 from mdp.plane import Plane
+from mdp.ranking.ranker import Ranker
+from mdp.ranking.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
+from mdp.ranking.record import Child, Offer, Trace
 from mdp.search.front import Front
 from mdp.search.node import Node
 from mdp.search.problem import Problem
-from mdp.search.ranker import Ranker
-from mdp.search.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
-from mdp.search.record import Child, Offer, Trace
 
 # Area left for ever counts as so many times the area made safe; None: the classic ranking. Many models, one greedy search
 # each: 4 is best on average, no value is best on most models.

@@ -17,7 +17,7 @@ from mdp.overhang import threshold
 from mdp.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.plane import Plane
 from mdp.pose import poses
-from mdp.search.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, residual_mm2
+from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, residual_mm2
 from mdp.search.node import Node
 from mdp.search.problem import FINEST, Problem
 from mdp.sweep.sweep import gains

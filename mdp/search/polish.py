@@ -16,10 +16,10 @@ from mdp.cost.symmetry import Mirror
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
+from mdp.ranking.ranking import rank_by_trade_off
 from mdp.search.front import EQUAL
 from mdp.search.node import Node
 from mdp.search.problem import Problem
-from mdp.search.ranking import rank_by_trade_off
 
 STEPS = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))  # of the offset step, and degrees: the grid's are about 4.5 apart
 ROUNDS = 4  # moves by one step before the next smaller one

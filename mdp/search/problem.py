@@ -15,7 +15,7 @@ from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, standing, threshold
 from mdp.plane import Plane
-from mdp.search.candidates import (
+from mdp.ranking.candidates import (
     Bounds,
     Feasibility,
     Reason,
@@ -27,9 +27,9 @@ from mdp.search.candidates import (
     residual_mm2,
     score_candidates,
 )
-from mdp.search.features import Model
+from mdp.ranking.features import Model
+from mdp.ranking.ranking import CandidateTable
 from mdp.search.node import Cut, Node
-from mdp.search.ranking import CandidateTable
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
 from mdp.sweep.sweep import gains

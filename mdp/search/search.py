@@ -20,17 +20,17 @@ from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
 from mdp.plan_file import MOST_PARTS, PlanFile
+from mdp.ranking.candidates import REASONS
+from mdp.ranking.ranker import RANKERS
+from mdp.ranking.ranking import rank_classic
+from mdp.ranking.record import Trace
 from mdp.search.beam import Beam
 from mdp.search.by_hand import check_colours, check_model, cut_by_hand
-from mdp.search.candidates import REASONS
 from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
 from mdp.search.polish import make_symmetric, polish
 from mdp.search.problem import Problem
-from mdp.search.ranker import RANKERS
-from mdp.search.ranking import rank_classic
-from mdp.search.record import Trace
 from profiles.errors import PlanError
 from profiles.profile import Profile
 

@@ -21,11 +21,11 @@ from machine.view.quantities import minutes
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plan_file import PlanFile, plan_of
+from mdp.ranking.ranker import RANKERS
 from mdp.read import locate, read_mesh
 from mdp.search.front import price_of_second_mm2
 from mdp.search.laying import OtherWay, find_better_way, lay_down
 from mdp.search.orientation import in_words, side_in_words, standing_still
-from mdp.search.ranker import RANKERS
 from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import ProfileError

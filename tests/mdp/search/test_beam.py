@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from mdp.ranking.ranker import RANKERS
+from mdp.ranking.ranking import CandidateTable, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
 from mdp.search.beam import Beam
 from mdp.search.problem import Problem
-from mdp.search.ranker import RANKERS
-from mdp.search.ranking import CandidateTable, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
 from profiles.profile import load
 from tests import shapes
 

@@ -13,7 +13,7 @@ from mdp.mesh import Mesh
 from mdp.overhang import facing_down
 from mdp.plane import Plane
 from mdp.pose import Pose, rotation
-from mdp.search.candidates import directions
+from mdp.ranking.candidates import directions
 from mdp.search.search import Progress, decompose, folded_mm3
 from profiles.errors import DecompositionError
 from profiles.profile import load

@@ -6,7 +6,7 @@ import pytest
 
 from mdp.mesh import Mesh
 from mdp.overhang import facing_down, risky_upright
-from mdp.search.candidates import directions
+from mdp.ranking.candidates import directions
 from mdp.support_need.need import SupportNeed, needs_support
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE
 from profiles.profile import load

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from mdp.mesh import Floats, Mesh
-from mdp.search.candidates import Reason, bounds, check
+from mdp.ranking.candidates import Reason, bounds, check
 from mdp.sweep.sweep import Remainder, sweep
 from profiles.profile import load
 from tests import shapes

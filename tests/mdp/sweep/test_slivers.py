@@ -5,8 +5,8 @@ import pytest
 from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
-from mdp.search.candidates import Reason, bounds, check, score_candidates
-from mdp.search.ranking import CandidateTable
+from mdp.ranking.candidates import Reason, bounds, check, score_candidates
+from mdp.ranking.ranking import CandidateTable
 from mdp.sweep.sweep import Remainder
 from profiles.profile import load
 from tests import shapes

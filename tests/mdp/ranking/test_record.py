@@ -6,8 +6,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mdp.plane import Plane
-from mdp.search.features import Measures, Model
-from mdp.search.record import Child, Offer, Trace, npz
+from mdp.ranking.features import Measures, Model
+from mdp.ranking.record import Child, Offer, Trace, npz
 
 MODEL = Model(risky_mm2=200.0, volume_mm3=1000.0, radius_mm=10.0)
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
-from mdp.search.features import Measures, Model
-from mdp.search.ranking import RankedCandidate
+from mdp.ranking.features import Measures, Model
+from mdp.ranking.ranking import RankedCandidate
 
 
 class Ranker(Protocol):

@@ -16,8 +16,8 @@ import numpy as np
 
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
-from mdp.search.candidates import Bounds, Feasibility, Reason, ScoredCandidates
-from mdp.search.features import Measures
+from mdp.ranking.candidates import Bounds, Feasibility, Reason, ScoredCandidates
+from mdp.ranking.features import Measures
 
 FIRST_THRESHOLD, THRESHOLD_FACTOR, ROUNDS = 1e-4, 5.0, 11  # shares of the risky area; the last one is above 1e3
 RESIDUAL_THRESHOLDS = np.array(list(accumulate(repeat(THRESHOLD_FACTOR, ROUNDS - 1), mul, initial=FIRST_THRESHOLD)))
@@ -122,11 +122,23 @@ class _TradeOffRanking:
     def row_at(self, position: int) -> int | None:
         """The row at a position of the ranking; None when there are not so many."""
         while len(self._feasible) <= position:
-            if self._next == len(self._order) and not self._sort_more():
+            self._skip_infeasible()
+            if self._next < len(self._order):
+                self._append_if_feasible(int(self._order[self._next]))
+                self._next += 1
+            elif not self._sort_more():
                 return None
-            self._append_if_feasible(int(self._order[self._next]))
-            self._next += 1
         return self._feasible[position]
+
+    def _skip_infeasible(self) -> None:
+        """Go on to the next row that is not known to be infeasible; most are, so they are passed over many at a time."""
+        while self._next < len(self._order):
+            reason = self._table.reason[self._order[self._next : self._next + SORTED_FIRST]]
+            possible = np.flatnonzero((reason == FEASIBLE) | (reason == UNKNOWN))
+            if len(possible) > 0:
+                self._next += int(possible[0])
+                return
+            self._next += len(reason)
 
     def _sort_more(self) -> bool:
         """Sort four times as many rows as before; False when all are sorted."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
-from mdp.search.features import COLUMNS, Measures, Model, features
+from mdp.ranking.features import COLUMNS, Measures, Model, features
 
 NO_NODE = -1
 FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file can carry; the clock would change the bytes
