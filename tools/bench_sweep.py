@@ -16,6 +16,7 @@ from mdp.read import locate, read_mesh
 from mdp.sweep.components import View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas
 from mdp.sweep.integrals import (
+    Areas,
     Needs,
     OffsetGrid,
     Overhangs,
@@ -62,7 +63,8 @@ def pieces_of_work(
     facets, columns, rows, topology = remainder.facets, remainder.most_columns(step), remainder.rows, remainder.topology
     heights, counts = _all_heights(rows.points, directions, step)
     cosines = np.ascontiguousarray(directions @ rows.vertex_normals)
-    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.mesh.areas_mm2, facets.risky, angle)
+    areas, lost = facets.mesh.areas_mm2, np.zeros(0, np.bool_)
+    surface = Overhangs(facets.points, facets.corners, facets.normals, areas, facets.risky, angle, lost)
     needs = remainder.needs(directions)
     grids = (directions, heights, counts, step, columns)
     return {
@@ -94,10 +96,11 @@ def _all_heights(points, directions, step):  # type: ignore[no-untyped-def]
 @numba.njit
 def _risks(surface, needs, grids):  # type: ignore[no-untyped-def]
     directions, heights, counts, step, columns = grids
-    up, residual, scratch = np.zeros(columns), np.zeros(columns), np.zeros((2, len(surface.risky) + 1), np.int32)
+    areas = Areas(np.zeros(columns), np.zeros(columns), np.zeros(columns))
+    scratch = np.zeros((2, len(surface.risky) + 1), np.int32)
     for k in range(len(directions)):
         grid = OffsetGrid(directions[k], heights[k], counts[k], step)
-        integrate_risky_area(surface, Needs(needs.sources, needs.classes[k], needs.weight), grid, scratch, up, residual)
+        integrate_risky_area(surface, Needs(needs.sources, needs.classes[k], needs.weight), grid, scratch, areas)
 
 
 @numba.njit

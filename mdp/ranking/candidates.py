@@ -14,7 +14,7 @@ import numpy as np
 from mdp.clearance import least_height_mm
 from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
+from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.plane import Plane
 from mdp.sweep.sweep import Gains, Remainder, gains, sweep
 from mdp.zone import Patches, Zone, spans_mm
@@ -132,13 +132,18 @@ def footprint(mesh: Mesh) -> tuple[Floats, float]:
 @dataclass(frozen=True, eq=False)
 class ScoredCandidates:
     """The candidates of one solid that would make enough safe above the platform, one array row each; whether they can be
-    cut is not known yet. direction is a row of Bounds.directions; evaluated counts all planes looked at."""
+    cut is not known yet. direction is a row of Bounds.directions; seam_mm2: what of the residual is the cut's seam; hopeless_mm2:
+    what of it no cut can save, 0 where that was not asked for; end_mm: offset of the last plane along the direction; evaluated
+    counts all planes looked at."""
 
     remainder: Remainder
     direction: Ints
     offset_mm: Floats
     gain_mm2: Floats
     residual_mm2: Floats
+    seam_mm2: Floats
+    hopeless_mm2: Floats
+    end_mm: Floats
     evaluated: int
 
 
@@ -159,10 +164,11 @@ class Feasibility:
 
 
 def score_candidates(
-    remainder: Remainder, limits: Bounds, step_mm: float, terms: CostTerms, least_gain_mm2: float
+    remainder: Remainder, limits: Bounds, step_mm: float, terms: CostTerms, least_gain_mm2: float, hopeless: Mask | None = None
 ) -> ScoredCandidates:
-    """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe, less its seam."""
-    swept = gains(remainder, limits.directions, step_mm, threshold(terms.angle_deg))
+    """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe, less its seam.
+    hopeless: the faces that no cut can save, see sweep.gains."""
+    swept = gains(remainder, limits.directions, step_mm, threshold(terms.angle_deg), hopeless)
     used = np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None]
     residual = residual_mm2(swept, terms)
     gain = swept.up_mm2 - residual
@@ -172,7 +178,18 @@ def score_candidates(
     for low, high in np.moveaxis(limits.keep_mm, 0, 2):
         scored &= (offset <= low[:, None]) | (offset >= high[:, None])
     direction = np.nonzero(scored)[0].astype(np.int32)
-    return ScoredCandidates(remainder, direction, offset[scored], gain[scored], residual[scored], int(swept.columns.sum()))
+    end: Floats = ((swept.first + swept.columns - 1) * np.float64(step_mm))[direction]
+    return ScoredCandidates(
+        remainder=remainder,
+        direction=direction,
+        offset_mm=offset[scored],
+        gain_mm2=gain[scored],
+        residual_mm2=residual[scored],
+        seam_mm2=(residual - swept.residual_mm2)[scored],
+        hopeless_mm2=swept.hopeless_mm2[scored],
+        end_mm=end,
+        evaluated=int(swept.columns.sum()),
+    )
 
 
 def residual_mm2(swept: Gains, terms: CostTerms) -> Floats:

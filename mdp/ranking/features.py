@@ -1,18 +1,30 @@
-"""Features: the six metrics M1..M6 of a candidate as the 2020 paper defines them, one definition for search and training.
+"""Features: what a ranker knows of a candidate, one definition for search and training.
 
-M1 reduced risky area, M2 the same accumulated over the cuts so far, M3 volume of the part, M4 distance of the plane from the
-platform, M5 distance to fragile regions (what the plane would cut into slivers, thin walls and rods, on either side of it), M6
-accumulated residual risky area. Areas are shares of the model's risky area, the volume a share of the model's, distances shares
-of the radius of its bounding sphere, cut to 0..1.
+M1..M6 are the metrics of the 2020 paper: M1 reduced risky area, M2 the same accumulated over the cuts so far, M3 volume of the
+part, M4 distance of the plane from the platform, M5 distance to fragile regions (what the plane would cut into slivers, thin
+walls and rods, on either side of it), M6 accumulated residual risky area. Areas are shares of the model's risky area, volumes
+of the model's, distances of the radius of its bounding sphere, cut to 0..1. Where seams cost something, M1, M2 and M6 count them.
+
+The others come from the same sweep: wasted, what of the residual another cut could have saved; hopeless, what of it none could,
+and hopeless_left, the same of what remains, a part of every later cost; risky_left, the area at risk that remains; seam; tilt and
+turn, the cosines of the direction with upright and with the cut before; section and contact, areas as shares of the sphere's
+great circle; extent of the part along its direction; volume_left; cuts made before, in tens; round of the classic ranking's
+relaxation; risky, the model's risky area in great circles; scale, the radius in decimetres.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from math import pi
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Ints
 
-COLUMNS = ("M1", "M2", "M3", "M4", "M5", "M6")
+if TYPE_CHECKING:
+    from mdp.ranking.ranking import CandidateTable
+
+TENS, DECIMETRE_MM = 10.0, 100.0
 
 
 @dataclass(frozen=True)
@@ -23,31 +35,91 @@ class Model:
     volume_mm3: float
     radius_mm: float
 
+    @property
+    def circle_mm2(self) -> float:
+        """Area of the bounding sphere's great circle."""
+        return pi * self.radius_mm**2
 
-@dataclass(frozen=True)
-class Measures:
-    """One candidate in numbers: its own gain, residual, volume and distances, and what the cuts before it saved and left."""
 
-    gain_mm2: float
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """What the cuts before have made of a model: what they saved and cost for ever, the area that is risky now and how much of
+    it no cut can save (0: not asked for), the volume that remains, how many they were, and (3,) the last one's direction."""
+
+    model: Model
+    saved_mm2: float
     residual_mm2: float
+    risky_mm2: float
+    hopeless_mm2: float
     volume_mm3: float
-    above_platform_mm: float
-    fragile_mm: float
-    saved_before_mm2: float
-    residual_before_mm2: float
+    cuts: int
+    last: Floats
 
 
-def features(measures: list[Measures], model: Model) -> Floats:
-    """(n, 6) rows M1..M6."""
-    rows = [
-        (
-            one.gain_mm2 / model.risky_mm2,
-            (one.saved_before_mm2 + one.gain_mm2) / model.risky_mm2,
-            one.volume_mm3 / model.volume_mm3,
-            min(max(one.above_platform_mm / model.radius_mm, 0.0), 1.0),
-            min(max(one.fragile_mm / model.radius_mm, 0.0), 1.0),
-            (one.residual_before_mm2 + one.residual_mm2) / model.risky_mm2,
-        )
-        for one in measures
-    ]
-    return np.array(rows, dtype=np.float64).reshape(-1, 6)
+Column = Callable[["CandidateTable", Ints], Floats]
+
+
+def _share(value: Floats) -> Floats:
+    clipped: Floats = np.clip(value, 0.0, 1.0)
+    return clipped
+
+
+def _wasted(table: "CandidateTable", rows: Ints) -> Floats:
+    scored = table.scored
+    return (scored.residual_mm2 - scored.seam_mm2 - scored.hopeless_mm2)[rows] / table.model.risky_mm2
+
+
+def _risky_left(table: "CandidateTable", rows: Ints) -> Floats:
+    saved = table.scored.gain_mm2[rows] + table.scored.residual_mm2[rows]
+    return (table.situation.risky_mm2 - saved) / table.model.risky_mm2
+
+
+def _hopeless_left(table: "CandidateTable", rows: Ints) -> Floats:
+    return (table.situation.hopeless_mm2 - table.scored.hopeless_mm2[rows]) / table.model.risky_mm2
+
+
+def _above_platform(table: "CandidateTable", rows: Ints) -> Floats:
+    return _share(
+        (table.scored.offset_mm[rows] - table.limits.least_offset_mm[table.scored.direction[rows]]) / table.model.radius_mm
+    )
+
+
+def _fragile(table: "CandidateTable", rows: Ints) -> Floats:
+    return _share(np.array([table.fragile_mm(int(row)) for row in rows], dtype=np.float64) / table.model.radius_mm)
+
+
+def _extent(table: "CandidateTable", rows: Ints) -> Floats:
+    return (table.scored.end_mm - table.scored.offset_mm)[rows] / table.model.radius_mm
+
+
+FEATURES: dict[str, Column] = {
+    "M1": lambda table, rows: table.scored.gain_mm2[rows] / table.model.risky_mm2,
+    "M2": lambda table, rows: (table.saved_mm2 + table.scored.gain_mm2[rows]) / table.model.risky_mm2,
+    "M3": lambda table, rows: table.volume_mm3[rows] / table.model.volume_mm3,
+    "M4": _above_platform,
+    "M5": _fragile,
+    "M6": lambda table, rows: (table.residual_mm2 + table.scored.residual_mm2[rows]) / table.model.risky_mm2,
+    "wasted": _wasted,
+    "hopeless": lambda table, rows: table.scored.hopeless_mm2[rows] / table.model.risky_mm2,
+    "hopeless_left": _hopeless_left,
+    "risky_left": _risky_left,
+    "seam": lambda table, rows: table.scored.seam_mm2[rows] / table.model.risky_mm2,
+    "tilt": lambda table, rows: table.normals(rows)[:, 2],
+    "turn": lambda table, rows: table.normals(rows) @ table.situation.last,
+    "section": lambda table, rows: table.section_mm2[rows] / table.model.circle_mm2,
+    "contact": lambda table, rows: table.contact_area_mm2[rows] / table.model.circle_mm2,
+    "extent": _extent,
+    "volume_left": lambda table, rows: (table.situation.volume_mm3 - table.volume_mm3[rows]) / table.model.volume_mm3,
+    "cuts": lambda table, rows: np.full(len(rows), table.situation.cuts / TENS),
+    "round": lambda table, rows: table.rounds(rows) / TENS,
+    "risky": lambda table, rows: np.full(len(rows), table.model.risky_mm2 / table.model.circle_mm2),
+    "scale": lambda table, rows: np.full(len(rows), table.model.radius_mm / DECIMETRE_MM),
+}
+COLUMNS = tuple(FEATURES)
+PAPER_COLUMNS = COLUMNS[:6]
+CHECKED = frozenset({"M3", "M5", "section", "contact", "volume_left"})  # known only of candidates that were checked
+
+
+def features(table: "CandidateTable", rows: Ints, columns: tuple[str, ...] = COLUMNS) -> Floats:
+    """(n, len(columns)) the features of a table's rows, of checked ones where a column is one of CHECKED."""
+    return np.stack([FEATURES[name](table, rows) for name in columns], axis=1)

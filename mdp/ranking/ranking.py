@@ -17,7 +17,7 @@ import numpy as np
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
 from mdp.ranking.candidates import Bounds, Feasibility, Reason, ScoredCandidates
-from mdp.ranking.features import Measures
+from mdp.ranking.features import Model, Situation
 
 FIRST_THRESHOLD, THRESHOLD_FACTOR, ROUNDS = 1e-4, 5.0, 11  # shares of the risky area; the last one is above 1e3
 RESIDUAL_THRESHOLDS = np.array(list(accumulate(repeat(THRESHOLD_FACTOR, ROUNDS - 1), mul, initial=FIRST_THRESHOLD)))
@@ -36,21 +36,33 @@ class CandidateTable:
         self,
         scored: ScoredCandidates,
         limits: Bounds,
-        saved_mm2: float,
-        residual_mm2: float,
+        situation: Situation,
         check: Callable[[Ints, Floats], Feasibility],
         least_gain_mm2: float = 0.0,
         is_weak: Callable[[Plane], bool] = lambda plane: False,
     ) -> None:
         """least_gain_mm2: what gains less is for parts of the preferred volume only; is_weak: whether a plane that can be cut
         leaves too weak a base, asked for only where a row's turn comes."""
-        self.scored, self.limits, self.least_gain_mm2 = scored, limits, least_gain_mm2
-        self.saved_mm2, self.residual_mm2 = saved_mm2, residual_mm2
+        self.scored: ScoredCandidates = scored
+        self.limits: Bounds = limits
+        self.least_gain_mm2 = least_gain_mm2
+        self.situation: Situation = situation
+        self.saved_mm2: float = situation.saved_mm2
+        self.residual_mm2: float = situation.residual_mm2
         self._check, self._is_weak, self._strong = check, is_weak, set[int]()
-        self.reason = np.full(len(scored.gain_mm2), UNKNOWN, np.int32)
-        self.volume_mm3, self._fragile_mm = np.zeros(len(scored.gain_mm2)), np.zeros(len(scored.gain_mm2))
+        count = len(scored.gain_mm2)
+        self.reason = np.full(count, UNKNOWN, np.int32)
+        self.volume_mm3: Floats = np.zeros(count)
+        self.section_mm2: Floats = np.zeros(count)
+        self.contact_area_mm2: Floats = np.zeros(count)
+        self._sliver_mm = np.zeros(count)
         self._rankings: dict[float, _TradeOffRanking] = {}
         self._rounds: list[Ints] = []
+
+    @property
+    def model(self) -> Model:
+        """What the features are measured against."""
+        return self.situation.model
 
     def rows_of_round(self, number: int, risky_mm2: float) -> Ints:
         """The rows that come below the residual threshold in this round first; risky_mm2: what the threshold is a share of."""
@@ -77,7 +89,8 @@ class CandidateTable:
         alike = np.nonzero(np.isin(self.scored.direction, self.scored.direction[fresh]))[0]
         checked = self._check(self.scored.direction[alike], self.scored.offset_mm[alike])
         self.reason[alike], self.volume_mm3[alike] = checked.reason, checked.volume_mm3
-        self._fragile_mm[alike] = checked.fragile_mm
+        self.section_mm2[alike], self.contact_area_mm2[alike] = checked.section_mm2, checked.contact_area_mm2
+        self._sliver_mm[alike] = checked.fragile_mm
 
     def feasible(self, row: int) -> bool:
         """Whether a checked row can be cut, its base strong enough."""
@@ -92,18 +105,19 @@ class CandidateTable:
         """The plane of a row."""
         return Plane(self.limits.directions[self.scored.direction[row]], float(self.scored.offset_mm[row]))
 
-    def measures(self, row: int) -> Measures:
-        """The numbers of a checked row."""
-        scored = self.scored
-        return Measures(
-            gain_mm2=float(scored.gain_mm2[row]),
-            residual_mm2=float(scored.residual_mm2[row]),
-            volume_mm3=float(self.volume_mm3[row]),
-            above_platform_mm=float(scored.offset_mm[row] - self.limits.least_offset_mm[scored.direction[row]]),
-            fragile_mm=min(float(self._fragile_mm[row]), scored.remainder.thin_mm(self.plane(row))),
-            saved_before_mm2=self.saved_mm2,
-            residual_before_mm2=self.residual_mm2,
-        )
+    def normals(self, rows: Ints) -> Floats:
+        """(n, 3) the normals of the rows' planes."""
+        normals: Floats = self.limits.directions[self.scored.direction[rows]]
+        return normals
+
+    def fragile_mm(self, row: int) -> float:
+        """Distance of a checked row's plane to fragile regions."""
+        return min(float(self._sliver_mm[row]), self.scored.remainder.thin_mm(self.plane(row)))
+
+    def rounds(self, rows: Ints) -> Ints:
+        """(n,) the rounds whose residual thresholds let the rows in."""
+        residual = self.scored.residual_mm2[rows] / self.model.risky_mm2
+        return np.searchsorted(RESIDUAL_THRESHOLDS, residual, side="right").astype(np.int32)
 
 
 class _TradeOffRanking:

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
-from mdp.ranking.features import COLUMNS, Measures, Model, features
+from mdp.ranking.features import COLUMNS, Model
 
+VERSION = 2  # of the arrays; 1 had the six metrics of the paper only
 NO_NODE = -1
 FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file can carry; the clock would change the bytes
 
@@ -26,11 +27,12 @@ Arrays = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Offer:
-    """A ranked candidate. parent: signature of the node it would cut; round: the one whose residual threshold let it in."""
+    """A ranked candidate. parent: signature of the node it would cut; features: its COLUMNS; round: the one whose residual
+    threshold let it in."""
 
     parent: Hashable
     plane: Plane
-    measures: Measures
+    features: Floats
     round: int
 
 
@@ -87,8 +89,7 @@ class Trace:
 
         What is added several times in a stage is one row.
         """
-        rows = features([offer.measures for offer in offers], self.model)
-        candidates = [self._candidate(offer, row) for offer, row in zip(offers, rows, strict=True)]
+        candidates = [self._candidate(offer) for offer in offers]
         for child in children:
             candidate = candidates[child.row]
             if candidate.child == NO_NODE:
@@ -113,7 +114,7 @@ class Trace:
         Candidates (n rows): features, parent_features (NaN where the parent is the model), stage (1, 2, ...), round, parent,
         normal, offset_mm, chosen (it made a new node), child (its node or that of its twin; -1: not cut), outcome (the
         child's; NaN: not cut). Nodes (k rows): node_cost and node_outcome (shares), node_stage, node_parent, node_expanded.
-        And columns, model, risky_mm2, volume_mm3, radius_mm.
+        And version, columns, model, risky_mm2, volume_mm3, radius_mm.
         """
         outcomes = self.outcomes()
         rows, nodes = self._candidates, self._nodes
@@ -134,6 +135,7 @@ class Trace:
             "node_stage": _integers(node.stage for node in nodes),
             "node_parent": _integers(node.parent for node in nodes),
             "node_expanded": np.array([node.expanded for node in nodes]),
+            "version": np.array(VERSION),
             "columns": np.array(COLUMNS),
             "model": np.array(self.name),
             "risky_mm2": np.array(self.model.risky_mm2),
@@ -145,11 +147,11 @@ class Trace:
         """The arrays as the content of an .npz file; the same search gives the same bytes."""
         return npz(self.arrays())
 
-    def _candidate(self, offer: Offer, row: Floats) -> _Candidate:
+    def _candidate(self, offer: Offer) -> _Candidate:
         parent = self._number[offer.parent]
         key = (parent, offer.plane.normal.tobytes(), offer.plane.offset_mm)
         if key not in self._known:
-            self._known[key] = _Candidate(self._stage, parent, offer, row)
+            self._known[key] = _Candidate(self._stage, parent, offer, offer.features)
             self._candidates.append(self._known[key])
         return self._known[key]
 

@@ -11,8 +11,11 @@ from dataclasses import dataclass
 from itertools import islice
 from math import isqrt
 
+import numpy as np
+
 from mdp.kernels.threads import ahead
 from mdp.plane import Plane
+from mdp.ranking.features import features
 from mdp.ranking.ranker import Ranker
 from mdp.ranking.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
 from mdp.ranking.record import Child, Offer, Trace
@@ -94,7 +97,8 @@ class Beam:
                 branch.coming.cancel()
 
     def _branch(self, node: Node, slot: int) -> Branch:
-        return Branch(node, ahead(self.problem.table, node, TRADE_OFFS[slot % len(TRADE_OFFS)] is None))
+        classic = TRADE_OFFS[slot % len(TRADE_OFFS)] is None
+        return Branch(node, ahead(self.problem.table, node, classic, self.trace is not None))
 
     def finalists(self) -> list[Node]:
         """The nodes to polish: of the second slot and of every slot with a square number the best one that it or a lower one
@@ -129,7 +133,7 @@ class Beam:
         if trade_off is not None:
             return rank_by_trade_off(tables, trade_off, bound_mm2)
         classic = rank_classic(tables, self.problem.model.risky_mm2, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
-        return self.ranker.rank(classic, lambda each: tables[each.table].measures(each.row), self.problem.model)
+        return self.ranker.rank(classic, tables)
 
     def _child(self, branch: Branch, candidate: RankedCandidate) -> Node | None:
         key, row = (candidate.table, candidate.row), candidate.row
@@ -161,4 +165,5 @@ class Beam:
 
 def _offer(branch: Branch, candidate: RankedCandidate) -> Offer:
     row = candidate.row
-    return Offer(branch.node.signature, branch.table.plane(row), branch.table.measures(row), candidate.round)
+    described = features(branch.table, np.array([row]))[0]
+    return Offer(branch.node.signature, branch.table.plane(row), described, candidate.round)

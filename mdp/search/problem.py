@@ -13,7 +13,7 @@ from mdp.cost.model_need import ModelNeed
 from mdp.cost.model_surface import ModelSurface
 from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
-from mdp.overhang import BASE_TOLERANCE_MM, standing, threshold
+from mdp.overhang import BASE_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
 from mdp.ranking.candidates import (
     Bounds,
@@ -27,11 +27,12 @@ from mdp.ranking.candidates import (
     residual_mm2,
     score_candidates,
 )
-from mdp.ranking.features import Model
+from mdp.ranking.features import Model, Situation
 from mdp.ranking.ranking import CandidateTable
 from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
+from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.sweep import gains
 from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
@@ -103,18 +104,39 @@ class Problem:
         """Whether a node has as many parts as are allowed."""
         return len(node.cuts) >= self.settings.most_parts - 1
 
-    def table(self, node: Node, large: bool = False) -> CandidateTable:
-        """The scored candidates of a node; large: also those that gain enough only for a part of the preferred volume."""
+    def table(self, node: Node, large: bool = False, described: bool = False) -> CandidateTable:
+        """The scored candidates of a node; large: also those that gain enough only for a part of the preferred volume; described:
+        with what no cut can save, for features."""
         least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
-        scored = score_candidates(node.remainder, self.limits, self.settings.offset_step_mm, self.terms, least_mm2)
+        hopeless = self._hopeless(node) if described else None
+        remainder, step_mm = node.remainder, self.settings.offset_step_mm
+        scored = score_candidates(remainder, self.limits, step_mm, self.terms, least_mm2, hopeless)
         self._evaluated.append(scored.evaluated)
 
         def check_planes(direction: Ints, offset_mm: Floats) -> Feasibility:
-            return check(node.remainder, self.limits, self.settings, direction, offset_mm)
+            return check(remainder, self.limits, self.settings, direction, offset_mm)
 
-        saved_mm2 = self.model.risky_mm2 - node.cost_mm2
+        hopeless_mm2 = 0.0 if hopeless is None else float(remainder.facets.mesh.areas_mm2[hopeless].sum())
         enough_mm2, is_weak = self.least_gain_mm2, partial(self.is_weak, node)
-        return CandidateTable(scored, self.limits, saved_mm2, node.residual_mm2, check_planes, enough_mm2, is_weak)
+        situation = self._situation(node, hopeless_mm2)
+        return CandidateTable(scored, self.limits, situation, check_planes, enough_mm2, is_weak)
+
+    def _hopeless(self, node: Node) -> Mask:
+        """(m,) the faces of what remains that no cut can save, in the order of its facets."""
+        least_mm = np.where(np.isfinite(self.limits.least_height_mm), self.limits.least_offset_mm, np.inf)
+        return hopeless_faces(node.remainder.facets, Savers(self.limits.directions, least_mm, threshold(self.terms.angle_deg)))
+
+    def _situation(self, node: Node, hopeless_mm2: float) -> Situation:
+        return Situation(
+            model=self.model,
+            saved_mm2=self.model.risky_mm2 - node.cost_mm2,
+            residual_mm2=node.residual_mm2,
+            risky_mm2=node.risky_mm2,
+            hopeless_mm2=hopeless_mm2,
+            volume_mm3=float(node.solid.volume()),
+            cuts=len(node.cuts),
+            last=node.cuts[-1].base.normal if node.cuts else UP,
+        )
 
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""

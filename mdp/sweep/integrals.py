@@ -19,7 +19,7 @@ from mdp.sweep.facets import Indices, Rows
 BLOCK = 128
 AHEAD = 3  # columns of a face that are worked out for the whole block; the few faces that cross more are finished singly
 THIRD = 1.0 / 3.0
-KINDS = 6  # of faces, see _select; the first is none
+KINDS = 8  # of faces, see _select; the first is none
 
 
 class OffsetGrid(NamedTuple):
@@ -34,7 +34,8 @@ class OffsetGrid(NamedTuple):
 
 class Overhangs(NamedTuple):
     """What the risky areas need of a surface: points (3, n), corners (3, m), unit normals (3, m), areas (m,), faces risky upright
-    (m,), and the cosine of normal and direction below which a face is risky along that direction."""
+    (m,), the cosine of normal and direction below which a face is risky along that direction, and the faces that no cut can save
+    (m,), (0,): not asked for."""
 
     points: Floats
     corners: Indices
@@ -42,6 +43,15 @@ class Overhangs(NamedTuple):
     areas_mm2: Floats
     risky: Mask
     risky_below: float
+    hopeless: Mask
+
+
+class Areas(NamedTuple):
+    """Where the areas above each offset of one direction go, (n,) each, see sweep.Gains."""
+
+    up: Floats
+    residual: Floats
+    hopeless: Floats
 
 
 class Needs(NamedTuple):
@@ -213,8 +223,9 @@ def integrate_volume(rows: Rows, grid: OffsetGrid, section: Floats, volume: Floa
 @part
 def _select(surface: Overhangs, needs: Needs, d: Floats, chosen: Ints, kind: Ints) -> int:
     """The faces that need support either way, with 1: upright only, 2: along d only, 3: both, 4 and 5: as 2 and 3, and along d
-    they are unsupportable; returns how many."""
-    normals, risky, risky_below = surface.normals, surface.risky, surface.risky_below
+    they are unsupportable, 6 and 7: as 3 and 5, and no cut can save them; returns how many."""
+    normals, risky, risky_below, hopeless = surface.normals, surface.risky, surface.risky_below, surface.hopeless
+    told = len(hopeless) > 0
     cosines = floats(BLOCK, 0.0)
     many = 0
     for begin in range(0, normals.shape[1], BLOCK):
@@ -222,6 +233,8 @@ def _select(surface: Overhangs, needs: Needs, d: Floats, chosen: Ints, kind: Int
         dot(normals[0, begin:end], normals[1, begin:end], normals[2, begin:end], d, cosines[: end - begin])
         for f in range(begin, end):
             code = int(risky[f]) + 2 * (_class(needs, f) if cosines[f - begin] < risky_below else 0)
+            if told and hopeless[f]:
+                code = 6 if code == 3 else 7 if code == 5 else code
             chosen[many], kind[many] = f, code
             many += int(code > 0)
     return many
@@ -271,7 +284,7 @@ def _add_areas(kind: Ints, block: Block, shares: Floats, integrals: Floats) -> N
 
 
 @part
-def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scratch: Ints, up: Floats, residual: Floats) -> None:
+def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scratch: Ints, out: Areas) -> None:
     """Risky areas above each offset: printed straight up, and along the direction, there weighted by what the faces need.
 
     scratch: (2, m + 1) whole numbers to work in.
@@ -296,11 +309,13 @@ def integrate_risky_area(surface: Overhangs, needs: Needs, grid: OffsetGrid, scr
     for column in range(n - 1, -1, -1):
         for which in range(1, KINDS):
             whole[which] += integrals[column + 1, 2 * which]
-        both = integrals[column, 7] + whole[3]
-        airy_both = integrals[column, 11] + whole[5]
-        up[column] = integrals[column, 3] + whole[1] + both + airy_both
+        lost, airy_lost = integrals[column, 13] + whole[6], integrals[column, 15] + whole[7]
+        both = integrals[column, 7] + whole[3] + lost
+        airy_both = integrals[column, 11] + whole[5] + airy_lost
+        out.up[column] = integrals[column, 3] + whole[1] + both + airy_both
         airy = integrals[column, 9] + whole[4] + airy_both
-        residual[column] = integrals[column, 5] + whole[2] + both + needs.weight * airy
+        out.residual[column] = integrals[column, 5] + whole[2] + both + needs.weight * airy
+        out.hopeless[column] = lost + airy_lost
 
 
 @part

@@ -27,6 +27,7 @@ from mdp.sweep.components import UNKNOWN, Topology, View, count_pieces, find_cri
 from mdp.sweep.contact_area import find_contact_areas
 from mdp.sweep.facets import Facets, Rows, lay_out
 from mdp.sweep.integrals import (
+    Areas,
     Needs,
     OffsetGrid,
     Overhangs,
@@ -46,7 +47,7 @@ class Gains(NamedTuple):
 
     up_mm2: risky area above the plane when printing straight up; residual_mm2: risky area above it when printing along the
     direction, weighted by what support each face needs; rim_mm: weighted length of the rim that a cut leaves, 0 where the
-    remainder counts no seams.
+    remainder counts no seams; hopeless_mm2: risky area above it that no cut can save, 0 where that was not asked for.
     """
 
     first: Ints
@@ -54,6 +55,7 @@ class Gains(NamedTuple):
     up_mm2: Floats
     residual_mm2: Floats
     rim_mm: Floats
+    hopeless_mm2: Floats
 
 
 class Sweep(NamedTuple):
@@ -159,12 +161,14 @@ class Sampling(NamedTuple):
     crumb: float
 
 
-def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below: float) -> Gains:
-    """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle."""
-    facets = remainder.facets
-    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.mesh.areas_mm2, facets.risky, risky_below)
+def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below: float, hopeless: Mask | None = None) -> Gains:
+    """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle; hopeless: (m,)
+    the faces, as remainder.facets orders them, that no cut can save."""
+    facets, lost = remainder.facets, np.zeros(0, np.bool_) if hopeless is None else hopeless
+    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.mesh.areas_mm2, facets.risky, risky_below, lost)
     shape = (len(directions), remainder.most_columns(step_mm))
-    swept = Gains(np.zeros(shape[0], np.int32), np.zeros(shape[0], np.int32), np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    columns = np.zeros((2, shape[0]), np.int32)
+    swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(4)))
     rims = Rims(facets.corners, facets.normals, facets.mesh.areas_mm2, facets.seam_weights, remainder.feather)
     in_threads(
         _gains, shape[0], Scars(surface, remainder.needs(directions), rims), np.ascontiguousarray(directions), step_mm, swept
@@ -214,7 +218,8 @@ def _gains(begin_row: int, end_row: int, scars: Scars, directions: Floats, step_
         if n > 0:
             grid = OffsetGrid(d, heights, n, step_mm)
             needs = Needs(table.sources, table.classes[row], table.weight)
-            integrate_risky_area(surface, needs, grid, scratch, out.up_mm2[row], out.residual_mm2[row])
+            areas = Areas(out.up_mm2[row], out.residual_mm2[row], out.hopeless_mm2[row])
+            integrate_risky_area(surface, needs, grid, scratch, areas)
             if len(rims.weights) > 0:
                 integrate_rim(rims, grid, out.rim_mm[row])
 

@@ -14,6 +14,7 @@ from mdp.overhang import facing_down
 from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.ranking.candidates import directions
+from mdp.ranking.features import COLUMNS
 from mdp.search.search import Progress, decompose, folded_mm3
 from profiles.errors import DecompositionError
 from profiles.profile import load
@@ -125,7 +126,7 @@ def test_a_record_holds_the_search_and_changes_nothing() -> None:
     record = np.load(io.BytesIO(records[0]))
     assert decomposition.residual_area_mm2 == decompose(shapes.tee(), "tee", profile).residual_area_mm2
     assert record["node_outcome"][0] * decomposition.risky_area_mm2 == pytest.approx(decomposition.cost_mm2, abs=1e-6)
-    assert record["features"].shape[1] == 6
+    assert record["features"].shape[1] == len(COLUMNS)
     assert record["chosen"].sum() == len(record["node_cost"]) - 1
     assert (record["features"][:, 1] + record["features"][:, 5] <= 1 + 1e-9).all()
 

@@ -6,6 +6,7 @@ from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.ranking.candidates import Reason, bounds, check, score_candidates
+from mdp.ranking.features import Model, Situation
 from mdp.ranking.ranking import CandidateTable
 from mdp.sweep.sweep import Remainder
 from profiles.profile import load
@@ -56,7 +57,7 @@ def test_only_a_sliver_forbids_a_plane_and_m5_is_less_near_a_fin_than_far_from_i
     rows = [int(np.flatnonzero(table.scored.offset_mm == offset_mm)[0]) for offset_mm in (5.0, 9.0, 18.0, 24.0)]
     table.check_rows(np.array(rows))
     assert table.reason[rows].tolist() == [Reason.FEASIBLE, Reason.FEASIBLE, Reason.FEASIBLE, Reason.FRAGILE]
-    assert [table.measures(row).fragile_mm for row in rows] == pytest.approx([5.0, 1.0, 0.0, 0.0], abs=0.11)
+    assert [table.fragile_mm(row) for row in rows] == pytest.approx([5.0, 1.0, 0.0, 0.0], abs=0.11)
 
 
 def test_no_plane_lies_in_an_overhanging_face_even_where_slivers_are_allowed() -> None:
@@ -72,4 +73,5 @@ def _table(mesh: Mesh, fragile_mm: float = 1.0) -> CandidateTable:
     profile = load(settings=[f"search.{word}" for word in words])
     limits = bounds(mesh, profile.machine, profile.search, UP[None])
     scored = score_candidates(_remainder(mesh), limits, profile.search.offset_step_mm, CostTerms(45.0, False), -np.inf)
-    return CandidateTable(scored, limits, 0.0, 0.0, lambda *planes: check(scored.remainder, limits, profile.search, *planes))
+    situation = Situation(Model(1.0, mesh.volume_mm3, 1.0), 0.0, 0.0, 1.0, 0.0, mesh.volume_mm3, 0, UP)
+    return CandidateTable(scored, limits, situation, lambda *planes: check(scored.remainder, limits, profile.search, *planes))
