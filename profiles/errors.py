@@ -5,6 +5,7 @@ UserError                         message (one sentence: thing, value, what is a
   MeshError                       mdp: unreadable, empty, open, flat: says what and where
   DecompositionError              mdp: an invariant of the decomposition cannot be met
   PlanError                       mdp: a plan file, or planes that cannot be cut: which one and why
+  LearningError                   mdp/learning: records, a checkpoint or a ranker that cannot be learnt from or judged
   SliceError                      slicer: a setting that cannot be sliced with
   MoveError                       machine: out of limits, unreachable, collision: part, axis, value, allowed
   GcodeError                      machine: a G-code text that cannot be read, with the line
@@ -39,6 +40,10 @@ class DecompositionError(UserError):
 
 class PlanError(UserError):
     """A plan file that cannot be used; the message names the key or the plane, and why."""
+
+
+class LearningError(UserError):
+    """Records or a training that no ranker can be learnt from; the message names the file, and the model at fault."""
 
 
 class SliceError(UserError):

@@ -1,0 +1,118 @@
+"""Training lists: the candidates that competed in one stage of a recorded search, and what became of each.
+
+Record files are what `mdp.ranking.record` writes, or anything with the same `version`, `model`, `columns`, `features`, `stage`
+and `outcome`; `child` and `node_expanded`, where they are there, tell the candidates whose outcome nobody has followed.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.learning.sources import Side, model_id, read_sources, side
+from mdp.mesh import Floats
+from mdp.ranking.features import COLUMNS
+from mdp.ranking.record import Arrays
+from profiles.errors import LearningError
+
+VERSION = 2
+NEEDED = ("model", "columns", "features", "stage", "outcome")
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingList:
+    """The n candidates of one stage, in the classic order.
+
+    features: (n, F), the columns named in `columns`; outcome: (n,) the least final cost through the candidate as share of the
+    model's risky area, NaN where it was never cut; censored: (n,) the outcome is its own cost, for nobody went on from there.
+    """
+
+    features: Floats
+    columns: tuple[str, ...]
+    outcome: Floats
+    censored: Mask
+    model: str
+    source: str
+    stage: int
+
+    def table(self, columns: Sequence[str]) -> Floats:
+        """(n, k) the named features."""
+        return self.features[:, [self.columns.index(name) for name in columns]]
+
+
+def read_lists(folder: Path, manifest: Path | None = None, columns: Sequence[str] = COLUMNS) -> list[TrainingList]:
+    """The lists of all record files of a folder, by file name and stage; a model's source is that of the manifest, else itself.
+
+    Raises LearningError for a folder without records, and for a record of another version, without one of the columns, of a
+    model that the manifest does not know, or with a feature that is no finite number.
+    """
+    files = sorted(folder.glob("*.npz"))
+    if not files:
+        raise LearningError(f"folder {folder}: holds no record (*.npz); `decompose --record` writes them")
+    sources = None if manifest is None else read_sources(manifest)
+    lists: list[TrainingList] = []
+    for file in files:
+        source = model_id(file) if sources is None else sources.get(model_id(file))
+        if source is None:
+            raise LearningError(f"record {file}: its model {model_id(file)} is not in {manifest}")
+        lists += _lists(read_record(file, columns), model_id(file), source)
+    return lists
+
+
+def read_record(file: Path, columns: Sequence[str] = COLUMNS) -> Arrays:
+    """The arrays of a record file that can be learnt from; LearningError as for `read_lists`."""
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            arrays: Arrays = dict(archive)
+    except (OSError, ValueError, BadZipFile, EOFError) as error:
+        raise LearningError(f"record {file}: cannot be read ({error})") from None
+    version = int(arrays["version"]) if "version" in arrays else 1
+    if version != VERSION:
+        raise LearningError(f"record {file}: is of version {version}, only {VERSION} is understood; record the search again")
+    _check(file, arrays, columns)
+    return arrays
+
+
+def _check(file: Path, arrays: Arrays, columns: Sequence[str]) -> None:
+    missing = [name for name in NEEDED if name not in arrays]
+    if missing:
+        raise LearningError(f"record {file}: holds no {', '.join(missing)}")
+    absent = [name for name in columns if name not in arrays["columns"]]
+    if absent:
+        raise LearningError(f"record {file}: has no feature {', '.join(absent)}; it has {', '.join(arrays['columns'])}")
+    rows = len(arrays["stage"])
+    if arrays["features"].shape != (rows, len(arrays["columns"])) or arrays["outcome"].shape != (rows,):
+        raise LearningError(f"record {file}: its features, stages and outcomes are not of the same candidates")
+    unusable = ~np.isfinite(arrays["features"])
+    if unusable.any():
+        row, column = np.argwhere(unusable)[0]
+        name, value = arrays["columns"][column], arrays["features"][row, column]
+        raise LearningError(f"record {file}: feature {name} of a candidate of model {arrays['model']} is {value}")
+
+
+def _lists(record: Arrays, model: str, source: str) -> Iterator[TrainingList]:
+    columns = tuple(str(name) for name in record["columns"])
+    censored = _censored(record)
+    for stage in np.unique(record["stage"]):
+        rows = record["stage"] == stage
+        features = record["features"][rows].astype(np.float64)
+        yield TrainingList(features, columns, record["outcome"][rows], censored[rows], model, source, int(stage))
+
+
+def _censored(record: Arrays) -> Mask:
+    if "node_expanded" not in record or "child" not in record:
+        return np.zeros(len(record["stage"]), np.bool_)
+    cut = record["child"] >= 0
+    censored: Mask = cut.copy()
+    censored[cut] = ~record["node_expanded"][record["child"][cut]]
+    return censored
+
+
+def of_side(lists: Sequence[TrainingList], wanted: Side) -> list[TrainingList]:
+    """The lists whose source is on one side of the split."""
+    return [one for one in lists if side(one.source) is wanted]

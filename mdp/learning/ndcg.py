@@ -1,0 +1,67 @@
+"""NDCG as the 2020 paper's table has it, and how often the best of a list is among the first few.
+
+NDCG@k = DCG@k / ideal DCG@k, DCG@k = sum over the first k of (2^rating - 1) / log2(place + 1), the ideal list cut at the same
+k, the mean over lists, 0 for a list without a rating above 0. Candidates with equal scores stay in the order they come.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from mdp.learning.labels import RatedList
+from mdp.mesh import Floats, Ints
+
+FULL = 50  # candidates of a full list: the beam width that the lists are collected with
+TIE = 1e-9  # outcomes (shares) that differ less are the same
+RESAMPLES = 2000
+
+Scores = Callable[[RatedList], Floats]
+Measure = Callable[[Floats, RatedList], float]
+
+
+def order(scores: Floats) -> Ints:
+    """(n,) candidates by falling score."""
+    return np.argsort(-scores, kind="stable").astype(np.int32)
+
+
+def ndcg(scores: Floats, ratings: Ints, cut: int) -> float:
+    """NDCG at a place of one list."""
+    ideal = _dcg(np.sort(ratings)[::-1], cut)
+    return _dcg(ratings[order(scores)], cut) / ideal if ideal > 0.0 else 0.0
+
+
+def _dcg(ratings: Ints, cut: int) -> float:
+    first = ratings[:cut]
+    gains = np.exp2(first) - 1.0
+    return float((gains / np.log2(np.arange(len(first)) + 2.0)).sum())
+
+
+def at(cut: int) -> Measure:
+    """NDCG at a place as a measure."""
+    return lambda scores, one: ndcg(scores, one.ratings, cut)
+
+
+def best_within(first: int) -> Measure:
+    """1 where a candidate with the least outcome of the list is among the first few, else 0."""
+    return lambda scores, one: float(regret(first)(scores, one) <= TIE)
+
+
+def regret(first: int) -> Measure:
+    """How much more than the best of the list the best of the first few ends with, share of the model's risky area."""
+    return lambda scores, one: float(one.outcome[order(scores)[:first]].min() - one.outcome.min())
+
+
+def full_lists(lists: Sequence[RatedList]) -> list[RatedList]:
+    """The lists that the beam filled."""
+    return [one for one in lists if len(one.ratings) >= FULL]
+
+
+def interval(values: Floats, models: Sequence[str]) -> tuple[float, float]:
+    """95 % interval of the mean of the lists' values, the models resampled: the lists of one model stand or fall together."""
+    names, inverse = np.unique(np.asarray(models), return_inverse=True)
+    sums = np.bincount(inverse, weights=values, minlength=len(names))
+    counts = np.bincount(inverse, minlength=len(names))
+    drawn = np.random.default_rng(0).integers(0, len(names), (RESAMPLES, len(names)))
+    means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
+    low, high = np.quantile(means, [0.025, 0.975])
+    return float(low), float(high)

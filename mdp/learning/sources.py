@@ -1,0 +1,52 @@
+"""Sources: where a model comes from, and whether it trains a ranker, stops the training, or judges the result.
+
+Models of one repository and folder are often variants of one thing, so a source is never on two sides. The side is a hash of the
+source's name: it depends on no other model, so a set that grows moves none.
+"""
+
+import csv
+from enum import StrEnum
+from hashlib import sha256
+from pathlib import Path
+
+from profiles.errors import LearningError
+
+NEEDED = ("id", "source_repo", "source_path")
+TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # of the sources, as in the 2020 paper; the rest judges
+
+
+class Side(StrEnum):
+    """What the lists of a source are for."""
+
+    TRAIN = "train"
+    VALIDATION = "validation"
+    TEST = "test"
+
+
+def side(source: str) -> Side:
+    """The side of a source."""
+    share = int.from_bytes(sha256(source.encode()).digest()[:8], "big") / 2**64
+    if share < TRAIN_SHARE:
+        return Side.TRAIN
+    return Side.VALIDATION if share < TRAIN_SHARE + VALIDATION_SHARE else Side.TEST
+
+
+def model_id(file: Path) -> str:
+    """The model of a record file, which is named MODEL.ORIENTATION.TERMS.npz."""
+    return file.name.split(".")[0]
+
+
+def read_sources(manifest: Path) -> dict[str, str]:
+    """Model -> its repository and folder, of a table with the columns id, source_repo and source_path.
+
+    Raises LearningError for a file that is no such table.
+    """
+    try:
+        with manifest.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise LearningError(f"manifest {manifest}: cannot be read ({error})") from None
+    missing = [name for name in NEEDED if not rows or not rows[0].get(name)]
+    if missing:
+        raise LearningError(f"manifest {manifest}: has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
+    return {row["id"]: f"{row['source_repo']}/{row['source_path'].rpartition('/')[0]}" for row in rows}

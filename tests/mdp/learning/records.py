@@ -1,0 +1,39 @@
+"""Records and lists made by hand."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mdp.learning.labels import RatedList, ratings
+from mdp.learning.ndcg import Scores
+from mdp.mesh import Floats
+from mdp.ranking.features import COLUMNS
+from mdp.ranking.record import npz
+
+
+def write_record(file: Path, outcome: Floats, stage: Floats | None = None, **others: Any) -> None:
+    """A record of n candidates with features drawn from the file's name; others: arrays in the place of its own."""
+    rng = np.random.default_rng(list(file.name.encode()))
+    arrays = {
+        "version": np.array(2),
+        "model": np.array(file.stem),
+        "columns": np.array(COLUMNS),
+        "features": rng.random((len(outcome), len(COLUMNS))),
+        "stage": np.ones(len(outcome), np.int32) if stage is None else stage,
+        "outcome": outcome,
+    }
+    file.write_bytes(npz(arrays | others))
+
+
+def drawn_list(seed: int, size: int) -> RatedList:
+    """A list whose candidates end the better the larger their M2 and the smaller their M6, with a little noise."""
+    rng = np.random.default_rng(seed)
+    features = rng.random((size, len(COLUMNS))).astype(np.float32)
+    outcome = 1.0 - features[:, 1].astype(np.float64) + 0.5 * features[:, 5] + 0.05 * rng.random(size)
+    return RatedList(features, outcome, ratings(outcome), f"m{seed % 7}")
+
+
+def by_column(name: str) -> Scores:
+    """Scores that are a feature."""
+    return lambda one: one.features[:, COLUMNS.index(name)].astype(np.float64)

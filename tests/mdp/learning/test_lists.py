@@ -1,0 +1,94 @@
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdp.learning.lists import of_side, read_lists
+from mdp.learning.sources import Side, side
+from mdp.ranking.features import COLUMNS
+from profiles.errors import LearningError
+from tests.mdp.learning.records import write_record
+
+OUTCOME = np.array([0.5, np.nan, 0.3, 0.2])
+
+
+def test_every_stage_of_a_record_is_a_list(tmp_path: Path) -> None:
+    write_record(tmp_path / "kitten.0.paper.npz", OUTCOME, np.array([1, 1, 1, 2], np.int32))
+    first, second = read_lists(tmp_path)
+    assert (first.model, first.stage, second.stage) == ("kitten", 1, 2)
+    assert np.array_equal(first.outcome, [0.5, np.nan, 0.3], equal_nan=True)
+    assert second.features.shape == (1, 6)
+
+
+def test_features_are_found_by_name_wherever_they_stand(tmp_path: Path) -> None:
+    names = ("rim", *reversed(COLUMNS))
+    write_record(tmp_path / "a.0.x.npz", OUTCOME, features=np.tile(np.arange(7.0), (4, 1)), columns=np.array(names))
+    assert read_lists(tmp_path)[0].table(("M1", "M6", "rim"))[0].tolist() == [6, 1, 0]
+
+
+def test_a_candidate_whose_node_nobody_expanded_is_censored(tmp_path: Path) -> None:
+    child, expanded = np.array([1, -1, 2, 3]), np.array([True, True, False, True])
+    write_record(tmp_path / "a.0.x.npz", OUTCOME, child=child, node_expanded=expanded)
+    write_record(tmp_path / "b.0.x.npz", OUTCOME)
+    followed, whole = read_lists(tmp_path)
+    assert followed.censored.tolist() == [False, False, True, False]
+    assert not whole.censored.any()
+
+
+def test_models_of_one_repository_and_folder_are_of_one_source(tmp_path: Path) -> None:
+    for name in ("a.0.x.npz", "a.1.x.npz", "b.0.x.npz", "c.0.x.npz"):
+        write_record(tmp_path / name, OUTCOME)
+    manifest = tmp_path / "manifest.csv"
+    manifest.write_text("id,source_repo,source_path\na,me/things,cat/a.stl\nb,me/things,cat/b.stl\nc,me/things,dog/c.stl\n")
+    assert [one.source for one in read_lists(tmp_path, manifest)] == ["me/things/cat"] * 3 + ["me/things/dog"]
+    assert [one.source for one in read_lists(tmp_path)] == ["a", "a", "b", "c"]
+
+
+def test_sources_are_split_as_in_the_paper_and_always_alike() -> None:
+    sides = [side(f"source {number}") for number in range(2000)]
+    assert [sides.count(each) / 2000 for each in Side] == pytest.approx([0.60, 0.15, 0.25], abs=0.02)
+    assert [side(name) for name in ("a", "b", "c")] == [Side.TEST, Side.TRAIN, Side.TRAIN]
+
+
+def test_a_list_is_on_the_side_of_its_source(tmp_path: Path) -> None:
+    for number in range(30):
+        write_record(tmp_path / f"m{number}.0.x.npz", OUTCOME)
+    lists = read_lists(tmp_path)
+    parts = [of_side(lists, each) for each in Side]
+    assert sum(len(part) for part in parts) == 30
+    assert all(side(one.source) is each for each, part in zip(Side, parts, strict=True) for one in part)
+
+
+@pytest.mark.parametrize(
+    ("others", "sentence"),
+    [
+        ({"version": np.array(1)}, "is of version 1, only 2 is understood"),
+        ({"columns": np.array(["M1", "M2", "M3", "M4", "M5", "x"])}, "has no feature M6; it has M1, M2, M3, M4, M5, x"),
+        ({"features": np.full((4, 6), np.inf)}, "feature M1 of a candidate of model kitten.0.x is inf"),
+        ({"features": np.zeros((3, 6))}, "its features, stages and outcomes are not of the same candidates"),
+    ],
+)
+def test_a_record_that_cannot_be_learnt_from_is_refused(tmp_path: Path, others: dict[str, object], sentence: str) -> None:
+    write_record(tmp_path / "kitten.0.x.npz", **({"outcome": OUTCOME} | others))
+    with pytest.raises(LearningError, match=re.escape(sentence)):
+        read_lists(tmp_path)
+
+
+def test_what_is_no_record_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LearningError, match="holds no record"):
+        read_lists(tmp_path)
+    (tmp_path / "a.npz").write_bytes(b"PK torn")
+    with pytest.raises(LearningError, match=r"record .*a\.npz: cannot be read"):
+        read_lists(tmp_path)
+
+
+def test_a_model_that_the_manifest_does_not_know_and_a_manifest_without_sources_are_refused(tmp_path: Path) -> None:
+    write_record(tmp_path / "a.0.x.npz", OUTCOME)
+    manifest = tmp_path / "manifest.csv"
+    manifest.write_text("id,source_repo,source_path\nb,me/things,b.stl\n")
+    with pytest.raises(LearningError, match="its model a is not in"):
+        read_lists(tmp_path, manifest)
+    manifest.write_text("id,faces\na,12\n")
+    with pytest.raises(LearningError, match="has no column source_repo, source_path"):
+        read_lists(tmp_path, manifest)
