@@ -34,7 +34,11 @@ CONFINED = {
     "PIL": ("machine/app/pictures/",),
     "tomlkit": ("machine/calibration/", "mdp/plan_file.py"),
     "platformdirs": ("machine/app/state_folder.py", "mdp/kernels/cache.py", "profiles/places.py"),
-    "torch": (),
+    "torch": ("mdp/learning/",),
+    "lightgbm": ("mdp/learning/",),
+    "xgboost": ("mdp/learning/",),
+    "onnx": ("mdp/learning/",),
+    "matplotlib": ("mdp/learning/",),
     "tests": (),
     "tools": (),
 }
@@ -51,6 +55,10 @@ HEAVY = {
     "serial",
     "onnxruntime",
     "torch",
+    "lightgbm",
+    "xgboost",
+    "onnx",
+    "matplotlib",
 }
 
 

@@ -21,9 +21,10 @@ Singles = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class RatedList:
-    """The n candidates of a list that were cut: features (n, F) unscaled, outcomes and ratings (n,)."""
+    """The n candidates of a list that were cut: features (n, F) unscaled, named in `columns`, outcomes and ratings (n,)."""
 
     features: Singles
+    columns: tuple[str, ...]
     outcome: Floats
     ratings: Ints
     model: str
@@ -32,6 +33,10 @@ class RatedList:
     def teaches(self) -> bool:
         """False for a list that has but one rating, as a list of one candidate: nothing can be learnt from its order."""
         return len(np.unique(self.ratings)) > 1
+
+    def table(self, columns: Sequence[str]) -> Singles:
+        """(n, k) the named features."""
+        return self.features[:, [self.columns.index(name) for name in columns]]
 
 
 def ratings(outcome: Floats) -> Ints:
@@ -50,7 +55,7 @@ def rate(lists: Sequence[TrainingList], columns: Sequence[str]) -> list[RatedLis
         if cut.any():
             outcome = one.outcome[cut]
             features = one.table(columns)[cut].astype(np.float32)
-            rated.append(RatedList(features, outcome, ratings(outcome), one.model))
+            rated.append(RatedList(features, tuple(columns), outcome, ratings(outcome), one.model))
     return rated
 
 

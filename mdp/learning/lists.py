@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from mdp.learning.sources import Side, model_id, read_sources, side
 from mdp.mesh import Floats
-from mdp.ranking.features import COLUMNS
-from mdp.ranking.record import Arrays
+from mdp.ranking.features import PAPER_COLUMNS
+from mdp.ranking.record import VERSION, Arrays
 from profiles.errors import LearningError
 
-VERSION = 2
 NEEDED = ("model", "columns", "features", "stage", "outcome")
 
 Mask = NDArray[np.bool_]
@@ -45,7 +44,7 @@ class TrainingList:
         return self.features[:, [self.columns.index(name) for name in columns]]
 
 
-def read_lists(folder: Path, manifest: Path | None = None, columns: Sequence[str] = COLUMNS) -> list[TrainingList]:
+def read_lists(folder: Path, manifest: Path | None = None, columns: Sequence[str] = PAPER_COLUMNS) -> list[TrainingList]:
     """The lists of all record files of a folder, by file name and stage; a model's source is that of the manifest, else itself.
 
     Raises LearningError for a folder without records, and for a record of another version, without one of the columns, of a
@@ -64,7 +63,7 @@ def read_lists(folder: Path, manifest: Path | None = None, columns: Sequence[str
     return lists
 
 
-def read_record(file: Path, columns: Sequence[str] = COLUMNS) -> Arrays:
+def read_record(file: Path, columns: Sequence[str] = PAPER_COLUMNS) -> Arrays:
     """The arrays of a record file that can be learnt from; LearningError as for `read_lists`."""
     try:
         with np.load(file, allow_pickle=False) as archive:

@@ -8,18 +8,18 @@ import numpy as np
 from mdp.learning.labels import RatedList, ratings
 from mdp.learning.ndcg import Scores
 from mdp.mesh import Floats
-from mdp.ranking.features import COLUMNS
-from mdp.ranking.record import npz
+from mdp.ranking.features import PAPER_COLUMNS
+from mdp.ranking.record import VERSION, npz
 
 
 def write_record(file: Path, outcome: Floats, stage: Floats | None = None, **others: Any) -> None:
     """A record of n candidates with features drawn from the file's name; others: arrays in the place of its own."""
     rng = np.random.default_rng(list(file.name.encode()))
     arrays = {
-        "version": np.array(2),
+        "version": np.array(VERSION),
         "model": np.array(file.stem),
-        "columns": np.array(COLUMNS),
-        "features": rng.random((len(outcome), len(COLUMNS))),
+        "columns": np.array(PAPER_COLUMNS),
+        "features": rng.random((len(outcome), len(PAPER_COLUMNS))),
         "stage": np.ones(len(outcome), np.int32) if stage is None else stage,
         "outcome": outcome,
     }
@@ -29,11 +29,11 @@ def write_record(file: Path, outcome: Floats, stage: Floats | None = None, **oth
 def drawn_list(seed: int, size: int) -> RatedList:
     """A list whose candidates end the better the larger their M2 and the smaller their M6, with a little noise."""
     rng = np.random.default_rng(seed)
-    features = rng.random((size, len(COLUMNS))).astype(np.float32)
+    features = rng.random((size, len(PAPER_COLUMNS))).astype(np.float32)
     outcome = 1.0 - features[:, 1].astype(np.float64) + 0.5 * features[:, 5] + 0.05 * rng.random(size)
-    return RatedList(features, outcome, ratings(outcome), f"m{seed % 7}")
+    return RatedList(features, PAPER_COLUMNS, outcome, ratings(outcome), f"m{seed % 7}")
 
 
 def by_column(name: str) -> Scores:
     """Scores that are a feature."""
-    return lambda one: one.features[:, COLUMNS.index(name)].astype(np.float64)
+    return lambda one: one.table((name,))[:, 0].astype(np.float64)

@@ -2,7 +2,7 @@ import numpy as np
 
 from mdp.learning.labels import RatedList, rate, ratings, scale
 from mdp.learning.lists import TrainingList
-from mdp.ranking.features import COLUMNS
+from mdp.ranking.features import PAPER_COLUMNS
 
 
 def test_the_five_least_outcomes_are_rated_and_the_rest_are_not() -> None:
@@ -16,15 +16,15 @@ def test_a_short_list_has_no_zero_and_equal_outcomes_keep_their_order() -> None:
 def test_only_candidates_that_were_cut_are_rated() -> None:
     outcome = np.array([np.nan, 0.3, 0.1, np.nan])
     features = np.arange(24.0).reshape(4, 6)
-    never = TrainingList(features, COLUMNS, np.full(4, np.nan), np.zeros(4, np.bool_), "a", "a", 2)
-    (one,) = rate([TrainingList(features, COLUMNS, outcome, np.zeros(4, np.bool_), "a", "a", 1), never], ("M2",))
+    never = TrainingList(features, PAPER_COLUMNS, np.full(4, np.nan), np.zeros(4, np.bool_), "a", "a", 2)
+    (one,) = rate([TrainingList(features, PAPER_COLUMNS, outcome, np.zeros(4, np.bool_), "a", "a", 1), never], ("M2",))
     assert (one.features.tolist(), one.ratings.tolist()) == ([[7], [13]], [4, 5])
 
 
 def test_a_list_with_a_single_label_teaches_nothing() -> None:
     features = np.zeros((2, 6), np.float32)
-    assert RatedList(features, np.zeros(2), ratings(np.zeros(2)), "a").teaches
-    assert not RatedList(features[:1], np.zeros(1), ratings(np.zeros(1)), "a").teaches
+    assert RatedList(features, PAPER_COLUMNS, np.zeros(2), ratings(np.zeros(2)), "a").teaches
+    assert not RatedList(features[:1], PAPER_COLUMNS, np.zeros(1), ratings(np.zeros(1)), "a").teaches
 
 
 def test_features_are_scaled_to_the_range_of_their_list_and_a_constant_one_becomes_zero() -> None:

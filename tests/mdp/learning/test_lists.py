@@ -6,7 +6,7 @@ import pytest
 
 from mdp.learning.lists import of_side, read_lists
 from mdp.learning.sources import Side, side
-from mdp.ranking.features import COLUMNS
+from mdp.ranking.features import PAPER_COLUMNS
 from profiles.errors import LearningError
 from tests.mdp.learning.records import write_record
 
@@ -22,7 +22,7 @@ def test_every_stage_of_a_record_is_a_list(tmp_path: Path) -> None:
 
 
 def test_features_are_found_by_name_wherever_they_stand(tmp_path: Path) -> None:
-    names = ("rim", *reversed(COLUMNS))
+    names = ("rim", *reversed(PAPER_COLUMNS))
     write_record(tmp_path / "a.0.x.npz", OUTCOME, features=np.tile(np.arange(7.0), (4, 1)), columns=np.array(names))
     assert read_lists(tmp_path)[0].table(("M1", "M6", "rim"))[0].tolist() == [6, 1, 0]
 

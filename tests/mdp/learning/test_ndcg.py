@@ -6,6 +6,7 @@ import pytest
 from mdp.learning.labels import RatedList, ratings
 from mdp.learning.ndcg import at, best_within, full_lists, interval, ndcg, regret
 from mdp.mesh import Floats
+from mdp.ranking.features import PAPER_COLUMNS
 from tests.mdp.learning.records import drawn_list
 from tests.mdp.learning.reference import reference_lists
 
@@ -13,7 +14,7 @@ RATINGS = np.array([0, 5, 1, 4, 2, 3], np.int32)
 
 
 def listed(outcome: Floats) -> RatedList:
-    return RatedList(np.zeros((len(outcome), 6), np.float32), outcome, ratings(outcome), "m")
+    return RatedList(np.zeros((len(outcome), 6), np.float32), PAPER_COLUMNS, outcome, ratings(outcome), "m")
 
 
 def test_the_right_order_has_an_ndcg_of_one_and_the_reverse_what_its_last_places_give() -> None:

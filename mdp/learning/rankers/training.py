@@ -1,0 +1,161 @@
+"""Training: steps over shuffled batches of lists until the validation lists are ordered no better, resumable at every epoch.
+
+Adam, the norm of all gradients together cut off. The network with the highest validation NDCG@1 is kept, then @3, then @5.
+One thread, and an order of lists drawn anew from seed and epoch: the same lists give the same weights, interrupted or not.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from mdp.learning.labels import RatedList
+from mdp.learning.ndcg import ndcg
+from mdp.learning.rankers.urank import LOSSES, Padded, pad
+from profiles.errors import LearningError
+
+CUTS = (1, 3, 5)
+
+Weights = dict[str, torch.Tensor]
+Figures = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How to train. batch: lists a step; rate: Adam's; clip: largest norm of the gradients; patience: epochs without a gain."""
+
+    loss: str = "urank"
+    epochs: int = 1000
+    patience: int = 50
+    batch: int = 16
+    rate: float = 1e-4
+    clip: float = 5.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """An epoch's number from 1, its mean training loss, its validation NDCG at CUTS, and the best epoch so far."""
+
+    number: int
+    loss: float
+    validation: Figures
+    best: int
+
+
+@dataclass(eq=False)
+class _State:
+    """All that a training needs to go on."""
+
+    network: torch.nn.Module
+    optimizer: torch.optim.Optimizer
+    best_weights: Weights
+    epoch: int = 0
+    best_epoch: int = 0
+    best: Figures = (-1.0,) * len(CUTS)
+
+
+def train(
+    network: torch.nn.Module,
+    columns: Sequence[str],
+    lists: tuple[Sequence[RatedList], Sequence[RatedList]],
+    schedule: Schedule,
+    checkpoint: Path | None = None,
+    on_epoch: Callable[[Epoch], None] | None = None,
+) -> Figures:
+    """Train a network in place on the named features of lists for training and for validation; the best validation NDCG at CUTS.
+
+    Lists with a single rating are left out. Where the checkpoint file is there, the training goes on from it. Raises
+    LearningError for no lists and for the checkpoint of another training.
+    """
+    torch.set_num_threads(1)
+    training, validation = ([one for one in side if one.teaches] for side in lists)
+    for side, name in ((training, "train"), (validation, "validate")):
+        if not side:
+            raise LearningError(f"no list to {name} with: record more models, of more repositories and folders")
+    padded, held_out = pad(training, columns), pad(validation, columns)
+    state = _State(network, torch.optim.Adam(network.parameters(), lr=schedule.rate), deepcopy(network.state_dict()))
+    key = _key(network, schedule, padded, held_out)
+    if checkpoint is not None and checkpoint.exists():
+        _resume(checkpoint, key, state)
+    while state.epoch < schedule.epochs and state.epoch - state.best_epoch < schedule.patience:
+        state.epoch += 1
+        loss = _steps(state, padded, schedule)
+        figures = _validate(network, held_out)
+        if figures > state.best:
+            state.best, state.best_epoch, state.best_weights = figures, state.epoch, deepcopy(network.state_dict())
+        if checkpoint is not None:
+            _save(checkpoint, key, state)
+        if on_epoch is not None:
+            on_epoch(Epoch(state.epoch, loss, figures, state.best_epoch))
+    network.load_state_dict(state.best_weights)
+    return state.best
+
+
+def _steps(state: _State, lists: Padded, schedule: Schedule) -> float:
+    """One epoch; the mean loss of the lists, each as its step met it."""
+    total = 0.0
+    for rows in _batches(len(lists.ratings), schedule, state.epoch):
+        batch = lists.take(rows)
+        losses = LOSSES[schedule.loss](state.network(batch.features), batch.ratings, batch.present)
+        state.optimizer.zero_grad()
+        losses.mean().backward()
+        torch.nn.utils.clip_grad_norm_(state.network.parameters(), schedule.clip)
+        state.optimizer.step()
+        total += float(losses.detach().sum())
+    return total / len(lists.ratings)
+
+
+def _batches(count: int, schedule: Schedule, epoch: int) -> Iterator[torch.Tensor]:
+    generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + epoch)
+    yield from torch.randperm(count, generator=generator).split(schedule.batch)
+
+
+def _validate(network: torch.nn.Module, lists: Padded) -> Figures:
+    with torch.no_grad():
+        scores = network(lists.features).double().numpy()
+    ratings, present = lists.ratings.numpy(), lists.present.numpy()
+    each = [(scores[row][here], ratings[row][here]) for row, here in enumerate(present)]
+    return tuple(sum(ndcg(one, rated, cut) for one, rated in each) / len(each) for cut in CUTS)
+
+
+def _key(network: torch.nn.Module, schedule: Schedule, *lists: Padded) -> str:
+    """What tells a training from others: its network as it starts, its schedule but for the end, its lists."""
+    digest = sha256(repr((schedule.loss, schedule.batch, schedule.rate, schedule.clip, schedule.seed)).encode())
+    tensors = [*network.state_dict().values(), *(tensor for one in lists for tensor in (one.features, one.ratings, one.present))]
+    for tensor in tensors:
+        digest.update(repr(tensor.shape).encode() + tensor.numpy().tobytes())
+    return digest.hexdigest()
+
+
+def _save(file: Path, key: str, state: _State) -> None:
+    """Write a checkpoint beside its file and rename it, so that a torn one never stands in its place."""
+    content = {
+        "key": key,
+        "network": state.network.state_dict(),
+        "optimizer": state.optimizer.state_dict(),
+        "best_weights": state.best_weights,
+        "counts": (state.epoch, state.best_epoch, state.best),
+    }
+    beside = file.with_name(f"{file.name}.new")
+    torch.save(content, beside)
+    os.replace(beside, file)
+
+
+def _resume(file: Path, key: str, state: _State) -> None:
+    try:
+        content: dict[str, Any] = torch.load(file, weights_only=True)
+        same = content["key"] == key
+    except Exception as error:  # noqa: BLE001 - torch raises whatever its reader of archives and pickles does
+        raise LearningError(f"checkpoint {file}: cannot be read ({error}); delete it to begin anew") from None
+    if not same:
+        raise LearningError(f"checkpoint {file}: is of a training with other lists or settings; delete it to begin anew")
+    state.network.load_state_dict(content["network"])
+    state.optimizer.load_state_dict(content["optimizer"])
+    state.best_weights = content["best_weights"]
+    state.epoch, state.best_epoch, state.best = content["counts"]
