@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
-from mdp.ranking.features import COLUMNS, Model
+from mdp.ranking.features import COLUMNS, Model, features
+from mdp.ranking.ranking import CandidateTable, RankedCandidate
 
 VERSION = 2  # of the arrays; 1 had the six metrics of the paper only
 NO_NODE = -1
@@ -34,6 +35,12 @@ class Offer:
     plane: Plane
     features: Floats
     round: int
+
+
+def offer(parent: Hashable, table: CandidateTable, candidate: RankedCandidate) -> Offer:
+    """A candidate of a table as it is put on record."""
+    row = candidate.row
+    return Offer(parent, table.plane(row), features(table, np.array([row]))[0], candidate.round)
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,11 @@ from dataclasses import dataclass
 from itertools import islice
 from math import isqrt
 
-import numpy as np
-
 from mdp.kernels.threads import ahead
 from mdp.plane import Plane
-from mdp.ranking.features import features
 from mdp.ranking.ranker import Ranker
 from mdp.ranking.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
-from mdp.ranking.record import Child, Offer, Trace
+from mdp.ranking.record import Child, Trace, offer
 from mdp.search.front import Front
 from mdp.search.node import Node
 from mdp.search.problem import Problem
@@ -160,10 +157,4 @@ class Beam:
                 residual_mm2 = float(tables[table].scored.residual_mm2[row])
                 offered.append(RankedCandidate(table, row, relaxation_round(residual_mm2 / risky_mm2)))
             children.append(Child(number_of[table, row], pick.node.signature, pick.node.cost_mm2))
-        trace.add([_offer(branches[candidate.table], candidate) for candidate in offered], children)
-
-
-def _offer(branch: Branch, candidate: RankedCandidate) -> Offer:
-    row = candidate.row
-    described = features(branch.table, np.array([row]))[0]
-    return Offer(branch.node.signature, branch.table.plane(row), described, candidate.round)
+        trace.add([offer(branches[each.table].node.signature, tables[each.table], each) for each in offered], children)

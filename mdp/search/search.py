@@ -9,10 +9,8 @@ bounds all descendants), two orders of the same cuts take one slot, the slots of
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from time import perf_counter
-
-import numpy as np
 
 from mdp.cost.symmetry import find_mirrors
 from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
@@ -22,7 +20,6 @@ from mdp.pedestal import on_pedestal
 from mdp.plan_file import MOST_PARTS, PlanFile
 from mdp.ranking.candidates import REASONS
 from mdp.ranking.ranker import RANKERS
-from mdp.ranking.ranking import rank_classic
 from mdp.ranking.record import Trace
 from mdp.search.beam import Beam
 from mdp.search.by_hand import check_colours, check_model, cut_by_hand
@@ -31,6 +28,7 @@ from mdp.search.node import Node
 from mdp.search.parts import make_parts
 from mdp.search.polish import make_symmetric, polish
 from mdp.search.problem import Problem
+from mdp.search.published import search_as_published
 from profiles.errors import PlanError
 from profiles.profile import Profile
 
@@ -80,7 +78,8 @@ def decompose(
     trace = None if on_record is None else Trace(name, problem.model, problem.start.signature)
     report = on_stage or (lambda progress: None)
     if profile.search.method == "published":
-        best, rounds = _search_as_published(problem, report)
+        continues = partial(_continues, problem)
+        best, rounds = search_as_published(problem, continues, trace, partial(_report, problem, report))
         front = Front(problem.start)
         front.offer(best)
     else:
@@ -251,7 +250,7 @@ def _search_beam(
             stage += 1
             beam.advance()
             held = sum(node is not None for node in beam.nodes)
-            report(Progress(stage, held, beam.best.cost_mm2 / problem.model.risky_mm2))
+            _report(problem, report, stage, held, beam.best)
         best = _polish_finalists(problem, beam, stage, report)
         if problem.settings.polish and problem.terms.seam_mm > 0.0:
             _prefer_symmetry(problem, beam.front)
@@ -271,7 +270,7 @@ def _polish_finalists(problem: Problem, beam: Beam, stage: int, report: Callable
         polished = coming.result()
         beam.front.offer(polished)
         best = min(best, polished, key=lambda node: (node.cost_mm2, len(node.cuts)))
-        report(Progress(stage, 1, best.cost_mm2 / problem.model.risky_mm2))
+        _report(problem, report, stage, 1, best)
     return best
 
 
@@ -284,30 +283,8 @@ def _prefer_symmetry(problem: Problem, front: Front) -> None:
         front.replace(node, make_symmetric(problem, node, mirrors))
 
 
-def _search_as_published(problem: Problem, report: Callable[[Progress], None]) -> tuple[Node, int]:
-    """The best node of the authors' loop, and after how many stages.
-
-    It ends as soon as the beam's best does not rise, keeps twins, and stops looking at candidates once one of a good parent
-    is useless.
-    """
-    best, beam, stage = problem.start, [problem.start], 0
-    while _continues(problem, stage):
-        stage += 1
-        tables = [problem.table(node) for node in beam]
-        useless = max(table.saved_mm2 for table in tables) / problem.model.risky_mm2
-        children: list[Node] = []
-        for candidate in rank_classic(tables, problem.model.risky_mm2, np.inf, useless):
-            table, row = tables[candidate.table], candidate.row
-            child = problem.cut(beam[candidate.table], table.plane(row), float(table.scored.residual_mm2[row]))
-            children += [child] if child is not None else []
-            if len(children) == problem.settings.beam_width:
-                break
-        highest = min(children, key=lambda node: node.cost_mm2, default=best)
-        if highest.cost_mm2 >= best.cost_mm2:
-            break
-        best, beam = highest, children
-        report(Progress(stage, len(beam), best.cost_mm2 / problem.model.risky_mm2))
-    return best, stage
+def _report(problem: Problem, report: Callable[[Progress], None], stage: int, held: int, best: Node) -> None:
+    report(Progress(stage, held, best.cost_mm2 / problem.model.risky_mm2))
 
 
 def _continues(problem: Problem, stage: int) -> bool:

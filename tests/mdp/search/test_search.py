@@ -218,3 +218,24 @@ def test_directions_are_spread_over_the_cap() -> None:
     assert len(spread) == 600
     assert spread[:, 2].min() >= np.sin(np.radians(10.0))
     assert np.degrees(nearest).min() > 3.5
+
+
+@pytest.mark.parametrize("method", ["published", "best"])
+def test_the_least_outcome_on_record_is_the_result(method: str) -> None:
+    words = (f"search.method={method}", "search.objective=risky", "search.polish=false", "search.directions=200")
+    records: list[bytes] = []
+    decomposition = decompose(shapes.ball(), "ball", load(settings=words), on_record=records.append)
+    with np.load(io.BytesIO(records[0])) as record:
+        outcomes = record["node_outcome"]
+    assert outcomes.min() == outcomes[0] == pytest.approx(decomposition.residual_area_mm2 / decomposition.risky_area_mm2)
+    assert 0.5 < outcomes[0] < 0.9
+
+
+def test_a_list_of_the_published_search_is_what_filled_its_beam() -> None:
+    words = ("search.method=published", "search.objective=risky", "search.directions=200", "search.beam_width=3")
+    records: list[bytes] = []
+    decompose(shapes.tee(), "tee", load(settings=words), on_record=records.append)
+    with np.load(io.BytesIO(records[0])) as record:
+        assert record["stage"].tolist() == [1, 1, 1]
+        assert record["child"].tolist() == [1, 2, 3]
+        assert record["node_expanded"].tolist() == [True, True, True, True]
