@@ -1,4 +1,4 @@
-"""Cut: exact, closed halves of a solid, and convex hulls, by manifold3d."""
+"""Cut: exact, closed halves of a solid, convex hulls and coarser meshes, by manifold3d."""
 
 from math import asin, atan2, degrees
 from typing import TypeAlias
@@ -56,6 +56,11 @@ def below(solid: Solid, plane: Plane) -> Solid:
 def convex_hull(points: Floats) -> Mesh:
     """The mesh of the convex hull of (n, 3) points."""
     return mesh_of(m3.Manifold.hull_points(points.copy()))
+
+
+def simplify(mesh: Mesh, tolerance_mm: float) -> Mesh:
+    """The mesh with fewer faces, its surface moved by at most about tolerance_mm."""
+    return mesh_of(solid_of(mesh).simplify(tolerance_mm))
 
 
 def _half_space(solid: Solid, plane: Plane) -> Solid:

@@ -29,7 +29,7 @@ CONFINED = {
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),
     "pydantic": ("profiles/",),
-    "rich": ("machine/app/",),
+    "rich": ("machine/app/", "mdp/learning/"),
     "prompt_toolkit": ("machine/app/",),
     "PIL": ("machine/app/pictures/",),
     "tomlkit": ("machine/calibration/", "mdp/plan_file.py"),
@@ -39,6 +39,8 @@ CONFINED = {
     "xgboost": ("mdp/learning/",),
     "onnx": ("mdp/learning/",),
     "matplotlib": ("mdp/learning/",),
+    "dask": ("mdp/learning/",),
+    "distributed": ("mdp/learning/",),
     "tests": (),
     "tools": (),
 }
@@ -59,6 +61,8 @@ HEAVY = {
     "xgboost",
     "onnx",
     "matplotlib",
+    "dask",
+    "distributed",
 }
 
 

@@ -20,18 +20,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, get_type_hints
-from zipfile import BadZipFile
 
 import numpy as np
 
-from mdp.formats.surface import check_surface
+from mdp.learning.models import read_model
+from mdp.learning.task import PAPER_TERMS
 from mdp.mesh import Floats, Mesh
-from mdp.repair.repair import repair
 from mdp.search.search import decompose
 from profiles.errors import MeshError
 from profiles.profile import Profile, load
 
-PAPER_TERMS = ("search.objective=risky", "search.count_platform_faces=true", "search.clearance=false")
 EQUAL = 1e-6  # shares of the risky area that differ less are a tie
 RESAMPLES = 10_000
 
@@ -115,7 +113,7 @@ def rows(
     if not missing:
         return
     try:
-        mesh = model(path)
+        mesh = read_model(path)
     except MeshError as error:
         for method, width in missing:
             yield Row(path.stem, named, method, width, 0, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0, f"MeshError: {error}")
@@ -125,17 +123,6 @@ def rows(
     for method, width in missing:
         profile = load(settings=(*settings, f"search.method={method}", f"search.beam_width={width}"))
         yield searched(path.stem, named, mesh, profile)
-
-
-def model(path: Path) -> Mesh:
-    """The solid of an npz file, repaired as a model file is, resting on the platform and centred; MeshError when it is none."""
-    try:
-        with np.load(path) as arrays:
-            solid, _ = repair([check_surface(path, arrays["vertices"], arrays["faces"])])
-    except (KeyError, ValueError, BadZipFile) as error:
-        raise MeshError(f"{path}: holds no vertices and faces ({error})") from None
-    low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    return Mesh(solid.vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]), solid.faces.astype(np.int32))
 
 
 def searched(name: str, settings: str, mesh: Mesh, profile: Profile) -> Row:

@@ -16,6 +16,12 @@ LEAST_ROWS, SHARES = 4, 8  # rows a call, and calls for every core: handing a ca
 Result = TypeVar("Result")
 
 
+def use_threads(count: int) -> None:
+    """Use so many threads from now on, for a process that is one of many on its machine."""
+    global THREADS  # one number for the process, as the cores are
+    THREADS = count
+
+
 @cache
 def _pool(name: str, threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix=name)

@@ -1,0 +1,144 @@
+"""Collect: records of wide searches over a folder of models, to train a ranker on.
+
+    python -m mdp.learning.collect FOLDER -o OUT [--terms paper,ours] [--orientations N] [--faces N] [--scheduler ADDRESS] ...
+
+One file a search, MODEL.ORIENTATION.TERMS.npz, and a line of OUT/index.csv. What is done is not done again, so whatever ended a
+run, it goes on when it is started again.
+"""
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from mdp.kernels.threads import THREADS
+from mdp.learning.index import FAILED, Row, Search, append_row, read_index, unfinished, write_index
+from mdp.learning.models import model_files, name_of
+from mdp.learning.task import TERMS, Result, Settings, run
+from profiles.errors import LearningError, UserError
+
+MOST_WIDE = 1000
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaints are sentences like all others."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        raise LearningError(f"{message}; --help shows what is allowed")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Collect what is missing in the folder of records; the exit code."""
+    try:
+        options = _options(arguments)
+        return collect(options)
+    except UserError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 1
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted; started again, the collection goes on where it stopped\n")
+        return 130
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = _Parser(prog="python -m mdp.learning.collect", description="record wide searches over many models")
+    parser.add_argument("folder", type=Path, help="holds models as npz (vertices in mm, faces) or as mesh files")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the records and their index.csv")
+    parser.add_argument("--beam-width", type=int, default=50, metavar="B")
+    parser.add_argument("--terms", default="paper,ours", help=f"of {', '.join(TERMS)}: paper searches as published")
+    parser.add_argument("--orientations", type=int, default=1, metavar="N", help="of each model: as given, then on other sides")
+    parser.add_argument("--faces", type=int, metavar="N", help="finer models are made coarser first")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a dask scheduler; else processes of this machine's own")
+    parser.add_argument("--workers", type=int, default=THREADS, metavar="N", help="processes on this machine, one core each")
+    parser.add_argument("--only", default="", metavar="TEXT", help="only models whose name has this in it")
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="every N-th model by name")
+    parser.add_argument("--retries", type=int, default=2, metavar="N", help="how often a search that crashed is tried again")
+    parser.add_argument("--time-limit", type=float, metavar="S", help="a search ends after this time with what it has")
+    options = parser.parse_args(arguments)
+    for name, least, most in (
+        *(("beam_width", 1, MOST_WIDE), ("orientations", 1, 1000), ("faces", 4, None), ("workers", 1, 1000)),
+        *(("every", 1, None), ("retries", 0, 100), ("time_limit", 0, None)),
+    ):
+        value = getattr(options, name)
+        if value is not None and not least <= value <= (value if most is None else most):
+            allowed = f"{least} or more" if most is None else f"{least} to {most}"
+            raise LearningError(f"--{name.replace('_', '-')} is {value:g}: {allowed} is allowed")
+    options.terms = options.terms.split(",")
+    for terms in options.terms:
+        if terms not in TERMS:
+            raise LearningError(f"--terms has {terms!r}: {', '.join(TERMS)} are allowed")
+    return options
+
+
+def collect(options: argparse.Namespace) -> int:
+    """Make the records that are missing; 1 when there is none at the end."""
+    settings = Settings(options.beam_width, options.faces, options.time_limit)
+    files = {name_of(file): file.resolve() for file in model_files(options.folder, options.only, options.every)}
+    wanted = [Search(name, turn, terms) for turn in range(options.orientations) for terms in options.terms for name in files]
+    rows = _rows(options.out, settings)
+    missing = unfinished(options.out, rows.values(), wanted)
+    rows = {search: row for search, row in rows.items() if search not in set(missing)}
+    write_index(options.out, rows.values())
+    if missing:
+        _run(options, settings, {search: files[search.id] for search in missing}, rows)
+        write_index(options.out, rows.values())
+    return _report(options.out, [rows[search] for search in wanted])
+
+
+def _rows(out: Path, settings: Settings) -> dict[Search, Row]:
+    """What is there already, in a folder that is made where it is missing."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LearningError(f"folder {out}: cannot be made ({error.strerror})") from None
+    rows = {row.search: row for row in read_index(out)}
+    others = sorted({row.settings for row in rows.values()} - {settings.in_words})
+    if others:
+        raise LearningError(f"folder {out}: holds searches with {others[0]}, not {settings.in_words}: take another folder")
+    return rows
+
+
+def _run(options: argparse.Namespace, settings: Settings, files: dict[Search, Path], rows: dict[Search, Row]) -> None:
+    """Search, and write each record and line as soon as it is there."""
+    from mdp.learning.cluster import Workers, completed, connected
+    from mdp.learning.progress import Progress
+
+    calls = {search: (search, file, settings) for search, file in files.items()}
+    workers = Workers(options.scheduler, options.workers, options.retries)
+    with connected(workers) as client, Progress(len(calls)) as progress:
+        for search, result in completed(client, run, calls, options.retries, progress.tick):
+            if isinstance(result, BaseException):
+                reason = f"{FAILED}{type(result).__name__}: {result}".splitlines()[0]
+                result = Result(Row(search.id, search.orientation, search.terms, settings.in_words, excluded=reason))
+            if result.record:
+                _write(options.out / search.file, result.record)
+            append_row(options.out, result.row)
+            rows[search] = result.row
+            progress.show(result.row)
+
+
+def _write(path: Path, content: bytes) -> None:
+    beside = path.with_suffix(".part")
+    beside.write_bytes(content)
+    beside.replace(path)
+
+
+def _report(out: Path, rows: Sequence[Row]) -> int:
+    """Say what there is now, what there is not and why."""
+    recorded = [row for row in rows if not row.excluded]
+    sys.stderr.write(
+        f"{out}: {len(recorded)} of {len(rows)} searches have a record, {sum(row.lists for row in recorded)} lists\n"
+    )
+    for reason, count in Counter(row.excluded for row in rows if row.excluded and not row.excluded.startswith(FAILED)).items():
+        sys.stderr.write(f"  {count} without: {reason}\n")
+    for row in rows:
+        if row.excluded.startswith(FAILED):
+            sys.stderr.write(f"  {row.search.file} {row.excluded}\n")
+    if not recorded:
+        raise LearningError(f"folder {out}: nothing was collected")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,105 @@
+"""Models: the solids of a folder to learn from, made coarser where they are too fine, in several orientations."""
+
+from itertools import pairwise
+from math import cos, radians, sin
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from mdp.cut import simplify
+from mdp.formats.readers import READERS
+from mdp.formats.surface import check_surface
+from mdp.mesh import Floats, Mesh
+from mdp.overhang import UP
+from mdp.read import read_mesh
+from mdp.repair.repair import repair
+from mdp.search.orientation import resting_orientations, standing_still
+from profiles.errors import LearningError, MeshError
+
+ARRAYS = ".npz"
+MOST_MOVED = 0.002  # share of the diagonal by which a coarser surface may lie off
+FINEST_MOVED = MOST_MOVED / 2**8
+SIDES_APART_DEG = 20.0  # directions of two sides that count as different
+TURN_DEG = 137.5  # the golden angle: no two turns come close to each other
+
+
+def model_files(folder: Path, only: str = "", every: int = 1) -> list[Path]:
+    """The models of a folder by name: npz files and mesh files whose name has `only` in it, of these every so many-th.
+
+    Raises LearningError for a folder without any, and for two models of one name.
+    """
+    if not folder.is_dir():
+        raise LearningError(f"folder {folder}: there is none; models to learn from are expected in it")
+    kinds = (ARRAYS, *READERS)
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in kinds and only in file.stem)[::every]
+    if not files:
+        words = f" with {only!r} in its name" if only else ""
+        raise LearningError(f"folder {folder}: holds no model{words}; {', '.join(kinds)} are read")
+    for file, other in pairwise(files):
+        if name_of(file) == name_of(other):
+            raise LearningError(f"folder {folder}: {file.name} and {other.name} would have the same records; rename one")
+    return files
+
+
+def name_of(file: Path) -> str:
+    """The model's name, without dots, which part the names of records."""
+    return file.stem.replace(".", "_")
+
+
+def read_model(path: Path) -> Mesh:
+    """The solid of an npz file (vertices (n, 3) in mm and faces (m, 3)) or of a mesh file, repaired, resting on the platform and
+    centred; MeshError when it is none."""
+    if path.suffix.lower() != ARRAYS:
+        return read_mesh(path)[0]
+    try:
+        with np.load(path) as arrays:
+            solid, _ = repair([check_surface(path, arrays["vertices"], arrays["faces"])])
+    except (KeyError, ValueError, BadZipFile) as error:
+        raise MeshError(f"{path}: holds no vertices and faces ({error})") from None
+    except OSError as error:
+        raise MeshError(f"{path}: cannot be read ({error})") from None
+    low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    return Mesh(solid.vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]), solid.faces.astype(np.int32))
+
+
+def coarser(mesh: Mesh, most_faces: int) -> Mesh:
+    """The mesh with at most so many faces, or as many as remain when its surface moves by MOST_MOVED of its diagonal."""
+    if len(mesh.faces) <= most_faces:
+        return mesh
+    diagonal_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
+    share, made = FINEST_MOVED, mesh
+    while len(made.faces) > most_faces and share <= MOST_MOVED:
+        made = simplify(mesh, share * diagonal_mm)
+        share *= 2.0
+    return standing_still(made, np.eye(3))
+
+
+def oriented(mesh: Mesh, number: int, angle_deg: float) -> Mesh:
+    """The mesh in one of its orientations, which are the same whatever number is asked for.
+
+    0: as it stands. Then it rests on its other sides that leave something risky, each as different from those before as can be.
+    Then the same again, turned about z by the golden angle, so that the sampled directions meet other faces.
+    """
+    sides = [np.eye(3), *(other_sides(mesh, angle_deg) if number > 0 else [])]
+    turns, side = divmod(number, len(sides))
+    turned = mesh if side == 0 else standing_still(mesh, sides[side])
+    return turned if turns == 0 else standing_still(turned, _about_z(radians(TURN_DEG * turns)))
+
+
+def other_sides(mesh: Mesh, angle_deg: float) -> list[Floats]:
+    """Rotations (3, 3) onto the sides that a mesh can rest on beside the present one, the most different first."""
+    left = [each.rotation for each in resting_orientations(mesh, angle_deg) if each.risky_mm2 > 0.0]
+    directions, sides = [UP], list[Floats]()
+    while left:
+        nearest = [max(float(direction @ rotation[2]) for direction in directions) for rotation in left]
+        place = int(np.argmin(np.round(nearest, 6)))
+        if nearest[place] > cos(radians(SIDES_APART_DEG)):
+            break
+        sides.append(left.pop(place))
+        directions.append(sides[-1][2])
+    return sides
+
+
+def _about_z(angle: float) -> Floats:
+    return np.array([[cos(angle), -sin(angle), 0.0], [sin(angle), cos(angle), 0.0], [0.0, 0.0, 1.0]])
