@@ -1,0 +1,56 @@
+"""Command: what the command lines of this room share. A complaint is a sentence on stderr and exit code 1, an interrupt 130."""
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from profiles.errors import LearningError, UserError
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaints are sentences like all others."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        """Raise LearningError in the place of printing how the command is used."""
+        raise LearningError(f"{message}; --help shows what is allowed")
+
+
+def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str] | None, interrupted: str) -> int:
+    """The exit code of a command; interrupted: what to say when a person stops it."""
+    try:
+        command(arguments)
+    except UserError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 1
+    except ModuleNotFoundError as error:
+        sys.stderr.write(f"error: {error.name} is not installed: pip install 'tiltprint[train]'\n")
+        return 1
+    except KeyboardInterrupt:
+        sys.stderr.write(f"interrupted; {interrupted}\n")
+        return 130
+    return 0
+
+
+def check_range(options: argparse.Namespace, name: str, least: float, most: float) -> None:
+    """Raise LearningError where an option's value is not within its range."""
+    value = getattr(options, name)
+    if not least <= value <= most:
+        raise LearningError(f"--{name.replace('_', '-')} is {value:g}: {least:g} to {most:g} is allowed")
+
+
+def commit() -> str:
+    """The commit of this program, or its version where it is no clone."""
+    here = Path(__file__).resolve().parent
+    try:
+        asked = subprocess.run(
+            ["git", "-C", str(here), "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True, timeout=10
+        )
+    except (OSError, subprocess.SubprocessError):
+        try:
+            return f"version {version('tiltprint')}"
+        except PackageNotFoundError:
+            return "unknown"
+    return asked.stdout.strip()

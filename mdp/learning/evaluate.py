@@ -1,0 +1,115 @@
+"""Evaluate: rankers and baselines on the lists of models that no training saw, and the pictures of the 2020 paper.
+
+    python -m mdp.learning.evaluate FOLDER [--manifest CSV] [--ranker FILE.onnx ...] [--without NAME,...] [--pictures DIR]
+    python -m mdp.learning.evaluate --figure7 TABLE.csv [--pictures DIR]
+
+Prints tables in Markdown. figure8-NAME.png: importance of a ranker's features, and their correlation; figure7.png: J and time
+against the beam's width, from the table of tools/compare_widths.py.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from mdp.learning.command import Parser, check_range, run
+from mdp.learning.labels import RatedList, rate
+from mdp.learning.lists import of_side, read_lists
+from mdp.learning.ndcg import Scores
+from mdp.learning.rankers.baselines import BASELINES
+from mdp.learning.sources import Side
+from mdp.ranking.features import PAPER_COLUMNS
+from profiles.errors import LearningError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the tables and draw the pictures; the exit code."""
+    return run(evaluate, arguments, "nothing is kept, it begins anew")
+
+
+def evaluate(arguments: Sequence[str] | None) -> None:
+    """Do what is asked for."""
+    options = _options(arguments)
+    if options.folder is not None:
+        _compare(options)
+    if options.figure7 is not None:
+        _draw_widths(options.figure7, options.pictures)
+
+
+def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = Parser(prog="python -m mdp.learning.evaluate", description="judge rankers on lists that no training saw")
+    parser.add_argument("folder", type=Path, nargs="?", help="of record files, MODEL.ORIENTATION.TERMS.npz")
+    parser.add_argument(
+        "--manifest", type=Path, metavar="CSV", help="id, source_repo, source_path of the models: split by source"
+    )
+    parser.add_argument(
+        "--ranker", type=Path, action="append", default=[], metavar="FILE.onnx", help="may be given several times"
+    )
+    parser.add_argument("--without", default="", metavar="NAME,...", help=f"baselines to leave out, of {'; '.join(BASELINES)}")
+    parser.add_argument("--repeats", type=int, default=10, metavar="K", help="how often each feature is shuffled")
+    parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="where pictures go; here by default")
+    parser.add_argument("--figure7", type=Path, metavar="CSV", help="table of tools/compare_widths.py")
+    options = parser.parse_args(arguments)
+    check_range(options, "repeats", 1, 10_000)
+    options.without = [name.strip() for name in options.without.split(",") if name.strip()]
+    if options.folder is None and options.figure7 is None:
+        raise LearningError("a folder of records or --figure7 is needed; --help shows what is allowed")
+    return options
+
+
+def _compare(options: argparse.Namespace) -> None:
+    """Tables of all rankers, then what the features of each given one do."""
+    from mdp.learning.evaluation.tables import tables
+    from mdp.learning.rankers.exported import read_ranker
+
+    given = {file: read_ranker(file) for file in options.ranker}
+    columns = tuple(dict.fromkeys([*PAPER_COLUMNS, *(name for one in given.values() for name in one.columns)]))
+    lists = read_lists(options.folder, options.manifest, columns)
+    training, validation, test = ([one for one in rate(of_side(lists, side), columns) if one.teaches] for side in Side)
+    for side, some in zip(Side, (training, validation, test), strict=True):
+        if not some:
+            raise LearningError(f"folder {options.folder}: no list of it is on the side {side}; record models of more sources")
+    rankers: dict[str, Scores] = {f"{one.kind}, {file}": one.scores for file, one in given.items()}
+    rankers |= _baselines(options.without, training, validation)
+    for text in tables(rankers, test):
+        sys.stdout.write(f"{text}\n\n")
+    for file, one in given.items():
+        _analyse(one.scores, one.columns, test, options.repeats, options.pictures / f"figure8-{file.stem}.png")
+
+
+def _baselines(without: Sequence[str], training: Sequence[RatedList], validation: Sequence[RatedList]) -> dict[str, Scores]:
+    unknown = [name for name in without if name not in BASELINES]
+    if unknown:
+        raise LearningError(f"--without {unknown[0]}: is no baseline; {'; '.join(BASELINES)} are there")
+    fitted = {}
+    for name, fit in BASELINES.items():
+        if name not in without:
+            sys.stderr.write(f"fitting {name}\n")
+            fitted[name] = fit(training, validation)
+    return fitted
+
+
+def _analyse(scores: Scores, columns: Sequence[str], lists: Sequence[RatedList], repeats: int, file: Path) -> None:
+    from mdp.learning.evaluation.analysis import correlation, importance
+    from mdp.learning.evaluation.pictures import draw_features, save
+
+    lost = importance(scores, columns, lists, repeats)
+    rows = [f"| {name} | {value:.4f} |" for name, value in zip(columns, lost, strict=True)]
+    sys.stdout.write("\n".join(["| feature | importance |", "|---|---:|", *rows, ""]))
+    save(draw_features(columns, lost, correlation(columns, lists)), file)
+    sys.stdout.write(f"\n![importance and correlation]({file})\n")
+
+
+def _draw_widths(table: Path, folder: Path) -> None:
+    from mdp.learning.evaluation.pictures import draw_widths, save
+    from mdp.learning.evaluation.widths import compare, read_searches
+
+    comparisons = compare(read_searches(table))
+    if not comparisons:
+        raise LearningError(f"table {table}: no model of it was searched with every ranker at all its widths")
+    save(draw_widths(comparisons), folder / "figure7.png")
+    sys.stdout.write(f"![J and time against the beam's width]({folder / 'figure7.png'})\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

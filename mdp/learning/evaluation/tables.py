@@ -1,0 +1,65 @@
+"""Tables of rankers over lists, in Markdown: NDCG as in the 2020 paper, how often the best comes first, what a miss costs."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from mdp.learning.labels import RatedList
+from mdp.learning.ndcg import Measure, Scores, at, best_within, full_lists, interval, regret
+from mdp.mesh import Floats
+
+CUTS = (1, 2, 3, 4, 5)
+FIRST = (1, 2, 5)
+SIZES = ((2, 5), (6, 10), (11, 20), (21, 35), (36, 49), (50, 10_000))
+
+Given = Sequence[Floats]  # the scores of every list
+
+
+def tables(rankers: Mapping[str, Scores], lists: Sequence[RatedList]) -> Iterator[str]:
+    """Markdown: all lists, the full ones, and NDCG by the number of candidates."""
+    given = {name: [scores(one) for one in lists] for name, scores in rankers.items()}
+    yield _headed("All lists", lists, table(given, lists))
+    full = full_lists(lists)
+    kept = {name: [own for own, one in zip(each, lists, strict=True) if len(own) >= SIZES[-1][0]] for name, each in given.items()}
+    yield _headed("Full lists", full, table(kept, full)) if full else "Full lists: none"
+    yield f"NDCG@1 / NDCG@5 by the number of candidates\n\n{by_size(given, lists)}"
+
+
+def _headed(title: str, lists: Sequence[RatedList], body: str) -> str:
+    return f"{title}: {len(lists)} of {len({one.model for one in lists})} models\n\n{body}"
+
+
+def table(given: Mapping[str, Given], lists: Sequence[RatedList]) -> str:
+    """A row a ranker: NDCG, the 95 % interval of NDCG@1 and NDCG@5 over models, best within the first few, regret."""
+    heads = [*(f"NDCG@{cut}" for cut in CUTS), "95 % of @1", "95 % of @5", *(f"best in first {first}" for first in FIRST)]
+    heads += [f"regret@{first}" for first in FIRST]
+    lines = [_row("ranker", heads), "|---|" + "---:|" * len(heads)]
+    for name, scores in given.items():
+        gains = [measured(at(cut), scores, lists) for cut in CUTS]
+        cells = [f"{values.mean():.3f}" for values in gains]
+        cells += ["{:.3f} to {:.3f}".format(*interval(values, [one.model for one in lists])) for values in (gains[0], gains[-1])]
+        cells += [f"{measured(best_within(first), scores, lists).mean():.1%}" for first in FIRST]
+        cells += [f"{measured(regret(first), scores, lists).mean():.4f}" for first in FIRST]
+        lines.append(_row(name, cells))
+    return "\n".join(lines)
+
+
+def by_size(given: Mapping[str, Given], lists: Sequence[RatedList]) -> str:
+    """A row a ranker, a column a range of sizes."""
+    rows = [[row for row, one in enumerate(lists) if low <= len(one.ratings) <= high] for low, high in SIZES]
+    named = [f"{low}-{high}" if high < SIZES[-1][1] else f"{low} and more" for low, high in SIZES]
+    lines = [_row("ranker", named), "|---|" + "---:|" * len(SIZES)]
+    lines.append(_row("lists", [str(len(each)) for each in rows]))
+    for name, scores in given.items():
+        ends = [measured(at(cut), scores, lists) for cut in (CUTS[0], CUTS[-1])]
+        lines.append(_row(name, [" / ".join(f"{values[each].mean():.3f}" for values in ends) if each else "-" for each in rows]))
+    return "\n".join(lines)
+
+
+def measured(measure: Measure, given: Given, lists: Sequence[RatedList]) -> Floats:
+    """(lists,) a measure of every list."""
+    return np.array([measure(scores, one) for scores, one in zip(given, lists, strict=True)])
+
+
+def _row(name: str, cells: Sequence[str]) -> str:
+    return f"| {name} | {' | '.join(cells)} |"

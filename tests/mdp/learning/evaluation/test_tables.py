@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from mdp.learning.evaluation.analysis import correlation, importance, shuffled
+from mdp.learning.evaluation.tables import tables
+from mdp.learning.rankers.baselines import trade_off
+from mdp.mesh import Floats
+from tests.mdp.learning.records import drawn_list
+
+LISTS = [drawn_list(seed, size) for seed, size in enumerate((2, 4, 8, 15, 30, 45, 50, 50) * 5)]
+
+
+def cells(text: str, name: str) -> list[str]:
+    return next([cell.strip() for cell in line.split("|")[2:-1]] for line in text.splitlines() if line.startswith(f"| {name} |"))
+
+
+def test_the_right_order_has_full_marks_in_every_table() -> None:
+    whole, full, sizes = tables({"right": lambda one: -one.outcome, "M2": trade_off(0.0)}, LISTS)
+    for text in (whole, full):
+        assert cells(text, "right")[:7] == ["1.000"] * 5 + ["1.000 to 1.000"] * 2
+        assert cells(text, "right")[7:] == ["100.0%"] * 3 + ["0.0000"] * 3
+    assert cells(sizes, "right") == ["1.000 / 1.000"] * 6
+    assert float(cells(full, "M2")[0]) < float(cells(whole, "M2")[0]) < 1
+
+
+def test_tables_say_how_many_lists_and_models_they_are_of() -> None:
+    whole, full, sizes = tables({"M2": trade_off(0.0)}, LISTS)
+    assert whole.startswith("All lists: 40 of 7 models")
+    assert full.startswith("Full lists: 10 of 6 models")
+    assert cells(sizes, "lists") == ["10", "5", "5", "5", "5", "10"]
+
+
+def test_without_a_full_list_there_is_no_table_of_them() -> None:
+    _, full, sizes = tables({"M2": trade_off(0.0)}, LISTS[:2])
+    assert full == "Full lists: none"
+    assert cells(sizes, "M2")[1:] == ["-"] * 5
+
+
+def test_only_features_that_a_ranker_looks_at_are_important() -> None:
+    m1, m2, m6 = importance(trade_off(0.5), ("M1", "M2", "M6"), LISTS, 3)
+    assert m1 == 0
+    assert m2 > m6 > 0.02
+
+
+def test_a_shuffled_feature_keeps_its_values_and_no_other_moves() -> None:
+    before = np.vstack([one.features for one in LISTS])
+    dealt = shuffled("M3", LISTS, np.random.default_rng(0))
+    after = np.vstack([one.features for one in dealt])
+    assert [len(one.features) for one in dealt] == [len(one.features) for one in LISTS]
+    assert np.array_equal(np.sort(after[:, 2]), np.sort(before[:, 2]))
+    assert (after != before).any(axis=0).tolist() == [False, False, True, False, False, False]
+
+
+def test_correlation_is_pearson_s_and_nothing_with_a_constant() -> None:
+    matrix: Floats = correlation(("M1", "M2", "M3"), LISTS)
+    rows = np.vstack([one.features[:, :3] for one in LISTS]).astype(np.float64)
+    assert matrix == pytest.approx(np.corrcoef(rows.T))
+    for one in LISTS:
+        one.features[:, 4] = 0.5
+    assert correlation(("M1", "M5"), LISTS)[0].tolist() == pytest.approx([1, 0])

@@ -1,0 +1,51 @@
+from math import log2
+
+import numpy as np
+import pytest
+
+from mdp.learning.ndcg import at
+from mdp.learning.rankers.baselines import BASELINES, fit_trade_off, random_order, trade_off
+from mdp.mesh import Floats
+from tests.mdp.learning.records import drawn_list
+
+TRAINING = [drawn_list(seed, 20) for seed in range(60)]
+VALIDATION = [drawn_list(seed, 20) for seed in range(60, 80)]
+TEST = [drawn_list(seed, 20) for seed in range(80, 140)]
+
+
+def mean_ndcg(name: str) -> float:
+    scores = BASELINES[name](TRAINING, VALIDATION)
+    return float(np.mean([at(5)(scores(one), one) for one in TEST]))
+
+
+def test_random_scores_come_again_for_the_same_list_and_order_nothing() -> None:
+    assert np.array_equal(random_order(TEST[0]), random_order(drawn_list(80, 20)))
+    discounts = [1 / log2(place + 1) for place in range(1, 6)]
+    expected = sum(discounts) * (31 + 15 + 7 + 3 + 1) / 20 / np.dot(discounts, [31, 15, 7, 3, 1])
+    assert mean_ndcg("random") == pytest.approx(expected, abs=0.05)
+
+
+def test_a_trade_off_takes_m6_off_m2() -> None:
+    one = drawn_list(1, 4)
+    expected: Floats = one.features[:, 1] - 0.5 * one.features[:, 5].astype(np.float64)
+    assert trade_off(0.5)(one) == pytest.approx(expected)
+
+
+def test_the_fitted_trade_off_finds_the_weight_that_the_outcomes_were_drawn_with() -> None:
+    one = drawn_list(1, 4)
+    m2, m6 = one.table(("M2", "M6")).T.astype(np.float64)
+    weight = np.median((m2 - fit_trade_off(TRAINING, VALIDATION)(one)) / m6)
+    assert weight == pytest.approx(0.5, abs=0.1)
+
+
+def test_what_is_saved_alone_orders_worse_than_less_what_is_lost() -> None:
+    assert mean_ndcg("random") < mean_ndcg("M2") < mean_ndcg("M2 - lambda M6")
+
+
+@pytest.mark.train
+@pytest.mark.parametrize(("name", "library"), [("LambdaMART (LightGBM)", "lightgbm"), ("LambdaRank (XGBoost)", "xgboost")])
+def test_boosted_trees_learn_the_order_and_learn_it_alike_again(name: str, library: str) -> None:
+    pytest.importorskip(library, reason="the extra `train` is not installed")
+    assert mean_ndcg("random") + 0.2 < mean_ndcg(name) < 1
+    again = [BASELINES[name](TRAINING, VALIDATION)(TEST[0]).tolist() for _ in range(2)]
+    assert again[0] == again[1]

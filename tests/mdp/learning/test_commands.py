@@ -1,0 +1,88 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdp.learning import evaluate, train
+from mdp.learning.sources import Side, side
+from tests.mdp.learning.records import write_record
+
+EXTRA = ("torch", "onnx", "lightgbm", "xgboost", "matplotlib")
+SLOW = "RankNet,RankNet (XGBoost),LambdaRank (XGBoost)"
+
+
+@pytest.fixture
+def records(tmp_path: Path) -> Path:
+    """Twelve records of two lists each."""
+    folder = tmp_path / "records"
+    folder.mkdir()
+    rng = np.random.default_rng(0)
+    for number in range(12):
+        stage = np.repeat(np.array([1, 2], np.int32), 12)
+        write_record(folder / f"m{number}.0.paper.npz", rng.random(24), stage)
+    return folder
+
+
+def test_the_records_have_models_on_every_side(records: Path) -> None:
+    assert {side(file.name.split(".")[0]) for file in records.iterdir()} == set(Side)
+
+
+@pytest.mark.train
+def test_a_ranker_is_trained_and_judged_by_two_commands(
+    records: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for library in EXTRA:
+        pytest.importorskip(library, reason="the extra `train` is not installed")
+    ranker = tmp_path / "ranker.onnx"
+    assert train.main([str(records), "-o", str(ranker), "--epochs", "3"]) == 0
+    assert '"NDCG@5": 0.' in capsys.readouterr().out
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["ranker.onnx", "records"]
+    asked = [str(records), "--ranker", str(ranker), "--without", SLOW, "--repeats", "1", "--pictures", str(tmp_path)]
+    assert evaluate.main(asked) == 0
+    printed = capsys.readouterr().out
+    assert all(
+        f"| {name} |" in printed for name in (f"urank, {ranker}", "random", "M2", "M2 - lambda M6", "LambdaMART (LightGBM)")
+    )
+    assert "| M6 |" in printed
+    assert (tmp_path / "figure8-ranker.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.train
+def test_figure_7_is_drawn_from_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib", reason="the extra `train` is not installed")
+    table = tmp_path / "widths.csv"
+    rows = [
+        f"a,s,best,{width},{share},1,{name}"
+        for name, width, share in (("classic", 1, 0.5), ("classic", 2, 0.4), ("learned", 1, 0))
+    ]
+    table.write_text("\n".join(["mesh,settings,method,width,share,core_s,ranker", *rows]))
+    assert evaluate.main(["--figure7", str(table), "--pictures", str(tmp_path / "pictures")]) == 0
+    assert "figure7.png" in capsys.readouterr().out
+    assert (tmp_path / "pictures" / "figure7.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ([], "a folder of records or --figure7 is needed"),
+        (["--repeats", "0", "nowhere"], "--repeats is 0: 1 to 10000 is allowed"),
+        (["--repeats", "few", "nowhere"], "argument --repeats: invalid int value: 'few'; --help shows what is allowed"),
+    ],
+)
+def test_what_cannot_be_done_is_told_in_a_sentence(
+    arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert evaluate.main(arguments) == 1
+    assert sentence in capsys.readouterr().err
+
+
+@pytest.mark.train
+def test_a_folder_without_records_and_an_unknown_baseline_are_told(
+    records: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for library in EXTRA:
+        pytest.importorskip(library, reason="the extra `train` is not installed")
+    assert train.main([str(tmp_path), "-o", str(tmp_path / "a.onnx")]) == 1
+    assert "holds no record" in capsys.readouterr().err
+    assert evaluate.main([str(records), "--without", "luck"]) == 1
+    assert "--without luck: is no baseline" in capsys.readouterr().err
