@@ -22,7 +22,7 @@ from mdp.ranking.features import Model, Situation
 FIRST_THRESHOLD, THRESHOLD_FACTOR, ROUNDS = 1e-4, 5.0, 11  # shares of the risky area; the last one is above 1e3
 RESIDUAL_THRESHOLDS = np.array(list(accumulate(repeat(THRESHOLD_FACTOR, ROUNDS - 1), mul, initial=FIRST_THRESHOLD)))
 SAME_COSINE = 0.95
-LOOK_AHEAD = 128
+FIRST_LOOK, LOOK_AHEAD = 8, 128  # rows that are checked together: few as long as the first ones will do, then twice as many
 EQUAL = 1e-9  # shares of the risky area that differ less are equal but for rounding
 SORTED_FIRST = 256
 UNKNOWN = -1
@@ -129,7 +129,7 @@ class _TradeOffRanking:
         self._cost = np.where(enough, trade_off * table.scored.residual_mm2 - table.scored.gain_mm2, np.inf)
         self._count = int(enough.sum())
         self._order: Ints = np.zeros(0, np.int64)
-        self._next = 0
+        self._next, self._ahead = 0, FIRST_LOOK
         self._feasible: list[int] = []
         self._planes: list[Plane] = []
 
@@ -170,7 +170,8 @@ class _TradeOffRanking:
         if any(nearly_equal(plane, other) for other in self._planes):
             return
         if self._table.reason[row] == UNKNOWN:
-            self._table.check_rows(self._order[self._next : self._next + LOOK_AHEAD])
+            self._table.check_rows(self._order[self._next : self._next + self._ahead])
+            self._ahead = min(2 * self._ahead, LOOK_AHEAD)
         if self._table.feasible(row):
             self._feasible.append(row)
             self._planes.append(plane)
@@ -236,13 +237,13 @@ class _ClassicRanking:
     def within_volume(self, least_mm3: float, most_mm3: float) -> Iterator[RankedCandidate]:
         """The feasible ones whose parts have a volume from least_mm3 to below most_mm3."""
         near: list[list[Plane]] = [[] for _ in self.tables]
-        best = -np.inf
+        best, ahead = -np.inf, FIRST_LOOK
         for number in range(ROUNDS):
             sorted_round = self._sort_round(number, best, any_gain=least_mm3 > 0.0)
             for position, (index, row) in enumerate(zip(sorted_round.table.tolist(), sorted_round.row.tolist(), strict=True)):
                 table = self.tables[index]
                 if table.reason[row] == UNKNOWN:
-                    soon = slice(position, position + LOOK_AHEAD)
+                    soon, ahead = slice(position, position + ahead), min(2 * ahead, LOOK_AHEAD)
                     self._check_ahead(sorted_round.table[soon], sorted_round.row[soon])
                 if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
                     continue
