@@ -1,6 +1,6 @@
 """Evaluate: rankers and baselines on the lists of models that no training saw, and the pictures of the 2020 paper.
 
-    python -m mdp.learning.evaluate FOLDER [--manifest CSV] [--ranker FILE.onnx ...] [--without NAME,...] [--pictures DIR]
+    python -m mdp.learning.evaluate FOLDER [--manifest CSV] [--terms paper] [--ranker FILE.onnx ...] [--without NAME,...] ...
     python -m mdp.learning.evaluate --figure7 TABLE.csv [--pictures DIR]
 
 Prints tables in Markdown. figure8-NAME.png: importance of a ranker's features, and their correlation; figure7.png: J and time
@@ -42,6 +42,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--manifest", type=Path, metavar="CSV", help="id, source_repo, source_path of the models: split by source"
     )
+    parser.add_argument("--terms", metavar="NAME", help="only records of searches on these terms; all by default")
     parser.add_argument(
         "--ranker", type=Path, action="append", default=[], metavar="FILE.onnx", help="may be given several times"
     )
@@ -64,7 +65,7 @@ def _compare(options: argparse.Namespace) -> None:
 
     given = {file: read_ranker(file) for file in options.ranker}
     columns = tuple(dict.fromkeys([*PAPER_COLUMNS, *(name for one in given.values() for name in one.columns)]))
-    lists = read_lists(options.folder, options.manifest, columns)
+    lists = read_lists(options.folder, options.manifest, columns, options.terms)
     training, validation, test = ([one for one in rate(of_side(lists, side), columns) if one.teaches] for side in Side)
     for side, some in zip(Side, (training, validation, test), strict=True):
         if not some:

@@ -44,15 +44,20 @@ class TrainingList:
         return self.features[:, [self.columns.index(name) for name in columns]]
 
 
-def read_lists(folder: Path, manifest: Path | None = None, columns: Sequence[str] = PAPER_COLUMNS) -> list[TrainingList]:
-    """The lists of all record files of a folder, by file name and stage; a model's source is that of the manifest, else itself.
+def read_lists(
+    folder: Path, manifest: Path | None = None, columns: Sequence[str] = PAPER_COLUMNS, terms: str | None = None
+) -> list[TrainingList]:
+    """The lists of a folder's record files, by file name and stage; a model's source is that of the manifest, else itself.
+
+    terms: only those of searches on these terms, MODEL.ORIENTATION.TERMS.npz.
 
     Raises LearningError for a folder without records, and for a record of another version, without one of the columns, of a
     model that the manifest does not know, or with a feature that is no finite number.
     """
-    files = sorted(folder.glob("*.npz"))
+    pattern = "*.npz" if terms is None else f"*.{terms}.npz"
+    files = sorted(folder.glob(pattern))
     if not files:
-        raise LearningError(f"folder {folder}: holds no record (*.npz); `decompose --record` writes them")
+        raise LearningError(f"folder {folder}: holds no record ({pattern}); python -m mdp.learning.collect makes them")
     sources = None if manifest is None else read_sources(manifest)
     lists: list[TrainingList] = []
     for file in files:

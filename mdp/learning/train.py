@@ -1,6 +1,6 @@
 """Train: the paper's ranker from a folder of records.
 
-    python -m mdp.learning.train FOLDER -o RANKER.onnx [--manifest CSV] [--loss urank|ranknet] [--epochs N] [--seed N] ...
+    python -m mdp.learning.train FOLDER -o RANKER.onnx [--manifest CSV] [--terms paper] [--loss urank|ranknet] [--epochs N] ...
 
 The lists of the training side teach, those of the validation side say when to stop, those of the test side are only counted in
 the file's figures. An interrupted training goes on from RANKER.onnx.checkpoint when it is started again.
@@ -38,7 +38,7 @@ def train(arguments: Sequence[str] | None) -> None:
     from mdp.learning.rankers import training, urank
     from mdp.learning.rankers.export import export, write
 
-    lists = read_lists(options.folder, options.manifest)
+    lists = read_lists(options.folder, options.manifest, terms=options.terms)
     teach, stop, judge = (rate(of_side(lists, side), PAPER_COLUMNS) for side in (Side.TRAIN, Side.VALIDATION, Side.TEST))
     schedule = training.Schedule(options.loss, options.epochs, options.patience, options.batch, options.rate, seed=options.seed)
     network = urank.Network(len(PAPER_COLUMNS), seed=options.seed)
@@ -65,10 +65,11 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--manifest", type=Path, metavar="CSV", help="id, source_repo, source_path of the models: split by source"
     )
+    parser.add_argument("--terms", metavar="NAME", help="only records of searches on these terms; all by default")
     parser.add_argument("--loss", choices=("urank", "ranknet"), default="urank")
     parser.add_argument("--epochs", type=int, default=1000, metavar="N", help="at most so many")
     parser.add_argument("--patience", type=int, default=50, metavar="N", help="epochs without a gain after which it ends")
-    parser.add_argument("--batch", type=int, default=16, metavar="N", help="lists a step; the paper takes 1")
+    parser.add_argument("--batch", type=int, default=8, metavar="N", help="lists a step; the paper takes 1")
     parser.add_argument("--rate", type=float, default=1e-4, metavar="R", help="learning rate of Adam")
     parser.add_argument("--seed", type=int, default=0, metavar="N")
     options = parser.parse_args(arguments)

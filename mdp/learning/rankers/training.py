@@ -32,7 +32,7 @@ class Schedule:
     loss: str = "urank"
     epochs: int = 1000
     patience: int = 50
-    batch: int = 16
+    batch: int = 8
     rate: float = 1e-4
     clip: float = 5.0
     seed: int = 0

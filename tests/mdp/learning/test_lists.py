@@ -21,6 +21,14 @@ def test_every_stage_of_a_record_is_a_list(tmp_path: Path) -> None:
     assert second.features.shape == (1, 6)
 
 
+def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
+    for name in ("a.0.paper.npz", "a.0.ours.npz", "b.1.paper.npz"):
+        write_record(tmp_path / name, OUTCOME)
+    assert [one.model for one in read_lists(tmp_path, terms="paper")] == ["a", "b"]
+    with pytest.raises(LearningError, match=r"holds no record \(\*\.yours\.npz\)"):
+        read_lists(tmp_path, terms="yours")
+
+
 def test_features_are_found_by_name_wherever_they_stand(tmp_path: Path) -> None:
     names = ("rim", *reversed(PAPER_COLUMNS))
     write_record(tmp_path / "a.0.x.npz", OUTCOME, features=np.tile(np.arange(7.0), (4, 1)), columns=np.array(names))
