@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 import dask
@@ -37,12 +38,22 @@ def connected(workers: Workers) -> Iterator[Client]:
 
     Raises LearningError when the scheduler cannot be reached.
     """
-    for name in ("distributed", "tornado", "asyncio"):  # what goes wrong is told in our own words
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
+        if name.startswith(("distributed", "tornado", "asyncio")):  # what goes wrong is told in our own words
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     settings = {"distributed.scheduler.allowed-failures": workers.retries, "distributed.comm.timeouts.connect": REACHED_WITHIN_S}
     with dask.config.set(settings):
-        client = _own(workers.count) if workers.scheduler is None else _joined(workers.scheduler)
+        # Threads and processes that begin now never hear of Ctrl-C: we alone do, and end them. (Were the tracker to begin among
+        # them, it would let them hear again.)
+        resource_tracker.ensure_running()
+        heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
+            client = _own(workers.count) if workers.scheduler is None else _joined(workers.scheduler)
+        except BaseException:
+            signal.pthread_sigmask(signal.SIG_SETMASK, heard)
+            raise
+        try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, heard)  # one that came meanwhile is raised here
             yield client
         except BaseException:
             _stop_at_once(client)
