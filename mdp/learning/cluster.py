@@ -41,7 +41,11 @@ def connected(workers: Workers) -> Iterator[Client]:
     for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
         if name.startswith(("distributed", "tornado", "asyncio")):  # what goes wrong is told in our own words
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    settings = {"distributed.scheduler.allowed-failures": workers.retries, "distributed.comm.timeouts.connect": REACHED_WITHIN_S}
+    settings = {
+        "distributed.scheduler.allowed-failures": workers.retries,
+        "distributed.scheduler.worker-saturation": 1.0,  # what waits on a worker that dies would be blamed, too
+        "distributed.comm.timeouts.connect": REACHED_WITHIN_S,
+    }
     with dask.config.set(settings):
         # Threads and processes that begin now never hear of Ctrl-C: we alone do, and end them. (Were the tracker to begin among
         # them, it would let them hear again.)
@@ -67,7 +71,7 @@ def _own(count: int) -> Client:
         n_workers=count,
         threads_per_worker=1,
         processes=True,
-        dashboard_address=None,
+        dashboard_address="127.0.0.1:0",  # any free port: other clusters may be running here
         memory_limit=MEMORY_LIMIT // count,
         silence_logs=logging.CRITICAL,
     )

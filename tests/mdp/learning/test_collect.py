@@ -1,0 +1,148 @@
+"""Collecting records: what runs on workers, what goes on after an end, what is refused."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdp.formats.readers import READERS
+from mdp.learning.collect import main
+from mdp.learning.index import INDEX, read_index
+from mdp.mesh import Mesh
+from profiles.errors import LearningError
+from tests import shapes
+
+QUICK = ("--terms", "paper", "--beam-width", "3")
+
+
+def _models(folder: Path, **meshes: Mesh) -> Path:
+    folder.mkdir()
+    for name, mesh in meshes.items():
+        np.savez(folder / f"{name}.npz", vertices=mesh.vertices, faces=mesh.faces)
+    return folder
+
+
+@pytest.mark.train
+def test_what_is_done_is_not_done_again_and_what_is_missing_comes_out_the_same_on_fewer_workers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("distributed")
+    models, out = _models(tmp_path / "models", tee=shapes.tee(), flat=shapes.box()), tmp_path / "out"
+    (models / "broken.stl").write_text("no mesh")
+    assert main([str(models), "-o", str(out), *QUICK, "--orientations", "2", "--workers", "2"]) == 0
+    first = {file.name: (file.stat().st_mtime_ns, file.read_bytes()) for file in out.glob("*.npz")}
+    assert sorted(first) == ["tee.0.paper.npz", "tee.1.paper.npz"]
+    reasons = {row.id: row.excluded for row in read_index(out) if row.orientation == 0}
+    assert (reasons["tee"], reasons["flat"]) == ("", "nothing feasible")
+    assert reasons["broken"].startswith("failed: ")
+    assert f"broken.0.paper.npz failed: {models}/broken.stl: is not an STL file" in capsys.readouterr().err
+
+    (out / "tee.1.paper.npz").unlink()
+    (models / "broken.stl").unlink()
+    assert main([str(models), "-o", str(out), *QUICK, "--orientations", "2", "--workers", "1"]) == 0
+    again = {file.name: (file.stat().st_mtime_ns, file.read_bytes()) for file in out.glob("*.npz")}
+    assert {name for name in first if again[name][0] != first[name][0]} == {"tee.1.paper.npz"}
+    assert again["tee.1.paper.npz"][1] == first["tee.1.paper.npz"][1]
+
+
+@pytest.mark.train
+def test_a_search_that_crashes_is_tried_again_and_then_told(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    from mdp.learning.cluster import Workers, completed, connected
+
+    calls = {"raises": (tmp_path / "raises", False), "dies": (tmp_path / "dies", True), "works": (None, False)}
+    with connected(Workers(None, 1, retries=0)) as client:
+        results = dict(completed(client, crash, calls, 1, lambda: None))
+    assert results["works"] == "done"
+    assert [str(results["raises"]), type(results["dies"]).__name__] == ["no luck", "KilledWorker"]
+    assert [(tmp_path / name).read_text() for name in ("raises", "dies")] == ["begun begun ", "begun "]
+
+
+def crash(count: Path | None, whole_process: bool) -> str:
+    """A task that notes that it began, then raises, ends its process, or works."""
+    if count is None:
+        return "done"
+    with count.open("a") as file:
+        file.write("begun ")
+    if whole_process:
+        os._exit(1)
+    raise RuntimeError("no luck")
+
+
+@pytest.mark.train
+def test_a_scheduler_that_is_not_there_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("mdp.learning.cluster.REACHED_WITHIN_S", 0.3)
+    models = _models(tmp_path / "models", tee=shapes.tee())
+    assert main([str(models), "-o", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]) == 1
+    message = capsys.readouterr().err
+    assert message.startswith("error: scheduler tcp://127.0.0.1:9: cannot be reached (")
+    assert message.count("\n") == 1
+
+
+@pytest.mark.train
+def test_a_scheduler_that_dies_is_one_sentence() -> None:
+    distributed = pytest.importorskip("distributed")
+    from mdp.learning.cluster import Workers, completed, connected
+
+    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
+    with (
+        pytest.raises(LearningError, match="is gone; started again, the collection goes on where it stopped"),
+        connected(Workers(cluster.scheduler_address, 1, 0)) as client,
+    ):
+        list(completed(client, time.sleep, {"long": (2.0,)}, 0, cluster.close))
+
+
+@pytest.mark.train
+def test_an_interrupt_ends_all_processes_at_once(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    models, out = _models(tmp_path / "models", ball=shapes.ball(30.0, 128)), tmp_path / "out"
+    command = [sys.executable, "-m", "mdp.learning.collect", str(models), "-o", str(out), "--orientations", "9"]
+    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    while not (out / INDEX).exists():
+        time.sleep(0.05)
+    time.sleep(1.0)
+    os.killpg(run.pid, signal.SIGINT)
+    assert run.stderr is not None
+    assert run.stderr.read() == "interrupted; started again, the collection goes on where it stopped\n"
+    assert run.wait() == 130
+    with pytest.raises(ProcessLookupError):  # the group is empty
+        _until_gone(run.pid)
+
+
+def _until_gone(group: int) -> None:
+    for _ in range(100):
+        os.killpg(group, 0)
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--beam-width", "wide"), "argument --beam-width: invalid int value: 'wide'; --help shows what is allowed"),
+        (("--beam-width", "0"), "--beam-width is 0: 1 to 1000 is allowed"),
+        (("--workers", "0"), "--workers is 0: 1 to 1000 is allowed"),
+        (("--time-limit", "-1"), "--time-limit is -1: 0 or more is allowed"),
+        (("--terms", "ours,mine"), "--terms has 'mine': paper, best, ours are allowed"),
+        (
+            ("--only", "tea"),
+            "folder {models}: holds no model with 'tea' in its name; .npz, {readers} are read",
+        ),
+        (("--luck",), "unrecognized arguments: --luck; --help shows what is allowed"),
+        (("--out", "{models}/tee.npz"), "folder {models}/tee.npz: cannot be made (File exists)"),
+    ],
+)
+def test_a_wrong_option_is_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], message: str
+) -> None:
+    models = _models(tmp_path / "models", tee=shapes.tee())
+    given = [str(models), "-o", str(tmp_path / "out"), *(word.format(models=models) for word in words)]
+    assert main(given) == 1
+    assert capsys.readouterr().err == f"error: {message.format(models=models, readers=', '.join(READERS))}\n"

@@ -1,0 +1,117 @@
+"""One search of a collection: the model that is read, its orientations, the record, the line of the index, the tables."""
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdp.kernels import threads
+from mdp.learning.index import Row, Search, append_row, read_index, unfinished, write_index
+from mdp.learning.models import coarser, model_files, oriented, other_sides, read_model
+from mdp.learning.summary import main as summarize
+from mdp.learning.task import Settings, run
+from mdp.mesh import Mesh
+from profiles.errors import LearningError, MeshError
+from tests import shapes
+from tests.mdp.learning.records import write_record
+
+
+@pytest.fixture
+def _all_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threads, "THREADS", threads.THREADS)  # put back at the end
+
+
+def _npz(path: Path, mesh: Mesh) -> Path:
+    np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
+    return path
+
+
+@pytest.mark.usefixtures("_all_cores")
+def test_a_search_gives_its_record_and_its_line(tmp_path: Path) -> None:
+    path = _npz(tmp_path / "ball.npz", shapes.ball())
+    result = run(Search("ball", 0, "paper"), path, Settings(beam_width=3))
+    with np.load(io.BytesIO(result.record)) as record:
+        least, lists, rows = record["node_cost"].min(), len(np.unique(record["stage"])), len(record["stage"])
+    row = result.row
+    assert row.outcome == pytest.approx(least, abs=1e-6)
+    assert (row.lists, row.mean_list_length) == (lists, round(rows / lists, 2))
+    assert (row.settings, row.late, row.excluded) == ("B=3", 0, "")
+    assert threads.THREADS == 1
+
+
+@pytest.mark.usefixtures("_all_cores")
+@pytest.mark.parametrize(
+    ("terms", "reason"), [("ours", "no risky face"), ("paper", "nothing feasible")], ids=lambda value: str(value)
+)
+def test_a_search_without_a_list_has_no_record(tmp_path: Path, terms: str, reason: str) -> None:
+    result = run(Search("box", 0, terms), _npz(tmp_path / "box.npz", shapes.box()), Settings(beam_width=1))
+    assert (result.row.excluded, result.record) == (reason, b"")
+
+
+@pytest.mark.usefixtures("_all_cores")
+def test_a_search_that_the_clock_ended_is_told_apart(tmp_path: Path) -> None:
+    path = _npz(tmp_path / "ball.npz", shapes.ball())
+    assert run(Search("ball", 0, "paper"), path, Settings(1, None, 0.0)).row.late == 1
+
+
+def test_orientations_rest_on_different_sides_then_turn() -> None:
+    mesh = shapes.tee()  # on either end of its bar it leans on the foot of its stem, on its back nothing is risky
+    assert len(other_sides(mesh, 45.0)) == 2
+    sizes = [np.ptp(oriented(mesh, k, 45.0).vertices, axis=0).round(2).tolist() for k in range(5)]
+    assert sizes[:3] == [[40.0, 10.0, 40.0], [46.96, 10.0, 40.25], [46.96, 10.0, 40.25]]
+    assert sizes[3:] == [[36.25, 34.4, 40.0], [41.38, 39.1, 40.25]]
+    assert oriented(mesh, 3, 45.0).bounds_mm[0][2] == 0.0
+
+
+def test_a_fine_model_is_made_coarser_within_two_thousandths_of_its_diagonal() -> None:
+    mesh = shapes.ball(10.0, 128)
+    made = coarser(mesh, 4000)
+    assert len(made.faces) <= 4000 < len(mesh.faces)
+    assert made.volume_mm3 == pytest.approx(mesh.volume_mm3, rel=0.01)
+    assert np.linalg.norm(made.vertices - [0.0, 0.0, 10.0], axis=1) == pytest.approx(10.0, abs=0.002 * 34.7)
+
+
+def test_an_npz_without_faces_is_refused_by_name(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", vertices=np.zeros((3, 3)))
+    with pytest.raises(MeshError, match=r"a\.npz: holds no vertices and faces"):
+        read_model(tmp_path / "a.npz")
+
+
+def test_models_whose_records_would_have_one_name_are_refused(tmp_path: Path) -> None:
+    for name in ("a.b.npz", "a_b.stl"):
+        (tmp_path / name).touch()
+    with pytest.raises(LearningError, match=r"a\.b\.npz and a_b\.stl would have the same records"):
+        model_files(tmp_path)
+
+
+def test_an_index_keeps_the_last_line_of_a_search_and_drops_one_cut_off(tmp_path: Path) -> None:
+    row = Row("a", 0, "paper", "B=50", excluded="failed: once")
+    write_index(tmp_path, [row])
+    append_row(tmp_path, replace(row, excluded="", outcome=0.25))
+    with (tmp_path / "index.csv").open("a") as file:
+        file.write("b,0,pap")
+    (read,) = read_index(tmp_path)
+    assert (read.excluded, read.outcome) == ("", 0.25)
+
+
+def test_what_failed_or_lost_its_record_is_done_again(tmp_path: Path) -> None:
+    reasons = {"a": "", "b": "", "c": "no risky face", "d": "failed: by accident"}
+    rows = [Row(name, 0, "paper", "B=50", excluded=reason) for name, reason in reasons.items()]
+    (tmp_path / "a.0.paper.npz").touch()
+    missing = unfinished(tmp_path, rows, [*(row.search for row in rows), Search("e", 0, "paper")])
+    assert [search.id for search in missing] == ["b", "d", "e"]
+
+
+def test_a_collection_is_told_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [Row("a", 0, "paper", "B=3", outcome=0.5, seconds=36.0), Row("b", 0, "paper", "B=3", excluded="failed: no mesh")]
+    write_index(tmp_path, rows)
+    write_record(tmp_path / "a.0.paper.npz", np.zeros(9), np.repeat([1, 2, 3], [4, 4, 1]))
+    assert summarize([str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "| paper | B=3 | 2 | 2 | 1 | 3 | 9 | 3.0 | 4 | 0.5000 | 0.01 | 0 |" in lines
+    assert "| paper | 3 | 0 | 0 | 0 | 0 | 0 | 0 | 0 | 0 |" in lines
+    assert "| paper | failed | 1 |" in lines
+    assert "- b.0.paper.npz: no mesh" in lines
+    assert summarize([str(tmp_path / "none")]) == 1
