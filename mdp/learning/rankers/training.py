@@ -71,7 +71,7 @@ def train(
     """Train a network in place on the named features of lists for training and for validation; the best validation NDCG at CUTS.
 
     Lists with a single rating are left out. Where the checkpoint file is there, the training goes on from it. Raises
-    LearningError for no lists and for the checkpoint of another training.
+    LearningError for no lists, and for a checkpoint of another training or one that cannot be written.
     """
     torch.set_num_threads(1)
     training, validation = ([one for one in side if one.teaches] for side in lists)
@@ -143,8 +143,11 @@ def _save(file: Path, key: str, state: _State) -> None:
         "counts": (state.epoch, state.best_epoch, state.best),
     }
     beside = file.with_name(f"{file.name}.new")
-    torch.save(content, beside)
-    os.replace(beside, file)
+    try:
+        torch.save(content, beside)
+        os.replace(beside, file)
+    except (OSError, RuntimeError) as error:
+        raise LearningError(f"checkpoint {file}: cannot be written ({error})") from None
 
 
 def _resume(file: Path, key: str, state: _State) -> None:

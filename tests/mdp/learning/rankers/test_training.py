@@ -61,6 +61,11 @@ def test_a_checkpoint_of_another_training_or_a_torn_one_is_refused(tmp_path: Pat
         train(small(), PAPER_COLUMNS, LISTS, SHORT, file)
 
 
+def test_a_checkpoint_that_cannot_be_written_is_told_in_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(LearningError, match=r"checkpoint .*a\.pt: cannot be written"):
+        train(small(), PAPER_COLUMNS, LISTS, SHORT, tmp_path / "nowhere" / "a.pt")
+
+
 def test_lists_of_one_candidate_are_no_lists_to_train_with() -> None:
     with pytest.raises(LearningError, match="no list to validate with"):
         train(small(), PAPER_COLUMNS, (LISTS[0], [drawn_list(1, 1)]), SHORT)
