@@ -10,39 +10,26 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from math import inf
 from pathlib import Path
 
 from mdp.kernels.threads import THREADS
+from mdp.learning import command
 from mdp.learning.index import FAILED, Row, Search, append_row, read_index, unfinished, write_index
 from mdp.learning.models import model_files, name_of
 from mdp.learning.task import TERMS, Result, Settings, run
-from profiles.errors import LearningError, UserError
+from profiles.errors import LearningError
 
 MOST_WIDE = 1000
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose complaints are sentences like all others."""
-
-    def error(self, message: str) -> None:  # type: ignore[override]
-        raise LearningError(f"{message}; --help shows what is allowed")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Collect what is missing in the folder of records; the exit code."""
-    try:
-        options = _options(arguments)
-        return collect(options)
-    except UserError as error:
-        sys.stderr.write(f"error: {error}\n")
-        return 1
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted; started again, the collection goes on where it stopped\n")
-        return 130
+    return command.run(collect, arguments, "started again, the collection goes on where it stopped")
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = _Parser(prog="python -m mdp.learning.collect", description="record wide searches over many models")
+    parser = command.Parser(prog="python -m mdp.learning.collect", description="record wide searches over many models")
     parser.add_argument("folder", type=Path, help="holds models as npz (vertices in mm, faces) or as mesh files")
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the records and their index.csv")
     parser.add_argument("--beam-width", type=int, default=50, metavar="B")
@@ -57,13 +44,10 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--time-limit", type=float, metavar="S", help="a search ends after this time with what it has")
     options = parser.parse_args(arguments)
     for name, least, most in (
-        *(("beam_width", 1, MOST_WIDE), ("orientations", 1, 1000), ("faces", 4, None), ("workers", 1, 1000)),
-        *(("every", 1, None), ("retries", 0, 100), ("time_limit", 0, None)),
+        *(("beam_width", 1, MOST_WIDE), ("orientations", 1, 1000), ("faces", 4, inf), ("workers", 1, 1000)),
+        *(("every", 1, inf), ("retries", 0, 100), ("time_limit", 0, inf)),
     ):
-        value = getattr(options, name)
-        if value is not None and not least <= value <= (value if most is None else most):
-            allowed = f"{least} or more" if most is None else f"{least} to {most}"
-            raise LearningError(f"--{name.replace('_', '-')} is {value:g}: {allowed} is allowed")
+        command.check_range(options, name, least, most)
     options.terms = options.terms.split(",")
     for terms in options.terms:
         if terms not in TERMS:
@@ -71,8 +55,9 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def collect(options: argparse.Namespace) -> int:
-    """Make the records that are missing; 1 when there is none at the end."""
+def collect(arguments: Sequence[str] | None) -> None:
+    """Make the records that are missing, and say what there is."""
+    options = _options(arguments)
     settings = Settings(options.beam_width, options.faces, options.time_limit)
     files = {name_of(file): file.resolve() for file in model_files(options.folder, options.only, options.every)}
     wanted = [Search(name, turn, terms) for turn in range(options.orientations) for terms in options.terms for name in files]
@@ -83,7 +68,7 @@ def collect(options: argparse.Namespace) -> int:
     if missing:
         _run(options, settings, {search: files[search.id] for search in missing}, rows)
         write_index(options.out, rows.values())
-    return _report(options.out, [rows[search] for search in wanted])
+    _report(options.out, [rows[search] for search in wanted])
 
 
 def _rows(out: Path, settings: Settings) -> dict[Search, Row]:
@@ -124,7 +109,7 @@ def _write(path: Path, content: bytes) -> None:
     beside.replace(path)
 
 
-def _report(out: Path, rows: Sequence[Row]) -> int:
+def _report(out: Path, rows: Sequence[Row]) -> None:
     """Say what there is now, what there is not and why."""
     recorded = [row for row in rows if not row.excluded]
     sys.stderr.write(
@@ -137,7 +122,6 @@ def _report(out: Path, rows: Sequence[Row]) -> int:
             sys.stderr.write(f"  {row.search.file} {row.excluded}\n")
     if not recorded:
         raise LearningError(f"folder {out}: nothing was collected")
-    return 0
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import PackageNotFoundError, version
+from math import inf
 from pathlib import Path
 
 from profiles.errors import LearningError, UserError
@@ -34,11 +35,12 @@ def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str
     return 0
 
 
-def check_range(options: argparse.Namespace, name: str, least: float, most: float) -> None:
-    """Raise LearningError where an option's value is not within its range."""
+def check_range(options: argparse.Namespace, name: str, least: float, most: float = inf) -> None:
+    """Raise LearningError where an option was given a value that is not within its range."""
     value = getattr(options, name)
-    if not least <= value <= most:
-        raise LearningError(f"--{name.replace('_', '-')} is {value:g}: {least:g} to {most:g} is allowed")
+    if value is not None and not least <= value <= most:
+        allowed = f"{least:g} or more" if most == inf else f"{least:g} to {most:g}"
+        raise LearningError(f"--{name.replace('_', '-')} is {value:g}: {allowed} is allowed")
 
 
 def commit() -> str:
