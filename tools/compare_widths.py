@@ -23,8 +23,8 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from mdp.learning.models import read_model
-from mdp.learning.task import PAPER_TERMS
+from mdp.learning.collection.models import read_model
+from mdp.learning.collection.task import PAPER_TERMS
 from mdp.mesh import Floats, Mesh
 from mdp.search.search import decompose
 from profiles.errors import MeshError

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from mdp.kernels.threads import THREADS
 from mdp.learning import command
-from mdp.learning.index import FAILED, Row, Search, append_row, read_index, unfinished, write_index
-from mdp.learning.models import model_files, name_of
-from mdp.learning.task import TERMS, Result, Settings, run
+from mdp.learning.collection.index import FAILED, Row, Search, append_row, read_index, unfinished, write_index
+from mdp.learning.collection.models import model_files, name_of
+from mdp.learning.collection.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
 
 MOST_WIDE = 1000
@@ -86,8 +86,8 @@ def _rows(out: Path, settings: Settings) -> dict[Search, Row]:
 
 def _run(options: argparse.Namespace, settings: Settings, files: dict[Search, Path], rows: dict[Search, Row]) -> None:
     """Search, and write each record and line as soon as it is there."""
-    from mdp.learning.cluster import Workers, completed, connected
-    from mdp.learning.progress import Progress
+    from mdp.learning.collection.cluster import Workers, completed, connected
+    from mdp.learning.collection.progress import Progress
 
     calls = {search: (search, file, settings) for search, file in files.items()}
     workers = Workers(options.scheduler, options.workers, options.retries)

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mdp.learning.index import FAILED, INDEX, Row, read_index
+from mdp.learning import command
+from mdp.learning.collection.index import FAILED, INDEX, Row, read_index
 from mdp.learning.lists import read_record
 from mdp.mesh import Ints
-from profiles.errors import LearningError, UserError
+from profiles.errors import LearningError
 
 LENGTHS = (1, 5, 10, 20, 30, 40, 50, 51, 101)  # where the classes of list lengths begin
 HEADS = (
@@ -32,15 +33,13 @@ MOST_NAMES = 20
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the tables of a folder; the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        if len(given) != 1 or given[0].startswith("-"):
-            raise LearningError("one folder of records is expected: python -m mdp.learning.summary FOLDER")
-        sys.stdout.write("\n\n".join(summary(Path(given[0]))) + "\n")
-    except UserError as error:
-        sys.stderr.write(f"error: {error}\n")
-        return 1
-    return 0
+    return command.run(_print, arguments, "nothing was changed")
+
+
+def _print(arguments: Sequence[str] | None) -> None:
+    parser = command.Parser(prog="python -m mdp.learning.summary", description="tell what a collection of records holds")
+    parser.add_argument("folder", type=Path, help="what mdp.learning.collect has written")
+    sys.stdout.write("\n\n".join(summary(parser.parse_args(arguments).folder)) + "\n")
 
 
 def summary(folder: Path) -> Iterator[str]:

@@ -12,7 +12,7 @@ import pytest
 
 from mdp.formats.readers import READERS
 from mdp.learning.collect import main
-from mdp.learning.index import INDEX, read_index
+from mdp.learning.collection.index import INDEX, read_index
 from mdp.mesh import Mesh
 from profiles.errors import LearningError
 from tests import shapes
@@ -53,7 +53,7 @@ def test_what_is_done_is_not_done_again_and_what_is_missing_comes_out_the_same_o
 @pytest.mark.train
 def test_a_search_that_crashes_is_tried_again_and_then_told(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
-    from mdp.learning.cluster import Workers, completed, connected
+    from mdp.learning.collection.cluster import Workers, completed, connected
 
     calls = {"raises": (tmp_path / "raises", False), "dies": (tmp_path / "dies", True), "works": (None, False)}
     with connected(Workers(None, 1, retries=0)) as client:
@@ -79,7 +79,7 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("mdp.learning.cluster.REACHED_WITHIN_S", 0.3)
+    monkeypatch.setattr("mdp.learning.collection.cluster.REACHED_WITHIN_S", 0.3)
     models = _models(tmp_path / "models", tee=shapes.tee())
     assert main([str(models), "-o", str(tmp_path / "out"), "--scheduler", "tcp://127.0.0.1:9"]) == 1
     message = capsys.readouterr().err
@@ -90,7 +90,7 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(
 @pytest.mark.train
 def test_a_scheduler_that_dies_is_one_sentence() -> None:
     distributed = pytest.importorskip("distributed")
-    from mdp.learning.cluster import Workers, completed, connected
+    from mdp.learning.collection.cluster import Workers, completed, connected
 
     cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
     with (

@@ -6,7 +6,7 @@ import pytest
 
 from mdp.learning.lists import of_side, read_lists
 from mdp.learning.sources import Side, side
-from mdp.ranking.features import PAPER_COLUMNS
+from mdp.ranking.features import COLUMNS, PAPER_COLUMNS
 from profiles.errors import LearningError
 from tests.mdp.learning.records import write_record
 
@@ -100,3 +100,12 @@ def test_a_model_that_the_manifest_does_not_know_and_a_manifest_without_sources_
     manifest.write_text("id,faces\na,12\n")
     with pytest.raises(LearningError, match="has no column source_repo, source_path"):
         read_lists(tmp_path, manifest)
+
+
+def test_the_small_set_holds_lists_of_twenty_models_in_less_than_300_kb() -> None:
+    folder = Path(__file__).parent / "data"
+    lists = read_lists(folder, columns=COLUMNS, terms="paper")
+    assert len({one.model for one in lists}) == 20
+    assert len(lists) >= 70
+    assert {one.model for one in read_lists(folder, terms="ours")} == {"bracket", "figure", "lattice", "tree"}
+    assert sum(file.stat().st_size for file in folder.iterdir()) < 300_000

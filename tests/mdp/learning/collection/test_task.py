@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from mdp.kernels import threads
-from mdp.learning.index import Row, Search, append_row, read_index, unfinished, write_index
-from mdp.learning.models import coarser, model_files, oriented, other_sides, read_model
+from mdp.learning.collection.index import Row, Search, append_row, read_index, unfinished, write_index
+from mdp.learning.collection.models import coarser, model_files, oriented, other_sides, read_model
+from mdp.learning.collection.task import Settings, run
 from mdp.learning.summary import main as summarize
-from mdp.learning.task import Settings, run
 from mdp.mesh import Mesh
 from profiles.errors import LearningError, MeshError
 from tests import shapes

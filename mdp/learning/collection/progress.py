@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
-from mdp.learning.index import Row
+from mdp.learning.collection.index import Row
 
 EVERY_S = 20.0
 
