@@ -15,7 +15,7 @@ from pathlib import Path
 
 from mdp.kernels.threads import THREADS
 from mdp.learning import command
-from mdp.learning.collection.index import FAILED, Row, Search, append_row, read_index, unfinished, write_index
+from mdp.learning.collection.index import FAILED, Row, Search, append_row, read_index, unfinished, write_index, writing_alone
 from mdp.learning.collection.models import model_files, name_of
 from mdp.learning.collection.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
@@ -48,7 +48,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
         *(("every", 1, inf), ("retries", 0, 100), ("time_limit", 0, inf)),
     ):
         command.check_range(options, name, least, most)
-    options.terms = options.terms.split(",")
+    options.terms = list(dict.fromkeys(options.terms.split(",")))
     for terms in options.terms:
         if terms not in TERMS:
             raise LearningError(f"--terms has {terms!r}: {', '.join(TERMS)} are allowed")
@@ -61,22 +61,19 @@ def collect(arguments: Sequence[str] | None) -> None:
     settings = Settings(options.beam_width, options.faces, options.time_limit)
     files = {name_of(file): file.resolve() for file in model_files(options.folder, options.only, options.every)}
     wanted = [Search(name, turn, terms) for turn in range(options.orientations) for terms in options.terms for name in files]
-    rows = _rows(options.out, settings)
-    missing = unfinished(options.out, rows.values(), wanted)
-    rows = {search: row for search, row in rows.items() if search not in set(missing)}
-    write_index(options.out, rows.values())
-    if missing:
-        _run(options, settings, {search: files[search.id] for search in missing}, rows)
+    with writing_alone(options.out):
+        rows = _rows(options.out, settings)
+        missing = unfinished(options.out, rows.values(), wanted)
+        rows = {search: row for search, row in rows.items() if search not in set(missing)}
         write_index(options.out, rows.values())
+        if missing:
+            _run(options, settings, {search: files[search.id] for search in missing}, rows)
+            write_index(options.out, rows.values())
     _report(options.out, [rows[search] for search in wanted])
 
 
 def _rows(out: Path, settings: Settings) -> dict[Search, Row]:
-    """What is there already, in a folder that is made where it is missing."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise LearningError(f"folder {out}: cannot be made ({error.strerror})") from None
+    """What is there already; LearningError where it is of other settings."""
     rows = {row.search: row for row in read_index(out)}
     others = sorted({row.settings for row in rows.values()} - {settings.in_words})
     if others:

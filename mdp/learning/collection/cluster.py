@@ -11,7 +11,7 @@ from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 import dask
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import CancelledError, Client, Future, LocalCluster, as_completed
 from distributed.system import MEMORY_LIMIT
 
 from profiles.errors import LearningError
@@ -119,11 +119,23 @@ def completed(
         on_wait()
         for future in waiting.next_batch(block=False):
             if future.status in ("finished", "error"):
-                yield futures.pop(future), future.result() if future.status == "finished" else future.exception()
+                yield futures.pop(future), _outcome(client, future)
                 future.release()
         if client.status != "running" or any(future.status in ("cancelled", "lost") for future in list(futures)[:1]):
-            raise LearningError(f"scheduler {_address(client)}: is gone; started again, the collection goes on where it stopped")
+            raise _lost(client)
         time.sleep(POLL_S)
+
+
+def _outcome(client: Client, future: Future) -> Any:
+    """What a call returned or raised."""
+    try:
+        return future.result() if future.status == "finished" else future.exception()
+    except (CancelledError, OSError):  # the connection broke between the end of the call and its result
+        raise _lost(client) from None
+
+
+def _lost(client: Client) -> LearningError:
+    return LearningError(f"scheduler {_address(client)}: is gone; started again, the collection goes on where it stopped")
 
 
 def _address(client: Client) -> str:

@@ -1,7 +1,9 @@
 """Index: one line a search of a collection of records, what came of it and why it has no record."""
 
 import csv
-from collections.abc import Callable, Iterable
+import fcntl
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -9,6 +11,7 @@ from typing import Any, get_type_hints
 from profiles.errors import LearningError
 
 INDEX = "index.csv"
+LOCK = "index.lock"
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,24 @@ class Row:
 
 
 COLUMNS = [field.name for field in fields(Row)]
+
+
+@contextmanager
+def writing_alone(folder: Path) -> Iterator[None]:
+    """A folder, made where it is missing, that nobody else writes into meanwhile.
+
+    Raises LearningError when somebody does, and for what cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / LOCK).open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise LearningError(f"folder {folder}: another collection writes into it; wait for it or take another") from None
+            yield
+    except OSError as error:
+        raise LearningError(f"folder {folder}: cannot be written ({error})") from None
 
 
 def read_index(folder: Path) -> list[Row]:

@@ -136,7 +136,10 @@ def _until_gone(group: int) -> None:
             "folder {models}: holds no model with 'tea' in its name; .npz, {readers} are read",
         ),
         (("--luck",), "unrecognized arguments: --luck; --help shows what is allowed"),
-        (("--out", "{models}/tee.npz"), "folder {models}/tee.npz: cannot be made (File exists)"),
+        (
+            ("--out", "{models}/tee.npz"),
+            "folder {models}/tee.npz: cannot be written ([Errno 17] File exists: '{models}/tee.npz')",
+        ),
     ],
 )
 def test_a_wrong_option_is_one_sentence(

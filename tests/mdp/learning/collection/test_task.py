@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mdp.kernels import threads
-from mdp.learning.collection.index import Row, Search, append_row, read_index, unfinished, write_index
+from mdp.learning.collection.index import Row, Search, append_row, read_index, unfinished, write_index, writing_alone
 from mdp.learning.collection.models import coarser, model_files, oriented, other_sides, read_model
 from mdp.learning.collection.task import Settings, run
 from mdp.learning.summary import main as summarize
@@ -94,6 +94,14 @@ def test_an_index_keeps_the_last_line_of_a_search_and_drops_one_cut_off(tmp_path
         file.write("b,0,pap")
     (read,) = read_index(tmp_path)
     assert (read.excluded, read.outcome) == ("", 0.25)
+
+
+def test_two_collections_do_not_write_into_one_folder(tmp_path: Path) -> None:
+    message = "another collection writes into it; wait for it or take another"
+    with writing_alone(tmp_path), pytest.raises(LearningError, match=message), writing_alone(tmp_path):
+        pass
+    with writing_alone(tmp_path):
+        pass
 
 
 def test_what_failed_or_lost_its_record_is_done_again(tmp_path: Path) -> None:
