@@ -8,7 +8,14 @@ from importlib.metadata import PackageNotFoundError, version
 from math import inf
 from pathlib import Path
 
+from mdp.ranking.features import CHECKED, COLUMNS, PAPER_COLUMNS
 from profiles.errors import LearningError, UserError
+
+COLUMN_SETS = {  # cheap: those that are known of a candidate before it is checked
+    "paper": PAPER_COLUMNS,
+    "cheap": tuple(name for name in COLUMNS if name not in CHECKED),
+    "all": COLUMNS,
+}
 
 
 class Parser(argparse.ArgumentParser):
@@ -33,6 +40,27 @@ def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str
         sys.stderr.write(f"interrupted; {interrupted}\n")
         return 130
     return 0
+
+
+def add_records(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say which records are read: folder, manifest, terms and columns."""
+    parser.add_argument("folder", type=Path, help="of record files, MODEL.ORIENTATION.TERMS.npz")
+    parser.add_argument(
+        "--manifest", type=Path, metavar="CSV", help="id, source_repo, source_path of the models: split by source"
+    )
+    parser.add_argument(
+        "--terms",
+        type=split_names,
+        default=(),
+        metavar="NAME,...",
+        help="only records of searches on these terms; all by default",
+    )
+    parser.add_argument("--columns", choices=COLUMN_SETS, help="features: the paper's, those known without a check, or all")
+
+
+def split_names(text: str) -> tuple[str, ...]:
+    """The names between commas."""
+    return tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def check_range(options: argparse.Namespace, name: str, least: float, most: float = inf) -> None:

@@ -65,7 +65,7 @@ def _compare(options: argparse.Namespace) -> None:
 
     given = {file: read_ranker(file) for file in options.ranker}
     columns = tuple(dict.fromkeys([*PAPER_COLUMNS, *(name for one in given.values() for name in one.columns)]))
-    lists = read_lists(options.folder, options.manifest, columns, options.terms)
+    lists = read_lists(options.folder, options.manifest, columns, () if options.terms is None else (options.terms,))
     training, validation, test = ([one for one in rate(of_side(lists, side), columns) if one.teaches] for side in Side)
     for side, some in zip(Side, (training, validation, test), strict=True):
         if not some:

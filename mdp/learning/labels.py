@@ -1,33 +1,53 @@
-"""Labels of the 2020 paper: 5, 4, 3, 2, 1 for the five best candidates of a list, 0 for the rest, and features scaled by list.
+"""Labels: ratings and features scaled by list as in the 2020 paper, and regrets, what a candidate costs more than the best.
 
-The value of a candidate is the least final cost through it, stopping there included. The paper's lists are what the beam kept, so
-candidates that were never cut are not among them.
+The value of a candidate is the least final cost through it, stopping there included. The paper rates the five best candidates of
+a list 5, 4, 3, 2, 1 and the rest 0; its lists are what the beam kept, so candidates that were never cut are not among them.
+Nor are, where regrets are asked for, those that nobody followed: all that is known of them is that stopping there is worse.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdp.learning.lists import TrainingList
+from mdp.learning.sources import terms_of
 from mdp.mesh import Floats, Ints
 
 BEST = 5  # so many candidates of a list are rated
+TIE = 1e-9  # outcomes (shares) that differ less are the same
 SMALLEST_RANGE = 1e-8
+LEAST_OUTCOME = 0.05  # lists that can end with less count as if they ended with it, else the best of models would weigh most
 
 Singles = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
 class RatedList:
-    """The n candidates of a list that were cut: features (n, F) unscaled, named in `columns`, outcomes and ratings (n,)."""
+    """The n candidates of a list that were cut: features (n, F) unscaled, named in `columns`, outcomes and ratings (n,).
+
+    record: name of the file that they are from, without its ending; a model has one for each orientation and terms.
+    """
 
     features: Singles
     columns: tuple[str, ...]
     outcome: Floats
     ratings: Ints
     model: str
+    record: str = ""
+
+    @property
+    def regrets(self) -> Floats:
+        """(n,) by how much each candidate ends with more than the best of the list, as share of the best."""
+        least = float(self.outcome.min())
+        shares: Floats = (self.outcome - least) / max(least, LEAST_OUTCOME)
+        return shares
+
+    @property
+    def terms(self) -> str:
+        """The terms of the search."""
+        return terms_of(self.record)
 
     @property
     def teaches(self) -> bool:
@@ -55,8 +75,20 @@ def rate(lists: Sequence[TrainingList], columns: Sequence[str]) -> list[RatedLis
         if cut.any():
             outcome = one.outcome[cut]
             features = one.table(columns)[cut].astype(np.float32)
-            rated.append(RatedList(features, tuple(columns), outcome, ratings(outcome), one.model))
+            rated.append(RatedList(features, tuple(columns), outcome, ratings(outcome), one.model, one.record))
     return rated
+
+
+def followed(lists: Sequence[TrainingList]) -> list[TrainingList]:
+    """The lists without the candidates that nobody followed, unless they are the best there."""
+    kept = []
+    for one in lists:
+        known = ~np.isnan(one.outcome)
+        if known.any():
+            rows = known & (~one.censored | (one.outcome <= np.min(one.outcome[known]) + TIE))
+            table, outcome, censored = one.features[rows], one.outcome[rows], one.censored[rows]
+            kept.append(replace(one, features=table, outcome=outcome, censored=censored))
+    return kept
 
 
 def scale(features: Singles) -> Singles:

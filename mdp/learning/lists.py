@@ -28,7 +28,8 @@ class TrainingList:
     """The n candidates of one stage, in the classic order.
 
     features: (n, F), the columns named in `columns`; outcome: (n,) the least final cost through the candidate as share of the
-    model's risky area, NaN where it was never cut; censored: (n,) the outcome is its own cost, for nobody went on from there.
+    model's risky area, NaN where it was never cut; censored: (n,) the outcome is its own cost, for nobody went on from there;
+    record: the file's name without its ending.
     """
 
     features: Floats
@@ -38,6 +39,7 @@ class TrainingList:
     model: str
     source: str
     stage: int
+    record: str
 
     def table(self, columns: Sequence[str]) -> Floats:
         """(n, k) the named features."""
@@ -45,26 +47,28 @@ class TrainingList:
 
 
 def read_lists(
-    folder: Path, manifest: Path | None = None, columns: Sequence[str] = PAPER_COLUMNS, terms: str | None = None
+    folder: Path, manifest: Path | None = None, columns: Sequence[str] = PAPER_COLUMNS, terms: Sequence[str] = ()
 ) -> list[TrainingList]:
     """The lists of a folder's record files, by file name and stage; a model's source is that of the manifest, else itself.
 
-    terms: only those of searches on these terms, MODEL.ORIENTATION.TERMS.npz.
+    terms: only those of searches on one of these terms, MODEL.ORIENTATION.TERMS.npz.
 
-    Raises LearningError for a folder without records, and for a record of another version, without one of the columns, of a
-    model that the manifest does not know, or with a feature that is no finite number.
+    Raises LearningError for a folder without records of each of the terms, and for a record of another version, without one of
+    the columns, of a model that the manifest does not know, or with a feature that is no finite number.
     """
-    pattern = "*.npz" if terms is None else f"*.{terms}.npz"
-    files = sorted(folder.glob(pattern))
-    if not files:
-        raise LearningError(f"folder {folder}: holds no record ({pattern}); python -m mdp.learning.collect makes them")
+    files: list[Path] = []
+    for pattern in [f"*.{name}.npz" for name in dict.fromkeys(terms)] or ["*.npz"]:
+        some = list(folder.glob(pattern))
+        if not some:
+            raise LearningError(f"folder {folder}: holds no record ({pattern}); python -m mdp.learning.collect makes them")
+        files += some
     sources = None if manifest is None else read_sources(manifest)
     lists: list[TrainingList] = []
-    for file in files:
+    for file in sorted(files):
         source = model_id(file) if sources is None else sources.get(model_id(file))
         if source is None:
             raise LearningError(f"record {file}: its model {model_id(file)} is not in {manifest}")
-        lists += _lists(read_record(file, columns), model_id(file), source)
+        lists += _lists(read_record(file, columns), file, source)
     return lists
 
 
@@ -99,21 +103,25 @@ def _check(file: Path, arrays: Arrays, columns: Sequence[str]) -> None:
         raise LearningError(f"record {file}: feature {name} of a candidate of model {arrays['model']} is {value}")
 
 
-def _lists(record: Arrays, model: str, source: str) -> Iterator[TrainingList]:
+def _lists(record: Arrays, file: Path, source: str) -> Iterator[TrainingList]:
     columns = tuple(str(name) for name in record["columns"])
     censored = _censored(record)
     for stage in np.unique(record["stage"]):
         rows = record["stage"] == stage
         features = record["features"][rows].astype(np.float64)
-        yield TrainingList(features, columns, record["outcome"][rows], censored[rows], model, source, int(stage))
+        outcome = record["outcome"][rows]
+        yield TrainingList(features, columns, outcome, censored[rows], model_id(file), source, int(stage), file.stem)
 
 
 def _censored(record: Arrays) -> Mask:
     if "node_expanded" not in record or "child" not in record:
         return np.zeros(len(record["stage"]), np.bool_)
     cut = record["child"] >= 0
+    followed = record["node_expanded"].astype(np.bool_)
+    if "parent" in record:  # a node that was expanded and of which nothing was cut tells no more than one that was not
+        followed &= np.isin(np.arange(len(followed)), record["parent"][cut])
     censored: Mask = cut.copy()
-    censored[cut] = ~record["node_expanded"][record["child"][cut]]
+    censored[cut] = ~followed[record["child"][cut]]
     return censored
 
 

@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mdp.learning.labels import RatedList
+from mdp.learning.labels import TIE, RatedList
 from mdp.mesh import Floats, Ints
 
 FULL = 50  # candidates of a full list: the beam width that the lists are collected with
-TIE = 1e-9  # outcomes (shares) that differ less are the same
 RESAMPLES = 2000
 
 Scores = Callable[[RatedList], Floats]
@@ -43,12 +42,12 @@ def at(cut: int) -> Measure:
 
 def best_within(first: int) -> Measure:
     """1 where a candidate with the least outcome of the list is among the first few, else 0."""
-    return lambda scores, one: float(regret(first)(scores, one) <= TIE)
+    return lambda scores, one: float(one.outcome[order(scores)[:first]].min() - one.outcome.min() <= TIE)
 
 
 def regret(first: int) -> Measure:
-    """How much more than the best of the list the best of the first few ends with, share of the model's risky area."""
-    return lambda scores, one: float(one.outcome[order(scores)[:first]].min() - one.outcome.min())
+    """By how much the best of the first few ends with more than the best of the list, as share of that."""
+    return lambda scores, one: float(one.regrets[order(scores)[:first]].min())
 
 
 def full_lists(lists: Sequence[RatedList]) -> list[RatedList]:

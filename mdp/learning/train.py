@@ -1,6 +1,6 @@
-"""Train: the paper's ranker from a folder of records.
+"""Train: a ranker from a folder of records, the paper's or one that is asked for little regret.
 
-    python -m mdp.learning.train FOLDER -o RANKER.onnx [--manifest CSV] [--terms paper] [--loss urank|ranknet] [--epochs N] ...
+    python -m mdp.learning.train FOLDER -o RANKER.onnx [--manifest CSV] [--loss urank|ranknet|regret] [--terms NAME,...] ...
 
 The lists of the training side teach, those of the validation side say when to stop, those of the test side are only counted in
 the file's figures. An interrupted training goes on from RANKER.onnx.checkpoint when it is started again.
@@ -9,22 +9,31 @@ the file's figures. An interrupted training goes on from RANKER.onnx.checkpoint 
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mdp.learning.command import Parser, check_range, commit, run
-from mdp.learning.labels import RatedList, rate
+from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, commit, run
+from mdp.learning.labels import RatedList, followed, rate
 from mdp.learning.lists import of_side, read_lists
-from mdp.learning.ndcg import at, full_lists
+from mdp.learning.ndcg import at, best_within, full_lists, regret
 from mdp.learning.sources import Side
-from mdp.ranking.features import PAPER_COLUMNS
+from profiles.errors import LearningError
 
 if TYPE_CHECKING:
-    from mdp.learning.ndcg import Scores
-    from mdp.learning.rankers.training import Epoch
+    import torch
 
+    from mdp.learning.ndcg import Scores
+    from mdp.learning.rankers.training import Epoch, Schedule
+
+Trained = tuple["Scores", Callable[[Mapping[str, str]], bytes]]  # what a ranker gives a list, and its file with metadata
+Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # to train with and to validate with
 CUTS = (1, 2, 3, 4, 5)
+PLACES = (1, 2)
+MOST_NETWORKS = 12  # of an ensemble: its file stays below 200 kB
+LOSSES = {"urank": "paper", "ranknet": "paper", "regret": "cheap"}  # and the columns that each is trained on by default
+OWN = ("epochs", "patience", "batch", "rate")  # of the schedule, each loss has its own
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -35,63 +44,120 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def train(arguments: Sequence[str] | None) -> None:
     """Train, write the ranker, say what it is worth on the lists that it never saw."""
     options = _options(arguments)
-    from mdp.learning.rankers import training, urank
-    from mdp.learning.rankers.export import export, write
+    from mdp.learning.rankers.export import write
 
-    lists = read_lists(options.folder, options.manifest, terms=options.terms)
-    teach, stop, judge = (rate(of_side(lists, side), PAPER_COLUMNS) for side in (Side.TRAIN, Side.VALIDATION, Side.TEST))
-    schedule = training.Schedule(options.loss, options.epochs, options.patience, options.batch, options.rate, seed=options.seed)
-    network = urank.Network(len(PAPER_COLUMNS), seed=options.seed)
-    checkpoint = options.output.with_name(f"{options.output.name}.checkpoint")
-    training.train(network, PAPER_COLUMNS, (teach, stop), schedule, checkpoint, show)
-    if sys.stderr.isatty():
-        sys.stderr.write("\n")
-    figures = judged(urank.scores(network, PAPER_COLUMNS), [one for one in judge if one.teaches])
+    columns = COLUMN_SETS[options.columns or LOSSES[options.loss]]
+    lists = read_lists(options.folder, options.manifest, columns, options.terms)
+    if options.loss == "regret":
+        lists = followed(lists)
+    teach, stop, judge = (rate(of_side(lists, side), columns) for side in (Side.TRAIN, Side.VALIDATION, Side.TEST))
+    checkpoints = [options.output.with_name(f"{options.output.name}.checkpoint")]
+    checkpoints += [
+        options.output.with_name(f"{options.output.name}.checkpoint{member}") for member in range(1, options.ensemble)
+    ]
+    trained = _train_regret if options.loss == "regret" else _train_paper
+    scores, export = trained(options, columns, (teach, stop), checkpoints)
     about = {
         "kind": options.loss,
-        "data_set": f"{options.folder.resolve().name}: {len(teach)} lists of {len({one.model for one in teach})} models",
+        "data_set": f"{options.folder.resolve().name}: {counts(teach)}",
         "commit": commit(),
-        "figures": json.dumps(figures),
+        "figures": json.dumps(judged(options.loss, scores, [one for one in judge if one.teaches])),
     }
-    write(options.output, export(network.weights(), PAPER_COLUMNS, about))
-    checkpoint.unlink(missing_ok=True)
+    write(options.output, export(about))
+    for file in checkpoints:
+        file.unlink(missing_ok=True)
     sys.stdout.write("\n".join(f"{name}: {value}" for name, value in {**about, "written": options.output}.items()) + "\n")
 
 
+def _train_paper(options: argparse.Namespace, columns: Sequence[str], lists: Sides, checkpoints: Sequence[Path]) -> Trained:
+    from mdp.learning.rankers import urank
+    from mdp.learning.rankers.export import export
+
+    network = urank.Network(len(columns), seed=options.seed)
+    _run(network, columns, lists, _schedule(options), checkpoints[0])
+    return urank.scores(network, columns), lambda about: export(network.weights(), columns, about)
+
+
+def _train_regret(options: argparse.Namespace, columns: Sequence[str], lists: Sides, checkpoints: Sequence[Path]) -> Trained:
+    from mdp.learning.rankers import regret
+
+    networks = []
+    for member, checkpoint in enumerate(checkpoints):
+        network = regret.Network(columns, seed=options.seed + member)
+        _run(network, columns, lists, _schedule(options, member), checkpoint)
+        networks.append(network)
+    return regret.scores(networks, columns), lambda about: regret.export(networks, columns, about)
+
+
+def _run(
+    network: "torch.nn.Module",
+    columns: Sequence[str],
+    lists: Sides,
+    schedule: "Schedule",
+    checkpoint: Path,
+) -> None:
+    """Train a network and show how it goes."""
+    from mdp.learning.rankers import training
+
+    training.train(network, columns, lists, schedule, checkpoint, show)
+    if sys.stderr.isatty():
+        sys.stderr.write("\n")
+
+
+def _schedule(options: argparse.Namespace, member: int = 0) -> "Schedule":
+    """The schedule of the loss with what was given in its place; member: of an ensemble, each has a seed of its own."""
+    from mdp.learning.rankers.training import SCHEDULES
+
+    given = {name: getattr(options, name) for name in OWN if getattr(options, name) is not None}
+    return replace(SCHEDULES[options.loss], **given, seed=options.seed + member)
+
+
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = Parser(prog="python -m mdp.learning.train", description="train the paper's ranker on records of wide searches")
-    parser.add_argument("folder", type=Path, help="of record files, MODEL.ORIENTATION.TERMS.npz")
+    parser = Parser(prog="python -m mdp.learning.train", description="train a ranker on records of wide searches")
+    add_records(parser)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.onnx")
-    parser.add_argument(
-        "--manifest", type=Path, metavar="CSV", help="id, source_repo, source_path of the models: split by source"
-    )
-    parser.add_argument("--terms", metavar="NAME", help="only records of searches on these terms; all by default")
-    parser.add_argument("--loss", choices=("urank", "ranknet"), default="urank")
-    parser.add_argument("--epochs", type=int, default=1000, metavar="N", help="at most so many")
-    parser.add_argument("--patience", type=int, default=50, metavar="N", help="epochs without a gain after which it ends")
-    parser.add_argument("--batch", type=int, default=8, metavar="N", help="lists a step; the paper takes 1")
-    parser.add_argument("--rate", type=float, default=1e-4, metavar="R", help="learning rate of Adam")
+    parser.add_argument("--loss", choices=LOSSES, default="urank", help="of the paper (urank), of pairs, or the regret to expect")
+    parser.add_argument("--ensemble", type=int, default=1, metavar="N", help="average N networks, with --loss regret")
+    parser.add_argument("--epochs", type=int, metavar="N", help="at most so many; default 1000, 100 with --loss regret")
+    parser.add_argument("--patience", type=int, metavar="N", help="epochs without a gain after which it ends; default 50, 25")
+    parser.add_argument("--batch", type=int, metavar="N", help="lists a step; default 8, 64; the paper takes 1")
+    parser.add_argument("--rate", type=float, metavar="R", help="learning rate of Adam; default 1e-4, 2e-3")
     parser.add_argument("--seed", type=int, default=0, metavar="N")
     options = parser.parse_args(arguments)
     for name, least, most in (("epochs", 1, 1e6), ("patience", 1, 1e6), ("batch", 1, 1e5), ("rate", 0.0, 10.0), ("seed", 0, 1e9)):
         check_range(options, name, least, most)
+    check_range(options, "ensemble", 1, MOST_NETWORKS)
+    if options.ensemble > 1 and options.loss != "regret":
+        raise LearningError(f"--ensemble is {options.ensemble}: with --loss {options.loss} only 1 is allowed")
     return options
 
 
 def show(epoch: "Epoch") -> None:
     """An epoch as a line that the next one replaces on a terminal."""
-    figures = " ".join(f"{value:.4f}" for value in epoch.validation)
-    line = f"epoch {epoch.number}: loss {epoch.loss:.3f}, validation NDCG@1,3,5 {figures}, best epoch {epoch.best}"
+    figures = ", ".join(f"{name} {value:.4f}" for name, value in zip(epoch.measures, epoch.validation, strict=True))
+    line = f"epoch {epoch.number}: loss {epoch.loss:.3f}, validation {figures}, best epoch {epoch.best}"
     sys.stderr.write(f"\r\x1b[K{line}" if sys.stderr.isatty() else f"{line}\n")
     sys.stderr.flush()
 
 
-def judged(scores: "Scores", lists: Sequence[RatedList]) -> dict[str, float | int]:
-    """Counts and mean NDCG on all and on full lists, with four digits."""
+def counts(lists: Sequence[RatedList]) -> str:
+    """How many records, lists and models."""
+    records, models = len({one.record for one in lists}), len({one.model for one in lists})
+    return f"{records} records, {len(lists)} lists, {models} models"
+
+
+def judged(loss: str, scores: "Scores", lists: Sequence[RatedList]) -> dict[str, float | int]:
+    """Counts and means with four digits: NDCG on all and on full lists, or regret by terms."""
     figures: dict[str, float | int] = {"lists": len(lists)}
-    for name, some in (("NDCG", lists), ("full NDCG", full_lists(lists))):
-        for cut in CUTS if some else ():
-            figures[f"{name}@{cut}"] = round(sum(at(cut)(scores(one), one) for one in some) / len(some), 4)
+    kinds: dict[str, Sequence[RatedList]] = {"NDCG": lists, "full NDCG": full_lists(lists)}
+    measures = {f"@{cut}": at(cut) for cut in CUTS}
+    if loss == "regret":
+        kinds = {f"{terms}:": [one for one in lists if one.terms == terms] for terms in sorted({one.terms for one in lists})}
+        measures = {f" regret@{first}": regret(first) for first in PLACES}
+        measures |= {f" best in first {first}": best_within(first) for first in PLACES}
+    for kind, some in kinds.items():
+        for name, measure in measures.items() if some else ():
+            figures[f"{kind}{name}".strip()] = round(sum(measure(scores(one), one) for one in some) / len(some), 4)
     return figures
 
 

@@ -54,10 +54,10 @@ class Graph:
         return content
 
 
-def scale_by_list(graph: Graph, features: str) -> str:
+def scale_by_list(graph: Graph, features: str, smallest_range: float = SMALLEST_RANGE) -> str:
     """(n, F) every column from 0 to 1 over its list, as `mdp.learning.labels.scale`."""
     low, high = (graph.add(operator, features, axes=[0], keepdims=1) for operator in ("ReduceMin", "ReduceMax"))
-    smallest = graph.constant(np.array(SMALLEST_RANGE, np.float32))
+    smallest = graph.constant(np.array(smallest_range, np.float32))
     return graph.add("Div", graph.add("Sub", features, low), graph.add("Add", graph.add("Sub", high, low), smallest))
 
 

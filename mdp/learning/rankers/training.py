@@ -1,11 +1,11 @@
 """Training: steps over shuffled batches of lists until the validation lists are ordered no better, resumable at every epoch.
 
-Adam, the norm of all gradients together cut off. The network with the highest validation NDCG@1 is kept, then @3, then @5.
+Adam, the norm of all gradients together cut off. The network with the highest figures on the validation lists is kept.
 One thread, and an order of lists drawn anew from seed and epoch: the same lists give the same weights, interrupted or not.
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from hashlib import sha256
@@ -15,19 +15,22 @@ from typing import Any
 import torch
 
 from mdp.learning.labels import RatedList
-from mdp.learning.ndcg import ndcg
-from mdp.learning.rankers.urank import LOSSES, Padded, pad
+from mdp.learning.rankers import regret, urank
+from mdp.learning.rankers.objective import Figures, Objective, Padded
 from profiles.errors import LearningError
 
-CUTS = (1, 3, 5)
+OBJECTIVES: dict[str, Objective] = {**urank.OBJECTIVES, "regret": regret.OBJECTIVE}
 
 Weights = dict[str, torch.Tensor]
-Figures = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """How to train. batch: lists a step; rate: Adam's; clip: largest norm of the gradients; patience: epochs without a gain."""
+    """How to train.
+
+    loss: name of an objective; patience: epochs without a gain; batch: lists a step; rate: Adam's; clip: largest norm of the
+    gradients; decay: of the weights, added to the gradients.
+    """
 
     loss: str = "urank"
     epochs: int = 1000
@@ -35,16 +38,26 @@ class Schedule:
     batch: int = 8
     rate: float = 1e-4
     clip: float = 5.0
+    decay: float = 0.0
     seed: int = 0
+
+
+SCHEDULES = {
+    "urank": Schedule(),
+    "ranknet": Schedule("ranknet"),
+    "regret": Schedule("regret", epochs=100, patience=25, batch=64, rate=2e-3, decay=1e-3),
+}
 
 
 @dataclass(frozen=True)
 class Epoch:
-    """An epoch's number from 1, its mean training loss, its validation NDCG at CUTS, and the best epoch so far."""
+    """An epoch's number from 1, its mean training loss, its figures on the validation lists and what they measure, and the best
+    epoch so far."""
 
     number: int
     loss: float
     validation: Figures
+    measures: tuple[str, ...]
     best: int
 
 
@@ -57,7 +70,7 @@ class _State:
     best_weights: Weights
     epoch: int = 0
     best_epoch: int = 0
-    best: Figures = (-1.0,) * len(CUTS)
+    best: Figures = ()
 
 
 def train(
@@ -68,7 +81,7 @@ def train(
     checkpoint: Path | None = None,
     on_epoch: Callable[[Epoch], None] | None = None,
 ) -> Figures:
-    """Train a network in place on the named features of lists for training and for validation; the best validation NDCG at CUTS.
+    """Train a network in place on the named features of lists for training and for validation; the best figures.
 
     Lists with a single rating are left out. Where the checkpoint file is there, the training goes on from it. Raises
     LearningError for no lists, and for a checkpoint of another training or one that cannot be written.
@@ -78,56 +91,56 @@ def train(
     for side, name in ((training, "train"), (validation, "validate")):
         if not side:
             raise LearningError(f"no list to {name} with: record more models, of more repositories and folders")
-    padded, held_out = pad(training, columns), pad(validation, columns)
-    state = _State(network, torch.optim.Adam(network.parameters(), lr=schedule.rate), deepcopy(network.state_dict()))
+    objective = OBJECTIVES[schedule.loss]
+    padded, held_out = objective.pad(training, columns), objective.pad(validation, columns)
+    objective.prepare(network, padded)
+    adam = torch.optim.Adam(network.parameters(), lr=schedule.rate, weight_decay=schedule.decay)
+    state = _State(network, adam, deepcopy(network.state_dict()))
     key = _key(network, schedule, padded, held_out)
     if checkpoint is not None and checkpoint.exists():
         _resume(checkpoint, key, state)
     while state.epoch < schedule.epochs and state.epoch - state.best_epoch < schedule.patience:
         state.epoch += 1
         loss = _steps(state, padded, schedule)
-        figures = _validate(network, held_out)
+        figures = _validate(network, held_out, objective)
         if figures > state.best:
             state.best, state.best_epoch, state.best_weights = figures, state.epoch, deepcopy(network.state_dict())
         if checkpoint is not None:
             _save(checkpoint, key, state)
         if on_epoch is not None:
-            on_epoch(Epoch(state.epoch, loss, figures, state.best_epoch))
+            on_epoch(Epoch(state.epoch, loss, figures, objective.measures, state.best_epoch))
     network.load_state_dict(state.best_weights)
     return state.best
 
 
 def _steps(state: _State, lists: Padded, schedule: Schedule) -> float:
     """One epoch; the mean loss of the lists, each as its step met it."""
-    total = 0.0
-    for rows in _batches(len(lists.ratings), schedule, state.epoch):
+    total, objective = 0.0, OBJECTIVES[schedule.loss]
+    generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + state.epoch)
+    for rows in torch.randperm(len(lists.targets), generator=generator).split(schedule.batch):
         batch = lists.take(rows)
-        losses = LOSSES[schedule.loss](state.network(batch.features), batch.ratings, batch.present)
+        seen = objective.thin(batch.present, generator)
+        losses = objective.loss(objective.score(state.network, batch.features, seen), batch.targets, seen)
         state.optimizer.zero_grad()
         losses.mean().backward()
         torch.nn.utils.clip_grad_norm_(state.network.parameters(), schedule.clip)
         state.optimizer.step()
         total += float(losses.detach().sum())
-    return total / len(lists.ratings)
+    return total / len(lists.targets)
 
 
-def _batches(count: int, schedule: Schedule, epoch: int) -> Iterator[torch.Tensor]:
-    generator = torch.Generator().manual_seed(schedule.seed * 1_000_003 + epoch)
-    yield from torch.randperm(count, generator=generator).split(schedule.batch)
-
-
-def _validate(network: torch.nn.Module, lists: Padded) -> Figures:
+def _validate(network: torch.nn.Module, lists: Padded, objective: Objective) -> Figures:
     with torch.no_grad():
-        scores = network(lists.features).double().numpy()
-    ratings, present = lists.ratings.numpy(), lists.present.numpy()
-    each = [(scores[row][here], ratings[row][here]) for row, here in enumerate(present)]
-    return tuple(sum(ndcg(one, rated, cut) for one, rated in each) / len(each) for cut in CUTS)
+        scores = objective.score(network, lists.features, lists.present).double().numpy()
+    targets, present = lists.targets.numpy(), lists.present.numpy()
+    each = [objective.figures(scores[row][here], targets[row][here]) for row, here in enumerate(present)]
+    return tuple(sum(values) / len(each) for values in zip(*each, strict=True))
 
 
 def _key(network: torch.nn.Module, schedule: Schedule, *lists: Padded) -> str:
     """What tells a training from others: its network as it starts, its schedule but for the end, its lists."""
-    digest = sha256(repr((schedule.loss, schedule.batch, schedule.rate, schedule.clip, schedule.seed)).encode())
-    tensors = [*network.state_dict().values(), *(tensor for one in lists for tensor in (one.features, one.ratings, one.present))]
+    digest = sha256(repr((schedule.loss, schedule.batch, schedule.rate, schedule.clip, schedule.decay, schedule.seed)).encode())
+    tensors = [*network.state_dict().values(), *(tensor for one in lists for tensor in (one.features, one.targets, one.present))]
     for tensor in tensors:
         digest.update(repr(tensor.shape).encode() + tensor.numpy().tobytes())
     return digest.hexdigest()

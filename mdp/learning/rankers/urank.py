@@ -1,26 +1,22 @@
 """uRank (Zhu and Klabjan 2020) as the 2020 paper uses it: the network and its loss; and RankNet's loss beside it.
 
-The paper prints the loss without its minus sign and calls |R| what is the number of distinct ratings. Lists of different lengths
-are padded to one length, so that a step takes many of them at once.
+The paper prints the loss without its minus sign and calls |R| what is the number of distinct ratings.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 import torch
 from torch.nn.functional import softplus
-from torch.nn.utils.rnn import pad_sequence
 
 from mdp.learning.labels import RatedList, Singles, scale
-from mdp.learning.ndcg import Scores
+from mdp.learning.ndcg import Scores, ndcg
+from mdp.learning.rankers.objective import FAR_BELOW, Figures, Loss, Objective, Targets
 from mdp.mesh import Floats
 
 HIDDEN = (100, 100)
-FAR_BELOW = -1e30  # a score that no exponential sees, finite so that gradients stay numbers
-
-Loss = Callable[[torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]
+CUTS = (1, 3, 5)
 
 
 class Network(torch.nn.Module):
@@ -46,29 +42,6 @@ class Network(torch.nn.Module):
         return [(layer.weight.detach().numpy(), layer.bias.detach().numpy()) for layer in self.layers]
 
 
-@dataclass(frozen=True, eq=False)
-class Padded:
-    """L lists padded to n candidates: features (L, n, F) scaled by list, ratings (L, n), present (L, n) true for candidates."""
-
-    features: torch.Tensor
-    ratings: torch.Tensor
-    present: torch.Tensor
-
-    def take(self, rows: torch.Tensor) -> "Padded":
-        """Some of the lists, no longer than the longest of them needs."""
-        longest = int(self.present[rows].sum(dim=1).max())
-        return Padded(self.features[rows, :longest], self.ratings[rows, :longest], self.present[rows, :longest])
-
-
-def pad(lists: Sequence[RatedList], columns: Sequence[str]) -> Padded:
-    """Lists side by side, the named features scaled."""
-    return Padded(
-        pad_sequence([torch.from_numpy(scale(one.table(columns))) for one in lists], batch_first=True),
-        pad_sequence([torch.from_numpy(one.ratings) for one in lists], batch_first=True),
-        pad_sequence([torch.ones(len(one.ratings), dtype=torch.bool) for one in lists], batch_first=True),
-    )
-
-
 def urank_loss(scores: torch.Tensor, ratings: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
     """(L,) loss of each list: every candidate against all of lower rating, weighted by its gain, over the ratings but one.
 
@@ -88,9 +61,6 @@ def ranknet_loss(scores: torch.Tensor, ratings: torch.Tensor, present: torch.Ten
     return pairs.sum(dim=(1, 2)) / lower.sum(dim=(1, 2)).clamp(min=1)
 
 
-LOSSES: dict[str, Loss] = {"urank": urank_loss, "ranknet": ranknet_loss}
-
-
 def _lower(ratings: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
     """(L, n, n) true at i, j where candidate j is rated lower than candidate i."""
     return (ratings.unsqueeze(1) < ratings.unsqueeze(2)) & present.unsqueeze(1) & present.unsqueeze(2)
@@ -100,6 +70,18 @@ def _distinct(ratings: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
     """(L,) how many different ratings each list has."""
     ordered = torch.where(present, ratings, ratings.amax(dim=1, keepdim=True)).sort(dim=1).values
     return (ordered.diff(dim=1) > 0).sum(dim=1) + 1
+
+
+def _figures(scores: Floats, ratings: Targets) -> Figures:
+    return tuple(ndcg(scores, ratings.astype(np.int32), cut) for cut in CUTS)
+
+
+def _objective(loss: Loss) -> Objective:
+    measures = tuple(f"NDCG@{cut}" for cut in CUTS)
+    return Objective(lambda one, columns: scale(one.table(columns)), lambda one: one.ratings, loss, _figures, measures)
+
+
+OBJECTIVES = {"urank": _objective(urank_loss), "ranknet": _objective(ranknet_loss)}
 
 
 def scores(network: torch.nn.Module, columns: Sequence[str]) -> Scores:

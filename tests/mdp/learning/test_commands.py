@@ -48,6 +48,25 @@ def test_a_ranker_is_trained_and_judged_by_two_commands(
 
 
 @pytest.mark.train
+def test_an_ensemble_with_little_regret_is_trained_on_some_terms(
+    records: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for library in ("torch", "onnx"):
+        pytest.importorskip(library, reason="the extra `train` is not installed")
+    asked = [str(records), "-o", str(tmp_path / "a.onnx"), "--loss", "regret", "--columns", "paper", "--epochs", "2"]
+    assert train.main([*asked, "--ensemble", "2", "--terms", "paper"]) == 0
+    printed = capsys.readouterr()
+    assert '"paper: regret@1": ' in printed.out
+    assert " records, " in printed.out
+    assert printed.err.count("epoch 2: loss") == 2
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.onnx", "records"]
+    assert train.main([*asked, "--terms", "paper,ours"]) == 1
+    assert "holds no record (*.ours.npz)" in capsys.readouterr().err
+    assert train.main([*asked, "--ensemble", "2", "--loss", "urank"]) == 1
+    assert "--ensemble is 2: with --loss urank only 1 is allowed" in capsys.readouterr().err
+
+
+@pytest.mark.train
 def test_figure_7_is_drawn_from_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib", reason="the extra `train` is not installed")
     table = tmp_path / "widths.csv"

@@ -24,9 +24,9 @@ def test_every_stage_of_a_record_is_a_list(tmp_path: Path) -> None:
 def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
     for name in ("a.0.paper.npz", "a.0.ours.npz", "b.1.paper.npz"):
         write_record(tmp_path / name, OUTCOME)
-    assert [one.model for one in read_lists(tmp_path, terms="paper")] == ["a", "b"]
+    assert [one.model for one in read_lists(tmp_path, terms=("paper",))] == ["a", "b"]
     with pytest.raises(LearningError, match=r"holds no record \(\*\.yours\.npz\)"):
-        read_lists(tmp_path, terms="yours")
+        read_lists(tmp_path, terms=("paper", "yours"))
 
 
 def test_features_are_found_by_name_wherever_they_stand(tmp_path: Path) -> None:
@@ -42,6 +42,12 @@ def test_a_candidate_whose_node_nobody_expanded_is_censored(tmp_path: Path) -> N
     followed, whole = read_lists(tmp_path)
     assert followed.censored.tolist() == [False, False, True, False]
     assert not whole.censored.any()
+
+
+def test_a_candidate_whose_node_was_expanded_and_never_cut_is_censored(tmp_path: Path) -> None:
+    arrays = {"child": np.array([1, 2, 3]), "parent": np.array([0, 0, 1]), "node_expanded": np.array([True, True, True, False])}
+    write_record(tmp_path / "a.0.x.npz", np.array([0.5, 0.3, 0.2]), **arrays)
+    assert read_lists(tmp_path)[0].censored.tolist() == [False, True, True]
 
 
 def test_models_of_one_repository_and_folder_are_of_one_source(tmp_path: Path) -> None:
@@ -104,8 +110,8 @@ def test_a_model_that_the_manifest_does_not_know_and_a_manifest_without_sources_
 
 def test_the_small_set_holds_lists_of_twenty_models_in_less_than_300_kb() -> None:
     folder = Path(__file__).parent / "data"
-    lists = read_lists(folder, columns=COLUMNS, terms="paper")
+    lists = read_lists(folder, columns=COLUMNS, terms=("paper",))
     assert len({one.model for one in lists}) == 20
     assert len(lists) >= 70
-    assert {one.model for one in read_lists(folder, terms="ours")} == {"bracket", "figure", "lattice", "tree"}
+    assert {one.model for one in read_lists(folder, terms=("ours",))} == {"bracket", "figure", "lattice", "tree"}
     assert sum(file.stat().st_size for file in folder.iterdir()) < 300_000

@@ -39,7 +39,7 @@ def test_the_best_is_within_the_first_two_when_one_as_good_is() -> None:
     one = listed(np.array([0.4, 0.1, 0.3, 0.1]))
     scores = np.array([4.0, 1.0, 3.0, 2.0])
     assert [best_within(first)(scores, one) for first in (1, 2, 3)] == [0, 0, 1]
-    assert [regret(first)(scores, one) for first in (1, 2, 3)] == pytest.approx([0.3, 0.2, 0])
+    assert [regret(first)(scores, one) for first in (1, 2, 3)] == pytest.approx([3, 2, 0])
 
 
 def test_full_lists_have_fifty_candidates() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from mdp.learning.rankers.urank import Network, pad, ranknet_loss, scores, urank_loss
+from mdp.learning.rankers.urank import OBJECTIVES, Network, ranknet_loss, scores, urank_loss
 from mdp.ranking.features import PAPER_COLUMNS
 from tests.mdp.learning.records import drawn_list
 from tests.mdp.learning.reference import reference_lists
@@ -73,5 +73,5 @@ def test_the_network_is_the_paper_s() -> None:
 def test_a_list_is_scored_alike_alone_and_in_a_batch() -> None:
     network, lists = Network(6), [drawn_list(1, 9), drawn_list(2, 4)]
     with torch.no_grad():
-        batch = network(pad(lists, PAPER_COLUMNS).features).numpy()
+        batch = network(OBJECTIVES["urank"].pad(lists, PAPER_COLUMNS).features).numpy()
     assert np.allclose(scores(network, PAPER_COLUMNS)(lists[1]), batch[1, :4], atol=1e-6)
