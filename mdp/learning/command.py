@@ -42,9 +42,12 @@ def run(command: Callable[[Sequence[str] | None], None], arguments: Sequence[str
     return 0
 
 
-def add_records(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say which records are read: folder, manifest, terms and columns."""
-    parser.add_argument("folder", type=Path, help="of record files, MODEL.ORIENTATION.TERMS.npz")
+def add_records(parser: argparse.ArgumentParser, use: str, nargs: str | None = None) -> None:
+    """Add the options that say what is read of which records.
+
+    use: what the columns are for; nargs: how often the folder is given, once by default.
+    """
+    parser.add_argument("folder", type=Path, nargs=nargs, help="of record files, MODEL.ORIENTATION.TERMS.npz")
     parser.add_argument(
         "--manifest", type=Path, metavar="CSV", help="id, source_repo, source_path of the models: split by source"
     )
@@ -55,7 +58,7 @@ def add_records(parser: argparse.ArgumentParser) -> None:
         metavar="NAME,...",
         help="only records of searches on these terms; all by default",
     )
-    parser.add_argument("--columns", choices=COLUMN_SETS, help="features: the paper's, those known without a check, or all")
+    parser.add_argument("--columns", choices=COLUMN_SETS, help=f"features {use}; cheap: known without a check")
 
 
 def split_names(text: str) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Evaluate: rankers and baselines on the lists of models that no training saw, and the pictures of the 2020 paper.
 
-    python -m mdp.learning.evaluate FOLDER [--manifest CSV] [--terms paper] [--ranker FILE.onnx ...] [--without NAME,...] ...
+    python -m mdp.learning.evaluate FOLDER [--manifest CSV] [--terms NAME,...] [--ranker FILE.onnx ...] [--without NAME,...] ...
     python -m mdp.learning.evaluate --figure7 TABLE.csv [--pictures DIR]
 
 Prints tables in Markdown. figure8-NAME.png: importance of a ranker's features, and their correlation; figure7.png: J and time
@@ -9,17 +9,20 @@ against the beam's width, from the table of tools/compare_widths.py.
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from mdp.learning.command import Parser, check_range, run
-from mdp.learning.labels import RatedList, rate
-from mdp.learning.lists import of_side, read_lists
+from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, run, split_names
+from mdp.learning.labels import RatedList, followed, rate
+from mdp.learning.lists import TrainingList, of_side, read_lists
 from mdp.learning.ndcg import Scores
-from mdp.learning.rankers.baselines import BASELINES
+from mdp.learning.rankers.baselines import BASELINES, REGRET_BASELINES, Fit
 from mdp.learning.sources import Side
-from mdp.ranking.features import PAPER_COLUMNS
 from profiles.errors import LearningError
+
+ALL_BASELINES = (*BASELINES, *REGRET_BASELINES)
+ALWAYS = ("M2", "M6", "wasted")  # what lines are fitted in
+Sides = dict[Side, list[RatedList]]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,21 +41,20 @@ def evaluate(arguments: Sequence[str] | None) -> None:
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = Parser(prog="python -m mdp.learning.evaluate", description="judge rankers on lists that no training saw")
-    parser.add_argument("folder", type=Path, nargs="?", help="of record files, MODEL.ORIENTATION.TERMS.npz")
-    parser.add_argument(
-        "--manifest", type=Path, metavar="CSV", help="id, source_repo, source_path of the models: split by source"
-    )
-    parser.add_argument("--terms", metavar="NAME", help="only records of searches on these terms; all by default")
+    add_records(parser, "that baselines learn from; default paper", nargs="?")
     parser.add_argument(
         "--ranker", type=Path, action="append", default=[], metavar="FILE.onnx", help="may be given several times"
     )
-    parser.add_argument("--without", default="", metavar="NAME,...", help=f"baselines to leave out, of {'; '.join(BASELINES)}")
+    leave = f"baselines to leave out, of {'; '.join(ALL_BASELINES)}"
+    parser.add_argument("--without", type=split_names, default=(), metavar="NAME,...", help=leave)
     parser.add_argument("--repeats", type=int, default=10, metavar="K", help="how often each feature is shuffled")
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="where pictures go; here by default")
     parser.add_argument("--figure7", type=Path, metavar="CSV", help="table of tools/compare_widths.py")
     options = parser.parse_args(arguments)
     check_range(options, "repeats", 1, 10_000)
-    options.without = [name.strip() for name in options.without.split(",") if name.strip()]
+    unknown = [name for name in options.without if name not in ALL_BASELINES]
+    if unknown:
+        raise LearningError(f"--without {unknown[0]}: is no baseline; {'; '.join(ALL_BASELINES)} are there")
     if options.folder is None and options.figure7 is None:
         raise LearningError("a folder of records or --figure7 is needed; --help shows what is allowed")
     return options
@@ -60,33 +62,38 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def _compare(options: argparse.Namespace) -> None:
     """Tables of all rankers, then what the features of each given one do."""
-    from mdp.learning.evaluation.tables import tables
+    from mdp.learning.evaluation.tables import regret_tables, tables
     from mdp.learning.rankers.exported import read_ranker
 
     given = {file: read_ranker(file) for file in options.ranker}
-    columns = tuple(dict.fromkeys([*PAPER_COLUMNS, *(name for one in given.values() for name in one.columns)]))
-    lists = read_lists(options.folder, options.manifest, columns, () if options.terms is None else (options.terms,))
-    training, validation, test = ([one for one in rate(of_side(lists, side), columns) if one.teaches] for side in Side)
-    for side, some in zip(Side, (training, validation, test), strict=True):
-        if not some:
-            raise LearningError(f"folder {options.folder}: no list of it is on the side {side}; record models of more sources")
+    learnt = COLUMN_SETS[options.columns or "paper"]
+    columns = tuple(dict.fromkeys([*learnt, *ALWAYS, *(name for one in given.values() for name in one.columns)]))
+    lists = read_lists(options.folder, options.manifest, columns, options.terms)
+    cut, known = (_sides(options.folder, some, columns) for some in (lists, followed(lists)))
     rankers: dict[str, Scores] = {f"{one.kind}, {file}": one.scores for file, one in given.items()}
-    rankers |= _baselines(options.without, training, validation)
-    for text in tables(rankers, test):
+    rankers |= _fitted(BASELINES, options.without, cut, learnt) | _fitted(REGRET_BASELINES, options.without, known, learnt)
+    for text in (*tables(rankers, cut[Side.TEST]), *regret_tables(rankers, known[Side.TEST])):
         sys.stdout.write(f"{text}\n\n")
     for file, one in given.items():
-        _analyse(one.scores, one.columns, test, options.repeats, options.pictures / f"figure8-{file.stem}.png")
+        picture = options.pictures / f"figure8-{file.stem}.png"
+        _analyse(one.scores, one.columns, cut[Side.TEST], options.repeats, picture)
 
 
-def _baselines(without: Sequence[str], training: Sequence[RatedList], validation: Sequence[RatedList]) -> dict[str, Scores]:
-    unknown = [name for name in without if name not in BASELINES]
-    if unknown:
-        raise LearningError(f"--without {unknown[0]}: is no baseline; {'; '.join(BASELINES)} are there")
+def _sides(folder: Path, lists: Sequence[TrainingList], columns: Sequence[str]) -> Sides:
+    """The lists of each side that have something to tell apart; LearningError where a side has none."""
+    sides = {side: [one for one in rate(of_side(lists, side), columns) if one.teaches] for side in Side}
+    for side, some in sides.items():
+        if not some:
+            raise LearningError(f"folder {folder}: no list of it is on the side {side}; record models of more sources")
+    return sides
+
+
+def _fitted(baselines: Mapping[str, Fit], without: Sequence[str], lists: Sides, columns: Sequence[str]) -> dict[str, Scores]:
     fitted = {}
-    for name, fit in BASELINES.items():
+    for name, fit in baselines.items():
         if name not in without:
             sys.stderr.write(f"fitting {name}\n")
-            fitted[name] = fit(training, validation)
+            fitted[name] = fit(lists[Side.TRAIN], lists[Side.VALIDATION], columns)
     return fitted
 
 

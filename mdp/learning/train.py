@@ -114,7 +114,7 @@ def _schedule(options: argparse.Namespace, member: int = 0) -> "Schedule":
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = Parser(prog="python -m mdp.learning.train", description="train a ranker on records of wide searches")
-    add_records(parser)
+    add_records(parser, "to learn from; default paper, cheap with --loss regret")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.onnx")
     parser.add_argument("--loss", choices=LOSSES, default="urank", help="of the paper (urank), of pairs, or the regret to expect")
     parser.add_argument("--ensemble", type=int, default=1, metavar="N", help="average N networks, with --loss regret")

@@ -1,4 +1,7 @@
-"""Tables of rankers over lists, in Markdown: NDCG as in the 2020 paper, how often the best comes first, what a miss costs."""
+"""Tables of rankers over lists, in Markdown: NDCG as in the 2020 paper, how often the best comes first, what a miss costs.
+
+NDCG is of all candidates that were cut, as in the paper; regret of those that somebody followed.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -10,6 +13,7 @@ from mdp.mesh import Floats
 
 CUTS = (1, 2, 3, 4, 5)
 FIRST = (1, 2, 5)
+SEVERAL = 20  # candidates from which a list is no short one
 SIZES = ((2, 5), (6, 10), (11, 20), (21, 35), (36, 49), (50, 10_000))
 
 Given = Sequence[Floats]  # the scores of every list
@@ -30,16 +34,38 @@ def _headed(title: str, lists: Sequence[RatedList], body: str) -> str:
 
 
 def table(given: Mapping[str, Given], lists: Sequence[RatedList]) -> str:
-    """A row a ranker: NDCG, the 95 % interval of NDCG@1 and NDCG@5 over models, best within the first few, regret."""
+    """A row a ranker: NDCG, the 95 % interval of NDCG@1 and NDCG@5 over models, best within the first few."""
     heads = [*(f"NDCG@{cut}" for cut in CUTS), "95 % of @1", "95 % of @5", *(f"best in first {first}" for first in FIRST)]
-    heads += [f"regret@{first}" for first in FIRST]
     lines = [_row("ranker", heads), "|---|" + "---:|" * len(heads)]
     for name, scores in given.items():
         gains = [measured(at(cut), scores, lists) for cut in CUTS]
         cells = [f"{values.mean():.3f}" for values in gains]
         cells += ["{:.3f} to {:.3f}".format(*interval(values, [one.model for one in lists])) for values in (gains[0], gains[-1])]
         cells += [f"{measured(best_within(first), scores, lists).mean():.1%}" for first in FIRST]
-        cells += [f"{measured(regret(first), scores, lists).mean():.4f}" for first in FIRST]
+        lines.append(_row(name, cells))
+    return "\n".join(lines)
+
+
+def regret_tables(rankers: Mapping[str, Scores], lists: Sequence[RatedList]) -> Iterator[str]:
+    """Markdown: regret, a table for the lists of each terms."""
+    for terms in sorted({one.terms for one in lists}):
+        some = [one for one in lists if one.terms == terms]
+        given = {name: [scores(one) for one in some] for name, scores in rankers.items()}
+        yield _headed(f"Regret, terms {terms}", some, regret_table(given, some))
+
+
+def regret_table(given: Mapping[str, Given], lists: Sequence[RatedList]) -> str:
+    """A row a ranker: mean regret, the 95 % interval of regret@1 over models, best within the first few, of long lists, too."""
+    heads = [*(f"regret@{first}" for first in FIRST), "95 % of @1", *(f"best in first {first}" for first in FIRST)]
+    lines = [_row("ranker", [*heads, f"in first 2 of {SEVERAL} and more"]), "|---|" + "---:|" * (len(heads) + 1)]
+    several = np.array([len(one.ratings) >= SEVERAL for one in lists])
+    for name, scores in given.items():
+        losses = [measured(regret(first), scores, lists) for first in FIRST]
+        found = [measured(best_within(first), scores, lists) for first in FIRST]
+        cells = [f"{values.mean():.4f}" for values in losses]
+        cells.append("{:.4f} to {:.4f}".format(*interval(losses[0], [one.model for one in lists])))
+        cells += [f"{values.mean():.1%}" for values in found]
+        cells.append(f"{found[1][several].mean():.1%}" if several.any() else "-")
         lines.append(_row(name, cells))
     return "\n".join(lines)
 

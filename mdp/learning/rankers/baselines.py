@@ -1,6 +1,7 @@
 """Baselines: orders without learning, a line in two features, and the learners that the paper and method hold uRank against.
 
-Boosted trees get the features scaled by list as uRank does; LambdaMART the unscaled ones beside them.
+Boosted trees get the features scaled by list as uRank does; LambdaMART the unscaled ones beside them. REGRET_BASELINES are held
+against what is trained for little regret: lines with the least regret, and LambdaMART on grades of regret.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,12 +10,12 @@ from zlib import crc32
 import numpy as np
 
 from mdp.learning.labels import RatedList, Singles, scale
-from mdp.learning.ndcg import Scores, ndcg
+from mdp.learning.ndcg import Scores, ndcg, regret
 from mdp.mesh import Floats, Ints
-from mdp.ranking.features import PAPER_COLUMNS
 
 WEIGHTS = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 53)])  # of M6 against M2, tried in turn
 FITTED_AT = 5  # the NDCG that the line is fitted by and that LambdaMART stops by
+GRADES = (0.2, 0.06, 0.02, 0.005, 1e-6)  # a candidate's grade is how many of these its regret is not above
 # The settings of XGBoost's own ranking demo, which the paper names, with the paper's depth and rounds.
 XGBOOST = {"max_depth": 8, "eta": 0.1, "gamma": 1.0, "min_child_weight": 0.1, "tree_method": "hist", "nthread": 1, "seed": 0}
 XGBOOST_PAIRS = {"lambdarank_pair_method": "mean", "lambdarank_num_pair_per_sample": 1}  # as that demo drew them in 2020
@@ -35,7 +36,8 @@ LIGHTGBM = {
 LIGHTGBM_ROUNDS, LIGHTGBM_PATIENCE = 1000, 50
 
 Lists = Sequence[RatedList]
-Fit = Callable[[Lists, Lists], Scores]  # lists to train with and to validate with
+Columns = Sequence[str]
+Fit = Callable[[Lists, Lists, Columns], Scores]  # lists to train with and to validate with, and what is learnt from
 
 
 def random_order(one: RatedList) -> Floats:
@@ -43,87 +45,117 @@ def random_order(one: RatedList) -> Floats:
     return np.random.default_rng(crc32(one.features.tobytes())).random(len(one.ratings))
 
 
-def trade_off(weight: float) -> Scores:
-    """M2 - weight M6: what is saved so far less what is lost for ever."""
+def trade_off(weight: float, lost: str = "M6") -> Scores:
+    """M2 - weight M6: what is saved so far less what is lost for ever; lost: another feature in the place of M6."""
 
     def of_list(one: RatedList) -> Floats:
-        saved, lost = one.table(("M2", "M6")).T.astype(np.float64)
-        scores: Floats = saved - weight * lost
+        gain, loss = one.table(("M2", lost)).T.astype(np.float64)
+        scores: Floats = gain - weight * loss
         return scores
 
     return of_list
 
 
-def fit_trade_off(training: Lists, validation: Lists) -> Scores:
+def fit_trade_off(training: Lists, validation: Lists, columns: Columns) -> Scores:
     """The trade-off with the highest NDCG on the training lists."""
-    del validation
+    del validation, columns
     means = [np.mean([ndcg(trade_off(weight)(one), one.ratings, FITTED_AT) for one in training]) for weight in WEIGHTS]
     return trade_off(float(WEIGHTS[int(np.argmax(means))]))
+
+
+def fit_least_regret(lost: str) -> Fit:
+    """The trade-off with a feature whose first candidate has the least regret on the training lists."""
+
+    def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
+        del validation, columns
+        means = [np.mean([regret(1)(trade_off(weight, lost)(one), one) for one in training]) for weight in WEIGHTS]
+        return trade_off(float(WEIGHTS[int(np.argmin(means))]), lost)
+
+    return fit
 
 
 def fit_xgboost(objective: str) -> Fit:
     """RankNet (rank:pairwise) or LambdaRank (rank:ndcg) as the paper ran them: 500 rounds, come what may."""
 
-    def fit(training: Lists, validation: Lists) -> Scores:
+    def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
         del validation
         import xgboost
 
-        rows = xgboost.DMatrix(np.vstack([_scaled(one) for one in training]), label=_ratings(training))
+        rows = xgboost.DMatrix(np.vstack([_scaled(one, columns) for one in training]), label=_joined(training, _ratings))
         rows.set_group([len(one.ratings) for one in training])
         booster = xgboost.train({**XGBOOST, **XGBOOST_PAIRS, "objective": objective}, rows, XGBOOST_ROUNDS)
-        return lambda one: booster.inplace_predict(_scaled(one)).astype(np.float64)
+        return lambda one: booster.inplace_predict(_scaled(one, columns)).astype(np.float64)
 
     return fit
 
 
-def fit_lambdamart(training: Lists, validation: Lists) -> Scores:
-    """LightGBM's LambdaMART, stopped when the validation lists are ordered no better."""
-    import lightgbm
+def fit_lambdamart(labels: Callable[[RatedList], Ints]) -> Fit:
+    """LightGBM's LambdaMART on labels, stopped when the validation lists are ordered no better."""
 
-    def rows(lists: Lists, reference: object = None) -> object:
-        table = np.vstack([_scaled_and_raw(one) for one in lists])
-        groups = [len(one.ratings) for one in lists]
-        return lightgbm.Dataset(table, label=_ratings(lists), group=groups, reference=reference)
+    def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
+        import lightgbm
 
-    train = rows(training)
-    booster = lightgbm.train(
-        LIGHTGBM,
-        train,
-        LIGHTGBM_ROUNDS,
-        valid_sets=[rows(validation, train)],
-        callbacks=[lightgbm.early_stopping(LIGHTGBM_PATIENCE, verbose=False)],
-    )
-    return lambda one: np.asarray(booster.predict(_scaled_and_raw(one), num_threads=1), dtype=np.float64)
+        def rows(lists: Lists, reference: object = None) -> object:
+            table = np.vstack([_scaled_and_raw(one, columns) for one in lists])
+            groups = [len(one.ratings) for one in lists]
+            return lightgbm.Dataset(table, label=_joined(lists, labels), group=groups, reference=reference)
+
+        train = rows(training)
+        booster = lightgbm.train(
+            LIGHTGBM,
+            train,
+            LIGHTGBM_ROUNDS,
+            valid_sets=[rows(validation, train)],
+            callbacks=[lightgbm.early_stopping(LIGHTGBM_PATIENCE, verbose=False)],
+        )
+        return lambda one: np.asarray(booster.predict(_scaled_and_raw(one, columns), num_threads=1), dtype=np.float64)
+
+    return fit
 
 
-def fit_ranknet(training: Lists, validation: Lists) -> Scores:
+def grades(one: RatedList) -> Ints:
+    """(n,) 5 for the best candidates, less for more regret, as GRADES says."""
+    grade: Ints = (one.regrets[:, np.newaxis] <= GRADES).sum(axis=1).astype(np.int32)
+    return grade
+
+
+def _ratings(one: RatedList) -> Ints:
+    return one.ratings
+
+
+def _joined(lists: Lists, labels: Callable[[RatedList], Ints]) -> Ints:
+    return np.concatenate([labels(one) for one in lists])
+
+
+def _scaled(one: RatedList, columns: Columns) -> Singles:
+    return scale(one.table(columns))
+
+
+def _scaled_and_raw(one: RatedList, columns: Columns) -> Singles:
+    return np.hstack([_scaled(one, columns), one.table(columns)])
+
+
+def fit_ranknet(training: Lists, validation: Lists, columns: Columns) -> Scores:
     """uRank's network and training with RankNet's loss."""
     from mdp.learning.rankers.training import Schedule, train
     from mdp.learning.rankers.urank import Network, scores
 
-    network = Network(len(PAPER_COLUMNS))
-    train(network, PAPER_COLUMNS, (training, validation), Schedule(loss="ranknet"))
-    return scores(network, PAPER_COLUMNS)
+    network = Network(len(columns))
+    train(network, columns, (training, validation), Schedule(loss="ranknet"))
+    return scores(network, columns)
 
 
 BASELINES: dict[str, Fit] = {
-    "random": lambda training, validation: random_order,
-    "M2": lambda training, validation: trade_off(0.0),
+    "random": lambda training, validation, columns: random_order,
+    "M2": lambda training, validation, columns: trade_off(0.0),
     "M2 - lambda M6": fit_trade_off,
     "RankNet": fit_ranknet,
     "RankNet (XGBoost)": fit_xgboost("rank:pairwise"),
     "LambdaRank (XGBoost)": fit_xgboost("rank:ndcg"),
-    "LambdaMART (LightGBM)": fit_lambdamart,
+    "LambdaMART (LightGBM)": fit_lambdamart(_ratings),
 }
-
-
-def _scaled(one: RatedList) -> Singles:
-    return scale(one.table(PAPER_COLUMNS))
-
-
-def _scaled_and_raw(one: RatedList) -> Singles:
-    return np.hstack([_scaled(one), one.table(PAPER_COLUMNS)])
-
-
-def _ratings(lists: Lists) -> Ints:
-    return np.concatenate([one.ratings for one in lists])
+REGRET_BASELINES: dict[str, Fit] = {
+    "M2 - lambda M6 (regret)": fit_least_regret("M6"),
+    "M2 - lambda wasted (regret)": fit_least_regret("wasted"),
+    "LambdaMART (regret)": fit_lambdamart(grades),
+}

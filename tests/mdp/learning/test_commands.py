@@ -5,10 +5,11 @@ import pytest
 
 from mdp.learning import evaluate, train
 from mdp.learning.sources import Side, side
+from mdp.ranking.features import COLUMNS
 from tests.mdp.learning.records import write_record
 
 EXTRA = ("torch", "onnx", "lightgbm", "xgboost", "matplotlib")
-SLOW = "RankNet,RankNet (XGBoost),LambdaRank (XGBoost)"
+SLOW = "RankNet,RankNet (XGBoost),LambdaRank (XGBoost),LambdaMART (LightGBM)"
 
 
 @pytest.fixture
@@ -19,7 +20,8 @@ def records(tmp_path: Path) -> Path:
     rng = np.random.default_rng(0)
     for number in range(12):
         stage = np.repeat(np.array([1, 2], np.int32), 12)
-        write_record(folder / f"m{number}.0.paper.npz", rng.random(24), stage)
+        features = rng.random((24, len(COLUMNS)))
+        write_record(folder / f"m{number}.0.paper.npz", rng.random(24), stage, columns=np.array(COLUMNS), features=features)
     return folder
 
 
@@ -40,10 +42,10 @@ def test_a_ranker_is_trained_and_judged_by_two_commands(
     asked = [str(records), "--ranker", str(ranker), "--without", SLOW, "--repeats", "1", "--pictures", str(tmp_path)]
     assert evaluate.main(asked) == 0
     printed = capsys.readouterr().out
-    assert all(
-        f"| {name} |" in printed for name in (f"urank, {ranker}", "random", "M2", "M2 - lambda M6", "LambdaMART (LightGBM)")
-    )
+    rows = (f"urank, {ranker}", "random", "M2", "M2 - lambda M6", "M2 - lambda wasted (regret)", "LambdaMART (regret)")
+    assert all(f"| {name} |" in printed for name in rows)
     assert "| M6 |" in printed
+    assert "Regret, terms paper: " in printed
     assert (tmp_path / "figure8-ranker.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mdp.learning.evaluation.analysis import correlation, importance, shuffled
-from mdp.learning.evaluation.tables import tables
+from mdp.learning.evaluation.tables import regret_tables, tables
 from mdp.learning.rankers.baselines import trade_off
 from mdp.mesh import Floats
 from tests.mdp.learning.records import drawn_list
@@ -18,7 +20,7 @@ def test_the_right_order_has_full_marks_in_every_table() -> None:
     whole, full, sizes = tables({"right": lambda one: -one.outcome, "M2": trade_off(0.0)}, LISTS)
     for text in (whole, full):
         assert cells(text, "right")[:7] == ["1.000"] * 5 + ["1.000 to 1.000"] * 2
-        assert cells(text, "right")[7:] == ["100.0%"] * 3 + ["0.0000"] * 3
+        assert cells(text, "right")[7:] == ["100.0%"] * 3
     assert cells(sizes, "right") == ["1.000 / 1.000"] * 6
     assert float(cells(full, "M2")[0]) < float(cells(whole, "M2")[0]) < 1
 
@@ -28,6 +30,17 @@ def test_tables_say_how_many_lists_and_models_they_are_of() -> None:
     assert whole.startswith("All lists: 40 of 7 models")
     assert full.startswith("Full lists: 10 of 6 models")
     assert cells(sizes, "lists") == ["10", "5", "5", "5", "5", "10"]
+
+
+def test_regret_has_a_table_for_each_terms() -> None:
+    lists = [replace(one, record=f"m.0.{terms}") for one, terms in zip(LISTS, ("paper", "ours") * 20, strict=True)]
+    ours, paper = regret_tables({"right": lambda one: -one.outcome, "wrong": lambda one: one.outcome}, lists)
+    assert ours.startswith("Regret, terms ours: 20 of 7 models")
+    assert paper.startswith("Regret, terms paper: 20 of 7 models")
+    assert cells(ours, "right") == ["0.0000"] * 3 + ["0.0000 to 0.0000"] + ["100.0%"] * 4
+    worst = [float(one.regrets.max()) for one in lists if one.terms == "ours"]
+    assert float(cells(ours, "wrong")[0]) == pytest.approx(np.mean(worst), abs=1e-4)
+    assert cells(ours, "wrong")[-1] == "0.0%"
 
 
 def test_without_a_full_list_there_is_no_table_of_them() -> None:

@@ -3,9 +3,19 @@ from math import log2
 import numpy as np
 import pytest
 
-from mdp.learning.ndcg import at
-from mdp.learning.rankers.baselines import BASELINES, fit_trade_off, random_order, trade_off
+from mdp.learning.labels import RatedList, ratings
+from mdp.learning.ndcg import Scores, at, regret
+from mdp.learning.rankers.baselines import (
+    BASELINES,
+    REGRET_BASELINES,
+    fit_least_regret,
+    fit_trade_off,
+    grades,
+    random_order,
+    trade_off,
+)
 from mdp.mesh import Floats
+from mdp.ranking.features import PAPER_COLUMNS
 from tests.mdp.learning.records import drawn_list
 
 TRAINING = [drawn_list(seed, 20) for seed in range(60)]
@@ -14,7 +24,7 @@ TEST = [drawn_list(seed, 20) for seed in range(80, 140)]
 
 
 def mean_ndcg(name: str) -> float:
-    scores = BASELINES[name](TRAINING, VALIDATION)
+    scores = BASELINES[name](TRAINING, VALIDATION, PAPER_COLUMNS)
     return float(np.mean([at(5)(scores(one), one) for one in TEST]))
 
 
@@ -34,7 +44,7 @@ def test_a_trade_off_takes_m6_off_m2() -> None:
 def test_the_fitted_trade_off_finds_the_weight_that_the_outcomes_were_drawn_with() -> None:
     one = drawn_list(1, 4)
     m2, m6 = one.table(("M2", "M6")).T.astype(np.float64)
-    weight = np.median((m2 - fit_trade_off(TRAINING, VALIDATION)(one)) / m6)
+    weight = np.median((m2 - fit_trade_off(TRAINING, VALIDATION, PAPER_COLUMNS)(one)) / m6)
     assert weight == pytest.approx(0.5, abs=0.1)
 
 
@@ -42,10 +52,34 @@ def test_what_is_saved_alone_orders_worse_than_less_what_is_lost() -> None:
     assert mean_ndcg("random") < mean_ndcg("M2") < mean_ndcg("M2 - lambda M6")
 
 
+def mean_regret(scores: Scores) -> float:
+    return float(np.mean([regret(1)(scores(one), one) for one in TEST]))
+
+
+def test_the_line_with_the_least_regret_has_less_than_m2_alone_and_looks_at_the_feature_that_it_is_told() -> None:
+    fitted = fit_least_regret("M6")(TRAINING, VALIDATION, PAPER_COLUMNS)
+    other = fit_least_regret("M1")(TRAINING, VALIDATION, PAPER_COLUMNS)
+    assert mean_regret(fitted) < 0.2 * mean_regret(trade_off(0.0))
+    assert mean_regret(fitted) < 0.2 * mean_regret(other)
+
+
+def test_grades_fall_with_regret() -> None:
+    outcome = np.array([0.5, 0.502, 0.508, 0.52, 0.58, 0.9])
+    one = RatedList(np.zeros((6, 0), np.float32), (), outcome, ratings(outcome), "a")
+    assert grades(one).tolist() == [5, 4, 3, 2, 1, 0]
+
+
+@pytest.mark.train
+def test_boosted_trees_on_grades_learn_to_have_little_regret() -> None:
+    pytest.importorskip("lightgbm", reason="the extra `train` is not installed")
+    fitted = REGRET_BASELINES["LambdaMART (regret)"](TRAINING, VALIDATION, PAPER_COLUMNS)
+    assert mean_regret(fitted) < 0.5 * mean_regret(trade_off(0.0))
+
+
 @pytest.mark.train
 @pytest.mark.parametrize(("name", "library"), [("LambdaMART (LightGBM)", "lightgbm"), ("LambdaRank (XGBoost)", "xgboost")])
 def test_boosted_trees_learn_the_order_and_learn_it_alike_again(name: str, library: str) -> None:
     pytest.importorskip(library, reason="the extra `train` is not installed")
     assert mean_ndcg("random") + 0.2 < mean_ndcg(name) < 1
-    again = [BASELINES[name](TRAINING, VALIDATION)(TEST[0]).tolist() for _ in range(2)]
+    again = [BASELINES[name](TRAINING, VALIDATION, PAPER_COLUMNS)(TEST[0]).tolist() for _ in range(2)]
     assert again[0] == again[1]
