@@ -5,6 +5,7 @@ UserError                         message (one sentence: thing, value, what is a
   MeshError                       mdp: unreadable, empty, open, flat: says what and where
   DecompositionError              mdp: an invariant of the decomposition cannot be met
   PlanError                       mdp: a plan file, or planes that cannot be cut: which one and why
+  RankerError                     mdp: an .onnx file that is no ranker, a ranker that is not known
   LearningError                   mdp/learning: records, a checkpoint or a ranker that cannot be learnt from or judged
   SliceError                      slicer: a setting that cannot be sliced with
   MoveError                       machine: out of limits, unreachable, collision: part, axis, value, allowed
@@ -40,6 +41,10 @@ class DecompositionError(UserError):
 
 class PlanError(UserError):
     """A plan file that cannot be used; the message names the key or the plane, and why."""
+
+
+class RankerError(UserError):
+    """A ranker that does not exist or cannot be used; the message names it and says why."""
 
 
 class LearningError(UserError):

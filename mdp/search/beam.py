@@ -1,8 +1,9 @@
 """Beam: the nodes that a search follows, one in each slot.
 
-The first slot follows the classic ranking, large parts first. Every further slot follows a trade-off of its own between what
-is made safe and what is left risky for ever, and takes its node from the children of its own and all lower slots. So a wider
-beam holds the narrower ones and never ends worse, and the slots do not fill with what one ranking finds nearly equal.
+The first slot follows the ranker: the classic ranking, large parts first, or a learned one. Every further slot has a trade-off
+of its own between what is made safe and what is left risky for ever, and each takes its node from the children of its own and all
+lower slots. So a wider beam holds the narrower ones and never ends worse, and the slots do not fill with what one ranking finds
+nearly equal; a learned ranker that chose for all of them won less.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,11 +17,12 @@ from mdp.plane import Plane
 from mdp.ranking.ranker import Ranker
 from mdp.ranking.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
 from mdp.ranking.record import Child, Trace, offer
+from mdp.ranking.shortlist import shortlist
 from mdp.search.front import Front
 from mdp.search.node import Node
 from mdp.search.problem import Problem
 
-# Area left for ever counts as so many times the area made safe; None: the classic ranking. Many models, one greedy search
+# Area left for ever counts as so many times the area made safe; None: the ranker's own. Many models, one greedy search
 # each: 4 is best on average, no value is best on most models.
 TRADE_OFFS = (None, 4.0, 1.0, 8.0, 2.0, 0.5, 16.0, 0.0)
 RECORDED = 50  # candidates of a stage that are put on record, the B of the 2020 paper
@@ -94,12 +96,15 @@ class Beam:
                 branch.coming.cancel()
 
     def _branch(self, node: Node, slot: int) -> Branch:
-        classic = TRADE_OFFS[slot % len(TRADE_OFFS)] is None
-        return Branch(node, ahead(self.problem.table, node, classic, self.trace is not None))
+        learned = self.ranker.learned
+        large = TRADE_OFFS[slot % len(TRADE_OFFS)] is None and not learned
+        return Branch(node, ahead(self.problem.table, node, large, learned or self.trace is not None))
 
     def finalists(self) -> list[Node]:
         """The nodes to polish: of the second slot and of every slot with a square number the best one that it or a lower one
-        ever held and that is no finalist yet."""
+        ever held and that is no finalist yet; of a single slot its best where a learned ranker saved the time."""
+        if len(self.bests) == 1:
+            return [node for node in self.bests if node.cuts and self.ranker.learned]
         finalists: list[Node] = []
         for count in range(2, len(self.bests) + 1):
             if count == 2 or isqrt(count) ** 2 == count:
@@ -129,6 +134,8 @@ class Beam:
         trade_off = TRADE_OFFS[slot % len(TRADE_OFFS)]
         if trade_off is not None:
             return rank_by_trade_off(tables, trade_off, bound_mm2)
+        if self.ranker.learned:
+            return self.ranker.rank(shortlist(tables, bound_mm2), tables)
         classic = rank_classic(tables, self.problem.model.risky_mm2, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
         return self.ranker.rank(classic, tables)
 

@@ -19,14 +19,14 @@ from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
 from mdp.plan_file import MOST_PARTS, PlanFile
 from mdp.ranking.candidates import REASONS
-from mdp.ranking.ranker import RANKERS
+from mdp.ranking.ranker import Ranker, ranker_named
 from mdp.ranking.record import Trace
 from mdp.search.beam import Beam
 from mdp.search.by_hand import check_colours, check_model, cut_by_hand
 from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
-from mdp.search.polish import make_symmetric, polish
+from mdp.search.polish import QUICK, STEPS, make_symmetric, polish
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
 from profiles.errors import PlanError
@@ -79,11 +79,11 @@ def decompose(
     report = on_stage or (lambda progress: None)
     if profile.search.method == "published":
         continues = partial(_continues, problem)
-        best, rounds = search_as_published(problem, continues, trace, partial(_report, problem, report))
+        best, rounds = search_as_published(problem, ranker_named(ranker), continues, trace, partial(_report, problem, report))
         front = Front(problem.start)
         front.offer(best)
     else:
-        best, front, rounds = _search_beam(problem, ranker, trace, report)
+        best, front, rounds = _search_beam(problem, ranker_named(ranker), trace, report)
     if on_record is not None and trace is not None:
         on_record(trace.to_bytes())
     taken = _take(problem, front, best, profile, parts, price)
@@ -240,10 +240,10 @@ def _feather_notes(parts: Sequence[Part]) -> tuple[str, ...]:
 
 
 def _search_beam(
-    problem: Problem, ranker: str, trace: Trace | None, report: Callable[[Progress], None]
+    problem: Problem, ranker: Ranker, trace: Trace | None, report: Callable[[Progress], None]
 ) -> tuple[Node, Front, int]:
     """The best node of a beam, the finalists polished, the best for every number of parts, and after how many stages."""
-    beam = Beam(problem, RANKERS[ranker], trace)
+    beam = Beam(problem, ranker, trace)
     stage = 0
     try:
         while any(beam.nodes) and _continues(problem, stage):
@@ -266,7 +266,8 @@ def _polish_finalists(problem: Problem, beam: Beam, stage: int, report: Callable
     """The best of a beam and of its polished finalists."""
     best = beam.best
     finalists = beam.finalists() if problem.settings.polish and problem.model.risky_mm2 > 0 else []
-    for coming in [ahead(polish, problem, node) for node in finalists]:
+    steps = QUICK if len(beam.bests) == 1 else STEPS
+    for coming in [ahead(polish, problem, node, steps) for node in finalists]:
         polished = coming.result()
         beam.front.offer(polished)
         best = min(best, polished, key=lambda node: (node.cost_mm2, len(node.cuts)))

@@ -21,14 +21,13 @@ from machine.view.quantities import minutes
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plan_file import PlanFile, plan_of
-from mdp.ranking.ranker import RANKERS
+from mdp.ranking.ranker import ranker_named
 from mdp.read import locate, read_mesh
 from mdp.search.front import price_of_second_mm2
 from mdp.search.laying import OtherWay, find_better_way, lay_down
 from mdp.search.orientation import in_words, side_in_words, standing_still
 from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
-from profiles.errors import ProfileError
 from profiles.profile import Profile
 from slicer.parts import slice_parts
 
@@ -50,8 +49,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     to_build: `build` comes next, the first run may compile what it needs meanwhile, and the rows of the front that need not be
     chosen from get no time.
     """
-    if request.ranker not in RANKERS:
-        raise ProfileError(f"--ranker {request.ranker}: this version knows {', '.join(RANKERS)}")
+    ranker_named(request.ranker)  # a wrong one is told before anything else is done
     profile, record_file = request.profile, request.outputs.record
     given = read_given_plan(request)
     began = perf_counter()

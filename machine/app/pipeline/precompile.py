@@ -29,6 +29,7 @@ from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
 from mdp.search.parts import one_piece
 from mdp.support_need.need import SupportNeed
+from mdp.sweep.hopeless import Savers, hopeless_faces
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
 from slicer.estimate.estimate import estimate
@@ -134,6 +135,7 @@ def _beside_sweep() -> None:
     estimate(one_piece(mesh_of(_tee()), profile.machine), profile)
     remainder = _remainder()
     gains(remainder, LEANING[None], 1.0, threshold(45.0))
+    hopeless_faces(remainder.facets, Savers(LEANING[None], np.zeros(1), threshold(45.0)))
     remainder.thin_mm(PLANE)
     hidden_shares(remainder.mesh)
     SupportNeed.of(remainder.mesh, load().process, 1.0).along(LEANING[None])

@@ -27,7 +27,14 @@ SearchName = Annotated[
     str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
 ]
 TimeLimit = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")]
-RankerName = Annotated[str, typer.Option("--ranker", metavar="classic", help="which candidates the beam follows")]
+RankerName = Annotated[
+    str,
+    typer.Option(
+        "--ranker",
+        metavar="classic|learned|FILE.onnx",
+        help="which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
+    ),
+]
 Orient = Annotated[bool, typer.Option("--orient", help="lay the model down the way that costs least, chosen with its parts")]
 PlanGiven = Annotated[Path | None, typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search")]
 PartsGiven = Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdp.ranking.ranker import RANKERS
+from mdp.ranking.ranker import ByReduction
 from mdp.ranking.ranking import CandidateTable, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
 from mdp.search.beam import Beam
 from mdp.search.problem import Problem
@@ -19,7 +19,7 @@ def _problem(width: int, shape: str = "tee") -> Problem:
 
 
 def _beam(width: int, stages: int, shape: str = "tee") -> Beam:
-    beam = Beam(_problem(width, shape), RANKERS["classic"], None)
+    beam = Beam(_problem(width, shape), ByReduction(), None)
     for _ in range(stages):
         beam.advance()
     return beam

@@ -1,0 +1,194 @@
+"""Network: a learned ranker, its file, and what it does to a search."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdp.mesh import Floats
+from mdp.ranking.features import CHECKED, COLUMNS, features
+from mdp.ranking.network import Network
+from mdp.ranking.ranker import ByReduction, ranker_named, shipped
+from mdp.ranking.ranking import RankedCandidate, nearly_equal, rank_classic
+from mdp.ranking.shortlist import EACH, LISTED, shortlist
+from mdp.search.beam import Beam
+from mdp.search.problem import Problem
+from mdp.search.search import decompose
+from profiles.errors import RankerError
+from profiles.profile import load
+from tests import shapes
+
+SETTINGS = ("search.directions=150", "search.objective=risky", "search.clearance=false")
+
+
+def _problem(width: int = 1, shape: str = "branch") -> Problem:
+    return Problem(getattr(shapes, shape)(), load(settings=(*SETTINGS, f"search.beam_width={width}")))
+
+
+class ByColumn(Network):
+    """A network in whose place stands a plain sum, so that the order it must give is known."""
+
+    def __init__(self, column: str) -> None:
+        super().__init__(Path("none.onnx"))
+        self.__dict__["columns"] = (column,)
+
+    def scores(self, rows: Floats) -> Floats:
+        return rows[:, 0]
+
+
+@pytest.mark.parametrize("column", ["M1", "M4", "seam"])
+def test_candidates_come_by_their_scores_and_equal_ones_as_they_were_offered(column: str) -> None:
+    problem = _problem()
+    table = problem.table(problem.root, described=True)
+    offered = list(shortlist([table], np.inf))
+    ranked = list(ByColumn(column).rank(offered, [table]))
+    values = features(table, np.array([each.row for each in offered]), (column,))[:, 0]
+    assert [each.row for each in ranked] == [offered[place].row for place in np.argsort(-values, kind="stable")]
+
+
+def test_candidates_beyond_the_list_keep_their_order_behind_it() -> None:
+    problem = _problem()
+    table = problem.table(problem.root, described=True)
+    table.check_rows(np.arange(len(table.reason)))
+    offered = [RankedCandidate(0, int(row), 0) for row in np.flatnonzero(table.reason == 0)[:60]]
+    ranked = list(ByColumn("M1").rank(offered, [table]))
+    assert ranked[50:] == offered[50:]
+    assert {each.row for each in ranked[:50]} == {each.row for each in offered[:50]}
+
+
+def test_a_shortlist_holds_feasible_candidates_once_few_of_a_kind_and_none_that_leaves_too_much() -> None:
+    problem = _problem(shape="ball")
+    table = problem.table(problem.root, described=True)
+    listed = list(shortlist([table], np.inf))
+    assert len({each.row for each in listed}) == len(listed) <= len(LISTED) * EACH
+    assert all(table.feasible(each.row) for each in listed)
+    residual = sorted(float(table.scored.residual_mm2[each.row]) for each in listed)
+    assert len(list(shortlist([table], residual[0]))) == 0
+
+
+def test_the_features_of_a_record_are_those_that_a_search_ranks_by() -> None:
+    problem = _problem()
+    table = problem.table(problem.root, described=True)
+    rows = np.array([each.row for each in shortlist([table], np.inf)])
+    everything = features(table, rows)
+    for number, column in enumerate(COLUMNS):
+        assert (features(table, rows, (column,))[:, 0] == everything[:, number]).all()
+
+
+def test_the_ranker_that_ships_wants_what_needs_no_check_and_is_small() -> None:
+    assert not set(shipped().columns) & CHECKED
+    assert shipped().file.stat().st_size < 200_000
+
+
+def test_scores_do_not_change_with_the_order_of_the_candidates_nor_below_the_last_decimal() -> None:
+    rng = np.random.default_rng(3)
+    rows, order = rng.random((20, len(shipped().columns))), rng.permutation(20)
+    scores = shipped().scores(rows)
+    assert (scores[order] == shipped().scores(rows[order])).all()
+    assert (scores == np.round(scores, 4)).all()
+
+
+def test_one_and_two_threads_give_the_same_search() -> None:
+    code = (
+        "import sys, mdp.kernels.threads as t; t.use_threads(int(sys.argv[1]));"
+        "from mdp.search.search import decompose; from profiles.profile import load; from tests import shapes;"
+        f"p = load(settings={(*SETTINGS, 'search.beam_width=2')!r});"
+        "print([(x.base.normal.tolist(), x.base.offset_mm) for x in decompose(shapes.branch(), 'b', p, 'learned').parts])"
+    )
+    one, two = (subprocess.run([sys.executable, "-c", code, threads], capture_output=True, check=True).stdout for threads in "12")
+    assert one == two
+    assert one.count(b"], ") > 1
+
+
+@pytest.mark.parametrize("shape", ["tee", "branch", "ball"])
+def test_a_wide_beam_holds_the_narrow_one_with_a_learned_ranker_too(shape: str) -> None:
+    beams = []
+    for width in (2, 4):
+        beam = Beam(_problem(width, shape), shipped(), None)
+        for _ in range(3):
+            beam.advance()
+        beams.append(beam)
+    for mine, other in zip(beams[0].bests, beams[1].bests, strict=False):
+        assert mine.signature == other.signature
+
+
+@pytest.mark.parametrize(("width", "held"), [(1, 2), (2, 3)])
+def test_the_published_search_follows_the_plain_best_beside_what_a_learned_ranker_chose(width: int, held: int) -> None:
+    profile = load(settings=(*SETTINGS, "search.method=published", f"search.beam_width={width}"))
+    counts: list[int] = []
+    decompose(shapes.branch(), "branch", profile, "learned", on_stage=lambda progress: counts.append(progress.beam))
+    assert max(counts) in (width, held)
+    problem = Problem(shapes.branch(), profile)
+    plain = next(rank_classic([problem.table(problem.root)], problem.model.risky_mm2, np.inf))
+    table = problem.table(problem.root, described=True)
+    offered = list(rank_classic([table], problem.model.risky_mm2, np.inf))[:50]
+    assert offered[0].row == plain.row
+    assert any(not nearly_equal(table.plane(plain.row), table.plane(each.row)) for each in shipped().rank(offered, [table]))
+
+
+def test_a_single_slot_is_polished_where_a_learned_ranker_saved_the_time() -> None:
+    for ranker, finalists in ((shipped(), 1), (ByReduction(), 0)):
+        beam = Beam(_problem(1), ranker, None)
+        beam.advance()
+        assert len(beam.finalists()) == finalists
+
+
+def test_a_name_that_is_no_ranker_is_told_with_those_that_are() -> None:
+    with pytest.raises(RankerError, match=r"--ranker oracle: classic, learned or the name of an \.onnx file is allowed"):
+        ranker_named("oracle")
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [(None, "there is no such file"), (b"", "is no ONNX file"), (b"solid", "is no ONNX file"), (5000, "is no ONNX file")],
+)
+def test_a_missing_a_foreign_and_a_truncated_file_are_a_sentence(
+    tmp_path: Path, content: bytes | int | None, sentence: str
+) -> None:
+    file = tmp_path / "mine.onnx"
+    if content is not None:
+        file.write_bytes(shipped().file.read_bytes()[:content] if isinstance(content, int) else content)
+    with pytest.raises(RankerError, match=rf"^ranker \S+mine\.onnx: {sentence}[^\n]*$"):
+        ranker_named(str(file))
+
+
+def test_candidates_without_a_number_are_a_sentence() -> None:
+    rows = np.full((2, len(shipped().columns)), np.nan)
+    with pytest.raises(RankerError, match="gives no number for each of 2 candidates"):
+        shipped().scores(rows)
+
+
+@pytest.mark.train
+@pytest.mark.parametrize(
+    ("names", "columns", "sentence"),
+    [
+        (("rows", "scores"), ("M1", "M2"), r"takes \['rows'\] and gives \['scores'\]; features and scores are needed"),
+        (("features", "out"), ("M1", "M2"), r"gives \['out'\]; features and scores are needed"),
+        (("features", "scores"), ("M1", "luck"), "wants the feature luck, which this version does not know"),
+        (("features", "scores"), (), "names no features"),
+        (("features", "scores"), ("M1", "M2", "M3"), "3 features a candidate are named"),
+    ],
+)
+def test_a_network_with_other_names_or_another_shape_is_a_sentence(
+    tmp_path: Path, names: tuple[str, str], columns: tuple[str, ...], sentence: str
+) -> None:
+    onnx = pytest.importorskip("onnx")
+    helper, kind = onnx.helper, onnx.TensorProto.FLOAT
+    nodes = [helper.make_node("ReduceSum", [names[0]], [names[1]], keepdims=0)]
+    given = helper.make_tensor_value_info(names[0], kind, ["n", 2])
+    taken = helper.make_tensor_value_info(names[1], kind, None)
+    model = helper.make_model(helper.make_graph(nodes, "g", [given], [taken]), opset_imports=[helper.make_opsetid("", 13)])
+    model.ir_version = 8
+    helper.set_model_props(model, {"features": ",".join(columns)})
+    file = tmp_path / "other.onnx"
+    file.write_bytes(model.SerializeToString())
+    with pytest.raises(RankerError, match=sentence):
+        ranker_named(str(file))
+
+
+def test_a_decomposition_names_its_ranker_and_a_learned_one_is_not_worse_than_the_uncut_model() -> None:
+    found = decompose(shapes.branch(), "branch", load(settings=(*SETTINGS, "search.beam_width=1")), "learned")
+    assert found.ranker == "learned"
+    assert found.reduction > 0.5
