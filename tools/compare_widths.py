@@ -1,15 +1,18 @@
 """Search many models at several beam widths and compare them (the paper's Fig. 7).
 
     python tools/compare_widths.py FOLDER --out FILE.csv [--widths 1,2,10] [--methods best,published] [--paper-terms]
-                                   [--set KEY=VALUE ...] [--every N] [--limit FACES] [--only TEXT]
+                                   [--rankers classic,learned] [--set KEY=VALUE ...] [--every N] [--limit FACES] [--only TEXT]
+                                   [--faces N] [--side test --manifest FILE.csv]
     python tools/compare_widths.py --out FILE.csv --summary
 
 FOLDER holds models as npz (vertices in mm and faces). One line of FILE.csv is one search, written as soon as it is done; lines
 that are there already are not searched again, so an interrupted run goes on where it stopped, and runs with other settings
 (told apart by the column `settings`) may share the file. --summary prints the tables and searches nothing. --paper-terms:
 seams cost nothing, faces on the platform count as risky, head and axes do not limit (`search.objective=risky`,
-`search.count_platform_faces=true`, `search.clearance=false`).
-J(1) in the tables is J at the least width there is.
+`search.count_platform_faces=true`, `search.clearance=false`). --faces: larger models are made coarser first; --side: only models
+whose sources are on one side of the split of mdp.learning.sources, test: those that no training saw.
+J(1) in the tables is J at the least width there is. Where there are two rankers, a table of both follows: without the faces on
+the platform, which no cut can save, how much of what a wider plain beam wins a learned one wins, and in how much time.
 """
 
 import argparse
@@ -18,25 +21,31 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
+from itertools import product
 from pathlib import Path
 from typing import Any, get_type_hints
 
 import numpy as np
 
-from mdp.learning.collection.models import read_model
+from mdp.learning.collection.models import coarser, read_model
 from mdp.learning.collection.task import PAPER_TERMS
+from mdp.learning.sources import Side, read_sources, side
 from mdp.mesh import Floats, Mesh
+from mdp.overhang import risky_upright, standing
+from mdp.ranking.ranker import CLASSIC
 from mdp.search.search import decompose
 from profiles.errors import MeshError
 from profiles.profile import Profile, load
 
+Key = tuple[str, str, str, int, str]
 EQUAL = 1e-6  # shares of the risky area that differ less are a tie
 RESAMPLES = 10_000
 
 
 @dataclass(frozen=True)
 class Row:
-    """One search: J and its share of what printing straight up leaves risky, or what went wrong. core_s: processor time."""
+    """One search: J (the cost, where seams cost something) and its share of what printing straight up leaves risky, or what went
+    wrong. core_s: processor time; floor: share of the faces on the platform that count as risky."""
 
     mesh: str
     settings: str
@@ -51,11 +60,13 @@ class Row:
     wall_s: float
     candidates: int
     error: str
+    ranker: str = CLASSIC
+    floor: float = 0.0
 
     @property
-    def key(self) -> tuple[str, str, str, int]:
+    def key(self) -> Key:
         """What tells the searches of a file apart."""
-        return self.mesh, self.settings, self.method, self.width
+        return self.mesh, self.settings, self.method, self.width, self.ranker
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -66,6 +77,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--summary", action="store_true")
     parser.add_argument("--widths", default="1,2,10")
     parser.add_argument("--methods", default="best")
+    parser.add_argument("--rankers", default=CLASSIC)
+    parser.add_argument("--faces", type=int, default=None, help="models with more faces are made coarser")
+    parser.add_argument("--side", choices=list(Side), default=None, help="only models on one side of the split by source")
+    parser.add_argument("--manifest", type=Path, default=None, help="id, source_repo and source_path of the models")
     parser.add_argument("--paper-terms", action="store_true")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--every", type=int, default=1, help="every N-th model by name")
@@ -75,6 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not options.summary:
         if options.folder is None or not options.folder.is_dir():
             parser.error(f"FOLDER is {options.folder}: a folder of npz files is needed")
+        if options.side is not None and options.manifest is None:
+            parser.error("--side needs --manifest, which tells where the models come from")
         _run(options)
     print("\n\n".join(summary(read(options.out))))
 
@@ -86,57 +103,74 @@ def _run(options: argparse.Namespace) -> None:
         writer = csv.DictWriter(file, [field.name for field in fields(Row)], lineterminator="\n")
         if file.tell() == 0:
             writer.writeheader()
-        for path in sorted(options.folder.glob("*.npz"))[:: options.every]:
-            if options.only not in path.stem:
-                continue
-            for row in rows(path, settings, options.methods.split(","), _widths(options.widths), options.limit, done):
+        for path in _models(options):
+            kinds = product(options.methods.split(","), _widths(options.widths), options.rankers.split(","))
+            wanted = [(path.stem, " ".join(settings), *kind) for kind in kinds]
+            for row in rows(path, [key for key in wanted if key not in done], options.limit, options.faces):
                 writer.writerow(asdict(row))
                 file.flush()
-                print(row.mesh, row.method, row.width, f"{row.share:.4f} {row.core_s:.1f} s", row.error, file=sys.stderr)
+                print(
+                    row.mesh, row.method, row.width, row.ranker, f"{row.share:.4f} {row.core_s:.1f} s", row.error, file=sys.stderr
+                )
+
+
+def _models(options: argparse.Namespace) -> list[Path]:
+    """The models that are asked for."""
+    paths = [path for path in sorted(options.folder.glob("*.npz"))[:: options.every] if options.only in path.stem]
+    if options.side is None:
+        return paths
+    sources = read_sources(options.manifest)
+    return [path for path in paths if path.stem in sources and side(sources[path.stem]) == options.side]
 
 
 def _widths(text: str) -> list[int]:
     return sorted(int(width) for width in text.split(","))
 
 
-def rows(
-    path: Path,
-    settings: Sequence[str],
-    methods: Sequence[str],
-    widths: Sequence[int],
-    limit: int | None,
-    done: set[tuple[str, str, str, int]],
-) -> Iterator[Row]:
-    """The searches of one model that are not done."""
-    named = " ".join(settings)
-    missing = [(m, w) for m in methods for w in widths if (path.stem, named, m, w) not in done]
+def rows(path: Path, missing: Sequence[Key], limit: int | None, most_faces: int | None) -> Iterator[Row]:
+    """The searches of one model that are missing."""
     if not missing:
         return
     try:
         mesh = read_model(path)
     except MeshError as error:
-        for method, width in missing:
-            yield Row(path.stem, named, method, width, 0, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0, f"MeshError: {error}")
+        for name, settings, method, width, ranker in missing:
+            yield Row(name, settings, method, width, 0, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0, f"MeshError: {error}", ranker)
         return
     if limit is not None and len(mesh.faces) > limit:
         return
-    for method, width in missing:
-        profile = load(settings=(*settings, f"search.method={method}", f"search.beam_width={width}"))
-        yield searched(path.stem, named, mesh, profile)
+    mesh = mesh if most_faces is None else coarser(mesh, most_faces)
+    for key in missing:
+        yield searched(key, mesh)
 
 
-def searched(name: str, settings: str, mesh: Mesh, profile: Profile) -> Row:
+def searched(key: Key, mesh: Mesh) -> Row:
     """One search, its failure included."""
+    name, settings, method, width, ranker = key
+    profile = load(settings=(*settings.split(), f"search.method={method}", f"search.beam_width={width}"))
     core, wall = time.process_time(), time.perf_counter()
-    search = (name, settings, profile.search.method, profile.search.beam_width, len(mesh.faces))
+    search = (name, settings, method, width, len(mesh.faces))
     try:
-        found = decompose(mesh, name, profile)
+        found = decompose(mesh, name, profile, ranker)
     except Exception as error:  # noqa: BLE001 - whatever fails is what the table counts
         spent = (time.process_time() - core, time.perf_counter() - wall)
-        return Row(*search, 0.0, 0.0, 1.0, 0, *spent, 0, f"{type(error).__name__}: {error}")
+        return Row(*search, 0.0, 0.0, 1.0, 0, *spent, 0, f"{type(error).__name__}: {error}", ranker)
     spent = (time.process_time() - core, time.perf_counter() - wall)
-    areas = (found.risky_area_mm2, found.residual_area_mm2, 1.0 - found.reduction if found.risky_area_mm2 > 0 else 0.0)
-    return Row(*search, *areas, len(found.parts), *spent, found.candidates_evaluated, "")
+    if found.risky_area_mm2 <= 0.0:
+        return Row(*search, 0.0, 0.0, 0.0, 1, *spent, found.candidates_evaluated, "", ranker)
+    cost_mm2 = min(row.cost_mm2 for row in found.front) if profile.search.objective == "scar" else found.residual_area_mm2
+    share, floor = cost_mm2 / found.risky_area_mm2, floor_mm2(mesh, profile) / found.risky_area_mm2
+    return Row(
+        *search, found.risky_area_mm2, cost_mm2, share, len(found.parts), *spent, found.candidates_evaluated, "", ranker, floor
+    )
+
+
+def floor_mm2(mesh: Mesh, profile: Profile) -> float:
+    """Area of the faces on the platform, where they count as risky."""
+    if not profile.search.count_platform_faces:
+        return 0.0
+    risky = risky_upright(mesh, profile.process.self_supporting_angle_deg, count_platform_faces=True)
+    return float(mesh.areas_mm2[risky & standing(mesh)].sum())
 
 
 def read(path: Path) -> list[Row]:
@@ -151,7 +185,10 @@ def read(path: Path) -> list[Row]:
 def summary(found: Sequence[Row]) -> Iterator[str]:
     """A table in Markdown for each of the settings, then what failed."""
     for settings in dict.fromkeys(row.settings for row in found):
-        yield table([row for row in found if row.settings == settings], settings)
+        here = [row for row in found if row.settings == settings]
+        yield table([row for row in here if row.ranker == CLASSIC], settings)
+        for method in sorted({row.method for row in here if row.ranker != CLASSIC}):
+            yield rankers_table([row for row in here if row.method == method], f"{settings or 'default settings'}, {method}")
     failed = [f"- {row.mesh}, {row.method}, width {row.width}: {row.error}" for row in found if row.error]
     yield "\n".join([f"{len(failed)} of {len(found)} searches failed", *failed])
 
@@ -206,6 +243,55 @@ def _cells(here: list[Row], first: list[Row], before: list[Row] | None, rival: l
         cells += ["-", "-"]
     sums = [_column(here, name).sum() for name in ("core_s", "wall_s")]
     return [*cells, f"{_column(here, 'parts').mean():.1f}", *(f"{total:.0f}" for total in sums)]
+
+
+RANKER_HEADS = (
+    "ranker | B | J without the floor | of plain B = 1 | of what plain 2 takes off plain 1"
+    " | of the gap from plain 2 to the widest | core time, of plain B = 1 | of plain 10 | worse than plain by > 1 % of J | better by > 1 %"
+)
+MORE = 0.01  # of J: a model is worse or better
+
+
+def rankers_table(found: Sequence[Row], title: str) -> str:
+    """One row a ranker and width, over the models with a risky face for which all of them were searched without failure."""
+    searches: dict[tuple[str, int], dict[str, Row]] = {}
+    for row in found:
+        each = searches.setdefault((row.ranker, row.width), {})
+        if not row.error and row.risky_mm2 > 0:
+            each[row.mesh] = row
+    models = sorted(set.intersection(*(set(each) for each in searches.values())))
+    lines = [f"{title}, {len(models)} models", "", f"| {RANKER_HEADS} |", "|" + "---|" * (RANKER_HEADS.count("|") + 1)]
+    plain = {width: [each[name] for name in models] for (ranker, width), each in searches.items() if ranker == CLASSIC}
+    for ranker, width in sorted(searches, key=lambda key: (key[1], key[0])):
+        here = [searches[ranker, width][name] for name in models]
+        lines.append(f"| {ranker} | {width} | {' | '.join(_ranker_cells(here, plain, width))} |")
+    return "\n".join(lines)
+
+
+def _ranker_cells(here: list[Row], plain: dict[int, list[Row]], width: int) -> list[str]:
+    costs = {number: _free(rows) for number, rows in plain.items()}
+    means = {number: float(each.mean()) for number, each in costs.items()}
+    own, widest = _free(here), max(plain)
+
+    def of_gap(wide: int, narrow: int) -> str:
+        known = wide in means and narrow in means and means[narrow] - means[wide] > EQUAL
+        return f"{(means[narrow] - own.mean()) / (means[narrow] - means[wide]):.0%}" if known else "-"
+
+    def of_time(number: int) -> str:
+        return f"{_column(here, 'core_s').sum() / _column(plain[number], 'core_s').sum():.2f}" if number in plain else "-"
+
+    first = f"{own.mean() / means[1]:.4f}" if 1 in means else "-"
+    cells = [f"{own.mean():.4f}", first, of_gap(2, 1), of_gap(widest, 2), of_time(1), of_time(10)]
+    if width not in costs:
+        return [*cells, "-", "-"]
+    equal = costs[width]
+    worse, better = own > (1.0 + MORE) * equal + EQUAL, own < (1.0 - MORE) * equal - EQUAL
+    return [*cells, f"{worse.mean():.1%}", f"{better.mean():.1%}"]
+
+
+def _free(found: Sequence[Row]) -> Floats:
+    """J without the floor, shares of what is risky straight up."""
+    return np.array([row.share - row.floor for row in found])
 
 
 def _column(found: Sequence[Row], name: str) -> Floats:

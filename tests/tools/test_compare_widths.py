@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests import shapes
-from tools.compare_widths import Row, interval, main, ratios, read, record, summary, table
+from tools.compare_widths import Row, interval, main, rankers_table, ratios, read, record, summary, table
 
 
 def _row(mesh: str, method: str, width: int, share: float, error: str = "") -> Row:
@@ -40,6 +40,19 @@ def test_a_model_that_failed_at_one_width_counts_at_none() -> None:
     assert "1 of 2 searches failed\n- c, published, width 2: no" in list(
         summary([FOUND[0], _row("c", "published", 2, 1.0, "no")])
     )
+
+
+def test_a_learned_ranker_is_held_against_plain_beams_without_what_no_cut_can_save() -> None:
+    def row(mesh: str, width: int, share: float, core_s: float, ranker: str = "classic") -> Row:
+        return Row(mesh, "", "best", width, 9, 50.0, 50.0 * share, share, 3, core_s, 1.0, 9, "", ranker, floor=0.1)
+
+    plain = [row(mesh, *each) for mesh in "ab" for each in ((1, 0.6, 1.0), (2, 0.5, 2.0), (10, 0.3, 8.0))]
+    learned = [row("a", 2, 0.5, 2.0, "learned"), row("b", 2, 0.45, 2.0, "learned")]
+    lines = rankers_table([*plain, *learned], "").splitlines()
+    (cells,) = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("| learned | 2 |")]
+    assert cells[2:4] == ["0.3750", "0.7500"]  # of 0.5 without the floor
+    assert cells[4:6] == ["125%", "12%"]
+    assert cells[6:] == ["2.00", "0.25", "0.0%", "50.0%"]
 
 
 def test_equal_values_have_the_ratio_one_even_when_both_are_nothing() -> None:
