@@ -247,7 +247,8 @@ def _cells(here: list[Row], first: list[Row], before: list[Row] | None, rival: l
 
 RANKER_HEADS = (
     "ranker | B | J without the floor | of plain B = 1 | of what plain 2 takes off plain 1"
-    " | of the gap from plain 2 to the widest | core time, of plain B = 1 | of plain 10 | worse than plain by > 1 % of J | better by > 1 %"
+    " | of the gap from plain 2 to the widest | core time, of plain B = 1 | of plain 10"
+    " | worse than plain by > 1 % of J | better by > 1 %"
 )
 MORE = 0.01  # of J: a model is worse or better
 
