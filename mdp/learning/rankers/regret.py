@@ -61,29 +61,30 @@ class Network(torch.nn.Module):
             for parameter in layer.parameters():
                 torch.nn.init.uniform_(parameter, -most, most, generator=generator)
 
-    def standardise(self, lists: Padded) -> None:
-        """Take mean and spread of the inputs from lists."""
-        inputs = self._inputs(lists.features, lists.present)[lists.present].double()
-        spread, mean = torch.std_mean(inputs, dim=0, correction=0)
-        self.mean.copy_(mean)
-        self.spread.copy_(torch.where(spread < SMALLEST_SPREAD, 1.0, spread))
-
-    def forward(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
-        """(L, n, F) features and (L, n) which candidates are there -> (L, n) scores."""
-        inputs = (self._inputs(features, present) - self.mean) / self.spread
-        rows = inputs
-        for layer in self.layers[:-1]:
-            rows = torch.relu(layer(rows))
-        scores: torch.Tensor = (self.layers[-1](rows) + self.line(inputs)).squeeze(-1)
-        return scores
-
-    def _inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+    def inputs(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, 2F + TRADE_OFFS) what the features are turned into before they are standardised."""
         here = present.unsqueeze(-1)
         low = torch.where(here, features, torch.inf).amin(dim=1, keepdim=True)
         high = torch.where(here, features, -torch.inf).amax(dim=1, keepdim=True)
         saved = features @ self.contrasts
         most = torch.where(here, saved, -torch.inf).amax(dim=1, keepdim=True)
         return torch.cat([features, (features - low) / (high - low + SMALLEST_RANGE), saved - most], dim=-1)
+
+    def standardise(self, lists: Padded) -> None:
+        """Take mean and spread of the inputs from lists."""
+        inputs = self.inputs(lists.features, lists.present)[lists.present].double()
+        spread, mean = torch.std_mean(inputs, dim=0, correction=0)
+        self.mean.copy_(mean)
+        self.spread.copy_(torch.where(spread < SMALLEST_SPREAD, 1.0, spread))
+
+    def forward(self, features: torch.Tensor, present: torch.Tensor) -> torch.Tensor:
+        """(L, n, F) features and (L, n) which candidates are there -> (L, n) scores."""
+        inputs = (self.inputs(features, present) - self.mean) / self.spread
+        rows = inputs
+        for layer in self.layers[:-1]:
+            rows = torch.relu(layer(rows))
+        scores: torch.Tensor = (self.layers[-1](rows) + self.line(inputs)).squeeze(-1)
+        return scores
 
 
 def contrasts(columns: Sequence[str]) -> Singles:

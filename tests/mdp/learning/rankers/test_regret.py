@@ -77,7 +77,7 @@ def test_a_candidate_that_a_step_does_not_see_changes_no_score() -> None:
 def test_inputs_have_mean_0_and_spread_1_over_the_training_lists() -> None:
     network = small()
     lists = OBJECTIVE.pad([planted(number) for number in range(10)], CHEAP)
-    inputs = (network._inputs(lists.features, lists.present)[lists.present] - network.mean) / network.spread
+    inputs = (network.inputs(lists.features, lists.present)[lists.present] - network.mean) / network.spread
     assert inputs.mean(dim=0).abs().max() < 1e-4
     assert torch.allclose(inputs.std(dim=0, correction=0), torch.ones(inputs.shape[1]), atol=1e-3)
 
