@@ -15,7 +15,7 @@ from pathlib import Path
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, run, split_names
 from mdp.learning.labels import RatedList, followed, rate
 from mdp.learning.lists import TrainingList, of_side, read_lists
-from mdp.learning.ndcg import Scores
+from mdp.learning.ndcg import Scores, as_searched
 from mdp.learning.rankers.baselines import BASELINES, REGRET_BASELINES, Fit
 from mdp.learning.sources import Side
 from profiles.errors import LearningError
@@ -70,13 +70,13 @@ def _compare(options: argparse.Namespace) -> None:
     columns = tuple(dict.fromkeys([*learnt, *ALWAYS, *(name for one in given.values() for name in one.columns)]))
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
     cut, known = (_sides(options.folder, some, columns) for some in (lists, followed(lists)))
-    rankers: dict[str, Scores] = {f"{one.kind}, {file}": one.scores for file, one in given.items()}
+    rankers: dict[str, Scores] = {f"{one.kind}, {file}": as_searched(one.scores) for file, one in given.items()}
     rankers |= _fitted(BASELINES, options.without, cut, learnt) | _fitted(REGRET_BASELINES, options.without, known, learnt)
     for text in (*tables(rankers, cut[Side.TEST]), *regret_tables(rankers, known[Side.TEST])):
         sys.stdout.write(f"{text}\n\n")
     for file, one in given.items():
         picture = options.pictures / f"figure8-{file.stem}.png"
-        _analyse(one.scores, one.columns, cut[Side.TEST], options.repeats, picture)
+        _analyse(as_searched(one.scores), one.columns, cut[Side.TEST], options.repeats, picture)
 
 
 def _sides(folder: Path, lists: Sequence[TrainingList], columns: Sequence[str]) -> Sides:

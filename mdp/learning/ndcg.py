@@ -10,6 +10,7 @@ import numpy as np
 
 from mdp.learning.labels import TIE, RatedList
 from mdp.mesh import Floats, Ints
+from mdp.ranking.network import DECIMALS
 
 FULL = 50  # candidates of a full list: the beam width that the lists are collected with
 RESAMPLES = 2000
@@ -21,6 +22,11 @@ Measure = Callable[[Floats, RatedList], float]
 def order(scores: Floats) -> Ints:
     """(n,) candidates by falling score."""
     return np.argsort(-scores, kind="stable").astype(np.int32)
+
+
+def as_searched(scores: Scores) -> Scores:
+    """Scores of a network rounded as a search compares them, so that candidates alike stay in the order they come."""
+    return lambda one: np.asarray(np.round(scores(one), DECIMALS), np.float64)
 
 
 def ndcg(scores: Floats, ratings: Ints, cut: int) -> float:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from mdp.learning.command import COLUMN_SETS, Parser, add_records, check_range, commit, run
 from mdp.learning.labels import RatedList, followed, rate
 from mdp.learning.lists import of_side, read_lists
-from mdp.learning.ndcg import at, best_within, full_lists, regret
+from mdp.learning.ndcg import as_searched, at, best_within, full_lists, regret
 from mdp.learning.sources import Side
 from profiles.errors import LearningError
 
@@ -61,7 +61,7 @@ def train(arguments: Sequence[str] | None) -> None:
         "kind": options.loss,
         "data_set": f"{options.folder.resolve().name}: {counts(teach)}",
         "commit": commit(),
-        "figures": json.dumps(judged(options.loss, scores, [one for one in judge if one.teaches])),
+        "figures": json.dumps(judged(options.loss, as_searched(scores), [one for one in judge if one.teaches])),
     }
     write(options.output, export(about))
     for file in checkpoints:

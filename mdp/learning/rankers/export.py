@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from mdp.learning.labels import SMALLEST_RANGE, Singles
+from mdp.ranking.network import INPUT, OUTPUT
 from profiles.errors import LearningError
 
-INPUT, OUTPUT = "features", "scores"
 OPSET, IR_VERSION = 13, 8  # old enough for every onnxruntime of the last years
 
 Layer = tuple[Singles, Singles]  # weight (outputs, inputs) and bias (outputs,)

@@ -9,8 +9,8 @@ from onnx.reference import ReferenceEvaluator
 
 from mdp.learning.labels import RatedList
 from mdp.learning.ndcg import Scores
-from mdp.learning.rankers.export import INPUT, OUTPUT
 from mdp.mesh import Floats
+from mdp.ranking.network import INPUT, OUTPUT
 from profiles.errors import LearningError
 
 

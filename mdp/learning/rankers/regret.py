@@ -14,9 +14,10 @@ import torch
 
 from mdp.learning.labels import RatedList, Singles
 from mdp.learning.ndcg import Scores, order
-from mdp.learning.rankers.export import INPUT, Graph, scale_by_list
+from mdp.learning.rankers.export import Graph, scale_by_list
 from mdp.learning.rankers.objective import FAR_BELOW, Figures, Objective, Padded, Targets
 from mdp.mesh import Floats
+from mdp.ranking.network import INPUT
 
 HIDDEN = (32, 32)
 TRADE_OFFS = (1.0, 4.0, 16.0)  # of M6 against M2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mdp.learning.labels import RatedList, ratings
-from mdp.learning.ndcg import at, best_within, full_lists, interval, ndcg, regret
+from mdp.learning.ndcg import as_searched, at, best_within, full_lists, interval, ndcg, order, regret
 from mdp.mesh import Floats
 from mdp.ranking.features import PAPER_COLUMNS
 from tests.mdp.learning.records import drawn_list
@@ -40,6 +40,12 @@ def test_the_best_is_within_the_first_two_when_one_as_good_is() -> None:
     scores = np.array([4.0, 1.0, 3.0, 2.0])
     assert [best_within(first)(scores, one) for first in (1, 2, 3)] == [0, 0, 1]
     assert [regret(first)(scores, one) for first in (1, 2, 3)] == pytest.approx([3, 2, 0])
+
+
+def test_scores_that_a_search_takes_for_equal_leave_candidates_in_the_order_they_come() -> None:
+    one = listed(np.array([0.1, 0.2, 0.3]))
+    scores = as_searched(lambda one: np.array([1.0, 1.00001, 1.0002]))
+    assert order(scores(one)).tolist() == [2, 0, 1]
 
 
 def test_full_lists_have_fifty_candidates() -> None:

@@ -12,10 +12,13 @@ from mdp.learning.command import COLUMN_SETS
 from mdp.learning.labels import RatedList, followed, rate, ratings
 from mdp.learning.lists import read_lists
 from mdp.learning.ndcg import best_within
+from mdp.learning.rankers.export import write
 from mdp.learning.rankers.regret import OBJECTIVE, Network, export, regret_loss, scores, thin
 from mdp.learning.rankers.training import SCHEDULES, Epoch, train
 from mdp.mesh import Floats
 from mdp.ranking.features import COLUMNS
+from mdp.ranking.network import Network as SearchNetwork
+from mdp.ranking.ranker import ranker_named
 
 pytestmark = pytest.mark.train
 
@@ -111,6 +114,15 @@ def test_the_graph_of_an_ensemble_scores_as_the_mean_of_its_members_in_torch(siz
         assert given.shape == (size,)
         assert np.abs(given - np.mean(each, axis=0)).max() < 1e-5
         assert np.abs(each[0] - each[1]).max() > 1e-2
+
+
+def test_a_search_takes_the_file_and_scores_by_it(tmp_path: Path) -> None:
+    members, one = [small(seed) for seed in range(2)], planted(3)
+    write(tmp_path / "a.onnx", export(members, CHEAP, {"kind": "regret"}))
+    ranker = ranker_named(str(tmp_path / "a.onnx"))
+    assert isinstance(ranker, SearchNetwork)
+    assert ranker.columns == CHEAP
+    assert ranker.scores(one.table(CHEAP)) == pytest.approx(scores(members, CHEAP)(one), abs=6e-5)
 
 
 def test_the_file_of_the_largest_ensemble_is_below_200_kb() -> None:
