@@ -102,6 +102,8 @@ class Trace:
             if candidate.child == NO_NODE:
                 candidate.chosen = child.signature not in self._number
                 candidate.child = self._node(child, candidate)
+            else:  # of a twin of its parent: the same solid, whatever rounding made of its signature
+                self._number.setdefault(child.signature, candidate.child)
 
     def outcomes(self) -> Floats:
         """(nodes,) outcome of every node as share of the model's risky area."""

@@ -113,6 +113,16 @@ def test_what_is_added_twice_in_a_stage_is_one_row() -> None:
     assert (record["chosen"].tolist(), record["child"].tolist()) == ([True, True, False], [1, 2, -1])
 
 
+def test_a_twin_whose_signature_rounds_otherwise_is_the_same_node() -> None:
+    search = Trace("m", MODEL, "model")
+    search.begin_stage(["model"])
+    search.add([offer("model", 1)], [Child(0, "a", 50.0), Child(0, "a rounded", 50.0)])
+    search.begin_stage(["a", "a rounded"])
+    search.add([offer("a rounded", 2)], [Child(0, "b", 10.0)])
+    assert search.arrays()["parent"].tolist() == [0, 1]
+    assert search.outcomes().tolist() == [0.05, 0.05, 0.05]
+
+
 def test_the_same_search_gives_the_same_bytes() -> None:
     assert trace().to_bytes() == trace().to_bytes()
 
