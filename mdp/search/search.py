@@ -114,7 +114,8 @@ def _take(problem: Problem, front: Front, best: Node, profile: Profile, wanted: 
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
     elif problem.terms.seam_mm <= 0.0:
-        choice = Choice(nodes.index(best), "the least risky area")
+        place = next(place for place, node in enumerate(nodes) if len(node.cuts) == len(best.cuts))  # it, or its equal in cost
+        choice = Choice(place, "the least risky area")
     node, row = nodes[choice.place], rows[choice.place]
     if price is not None and row.time_s is None:
         row = price_row(row, made(node), price)

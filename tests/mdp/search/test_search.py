@@ -1,5 +1,6 @@
 import io
 from concurrent.futures import Future, wait
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -15,7 +16,9 @@ from mdp.plane import Plane
 from mdp.pose import Pose, rotation
 from mdp.ranking.candidates import directions
 from mdp.ranking.features import COLUMNS
-from mdp.search.search import Progress, decompose, folded_mm3
+from mdp.search.front import Front
+from mdp.search.problem import Problem
+from mdp.search.search import Progress, _take, decompose, folded_mm3
 from profiles.errors import DecompositionError
 from profiles.profile import load
 from tests import shapes
@@ -239,3 +242,14 @@ def test_a_list_of_the_published_search_is_what_filled_its_beam() -> None:
         assert record["stage"].tolist() == [1, 1, 1]
         assert record["child"].tolist() == [1, 2, 3]
         assert record["node_expanded"].tolist() == [True, True, True, True]
+
+
+def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best() -> None:
+    profile = load(settings=("search.objective=risky", "search.clearance=false"))
+    problem = Problem(shapes.tee(), profile)
+    first = problem.cut(problem.root, Plane(np.array([0.0, 0.0, 1.0]), 15.0))
+    assert first is not None
+    twin, front = replace(first), Front(problem.start)
+    front.offer(first)
+    front.offer(twin)
+    assert _take(problem, front, twin, profile, None, None).node.cost_mm2 == first.cost_mm2
