@@ -21,6 +21,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -33,6 +34,7 @@ from mdp.learning.sources import Side, read_sources, side
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, standing
 from mdp.ranking.ranker import CLASSIC
+from mdp.read import locate, read_mesh
 from mdp.search.search import decompose
 from profiles.errors import MeshError
 from profiles.profile import Profile, load
@@ -141,7 +143,16 @@ def rows(path: Path, missing: Sequence[Key], limit: int | None, most_faces: int 
         return
     mesh = mesh if most_faces is None else coarser(mesh, most_faces)
     for key in missing:
+        _warm_up(key[1], key[-1])
+    for key in missing:
         yield searched(key, mesh)
+
+
+@cache
+def _warm_up(settings: str, ranker: str) -> None:
+    """Load the kernels and the ranker once, before anything is timed."""
+    tree, _ = read_mesh(locate("demo:tree"))
+    decompose(tree, "tree", load(settings=(*settings.split(), "search.directions=50")), ranker)
 
 
 def searched(key: Key, mesh: Mesh) -> Row:

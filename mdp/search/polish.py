@@ -21,9 +21,7 @@ from mdp.search.front import EQUAL
 from mdp.search.node import Node
 from mdp.search.problem import Problem
 
-Steps = tuple[tuple[float, float], ...]
-STEPS: Steps = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))  # of the offset step, and degrees: the grid's are 4.5 apart
-QUICK: Steps = STEPS[:1]  # half of what they win in a fifth of the time
+STEPS = ((1.0, 3.0), (0.5, 1.5), (0.25, 0.75), (0.125, 0.375))  # of the offset step, and degrees: the grid's are about 4.5 apart
 ROUNDS = 4  # moves by one step before the next smaller one
 TRIES = 2  # moved planes that are cut before one stays where it is
 ENOUGH = 1e-3  # a move that saves a smaller share of the risky area is not worth a cut
@@ -57,12 +55,12 @@ class Chain:
         return self.nodes[-1].cost_mm2
 
 
-def polish(problem: Problem, node: Node, steps: Steps = STEPS) -> Node:
-    """The node with its cuts polished and, where there is room, further ones; steps: by which planes are moved."""
-    best = _move_planes(problem, _drop_cuts(problem, Chain.to(node)), steps)
+def polish(problem: Problem, node: Node) -> Node:
+    """The node with its cuts polished and, where there is room, further ones."""
+    best = _move_planes(problem, _drop_cuts(problem, Chain.to(node)))
     longer = _add_cuts(problem, best)
     if len(longer.nodes) > len(best.nodes):
-        longer = _move_planes(problem, _drop_cuts(problem, longer), steps)
+        longer = _move_planes(problem, _drop_cuts(problem, longer))
     return min((node, best.nodes[-1], longer.nodes[-1]), key=lambda last: (last.cost_mm2, len(last.cuts)))
 
 
@@ -114,7 +112,7 @@ def _drop_cuts(problem: Problem, best: Chain) -> Chain:
     return best
 
 
-def _move_planes(problem: Problem, best: Chain, steps: Steps) -> Chain:
+def _move_planes(problem: Problem, best: Chain) -> Chain:
     """The chain with every plane moved to where less stays risky, the one cut first moved first."""
     enough_mm2 = ENOUGH * problem.model.risky_mm2
     for position in range(len(problem.start.cuts), len(best.planes)):
@@ -122,7 +120,7 @@ def _move_planes(problem: Problem, best: Chain, steps: Steps) -> Chain:
             break
         node = best.nodes[position]
         surface = _surface(node)
-        ever_better = list(_climb(problem, surface, best, position, steps))
+        ever_better = list(_climb(problem, surface, best, position))
         for planes in ever_better[: -TRIES - 1 : -1]:
             if problem.late() or node.residual_mm2 + surface.left_mm2(planes) > best.cost_mm2 - enough_mm2:
                 break
@@ -159,13 +157,13 @@ def _surface(node: Node) -> Surface:
     return Surface.of(node.remainder, node.terms)
 
 
-def _climb(problem: Problem, surface: Surface, chain: Chain, position: int, steps: Steps) -> Iterator[list[Plane]]:
+def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> Iterator[list[Plane]]:
     """Ever better planes from a position on, the first of them moved, the best ones last. surface: before the cut there."""
     here, *later = chain.planes[position:]
     classes = surface.classes([here, *later])  # of the present direction; a plane that is taken is measured by its own
     least_mm2 = surface.left_mm2([here, *later], classes)
     pivot = _middle(chain.nodes[position + 1])
-    for share, turn_deg in steps:
+    for share, turn_deg in STEPS:
         for _ in range(ROUNDS):
             before_mm2 = least_mm2
             for plane in _neighbours(here, pivot, share * problem.settings.offset_step_mm, turn_deg):

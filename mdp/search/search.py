@@ -26,7 +26,7 @@ from mdp.search.by_hand import check_colours, check_model, cut_by_hand
 from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
-from mdp.search.polish import QUICK, STEPS, make_symmetric, polish
+from mdp.search.polish import make_symmetric, polish
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
 from profiles.errors import PlanError
@@ -267,8 +267,7 @@ def _polish_finalists(problem: Problem, beam: Beam, stage: int, report: Callable
     """The best of a beam and of its polished finalists."""
     best = beam.best
     finalists = beam.finalists() if problem.settings.polish and problem.model.risky_mm2 > 0 else []
-    steps = QUICK if len(beam.bests) == 1 else STEPS
-    for coming in [ahead(polish, problem, node, steps) for node in finalists]:
+    for coming in [ahead(polish, problem, node) for node in finalists]:
         polished = coming.result()
         beam.front.offer(polished)
         best = min(best, polished, key=lambda node: (node.cost_mm2, len(node.cuts)))
