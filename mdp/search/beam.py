@@ -9,7 +9,7 @@ nearly equal; a learned ranker that chose for all of them won less.
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain, islice
 from math import isqrt
 
 from mdp.kernels.threads import ahead
@@ -17,7 +17,7 @@ from mdp.plane import Plane
 from mdp.ranking.ranker import Ranker
 from mdp.ranking.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
 from mdp.ranking.record import Child, Trace, offer
-from mdp.ranking.shortlist import shortlist
+from mdp.ranking.shortlist import LISTED, shortlist
 from mdp.search.front import Front
 from mdp.search.node import Node
 from mdp.search.problem import Problem
@@ -134,8 +134,8 @@ class Beam:
         trade_off = TRADE_OFFS[slot % len(TRADE_OFFS)]
         if trade_off is not None:
             return rank_by_trade_off(tables, trade_off, bound_mm2)
-        if self.ranker.learned:
-            return self.ranker.rank(shortlist(tables, bound_mm2), tables)
+        if self.ranker.learned:  # what follows the shortlist is for the case that nothing on it can be cut
+            return chain(self.ranker.rank(shortlist(tables, bound_mm2), tables), rank_by_trade_off(tables, LISTED[0], bound_mm2))
         classic = rank_classic(tables, self.problem.model.risky_mm2, bound_mm2, preferred_mm3=self.problem.preferred_mm3)
         return self.ranker.rank(classic, tables)
 

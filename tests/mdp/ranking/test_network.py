@@ -135,6 +135,17 @@ def test_a_single_slot_is_polished_where_a_learned_ranker_saved_the_time() -> No
         assert len(beam.finalists()) == finalists
 
 
+def test_where_nothing_on_the_shortlist_can_be_cut_the_next_candidates_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = _problem()
+    table = problem.table(problem.root, described=True)
+    listed = {table.plane(each.row).offset_mm for each in shortlist([table], np.inf)}
+    cut = problem.cut
+    monkeypatch.setattr(problem, "cut", lambda node, plane, *rest: None if plane.offset_mm in listed else cut(node, plane, *rest))
+    beam = Beam(problem, shipped(), None)
+    beam.advance()
+    assert beam.best.cuts[0].base.offset_mm not in listed
+
+
 def test_a_name_that_is_no_ranker_is_told_with_those_that_are() -> None:
     with pytest.raises(RankerError, match=r"--ranker oracle: classic, learned or the name of an \.onnx file is allowed"):
         ranker_named("oracle")
