@@ -1,6 +1,6 @@
 """Collect: records of wide searches over a folder of models, to train a ranker on.
 
-    python -m mdp.learning.collect FOLDER -o OUT [--terms paper,ours] [--orientations N] [--faces N] [--scheduler ADDRESS] ...
+    python -m mdp.learning.collect FOLDER -o OUT [--terms paper,ours] [--orientations N] [--machine NAME] [--set KEY=VALUE] ...
 
 One file a search, MODEL.ORIENTATION.TERMS.npz, and a line of OUT/index.csv. What is done is not done again, so whatever ended a
 run, it goes on when it is started again.
@@ -19,6 +19,7 @@ from mdp.learning.collection.index import FAILED, Row, Search, append_row, read_
 from mdp.learning.collection.models import model_files, name_of
 from mdp.learning.collection.task import TERMS, Result, Settings, run
 from profiles.errors import LearningError
+from profiles.profile import DEFAULTS
 
 MOST_WIDE = 1000
 
@@ -42,6 +43,9 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--every", type=int, default=1, metavar="N", help="every N-th model by name")
     parser.add_argument("--retries", type=int, default=2, metavar="N", help="how often a search that crashed is tried again")
     parser.add_argument("--time-limit", type=float, metavar="S", help="a search ends after this time with what it has")
+    for kind, usual in DEFAULTS.items():
+        parser.add_argument(f"--{kind}", default=usual, metavar="NAME|FILE", help=f"profile; default {usual}")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of the profiles, as in a search")
     options = parser.parse_args(arguments)
     for name, least, most in (
         *(("beam_width", 1, MOST_WIDE), ("orientations", 1, 1000), ("faces", 4, inf), ("workers", 1, 1000)),
@@ -58,7 +62,10 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
 def collect(arguments: Sequence[str] | None) -> None:
     """Make the records that are missing, and say what there is."""
     options = _options(arguments)
-    settings = Settings(options.beam_width, options.faces, options.time_limit)
+    profiles = (_found(options.machine), _found(options.material), _found(options.process))
+    settings = Settings(options.beam_width, options.faces, options.time_limit, *profiles, tuple(options.set))
+    for terms in options.terms:
+        settings.profile(terms)  # a wrong one is told before anything begins
     files = {name_of(file): file.resolve() for file in model_files(options.folder, options.only, options.every)}
     wanted = [Search(name, turn, terms) for turn in range(options.orientations) for terms in options.terms for name in files]
     with writing_alone(options.out):
@@ -70,6 +77,11 @@ def collect(arguments: Sequence[str] | None) -> None:
             _run(options, settings, {search: files[search.id] for search in missing}, rows)
             write_index(options.out, rows.values())
     _report(options.out, [rows[search] for search in wanted])
+
+
+def _found(profile: str) -> str:
+    """A profile's name, or where its file is, for workers start elsewhere."""
+    return str(Path(profile).resolve()) if Path(profile).is_file() else profile
 
 
 def _rows(out: Path, settings: Settings) -> dict[Search, Row]:

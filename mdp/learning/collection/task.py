@@ -12,7 +12,7 @@ from mdp.learning.collection.index import FAILED, NO_CUT, NO_RISK, Row, Search
 from mdp.learning.collection.models import coarser, oriented, read_model
 from mdp.search.search import decompose
 from profiles.errors import UserError
-from profiles.profile import Profile, load
+from profiles.profile import DEFAULTS, Profile, load
 
 PAPER_TERMS = ("search.objective=risky", "search.count_platform_faces=true", "search.clearance=false")
 TERMS = {"paper": ("search.method=published", *PAPER_TERMS), "best": PAPER_TERMS, "ours": ()}
@@ -21,21 +21,29 @@ UNPOLISHED = "search.polish=false"  # a record holds what the beam saw; polishin
 
 @dataclass(frozen=True)
 class Settings:
-    """What all searches of a collection share. most_faces: None for any number; time_limit_s: None for as long as it takes."""
+    """What all searches of a collection share. most_faces: None for any number; time_limit_s: None for as long as it takes;
+    machine, material, process: names or files of profiles; own: KEY=VALUE as of --set."""
 
     beam_width: int = 50
     most_faces: int | None = None
     time_limit_s: float | None = None
+    machine: str = DEFAULTS["machine"]
+    material: str = DEFAULTS["material"]
+    process: str = DEFAULTS["process"]
+    own: tuple[str, ...] = ()
 
     @property
     def in_words(self) -> str:
         """What a record depends on."""
-        return f"B={self.beam_width}" + (f" faces<={self.most_faces}" if self.most_faces is not None else "")
+        faces = [] if self.most_faces is None else [f"faces<={self.most_faces}"]
+        profiles = [f"{kind}={getattr(self, kind)}" for kind, usual in DEFAULTS.items() if getattr(self, kind) != usual]
+        return " ".join((f"B={self.beam_width}", *faces, *profiles, *self.own))
 
     def profile(self, terms: str) -> Profile:
         """The profile of a search on some terms."""
         limit = () if self.time_limit_s is None else (f"search.time_limit_s={self.time_limit_s}",)
-        return load(settings=(*TERMS[terms], UNPOLISHED, f"search.beam_width={self.beam_width}", *limit))
+        fixed = (*TERMS[terms], UNPOLISHED, f"search.beam_width={self.beam_width}", *limit)
+        return load(self.machine, self.material, self.process, (*self.own, *fixed))
 
 
 @dataclass(frozen=True)

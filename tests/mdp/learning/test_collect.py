@@ -136,6 +136,7 @@ def _until_gone(group: int) -> None:
             ("--only", "tea"),
             "folder {models}: holds no model with 'tea' in its name; .npz, {readers} are read",
         ),
+        (("--set", "search.luck=1"), "search.luck is not a key of a profile (`profiles show` lists them)"),
         (("--luck",), "unrecognized arguments: --luck; --help shows what is allowed"),
         (
             ("--out", "{models}/tee.npz"),

@@ -14,6 +14,7 @@ from mdp.learning.collection.task import Settings, run
 from mdp.learning.summary import main as summarize
 from mdp.mesh import Mesh
 from profiles.errors import LearningError, MeshError
+from profiles.profile import load
 from tests import shapes
 from tests.mdp.learning.records import write_record
 
@@ -48,6 +49,14 @@ def test_a_search_gives_its_record_and_its_line(tmp_path: Path) -> None:
 def test_a_search_without_a_list_has_no_record(tmp_path: Path, terms: str, reason: str) -> None:
     result = run(Search("box", 0, terms), _npz(tmp_path / "box.npz", shapes.box()), Settings(beam_width=1))
     assert (result.row.excluded, result.record) == (reason, b"")
+
+
+def test_a_collection_searches_by_the_profiles_and_settings_that_it_is_given() -> None:
+    settings = Settings(3, machine="fractal5pro", own=("search.seam_mm=1.5",))
+    profile = settings.profile("ours")
+    assert (profile.search.seam_mm, profile.search.beam_width, profile.search.polish) == (1.5, 3, False)
+    assert profile.machine == load("fractal5pro").machine
+    assert settings.in_words == "B=3 machine=fractal5pro search.seam_mm=1.5"
 
 
 @pytest.mark.usefixtures("_all_cores")
