@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 INPUT, OUTPUT = "features", "scores"
 DECIMALS = 4  # of scores; networks give some 7 digits, and those that differ less are ties that the order offered decides
-LISTED = 50  # candidates that are ranked together, the B of the 2020 paper
+RANKED_TOGETHER = 50  # candidates, the B of the 2020 paper
 
 
 class Network:
@@ -40,7 +40,7 @@ class Network:
     def rank(self, offered: Iterable[RankedCandidate], tables: Sequence[CandidateTable]) -> Iterator[RankedCandidate]:
         """The first candidates by their scores, then the others as they come."""
         others = iter(offered)
-        first = list(islice(others, LISTED))
+        first = list(islice(others, RANKED_TOGETHER))
         if len(first) > 1:
             scores = self.scores(self._features(first, tables))
             first = [first[place] for place in np.argsort(-scores, kind="stable")]
