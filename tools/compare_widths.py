@@ -283,7 +283,7 @@ def rankers_table(found: Sequence[Row], title: str) -> str:
 def _ranker_cells(here: list[Row], plain: dict[int, list[Row]], width: int) -> list[str]:
     costs = {number: _free(rows) for number, rows in plain.items()}
     means = {number: float(each.mean()) for number, each in costs.items()}
-    own, widest = _free(here), max(plain)
+    own, widest = _free(here), max(plain, default=0)
 
     def of_gap(wide: int, narrow: int) -> str:
         known = wide in means and narrow in means and means[narrow] - means[wide] > EQUAL

@@ -55,6 +55,12 @@ def test_a_learned_ranker_is_held_against_plain_beams_without_what_no_cut_can_sa
     assert cells[6:] == ["2.00", "0.25", "0.0%", "50.0%"]
 
 
+def test_a_learned_ranker_without_a_plain_search_beside_it_is_compared_with_nothing() -> None:
+    alone = Row("a", "", "best", 2, 9, 50.0, 25.0, 0.5, 3, 2.0, 1.0, 9, "", "learned")
+    (line,) = [line for line in rankers_table([alone], "").splitlines() if line.startswith("| learned")]
+    assert [cell.strip() for cell in line.strip("|").split("|")] == ["learned", "2", "0.5000", *"-------"]
+
+
 def test_equal_values_have_the_ratio_one_even_when_both_are_nothing() -> None:
     assert ratios(np.array([0.0, 0.3, 0.2]), np.array([0.0, 0.3, 0.4])) == pytest.approx([1.0, 1.0, 0.5])
 
