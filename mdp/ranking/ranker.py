@@ -45,6 +45,7 @@ class ByReduction:
         return iter(offered)
 
 
+@cache
 def ranker_named(name: str) -> Ranker:
     """The ranker of a name, see above.
 

@@ -58,7 +58,6 @@ class _Candidate:
     stage: int
     parent: int
     offer: Offer
-    features: Floats
     chosen: bool = False
     child: int = NO_NODE
 
@@ -129,7 +128,7 @@ class Trace:
         rows, nodes = self._candidates, self._nodes
         child = _integers(row.child for row in rows)
         return {
-            "features": _table([row.features for row in rows], len(COLUMNS)),
+            "features": _table([row.offer.features for row in rows], len(COLUMNS)),
             "parent_features": _table([nodes[row.parent].features for row in rows], len(COLUMNS)),
             "stage": _integers(row.stage for row in rows),
             "round": _integers(row.offer.round for row in rows),
@@ -160,7 +159,7 @@ class Trace:
         parent = self._number[offer.parent]
         key = (parent, offer.plane.normal.tobytes(), offer.plane.offset_mm)
         if key not in self._known:
-            self._known[key] = _Candidate(self._stage, parent, offer, offer.features)
+            self._known[key] = _Candidate(self._stage, parent, offer)
             self._candidates.append(self._known[key])
         return self._known[key]
 
@@ -169,7 +168,7 @@ class Trace:
         number = self._number.setdefault(child.signature, len(self._nodes))
         if number == len(self._nodes):
             cost = child.cost_mm2 / self.model.risky_mm2
-            self._nodes.append(_Node(cost, self._stage, candidate.parent, candidate.features))
+            self._nodes.append(_Node(cost, self._stage, candidate.parent, candidate.offer.features))
         return number
 
 

@@ -50,19 +50,20 @@ def _fill(
     plain = list(islice(classic, 1))
     chosen: list[RankedCandidate] = []
     children: list[Node] = []
-    for candidate in ranker.rank(chain(plain, classic), tables):
-        full = len(children) >= problem.settings.beam_width
-        if full and (not ranker.learned or plain[0] in chosen):
-            break
-        if full:
-            candidate = plain[0]
+
+    def follow(candidate: RankedCandidate) -> None:
         table, row = tables[candidate.table], candidate.row
         child = problem.cut(beam[candidate.table], table.plane(row), float(table.scored.residual_mm2[row]))
         if child is not None:
             chosen.append(candidate)
             children.append(child)
-        if full:
+
+    for candidate in ranker.rank(chain(plain, classic), tables):
+        follow(candidate)
+        if len(children) == problem.settings.beam_width:
             break
+    if ranker.learned and plain and plain[0] not in chosen:
+        follow(plain[0])
     return chosen, children
 
 
