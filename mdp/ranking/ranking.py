@@ -67,7 +67,7 @@ class CandidateTable:
     def rows_of_round(self, number: int, risky_mm2: float) -> Ints:
         """The rows that come below the residual threshold in this round first; risky_mm2: what the threshold is a share of."""
         if not self._rounds:
-            rounds = np.searchsorted(RESIDUAL_THRESHOLDS, self.scored.residual_mm2 / risky_mm2, side="right")
+            rounds = relaxation_rounds(self.scored.residual_mm2 / risky_mm2)
             order = np.argsort(rounds, kind="stable")
             self._rounds = np.split(order, np.searchsorted(rounds[order], np.arange(1, ROUNDS + 1)))
         return self._rounds[number]
@@ -116,8 +116,7 @@ class CandidateTable:
 
     def rounds(self, rows: Ints) -> Ints:
         """(n,) the rounds whose residual thresholds let the rows in."""
-        residual = self.scored.residual_mm2[rows] / self.model.risky_mm2
-        return np.searchsorted(RESIDUAL_THRESHOLDS, residual, side="right").astype(np.int32)
+        return relaxation_rounds(self.scored.residual_mm2[rows] / self.model.risky_mm2)
 
 
 class _TradeOffRanking:
@@ -280,7 +279,12 @@ class _ClassicRanking:
 
 def relaxation_round(residual: float) -> int:
     """The round whose residual threshold lets in a candidate with this share of the risky area left on its part."""
-    return int(np.searchsorted(RESIDUAL_THRESHOLDS, residual, side="right"))
+    return int(relaxation_rounds(np.array([residual]))[0])
+
+
+def relaxation_rounds(residual: Floats) -> Ints:
+    """(n,) the same for many."""
+    return np.searchsorted(RESIDUAL_THRESHOLDS, residual, side="right").astype(np.int32)
 
 
 def nearly_equal(plane: Plane, other: Plane) -> bool:

@@ -10,9 +10,8 @@ from mdp.decomposition import FrontRow, Part
 from mdp.search.node import Node
 from profiles.profile import Profile
 
-EQUAL = (
-    0.01  # costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams
-)
+# Costs are alike that differ by a smaller share: of the uncut model's for fewer parts, of their own for shorter seams.
+EQUAL = 0.01
 
 
 @dataclass(frozen=True)

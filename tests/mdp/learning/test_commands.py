@@ -25,6 +25,11 @@ def records(tmp_path: Path) -> Path:
     return folder
 
 
+def _needs(*libraries: str) -> None:
+    for library in libraries:
+        pytest.importorskip(library, reason="the extra `train` is not installed")
+
+
 def test_the_records_have_models_on_every_side(records: Path) -> None:
     assert {side(file.name.split(".")[0]) for file in records.iterdir()} == set(Side)
 
@@ -33,8 +38,7 @@ def test_the_records_have_models_on_every_side(records: Path) -> None:
 def test_a_ranker_is_trained_and_judged_by_two_commands(
     records: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for library in EXTRA:
-        pytest.importorskip(library, reason="the extra `train` is not installed")
+    _needs(*EXTRA)
     ranker = tmp_path / "ranker.onnx"
     assert train.main([str(records), "-o", str(ranker), "--epochs", "3"]) == 0
     assert '"NDCG@5": 0.' in capsys.readouterr().out
@@ -53,8 +57,7 @@ def test_a_ranker_is_trained_and_judged_by_two_commands(
 def test_an_ensemble_with_little_regret_is_trained_on_some_terms(
     records: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for library in ("torch", "onnx"):
-        pytest.importorskip(library, reason="the extra `train` is not installed")
+    _needs("torch", "onnx")
     asked = [str(records), "-o", str(tmp_path / "a.onnx"), "--loss", "regret", "--columns", "paper", "--epochs", "2"]
     assert train.main([*asked, "--ensemble", "2", "--terms", "paper"]) == 0
     printed = capsys.readouterr()
@@ -101,8 +104,7 @@ def test_what_cannot_be_done_is_told_in_a_sentence(
 def test_a_folder_without_records_and_an_unknown_baseline_are_told(
     records: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for library in EXTRA:
-        pytest.importorskip(library, reason="the extra `train` is not installed")
+    _needs(*EXTRA)
     assert train.main([str(tmp_path), "-o", str(tmp_path / "a.onnx")]) == 1
     assert "holds no record" in capsys.readouterr().err
     assert evaluate.main([str(records), "--without", "luck"]) == 1
