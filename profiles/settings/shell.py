@@ -1,0 +1,54 @@
+"""The shell: walls, their seams, and solid layers under and over a surface."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from profiles.machine import Frozen
+
+
+class Shell(Frozen):
+    """Walls, seams and skins."""
+
+    walls: int = Field(3, ge=0, le=50, description="number of walls")
+    wall_order: Literal["inner-first", "outer-first"] = Field(
+        "inner-first",
+        description="inner-first: the outer wall leans on finished plastic, best over overhangs; outer-first: nothing pushes it "
+        "outward, best for fits",
+    )
+    outer_bulge: float = Field(
+        0.04,
+        ge=0,
+        le=0.2,
+        description="outer beads carry more plastic than their round sides hold and may bulge over the model by this, so that "
+        "the print has the model's volume, share of a line width; 0: as other slicers",
+    )
+    top_layers: int = Field(4, ge=0, le=1000, description="solid layers under a surface that faces the printing direction")
+    bottom_layers: int = Field(4, ge=0, le=1000, description="solid layers over a surface that faces away from it")
+    top_thickness_mm: float = Field(
+        0.7,
+        ge=0,
+        le=100,
+        description="least thickness of the layers under a surface, however thin they are: more layers then, mm",
+    )
+    bottom_thickness_mm: float = Field(
+        0.5, ge=0, le=100, description="least thickness of the layers over a surface that faces away, mm"
+    )
+    solid_below_mm2: float = Field(
+        70.0,
+        ge=0,
+        le=1e6,
+        description="places of sparse infill smaller than this become solid: thin limbs gain strength, and travels cost more "
+        "than the plastic saved, mm2",
+    )
+    seam: Literal["aligned", "corner", "rear", "nearest", "random"] = Field(
+        "aligned",
+        description="where walls begin: in one line over the layers, in inner then outer corners, at the rear, nearest to the "
+        "tip, or scattered; never on the edge of an interface",
+    )
+    seam_gap: float = Field(
+        0.1,
+        ge=0,
+        le=1,
+        description="walls stop this short of their beginning, so that the ends do not bulge, share of a line width",
+    )

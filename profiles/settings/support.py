@@ -1,0 +1,90 @@
+"""Support: what hangs, what spans, what stands below it."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from profiles.machine import Frozen
+
+
+class Support(Frozen):
+    """Overhangs, bridges and support."""
+
+    overhang_share: float = Field(
+        0.5, ge=0, le=1, description="walls with less than this share of their width on plastic below count as overhanging"
+    )
+    bridge_longest_mm: float = Field(
+        6.0, ge=0, le=100, description="spans up to this print without support; PLA with a fan manages more, PETG hardly, mm"
+    )
+    arch_longest_mm: float = Field(
+        6.0,
+        ge=0,
+        le=100,
+        description="arches whose flat crown is no wider than this print without support, for each layer reaches little further "
+        "than the one below; the crown of a level hole is 0.7 of its diameter wide, mm",
+    )
+    first_layer_flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on extruded volume of part 1's first layer")
+    bridge_flow: float = Field(
+        1.0, ge=0.3, le=2, description="factor on extruded volume of bridges; 1: as much plastic as the layer has room for"
+    )
+    infill_bridge_flow: float = Field(
+        1.0, ge=0.3, le=2, description="factor on extruded volume of the first solid layer over sparse infill, which spans it"
+    )
+    support: Literal["none", "auto"] = Field("auto", description="auto: support what the decomposition left risky")
+    support_style: Literal["tree", "grid"] = Field(
+        "tree",
+        description="tree: what hangs is gathered into branches, which saves plastic and time; grid: columns straight down where "
+        "they find ground, sturdier under heavy flat places",
+    )
+    support_on_part: bool = Field(
+        True, description="false: support stands on the platform or on the part's base only, so that it scars no surface"
+    )
+    support_branch_angle_deg: float = Field(
+        40.0,
+        ge=0,
+        le=60,
+        description="support leans no farther than this from the printing direction, nor than self_supporting_angle_deg, deg; "
+        "40: a sparse branch holds itself less well than a wall",
+    )
+    support_branch_mm: float = Field(
+        2.0, ge=0.2, le=20, description="diameter of a branch at its top, mm; thinner ones are knocked over by the nozzle"
+    )
+    support_branch_growth_deg: float = Field(
+        1.0, ge=0, le=20, description="branches get thicker downward, each side leaning by this, deg: tall ones must not sway"
+    )
+    support_pattern: Literal["lines", "grid"] = Field("lines", description="what fills support: lines are easily broken away")
+    support_density: float = Field(0.15, gt=0, le=1, description="share of the support's inside that is filled")
+    support_walls: int = Field(
+        1, ge=0, le=10, description="outlines around support; leaning support needs one for its lines to end on"
+    )
+    support_interface_layers: int = Field(
+        3, ge=0, le=100, description="dense layers of support under the part: a floor even enough to lay a skin on"
+    )
+    support_bottom_interface_layers: int = Field(
+        2, ge=0, le=100, description="dense layers of support that stands on the part, so that it comes off in one piece"
+    )
+    support_interface_density: float = Field(
+        0.7, gt=0, le=1, description="share of the dense layers that is filled; a closed floor would weld to the part"
+    )
+    support_gap_mm: float = Field(
+        0.2, ge=0, le=2, description="gap along the printing direction between support and the part over it, mm; 0: it welds"
+    )
+    support_bottom_gap_mm: float = Field(
+        0.2, ge=0, le=2, description="gap along the printing direction between support and what it stands on, mm"
+    )
+    support_distance_mm: float = Field(
+        0.3,
+        ge=0,
+        le=5,
+        description="gap across the printing direction between support and part, and to where later parts will be, mm; "
+        "two thirds of a line: near enough to hold the edges",
+    )
+    support_foot_mm: float = Field(
+        2.0, ge=0, le=20, description="support is wider by this in its first layer on the platform, so that it sticks, mm"
+    )
+    support_foot_density: float = Field(
+        0.7, gt=0, le=1, description="share of the support's first layer on the platform that is filled"
+    )
+    support_least_mm2: float = Field(
+        1.0, ge=0, le=1000, description="a hanging place smaller than this, seen from above, holds itself, mm2"
+    )
