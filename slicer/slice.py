@@ -15,7 +15,7 @@ from slicer.fill.bridge import bridge_area, bridge_beads, infill_bridge_area, in
 from slicer.fill.infill import infill_beads
 from slicer.fill.skin import angle_of_layer_deg, skin_beads
 from slicer.geometry.polygons import union
-from slicer.interlock import fill_grooves
+from slicer.interface.interlock import fill_grooves
 from slicer.paths import Kind, Layer, Path, SlicedPart
 from slicer.speed import layer_time_s, speeds_mm_s
 from slicer.stack import Stack, build_stack

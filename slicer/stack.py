@@ -11,8 +11,8 @@ from slicer.bead import first_layer_process, with_line_width
 from slicer.fill.infill import pattern_density
 from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import Heights, layer_heights
-from slicer.interface import interface_edges, plastic_beneath, strengthen_interface
-from slicer.interlock import cut_grooves
+from slicer.interface.interface import interface_edges, plastic_beneath, strengthen_interface
+from slicer.interface.interlock import cut_grooves
 from slicer.plate import compensate_elephant_foot, plate_outline
 from slicer.region import Region, regions
 from slicer.section import sections

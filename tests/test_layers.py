@@ -20,7 +20,7 @@ CONFINED = {
         "mdp/repair/",
         "mdp/formats/polygons",
         "slicer/geometry/",
-        "slicer/interlock",
+        "slicer/interface/interlock",
         "machine/kinematics/collision",
         "machine/app/pipeline/precompile",
     ),

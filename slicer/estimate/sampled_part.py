@@ -15,7 +15,7 @@ from slicer.estimate.hanging import ThickSupport, thick_support
 from slicer.estimate.shell import Shell, shell_of
 from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import Heights, layer_heights
-from slicer.interface import strengthen_interface
+from slicer.interface.interface import strengthen_interface
 from slicer.plate import plate_outline
 from slicer.region import shell_layers
 from slicer.section import sections

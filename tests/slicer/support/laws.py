@@ -10,7 +10,7 @@ import shapely
 from mdp.decomposition import Part
 from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import layer_heights
-from slicer.interface import plastic_beneath
+from slicer.interface.interface import plastic_beneath
 from slicer.section import sections
 from slicer.support.blocker import blocked_areas, far_mm
 from slicer.support.overhang import detect_overhangs

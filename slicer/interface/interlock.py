@@ -15,7 +15,7 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, clean, offset
-from slicer.interface import BENEATH_MM
+from slicer.interface.interface import BENEATH_MM
 from slicer.paths import Kind
 from slicer.section import sections
 from slicer.travel.order import Placed
