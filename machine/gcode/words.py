@@ -4,7 +4,6 @@ The dry run's reader, the host and the simulated printer all read with these. Le
 """
 
 import re
-from collections.abc import Callable, Iterable
 
 from profiles.errors import GcodeError
 
@@ -54,11 +53,6 @@ def split_command(text: str) -> tuple[str, str]:
         return f"{head[1]}{head[2]}", text[head.end() :]
     name, _, rest = text.partition(" ")
     return name, rest
-
-
-def plain_move(letters: Iterable[str]) -> Callable[[str], object]:
-    """What tells a usual G0 or G1 line, of words of these letters and F only, from any other."""
-    return re.compile(rf"G[01](?: [{''.join(letters)}F]{NUMBER})+\s*").fullmatch
 
 
 def unframe(number: int, code: str) -> str:

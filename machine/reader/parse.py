@@ -3,11 +3,12 @@
 import re
 from collections.abc import Iterable
 
-from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, PAREN, plain_move, quote, read_words, unframe
+from machine.gcode.words import BLOCK, FLAG, FLAGS, MACRO, PAREN, quote, read_words, unframe
 from machine.reader.codes import dispatch
 from machine.reader.macros import macro
-from machine.reader.motion import flush, straight
+from machine.reader.motion import flush
 from machine.reader.parsed import ParsedProgram
+from machine.reader.plain_moves import letters_of, read_plain_moves, text_of
 from machine.reader.remarks import remark
 from machine.reader.state import Reader, Words, reader_of
 from machine.reader.table import parsed_program
@@ -25,15 +26,14 @@ def parse_gcode(lines: Iterable[str], machine: Machine) -> ParsedProgram:
     Raises GcodeError, with the line, for what is not G-code and for motion codes that are not supported; M codes and
     macros that are not known are counted in `ignored`: code -> (first line, how often).
     """
-    reader = reader_of(machine)
-    plain = plain_move(reader.letters)
-    for number, line in enumerate(lines, start=1):
-        reader.number = number
-        if line[:2] in ("G1", "G0") and len(line) < 200 and plain(line) and not reader.ended:
-            reader.motion = line[:2]
-            straight(reader, [(word[0], float(word[1:])) for word in line.split()[1:]], line[1] == "0")
-        else:
-            _line(reader, line)
+    reader, lines = reader_of(machine), tuple(lines)
+    text, letters, at = text_of(lines), letters_of(reader), 0
+    while at < len(lines):
+        after = read_plain_moves(reader, text, letters, at) if lines[at][:2] in ("G1", "G0") else at
+        if after == at:
+            reader.number = after = at + 1
+            _line(reader, lines[at])
+        at = after
     if reader.turning:
         flush(reader)
     return parsed_program(reader)

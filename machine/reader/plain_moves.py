@@ -1,0 +1,166 @@
+"""Plain moves: a run of usual G0 and G1 lines read at once by a kernel, as `Modes.move` and `straight` would one by one.
+
+They are 98 lines in a hundred of a program. What is not usual ends the run, and the reader takes that line: other letters than
+the machine's axes and F, a feed that is not above 0, a number of more digits than one division reads exactly, comments.
+"""
+
+from collections.abc import Sequence
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.gcode.modes import E_AXIS
+from machine.reader.state import ROW, Reader
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+
+Bytes = NDArray[np.uint8]
+
+LONGEST = 200
+MOST_DIGITS = 15  # below 2^53 whole numbers are exact, and so are the powers of ten to divide by: the quotient is rounded once
+NONE, FEED = -1, 6  # what a letter stands for, besides the axes 0 to 5
+MOST_AT_ONCE = 4096  # lines
+
+
+class Text(NamedTuple):
+    """Lines as bytes, one for each character; line k is text[start[k]:start[k + 1]]."""
+
+    text: Bytes
+    start: NDArray[np.int64]
+
+
+class Meaning(NamedTuple):
+    """What words mean during a run. letters: (256,) axis, FEED or NONE of each byte.
+
+    units, steps, offset: (6,) as those of Modes; row: (ROW,) a row with what the comments said. rapid: G0 is as fast as can be.
+    """
+
+    letters: NDArray[np.int8]
+    units: Floats
+    steps: NDArray[np.bool_]
+    offset: Floats
+    row: Floats
+    feed_share: float
+    rapid: bool
+    travelling: float
+
+
+def text_of(lines: Sequence[str]) -> Text:
+    """The lines for the kernel; a character that is not ASCII becomes a question mark, which is in no plain move."""
+    start = np.zeros(len(lines) + 1, dtype=np.int64)
+    np.cumsum(np.fromiter(map(len, lines), dtype=np.int64, count=len(lines)), out=start[1:])
+    return Text(np.frombuffer("".join(lines).encode("ascii", "replace"), dtype=np.uint8), start)
+
+
+def letters_of(reader: Reader) -> NDArray[np.int8]:
+    """(256,) what each letter stands for in a move."""
+    letters = np.full(256, NONE, dtype=np.int8)
+    letters[ord("F")] = FEED
+    for letter, axis in reader.letters.items():
+        letters[ord(letter)] = axis
+    return letters
+
+
+def read_plain_moves(reader: Reader, text: Text, letters: NDArray[np.int8], first: int) -> int:
+    """Rows of the plain moves from line `first`, counted from 0; returns the first line that is none, or was not come to.
+
+    Nothing is read where M221, M200 or G93 change what a move's words mean, nor before a turn under way has become a row.
+    """
+    modes = reader.modes
+    if reader.flow != 1.0 or reader.filament_mm2 or modes.inverse_time or reader.turning or reader.ended:
+        return first
+    remarks = (0.0, reader.part, reader.layer, reader.type, reader.width, reader.height, reader.printing, reader.followed)
+    row = np.array([0.0, *reader.at, *reader.at, *remarks])
+    meaning = Meaning(
+        letters, np.array(modes.units), np.array(modes.steps), np.array(modes.offset), row,
+        reader.feed_share, bool(reader.dialect.rapid), reader.travelling,
+    )  # fmt: skip
+    rows = np.empty((min(MOST_AT_ONCE, len(text.start) - 1 - first), ROW))
+    place = np.array([*reader.at, modes.feed])
+    last, count = _read_run(text, meaning, first, place, rows)
+    if last > first:
+        begin = int(text.start[last - 1])
+        reader.number, reader.motion = last, text.text[begin : begin + 2].tobytes().decode("ascii")
+        reader.at[:], modes.feed = place[:6].tolist(), float(place[6])
+        reader.rows.frombytes(rows[:count].tobytes())
+    return last
+
+
+@kernel
+def _read_run(text: Text, meaning: Meaning, first: int, place: Floats, rows: Floats) -> tuple[int, int]:
+    """The line after the run and how many rows it has; place: (7,) axes and feed, which it leaves as they are then."""
+    words = np.empty((32, 2))
+    count, line = 0, first
+    while line < len(text.start) - 1 and line - first < len(rows):
+        begin, end = text.start[line], text.start[line + 1]
+        found = _read_words(text.text, begin, end, meaning.letters, words)
+        if found < 0:
+            break
+        for k in range(ROW):
+            rows[count, k] = meaning.row[k]
+        for k in range(6):
+            rows[count, 1 + k] = place[k]
+        moved = False
+        for k in range(found):
+            axis, value = int(words[k, 0]), words[k, 1]
+            if axis == FEED:
+                place[FEED] = value * meaning.units[0]
+                continue
+            moved = True
+            value *= meaning.units[axis]
+            place[axis] = place[axis] + value if meaning.steps[axis] else value - meaning.offset[axis]
+        if moved:
+            rows[count, 0] = line + 1
+            for k in range(6):
+                rows[count, 7 + k] = place[k]
+            quick = meaning.rapid and text.text[begin + 1] == 48
+            rows[count, 13] = inf if quick else place[FEED] * meaning.feed_share
+            if rows[count, 1 + E_AXIS] == rows[count, 7 + E_AXIS]:
+                rows[count, 19] = meaning.travelling
+            count += 1
+        line += 1
+    return line, count
+
+
+@part
+def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], words: Floats) -> int:
+    """How many words a plain move has, each what it stands for and its value; -1: the line is none."""
+    while end > begin and (text[end - 1] == 32 or 9 <= text[end - 1] <= 13):
+        end -= 1
+    if end - begin < 5 or end - begin >= LONGEST or text[begin] != 71 or (text[begin + 1] != 48 and text[begin + 1] != 49):
+        return -1
+    at, found = begin + 2, 0
+    while at < end:
+        if found == len(words) or at + 2 >= end or text[at] != 32:
+            return -1
+        axis = letters[text[at + 1]]
+        at += 2
+        negative = text[at] == 45
+        if negative or text[at] == 43:
+            at += 1
+        whole, digits, behind, dotted = 0, 0, 0, False
+        while at < end and text[at] != 32:
+            if text[at] == 46 and not dotted:
+                dotted = True
+            elif 48 <= text[at] <= 57:
+                whole = 10 * whole + (text[at] - 48)
+                digits += 1
+                behind += dotted
+            else:
+                return -1
+            at += 1
+            if digits > MOST_DIGITS:
+                return -1
+        if axis == NONE or digits == 0 or digits - behind > 12:
+            return -1
+        divisor = 1.0
+        for _ in range(behind):
+            divisor *= 10.0
+        value = whole / divisor
+        if axis == FEED and (negative or value <= 0.0):
+            return -1
+        words[found, 0], words[found, 1] = axis, -value if negative else value
+        found += 1
+    return found
