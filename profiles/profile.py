@@ -4,11 +4,12 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from profiles.errors import ProfileError
 from profiles.machine import Frozen, Machine
 from profiles.material import Material
+from profiles.part_settings import PartSettings, merge_part_settings, process_of_part
 from profiles.places import KINDS, OF_KIND, kind_of, known, shipped, tables
 from profiles.process import HEIGHTS, WIDTHS, Process
 from profiles.search import Search
@@ -22,12 +23,23 @@ LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diame
 
 
 class Profile(Frozen):
-    """Everything a run needs to know about machine, material, process and search."""
+    """Everything a run needs to know about machine, material, process and search; parts: those with settings of their own."""
 
     machine: Machine
     material: Material
     process: Process
     search: Search
+    parts: list[PartSettings] = Field(default=[])
+
+    def of_part(self, index: int) -> "Profile":
+        """What a part is sliced with."""
+        own = next((each.process for each in self.parts if each.part == index), None)
+        return self if own is None else self.model_copy(update={"process": process_of_part(self.process, own), "parts": []})
+
+    @property
+    def of_all_parts(self) -> "Profile":
+        """What all parts share: for decompositions whose parts are others."""
+        return self.model_copy(update={"parts": []}) if self.parts else self
 
 
 def load(
@@ -54,6 +66,17 @@ def load(
     if problems:
         raise ProfileError("; ".join(problems))
     return profile
+
+
+def with_part_settings(profile: Profile, given: Iterable[PartSettings]) -> Profile:
+    """The profile with these settings of single parts under those it has. Raises ProfileError naming every problem at once."""
+    parts = merge_part_settings(profile.process, [*given, *profile.parts])
+    whole = profile.model_copy(update={"parts": parts})
+    checked = {each.part: _check_together(whole.of_part(each.part)) for each in parts}
+    problems = [f"part {part}: {problem}" for part, sentences in checked.items() for problem in sentences]
+    if problems:
+        raise ProfileError("; ".join(problems))
+    return whole
 
 
 def load_one(name: str, settings: Iterable[str] = ()) -> dict[str, Frozen]:

@@ -45,7 +45,7 @@ def slice_parts(
 
 def _layers(part: Part, profile: Profile) -> int:
     """How many layers a part will have, about: what takes time."""
-    return max(1, round(float(part.in_part_frame().bounds_mm[1, 2]) / profile.process.layer_height_mm))
+    return max(1, round(float(part.in_part_frame().bounds_mm[1, 2]) / profile.of_part(part.index).process.layer_height_mm))
 
 
 def _process_count(parts: int, layers: int) -> int:

@@ -45,6 +45,7 @@ def slice_part(
     input gives the same paths. on_layer: called after each layer with its number and how many there are. Raises SliceError
     when the part gives no bead at all.
     """
+    profile = profile.of_part(part.index)
     stack = build_stack(part, profile, earlier, later)
     bounds_mm = part.in_part_frame().bounds_mm
     rear = rear_of(bounds_mm)

@@ -32,7 +32,7 @@ CONFINED = {
     "rich": ("machine/app/", "mdp/learning/"),
     "prompt_toolkit": ("machine/app/",),
     "PIL": ("machine/app/pictures/",),
-    "tomlkit": ("machine/calibration/", "mdp/plan_file.py"),
+    "tomlkit": ("machine/calibration/", "mdp/plans/writing.py"),
     "platformdirs": ("machine/app/state_folder.py", "mdp/kernels/cache.py", "profiles/places.py"),
     "torch": ("mdp/learning/",),
     "lightgbm": ("mdp/learning/",),

@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from profiles.profile import SECTIONS, Profile, sound_section
+from profiles.errors import ProfileError
+from profiles.part_settings import PartSettings
+from profiles.profile import SECTIONS, Profile, sound_section, with_part_settings
 
 BEGIN, END = "; tiltprint_config = begin", "; tiltprint_config = end"
 WHOLE = re.compile(r"machine\.(gcode|sources)\.")  # below these, keys are names and values are text
@@ -19,10 +21,20 @@ def read_embedded_profile(lines: Sequence[str], profile: Profile, named: frozens
     Returns it and the names of the sections taken over. A file without the comments, or with ones that make no valid
     section, changes nothing.
     """
-    tables = {name: table for name, table in _tables(lines).items() if name in SECTIONS and name not in named}
+    found = _tables(lines)
+    tables = {name: table for name, table in found.items() if name in SECTIONS and name not in named}
     sections = {name: sound_section(name, table) for name, table in tables.items()}
     taken = {name: section for name, section in sections.items() if section is not None}
-    return profile.model_copy(update=taken), tuple(taken)
+    told = profile.model_copy(update=taken)
+    return _with_parts(told, found.get("parts", [])) if "process" in taken else told, tuple(taken)
+
+
+def _with_parts(profile: Profile, tables: Any) -> Profile:
+    """The profile with the file's settings of single parts; without them where they are not valid."""
+    try:
+        return with_part_settings(profile, [PartSettings.model_validate(each) for each in tables])
+    except (ProfileError, ValueError):
+        return profile
 
 
 def _tables(lines: Sequence[str]) -> dict[str, Any]:

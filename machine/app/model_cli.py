@@ -20,6 +20,7 @@ from machine.app.terminal.options import (
     Model,
     ModelOrGcode,
     Orient,
+    PartSettingsGiven,
     PartsGiven,
     PlanGiven,
     ProcessGiven,
@@ -49,6 +50,7 @@ def decompose(
         Path | None, typer.Option("--planes", metavar="FILE", help="planes by hand, cut first; the search finds the others")
     ] = None,
     parts: PartsGiven = None,
+    part: PartSettingsGiven = None,
     json: JsonFile = None,
     png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the parts")] = None,
     sheet: Annotated[
@@ -69,7 +71,7 @@ def decompose(
     """Cut a model into parts, each with its own printing direction."""
     from machine.app.commands.decompose import decompose
 
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit))
+    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     known = plan is not None and exists(plan)
     written = None if known else plan
     outputs = Outputs(folder=out, json=json, html=html, png=png, sheet=sheet, front=front, record=record, plan=written)
@@ -87,6 +89,7 @@ def export(
     orient: Orient = False,
     plan: PlanGiven = None,
     parts: PartsGiven = None,
+    part: PartSettingsGiven = None,
     json: JsonFile = None,
     svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer, see --layer")] = None,
     html: HtmlFile = None,
@@ -103,7 +106,7 @@ def export(
     """Write the G-code of a model, dry-run first."""
     from machine.app.commands.export import export
 
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit))
+    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     outputs = Outputs(gcode=out, json=json, html=html, svg=svg, layer=layer)
     cuts = Cuts(plan, parts)
     request = ModelRequest(model, profile, ranker=ranker, orient=orient, outputs=outputs, compare=compare, force=force, cuts=cuts)
@@ -119,6 +122,7 @@ def simulate(
     orient: Orient = False,
     plan: PlanGiven = None,
     parts: PartsGiven = None,
+    part: PartSettingsGiven = None,
     json: JsonFile = None,
     reference: Annotated[
         str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
@@ -135,7 +139,7 @@ def simulate(
     """Dry-run a model or a G-code file. The plastic is held against the model; exit 1 when a finding is an error."""
     from machine.app.commands.simulate import simulate
 
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit))
+    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
     outputs = Outputs(json=json, html=html)
     return simulate(ModelRequest(model, profile, chosen, ranker, orient, outputs, cuts=Cuts(plan, parts)), reference, baud)
@@ -154,6 +158,7 @@ def view(
     orient: Orient = False,
     plan: PlanGiven = None,
     parts: PartsGiven = None,
+    part: PartSettingsGiven = None,
     compare: Annotated[bool, typer.Option("--compare", help="tell also time and material printed in one part")] = False,
     machine: MachineGiven = None,
     material: MaterialGiven = None,
@@ -163,7 +168,7 @@ def view(
     """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
     from machine.app.commands.view import view
 
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit))
+    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
     request = ModelRequest(model, profile, chosen, ranker, orient, Outputs(html=out), compare, cuts=Cuts(plan, parts))
     return view(request, open_)

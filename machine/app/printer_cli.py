@@ -16,6 +16,7 @@ from machine.app.terminal.options import (
     MaterialGiven,
     ModelOrGcode,
     Orient,
+    PartSettingsGiven,
     PartsGiven,
     PlanGiven,
     PortOrSim,
@@ -46,6 +47,7 @@ def print_(
     orient: Orient = False,
     plan: PlanGiven = None,
     parts: PartsGiven = None,
+    part: PartSettingsGiven = None,
     speed: SimSpeed = 0.0,
     watch: Watch = False,
     watch_port: WatchPort = None,
@@ -68,7 +70,7 @@ def print_(
     """
     from machine.app.commands.print import print_model
 
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit))
+    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
     request = ModelRequest(model, profile, chosen, ranker, orient, force=force, cuts=Cuts(plan, parts))
     return print_model(request, PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port)))

@@ -55,7 +55,8 @@ def _findings(run: DryRun, share: Share, result: Agreement, profile: Profile) ->
         )
         place = (int(run.program.line[row]), int(run.program.part[row]), int(run.program.layer[row]))
         findings.append(Finding("error", "outside", *place, message))
-    if profile.process.infill_density >= 1.0 and result.filled < LEAST_FILLED:
+    solid = all(profile.of_part(int(part)).process.infill_density >= 1.0 for part in set(run.program.part.tolist()))
+    if solid and result.filled < LEAST_FILLED:
         message = (
             f"the beads fill {100 * result.filled:.1f} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"
         )

@@ -48,8 +48,9 @@ def check_parts(parts: Sequence[Part], profile: Profile) -> None:
 
     Half a line is left at the sides, for the tip stays so far inside what it prints.
     """
-    machine, inset = profile.machine, 0.5 * profile.process.line_width_mm * np.array([1.0, 1.0, 0.0])
+    machine = profile.machine
     for part in parts:
+        inset = 0.5 * profile.of_part(part.index).process.line_width_mm * np.array([1.0, 1.0, 0.0])
         reached = machine_points(machine, part.pose, part.mesh.vertices)
         low, high = reached.min(axis=0) + inset, reached.max(axis=0) - inset
         for axis, (letter, limits) in enumerate(list(axis_limits(machine).items())[:3]):

@@ -6,7 +6,7 @@ from typing import Any
 from profiles.errors import ProfileError
 from profiles.machine import Frozen
 from profiles.places import OF_KIND, shipped
-from profiles.profile import DEFAULTS, Profile, load_one, rows
+from profiles.profile import DEFAULTS, SECTIONS, Profile, load_one, rows
 
 Table = dict[str, Any]
 
@@ -18,12 +18,15 @@ def settings_tables(profile: Profile) -> list[Table]:
     """
     usual = _usual(profile)
     changed, every = [], []
-    for section in type(profile).model_fields:
+    for section in SECTIONS:
         before = {key: value for key, value, _ in rows(section, usual[section])}
         for key, value, meaning in rows(section, getattr(profile, section)):
             every.append([key, _text(value), meaning])
             if key not in before or before[key] != value:
                 changed.append([key, _text(value), _text(before[key]) if key in before else ""])
+    for part in profile.parts:
+        shared = profile.process.model_dump(mode="json")
+        changed += [[f"part {part.part}: process.{key}", _text(value), _text(shared[key])] for key, value in part.process.items()]
     notes = [] if changed else ["all settings are the usual ones"]
     return [
         {"title": "Settings changed", "head": ["setting", "value", "usual"], "rows": changed, "notes": notes, "folded": False},

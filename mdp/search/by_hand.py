@@ -14,8 +14,8 @@ from mdp.colour import NO_COLOUR, colour_text
 from mdp.cut import above, mesh_of
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import threshold
-from mdp.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.plane import Plane
+from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
 from mdp.pose import poses
 from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, residual_mm2
 from mdp.search.node import Node

@@ -17,7 +17,7 @@ from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
-from mdp.plan_file import MOST_PARTS, PlanFile
+from mdp.plans.plan_file import PlanFile
 from mdp.ranking.candidates import REASONS
 from mdp.ranking.ranker import Ranker, ranker_named
 from mdp.ranking.record import Trace
@@ -30,6 +30,7 @@ from mdp.search.polish import make_symmetric, polish
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
 from profiles.errors import PlanError
+from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
 MOST_FEATHERED = 0.1  # share of a seam; a person is told of more

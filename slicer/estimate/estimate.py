@@ -53,7 +53,8 @@ def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
     top_mm = max((float(part.mesh.bounds_mm[1, 2]) for part in several), default=0.0)
     total = Estimate(0.0, 0.0, 0.0)
     for part in several:
-        total += _estimate_part(sample_part(part, profile), profile, top_mm)
+        own = profile.of_part(part.index)
+        total += _estimate_part(sample_part(part, own), own, top_mm)
     return total
 
 

@@ -10,10 +10,10 @@ from machine.app.pipeline.pipeline import decompose_model
 from machine.app.pipeline.precompile import compile_pictures
 from machine.app.requests import ModelRequest, Outputs
 from machine.app.terminal.advice import advice
-from machine.app.terminal.report import parts_table, show
+from machine.app.terminal.report import part_settings_lines, parts_table, show
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
-from mdp.plan_file import plan_text
+from mdp.plans.writing import plan_text
 from mdp.save import json_values, part_file, stl, threemf
 from profiles.profile import Profile
 
@@ -22,10 +22,10 @@ PLAN = "plan.toml"
 
 def decompose(request: ModelRequest) -> int:
     """Find the parts of a model and save what is asked for."""
-    outputs, profile = request.outputs, request.profile
+    outputs = request.outputs
     check_outputs(outputs)
     decomposed = decompose_model(request)
-    decomposition = decomposed.decomposition
+    decomposition, profile = decomposed.decomposition, decomposed.profile
     figures = json_values(decomposition, decomposed.read_s, decomposed.total_s)
     if outputs.folder is not None:
         make_folder(outputs.folder)
@@ -43,7 +43,7 @@ def decompose(request: ModelRequest) -> int:
         write_json(outputs.json, figures)
     if outputs.json != STDOUT:
         made = parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
-        show(made + advice(decomposition, decomposed.better, profile))
+        show(made + part_settings_lines(profile) + advice(decomposition, decomposed.better, profile))
     return 0
 
 

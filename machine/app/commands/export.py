@@ -7,7 +7,7 @@ from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
 from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import say
-from machine.app.terminal.report import run_table, show
+from machine.app.terminal.report import part_settings_lines, run_table, show
 from machine.dryrun.dryrun import summary
 from machine.view.page import print_page
 from profiles.errors import OutputError
@@ -18,12 +18,14 @@ def export(request: ModelRequest) -> int:
 
     Where the G-code goes to standard output the table goes to stderr.
     """
-    outputs, profile = request.outputs, request.profile
+    outputs = request.outputs
     if outputs.gcode == outputs.json == STDOUT:
         raise OutputError("-o - and --json -: only one of them can go to standard output")
     check_outputs(outputs)
     part, layer = parse_layer(outputs.layer, outputs.svg is not None)
-    program = build(decompose_model(request, to_build=True).decomposition, profile, pictures=True)
+    decomposed = decompose_model(request, to_build=True)
+    profile = decomposed.profile
+    program = build(decomposed.decomposition, profile, pictures=True)
     refuse_errors(program, request.force)
     picture = b"" if outputs.svg is None else draw_layer(program.sliced, part, layer)
     if outputs.gcode is not None:
@@ -36,7 +38,7 @@ def export(request: ModelRequest) -> int:
     if outputs.json is not None:
         comparison = {"compare": alternatives_json(alternatives)} if alternatives else {}
         write_json(outputs.json, summary(program.run) | comparison)
-    table = run_table(program.run) + (compare_table(alternatives) if alternatives else "")
+    table = run_table(program.run) + part_settings_lines(profile) + (compare_table(alternatives) if alternatives else "")
     if outputs.gcode == STDOUT:
         say(table.removesuffix("\n"))
     elif outputs.json != STDOUT:

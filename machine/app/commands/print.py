@@ -9,7 +9,7 @@ from machine.app.printer.compatibility import check_dialect, check_port, check_p
 from machine.app.printer.stream import PrintJob, print_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
-from machine.app.terminal.report import run_table, show
+from machine.app.terminal.report import part_settings_lines, run_table, show
 from machine.dryrun.starvation import check_baud, find_starvation
 
 
@@ -32,7 +32,7 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     refuse_errors(program, request.force)
     if is_rate_limited(printing.port):
         program = replace(program, run=find_starvation(program.run, program.lines, profile.machine, printing.baud))
-    show(run_table(program.run))
+    show(run_table(program.run) + part_settings_lines(profile))
     job = PrintJob(request.name, program, profile, Path(request.model) if request.is_gcode else None)
     with serve_watch_page(job.name, program, profile, printing.watch_port) as watchers:
         code = print_program(job, printing, watchers.follow)

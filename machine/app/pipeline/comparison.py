@@ -68,7 +68,8 @@ def _best(mesh: Mesh, profile: Profile) -> Orientation:
 
 
 def _with_support(profile: Profile) -> Profile:
-    return profile.model_copy(update={"process": profile.process.model_copy(update={"support": "auto"})})
+    bare = profile.of_all_parts
+    return bare.model_copy(update={"process": bare.process.model_copy(update={"support": "auto"})})
 
 
 def _in_one_part(name: str, orientation: str, mesh: Mesh, risky_mm2: float, profile: Profile) -> Alternative:

@@ -1,9 +1,11 @@
 """Given plan: the file that a person names to cut by, or to begin the search with, and what does not go with it."""
 
 from machine.app.requests import ModelRequest
-from mdp.plan_file import PlanFile, read_plan
+from mdp.plans.plan_file import PlanFile
+from mdp.plans.reading import read_plan
 from mdp.search.search import check_part_count
-from profiles.errors import PlanError
+from profiles.errors import PlanError, ProfileError
+from profiles.profile import Profile, with_part_settings
 
 
 def read_given_plan(request: ModelRequest) -> PlanFile | None:
@@ -22,8 +24,29 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     return None if file is None else read_plan(file)
 
 
+def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
+    """The profile with the settings that a plan has for single parts, under those of --part. Raises PlanError."""
+    if given is None or not given.settings:
+        return profile
+    try:
+        with_part_settings(profile.of_all_parts, given.settings)
+    except ProfileError as error:
+        raise PlanError(f"plan {given.name}: {error}") from None
+    return with_part_settings(profile, given.settings)
+
+
+def check_parts_named(profile: Profile, parts: int) -> None:
+    """Raise ProfileError for settings of parts that are not there."""
+    for each in profile.parts:
+        if each.part > parts:
+            there = "1 alone" if parts == 1 else f"1 to {parts}"
+            raise ProfileError(f"part {each.part} is not there to have {each.in_words}: the parts are {there}")
+
+
 def refuse_cuts(request: ModelRequest) -> None:
     """Raise PlanError where a G-code file is to be cut."""
     for option, value in (("--plan", request.cuts.plan), ("--parts", request.cuts.parts)):
         if value is not None:
             raise PlanError(f"{option} {value}: {request.model} is G-code, which is cut already; it goes with a model")
+    for each in request.profile.parts:
+        raise PlanError(f"--part {each.part}: {request.model} is G-code, which is sliced already; it goes with a model")

@@ -7,7 +7,7 @@ import numpy as np
 
 from machine.app.output import write_bytes
 from machine.app.pictures.thumbnail import with_thumbnails
-from machine.app.pipeline.given_plan import read_given_plan
+from machine.app.pipeline.given_plan import check_parts_named, read_given_plan, with_plan_settings
 from machine.app.pipeline.precompile import compile_pictures, compile_program, compile_search
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
@@ -20,7 +20,7 @@ from machine.view.program import Program
 from machine.view.quantities import minutes
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
-from mdp.plan_file import PlanFile, plan_of
+from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.ranking.ranker import ranker_named
 from mdp.read import locate, read_mesh
 from mdp.search.front import price_of_second_mm2
@@ -34,9 +34,13 @@ from slicer.parts import slice_parts
 
 @dataclass(frozen=True, eq=False)
 class Decomposed:
-    """A decomposition, the plan that cuts it again, how long its steps took, and what a person should rather do."""
+    """A decomposition, the plan that cuts it again, how long its steps took, and what a person should rather do.
+
+    profile: what it is printed with, the plan's settings of single parts included.
+    """
 
     decomposition: Decomposition
+    profile: Profile
     plan: PlanFile
     read_s: float
     total_s: float
@@ -50,8 +54,8 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     chosen from get no time.
     """
     ranker_named(request.ranker)  # a wrong one is told before anything else is done
-    profile, record_file = request.profile, request.outputs.record
-    given = read_given_plan(request)
+    record_file, given = request.outputs.record, read_given_plan(request)
+    profile = with_plan_settings(request.profile, given)
     began = perf_counter()
     mesh, repairs = read_mesh(locate(request.model), profile.process.scale, profile.process.rotate_deg)
     read_s = perf_counter() - began
@@ -76,10 +80,11 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
             notes = _hint(decomposition, better)
     if record_file is not None:
         write_bytes(record_file, asked.record_of(decomposition))
+    check_parts_named(profile, len(decomposition.parts))
     for note in (*decomposition.notes, *notes):
         say(f"{request.name}: {note}")
-    plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation)
-    return Decomposed(decomposition, plan, read_s, perf_counter() - began, better)
+    plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
+    return Decomposed(decomposition, profile, plan, read_s, perf_counter() - began, better)
 
 
 class _Search:
@@ -87,7 +92,7 @@ class _Search:
 
     def __init__(self, request: ModelRequest, given: PlanFile | None, to_build: bool, report: Report) -> None:
         self._request, self._given, self._report = request, given, report
-        cuts, profile = request.cuts, request.profile
+        cuts, profile = request.cuts, request.profile.of_all_parts
         free = cuts.plan is not None or cuts.parts is not None or price_of_second_mm2(profile) <= 0.0
         self._price = None if to_build and free and not request.orient else pricing(profile)
         self._records: list[tuple[Decomposition, list[bytes]]] = []

@@ -37,6 +37,10 @@ RankerName = Annotated[
 ]
 Orient = Annotated[bool, typer.Option("--orient", help="lay the model down the way that costs least, chosen with its parts")]
 PlanGiven = Annotated[Path | None, typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search")]
+PartSettingsGiven = Annotated[
+    list[str] | None,
+    typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
+]
 PartsGiven = Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")]
 Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
 
@@ -53,12 +57,20 @@ WatchPort = Annotated[
 ]
 
 
-def profile_of(machine: str | None, material: str | None, process: str | None, settings: Sequence[str] | None) -> "Profile":
+def profile_of(
+    machine: str | None,
+    material: str | None,
+    process: str | None,
+    settings: Sequence[str] | None,
+    part_settings: Sequence[str] | None = None,
+) -> "Profile":
     """The profile of these names, the default ones where none is given, with these settings. Raises ProfileError."""
-    from profiles.profile import DEFAULTS, load
+    from profiles.part_settings import parse_part_settings
+    from profiles.profile import DEFAULTS, load, with_part_settings
 
     names = {"machine": machine, "material": material, "process": process}
-    return load(**{kind: DEFAULTS[kind] if name is None else name for kind, name in names.items()}, settings=settings or ())
+    profile = load(**{kind: DEFAULTS[kind] if name is None else name for kind, name in names.items()}, settings=settings or ())
+    return with_part_settings(profile, map(parse_part_settings, part_settings or ()))
 
 
 def machine_profile(machine: str | None, settings: Sequence[str] | None = None) -> "Profile":

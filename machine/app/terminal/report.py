@@ -9,6 +9,7 @@ from machine.dryrun.dryrun import DryRun, summary
 from machine.view.parts import risky_before_mm2
 from machine.view.quantities import duration, minutes
 from mdp.decomposition import Decomposition, FrontRow
+from profiles.profile import Profile
 
 WIDEST = 100  # characters of a line
 NO_BREAK = "\u00a0"  # a space at which no line ends
@@ -84,6 +85,12 @@ def run_table(run: DryRun) -> str:
         where = f" (line{NO_BREAK}{finding['line']})" if finding["line"] else ""
         lines += _wrap_finding(finding["severity"], finding["message"] + where)
     return "\n".join(lines) + "\n"
+
+
+def part_settings_lines(profile: Profile) -> str:
+    """The parts with settings of their own."""
+    lines = (wrap(f"part {each.part} with {each.in_words}", WIDEST, subsequent_indent="  ") for each in profile.parts)
+    return "".join(line + "\n" for several in lines for line in several)
 
 
 def _wrap_finding(severity: str, message: str) -> list[str]:

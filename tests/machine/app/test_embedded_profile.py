@@ -4,7 +4,8 @@ import pytest
 
 from machine.app.embedded_profile import read_embedded_profile
 from machine.gcode.settings import foot
-from profiles.profile import load, shipped
+from profiles.part_settings import parse_part_settings
+from profiles.profile import load, shipped, with_part_settings
 
 OTHER = load("generic_ac", "petg" if "petg" in shipped("material") else "pla", settings=["machine.lift_mm=33", "process.walls=7"])
 
@@ -31,3 +32,10 @@ def test_a_foot_that_makes_no_sense_changes_nothing_of_the_machine(edit: str) ->
 
 def test_a_file_without_a_foot_changes_nothing() -> None:
     assert read_embedded_profile(["G28"], OTHER, frozenset()) == (OTHER, ())
+
+
+def test_settings_of_single_parts_come_back_with_the_process() -> None:
+    made = with_part_settings(load(), [parse_part_settings("2:walls=4,infill_pattern=gyroid,infill_density=0.4")])
+    lines = tuple(foot(made, 1.0, 1.0))
+    assert read_embedded_profile(lines, OTHER, frozenset())[0].parts == made.parts
+    assert read_embedded_profile(lines, OTHER, frozenset({"process"}))[0].parts == []

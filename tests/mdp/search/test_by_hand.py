@@ -11,8 +11,10 @@ import pytest
 from mdp.cut import below, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
-from mdp.plan_file import PlanFile, PlannedPart, plan_of, plan_text, read_plan
 from mdp.plane import Plane
+from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
+from mdp.plans.reading import read_plan
+from mdp.plans.writing import plan_text
 from mdp.save import stl
 from mdp.search.search import cut_by_plan, decompose
 from mdp.zone import Painted, Zone, Zones

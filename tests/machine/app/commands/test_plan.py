@@ -10,6 +10,7 @@ import pytest
 from machine.app.cli import main
 from mdp.cut import solid_of
 from mdp.mesh import Mesh
+from mdp.save import stl
 from tests import shapes
 from tests.mdp.files import painted_ply
 
@@ -55,6 +56,23 @@ def test_a_plan_that_is_not_there_yet_is_written_and_then_used(folder: Path) -> 
     assert [row["parts"] for row in second["front"]] == [row["parts"] for row in first["front"]]
     _run("decompose", "demo:tree", "--plan", "tree.toml", "--parts", "2", "--json", "two.json")
     assert len(_values("two.json")["parts"]) == 2
+
+
+def test_settings_of_a_part_are_kept_in_the_plan_and_change_what_is_written(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("box.stl").write_bytes(stl(shapes.box()))
+    Path("box.toml").write_text("version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 6\nprocess = {walls = 1}\n")
+    _run("export", "box.stl", "--plan", "box.toml", "-o", "one.gcode")
+    assert "part 2 with walls = 1" in capsys.readouterr().out
+    _run("export", "box.stl", "--plan", "box.toml", "--part", "2:walls=4", "-o", "four.gcode")
+    walls = [Path(f"{name}.gcode").read_text().split(";PART:2")[1].count(";TYPE:Perimeter") for name in ("one", "four")]
+    assert (walls[0], walls[1] > 60) == (3, True)  # one more in the three layers of the interface
+    _run("decompose", "box.stl", "--plan", "box.toml", "--part", "1:infill_density=0.5", "-o", "parts")
+    assert "process = {infill_density = 0.5}" in Path("parts/plan.toml").read_text()
+    assert "process = {walls = 1}" in Path("parts/plan.toml").read_text()
+    assert main(["decompose", "box.stl", "--plan", "box.toml", "--part", "3:walls=4", *FAST]) == 1
+    assert "part 3 is not there to have walls = 4: the parts are 1 to 2" in capsys.readouterr().err
 
 
 def test_more_parts_than_there_are_give_all_there_are_and_say_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

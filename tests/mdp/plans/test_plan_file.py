@@ -7,10 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.plan_file import PlanFile, PlannedPart, PlannedRow, mesh_sha256, plan_text, read_plan
+from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow, mesh_sha256
+from mdp.plans.reading import read_plan
+from mdp.plans.writing import plan_text
 from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.machine import Vector
+from profiles.part_settings import PartSettings
 from tests import shapes
 
 FIRST = "version = 1\n[[part]]\n"
@@ -40,6 +43,7 @@ PLANS = st.builds(
     orientation=st.sampled_from([None, TURNED]),
     parts=st.lists(OPEN, max_size=5).map(tuple),
     zones=st.builds(Zones, *[st.lists(ZONES | COLOURS, max_size=2).map(tuple)] * 2),
+    settings=st.sampled_from([(), (PartSettings(part=1, process={"infill_pattern": "gyroid", "infill_density": 0.4}),)]),
     front=st.lists(ROWS, max_size=3, unique_by=lambda row: len(row.parts)).map(tuple),
 )
 
@@ -63,8 +67,9 @@ REFUSED = [
     ("version = 1\norientation = [[1, 0, 0], [0, 1, 0]]", "a rotation is expected, three rows of three numbers"),
     ("version = 1\norientation = [[2, 0, 0], [0, 1, 0], [0, 0, 1]]", "a rotation is expected, three rows of three numbers"),
     ("version = 1\norientation = 7", "orientation is 7: 3 numbers in brackets are expected"),
+    (f"{FIRST}process = 4", "part 1: process is 4: keys and values are expected, as {walls = 4}"),
     ("version = 1\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 5", "part 1 stands on the platform and has no plane"),
-    (f"{FIRST}tilt_deg = 4", "part 1: 'tilt_deg' is no key of a plan: normal, offset_mm are allowed"),
+    (f"{FIRST}tilt_deg = 4", "part 1: 'tilt_deg' is no key of a plan: normal, offset_mm, process are allowed"),
     (f"{FIRST}[[part]]\nnormal = [0, 1]", "part 2: normal is [0, 1]: 3 numbers in brackets are expected"),
     (f"{FIRST}[[part]]\nnormal = 'up'", "part 2: normal is 'up': 3 numbers in brackets are expected"),
     (f"{FIRST}[[part]]\nnormal = [0, 0, nan]", "part 2: normal is [0, 0, nan]: 3 numbers in brackets are expected"),

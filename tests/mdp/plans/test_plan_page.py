@@ -3,10 +3,11 @@
 import re
 from pathlib import Path
 
-from mdp.plan_file import KEYS, PlannedPart, read_plan
+from mdp.plans.plan_file import KEYS, PlannedPart
+from mdp.plans.reading import read_plan
 from mdp.zone import Painted, Zone, Zones
 
-PAGE = Path(__file__).parents[2] / "docs" / "plan.md"
+PAGE = Path(__file__).parents[3] / "docs" / "plan.md"
 
 
 def test_the_example_of_the_page_is_read_as_the_page_says(tmp_path: Path) -> None:

@@ -1,0 +1,137 @@
+"""Plan file: a decomposition as a small TOML file that a person can read, change and use again.
+
+    version = 1
+    model = "kitten.off"
+    sha256 = "..."                      # of the model as it was cut; another model is refused
+
+    [[part]]                            # in print order; part 1 stands on the platform
+    [[part]]
+    normal = [0.0, 0.5, 0.8660254]      # printing direction; its base plane: the points p with normal . p = offset_mm
+    offset_mm = 31.0
+    process = {walls = 4}               # settings of this part alone
+
+    [[keep]]                            # no plane passes through this box of the workpiece frame
+    min_mm = [-5.0, -5.0, 20.0]
+    max_mm = [5.0, 5.0, 30.0]
+
+    [[no_seam]]                         # seams here count a hundred times: a box, or the faces of a colour of the model's file
+    colour = "#00ff00"
+
+    [[front]]                           # the best decomposition of every other number of parts, for --parts
+    planes = [[0.0, 0.0, 1.0, 40.0]]    # normal and offset_mm of part 2, 3, ...
+
+A file of planes by hand needs no sha256, and a part may leave out `normal` or `offset_mm`: the search completes it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
+
+import numpy as np
+
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.mesh import Floats, Mesh
+from mdp.plane import Plane
+from mdp.zone import NO_ZONES, Zones
+from profiles.errors import PlanError
+from profiles.machine import Vector
+from profiles.part_settings import PartSettings
+
+VERSION = 1
+GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
+KEYS = ("version", "model", "sha256", "orientation", "part", "keep", "no_seam", "front")
+PART_KEYS = ("normal", "offset_mm", "process")
+ZONE_KEYS = ("min_mm", "max_mm", "colour")
+ROW_KEYS = ("planes", "support_area_mm2", "seam_mm", "cost_mm2")
+
+
+@dataclass(frozen=True)
+class PlannedPart:
+    """The base plane of a part, its normal of length 1; None: to be found by the search. remark: a comment for the reader."""
+
+    normal: Vector | None
+    offset_mm: float | None
+    remark: str = field(default="", compare=False)
+
+    @property
+    def plane(self) -> Plane | None:
+        """The plane where it is given whole."""
+        return None if self.normal is None or self.offset_mm is None else Plane(np.array(self.normal), self.offset_mm)
+
+
+@dataclass(frozen=True)
+class PlannedRow:
+    """A decomposition into some other number of parts: its parts from the second on, and what it costs."""
+
+    parts: tuple[PlannedPart, ...]
+    support_area_mm2: float = 0.0
+    seam_mm: float = 0.0
+    cost_mm2: float = 0.0
+
+    @property
+    def planes(self) -> tuple[Plane, ...]:
+        """The planes in the order of the cuts, which is the reverse of the print order."""
+        return tuple(plane for part in reversed(self.parts) if (plane := part.plane) is not None)
+
+
+@dataclass(frozen=True)
+class PlanFile:
+    """What a file holds. name: the file's; sha256: of the model it was made of, "": made by hand for any; orientation: rows of
+    the rotation that laid the model down before it was cut, None: it stands as in its file; parts: in print order, without
+    part 1; front: one row for every number of parts; settings: of single parts, part 1 too."""
+
+    name: str
+    model: str = ""
+    sha256: str = ""
+    orientation: tuple[Vector, ...] | None = None
+    parts: tuple[PlannedPart, ...] = ()
+    zones: Zones = NO_ZONES
+    front: tuple[PlannedRow, ...] = ()
+    settings: tuple[PartSettings, ...] = ()
+
+    def row(self, most_parts: int) -> tuple[PlannedPart, ...]:
+        """The parts, from the second on, of the row with the most parts that are at most so many. Raises PlanError."""
+        rows = {len(row.parts) + 1: row.parts for row in self.front} | {len(self.parts) + 1: self.parts}
+        allowed = [count for count in rows if count <= most_parts]
+        if not allowed:
+            counts = ", ".join(map(str, sorted(rows)))
+            raise PlanError(f"{self.name} holds no decomposition into {most_parts} parts or fewer, only into {counts}")
+        return rows[max(allowed)]
+
+
+def mesh_sha256(mesh: Mesh) -> str:
+    """A word for the faces of a mesh and its vertices to the micrometre, the same on every machine."""
+    vertices = np.floor(mesh.vertices / GRID_MM + GRID_SHIFT).astype("<i8")
+    return sha256(vertices.tobytes() + mesh.faces.astype("<i4").tobytes()).hexdigest()
+
+
+def plan_of(
+    decomposition: Decomposition,
+    zones: Zones = NO_ZONES,
+    orientation: Floats | None = None,
+    settings: Sequence[PartSettings] = (),
+) -> PlanFile:
+    """The plan of a decomposition."""
+    rows = tuple(_row(row) for row in decomposition.front)
+    parts = tuple(
+        PlannedPart(
+            _vector(part.base.normal),
+            float(part.base.offset_mm),
+            f"part {part.index}: {part.volume_mm3 / 1000:.2f} cm3, printed at tilt {part.pose.tilt_deg:.2f} and turn "
+            f"{part.pose.turn_deg:.2f} deg",
+        )
+        for part in decomposition.parts[1:]
+    )
+    turned = None if orientation is None else tuple(_vector(row) for row in orientation)
+    sha = mesh_sha256(decomposition.mesh)
+    return PlanFile("plan.toml", decomposition.name, sha, turned, parts, zones, rows, tuple(settings))
+
+
+def _row(row: FrontRow) -> PlannedRow:
+    parts = tuple(PlannedPart(_vector(plane.normal), float(plane.offset_mm)) for plane in reversed(row.planes))
+    return PlannedRow(parts, float(row.support_area_mm2), float(row.seam_mm), float(row.cost_mm2))
+
+
+def _vector(values: Floats) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,80 @@
+"""Writing: a plan as the text of its file, with remarks for a reader."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import tomlkit
+
+from mdp.colour import colour_text
+from mdp.plans.plan_file import ROW_KEYS, VERSION, PlanFile, PlannedPart, PlannedRow
+from mdp.zone import Painted, Zone
+
+
+def plan_text(plan: PlanFile) -> str:
+    """The content of a plan's file."""
+    document = tomlkit.document()
+    count = len(plan.parts) + 1
+    document.add(tomlkit.comment(f"How a model is cut into {count} part{'s' * (count > 1)}, in print order; use it with --plan."))
+    document["version"] = VERSION
+    document["model"] = plan.model
+    document["sha256"] = plan.sha256
+    if plan.orientation is not None:
+        document["orientation"] = [list(row) for row in plan.orientation]
+    parts = (PlannedPart(None, None, "part 1 stands on the platform"), *plan.parts)
+    settings = {each.part: each.process for each in plan.settings}
+    document["part"] = _tables([_part_table(part, settings.get(k, {})) for k, part in enumerate(parts, start=1)])
+    for key, zones in (("keep", plan.zones.keep), ("no_seam", plan.zones.no_seam)):
+        if zones:
+            document[key] = _tables([_table(_zone_values(zone)) for zone in zones])
+    if plan.front:
+        document["front"] = _tables([_row_table(row) for row in plan.front])
+    return tomlkit.dumps(document)
+
+
+def _zone_values(zone: Zone | Painted) -> dict[str, Any]:
+    if isinstance(zone, Painted):
+        return {"colour": colour_text(zone.colour)}
+    return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm)}
+
+
+def _table(values: dict[str, Any]) -> tomlkit.items.Table:
+    table = tomlkit.table()
+    table.update(values)
+    return table
+
+
+def _tables(tables: Sequence[tomlkit.items.Table]) -> tomlkit.items.AoT:
+    array = tomlkit.aot()
+    for table in tables:
+        array.append(table)
+    return array
+
+
+def _part_table(part: PlannedPart, process: Mapping[str, Any]) -> tomlkit.items.Table:
+    table = tomlkit.table()
+    if part.remark:
+        table.add(tomlkit.comment(part.remark))
+        if part.normal is None and not process:
+            table.add(tomlkit.nl())
+    if part.normal is not None:
+        table["normal"] = list(part.normal)
+    if part.offset_mm is not None:
+        table["offset_mm"] = part.offset_mm
+    if process:
+        own = tomlkit.inline_table()
+        own.update(process)
+        table["process"] = own
+    return table
+
+
+def _row_table(row: PlannedRow) -> tomlkit.items.Table:
+    """A row of the front, each plane on a line of its own."""
+    table = tomlkit.table()
+    count = len(row.parts) + 1
+    table.add(tomlkit.comment(f"{count} part{'s' * (count > 1)}"))
+    planes = tomlkit.array()
+    planes.extend([[*plane.normal.tolist(), plane.offset_mm] for part in row.parts if (plane := part.plane) is not None])
+    table["planes"] = planes.multiline(len(row.parts) > 1)
+    values = (row.support_area_mm2, row.seam_mm, row.cost_mm2)
+    table.update(dict(zip(ROW_KEYS[1:], values, strict=True)))
+    return table

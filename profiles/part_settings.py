@@ -1,0 +1,111 @@
+"""Part settings: what one part of a print is sliced with in place of the process's own values."""
+
+import tomllib
+from collections.abc import Iterable
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from profiles.errors import ProfileError
+from profiles.machine import Frozen
+from profiles.process import Process
+from profiles.settings.plate import Plate
+from profiles.settings.support import Support
+from profiles.wording import sentences
+
+MOST_PARTS = 1000
+# What decides where a model is cut or what stands on other parts, what only the plate knows, what moves between parts share.
+SUPPORT_OF_A_PART = {
+    "overhang_share",
+    "bridge_flow",
+    "infill_bridge_flow",
+    "support_pattern",
+    "support_density",
+    "support_interface_density",
+}
+OF_THE_PRINT = (
+    frozenset(Plate.model_fields)
+    | (frozenset(Support.model_fields) - SUPPORT_OF_A_PART)
+    | frozenset(key for key in Process.model_fields if key.startswith(("first_layer_", "travel_", "lift_")))
+    | frozenset(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
+    | {"name", "scale", "rotate_deg", "self_supporting_angle_deg", "interlock_mm"}
+)
+OF_PARTS_ON_PLASTIC = {
+    "interface_overlap",
+    "interface_flow",
+    "interface_speed_mm_s",
+    "interface_layers",
+    "interface_temperature_add_c",
+    "interface_fan",
+    "interface_extra_walls",
+}
+
+
+class PartSettings(Frozen):
+    """Values of the process that hold for one part only, by their keys."""
+
+    part: int = Field(ge=1, le=MOST_PARTS, description="number of the part in print order")
+    process: dict[str, Any] = Field(description="keys of the process and their values")
+
+    @property
+    def in_words(self) -> str:
+        """The settings as a person would write them."""
+        return ", ".join(f"{key} = {value}" for key, value in self.process.items())
+
+
+def part_keys() -> list[str]:
+    """The keys of a process that may differ from part to part."""
+    return [key for key in Process.model_fields if key not in OF_THE_PRINT]
+
+
+def parse_part_settings(text: str) -> PartSettings:
+    """The settings of `2:walls=4,infill_density=0.4`. Raises ProfileError where the text has another form."""
+    number, colon, rest = text.partition(":")
+    pairs = [pair.partition("=") for pair in rest.split(",")]
+    known = colon and number.strip().isascii() and number.strip().isdigit() and 1 <= int(number.strip()[:9]) <= MOST_PARTS
+    if not known or not all(key.strip() and equals and value.strip() for key, equals, value in pairs):
+        raise ProfileError(
+            f"--part {text}: PART:KEY=VALUE,... is expected, as 2:walls=4,infill_density=0.4; PART is 1 to {MOST_PARTS}"
+        )
+    values = {key.strip().removeprefix("process."): _value(value.strip()) for key, _, value in pairs}
+    return PartSettings(part=int(number), process=values)
+
+
+def merge_part_settings(process: Process, given: Iterable[PartSettings]) -> list[PartSettings]:
+    """One entry a part, in print order, values as the process's own keys have them; what is given later wins.
+
+    Raises ProfileError with every key that is none, that holds for the whole print, or whose value is not allowed.
+    """
+    merged: dict[int, dict[str, Any]] = {}
+    for each in given:
+        merged[each.part] = merged.get(each.part, {}) | each.process
+    problems = [f"part {part}: {problem}" for part in sorted(merged) for problem in _problems(process, part, merged[part])]
+    if problems:
+        raise ProfileError("; ".join(problems))
+    settled = {part: process_of_part(process, own).model_dump() for part, own in sorted(merged.items())}
+    return [PartSettings(part=part, process={key: values[key] for key in merged[part]}) for part, values in settled.items()]
+
+
+def process_of_part(process: Process, own: dict[str, Any]) -> Process:
+    """The process with a part's own values. Raises ValidationError."""
+    return Process.model_validate(process.model_dump() | own)
+
+
+def _problems(process: Process, part: int, own: dict[str, Any]) -> Iterable[str]:
+    for key in own:
+        if key in OF_THE_PRINT:
+            yield f"process.{key} holds for the whole print: --set process.{key}=... sets it"
+        elif part == 1 and key in OF_PARTS_ON_PLASTIC:
+            yield f"process.{key} holds for parts that stand on plastic: part 1 stands on the platform"
+    try:
+        process_of_part(process, own)
+    except ValidationError as error:
+        yield from sentences(error.errors(), Process, "process.")
+
+
+def _value(text: str) -> Any:
+    """A value as TOML has it; what is no TOML is text."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
