@@ -4,6 +4,8 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.paths import Kind
 
+KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_mm_s2"))
+
 
 def stroke_accelerations(profile: Profile, first_layer: bool) -> dict[Kind, float] | None:
     """mm/s2 by kind; None where the process sets no acceleration at all, so that the firmware's own rule."""
@@ -32,7 +34,7 @@ def travel_mm_s2(profile: Profile) -> float | None:
 
 def sets_acceleration(process: Process) -> bool:
     """Whether the process sets any acceleration."""
-    return any(getattr(process, key) is not None for key in type(process).model_fields if key.endswith("acceleration_mm_s2"))
+    return any(getattr(process, key) is not None for key in KEYS)
 
 
 def axes_mm_s2(profile: Profile) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from machine.kinematics.table import machine_points
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Rows
 from mdp.decomposition import Part
+from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.errors import MoveError
 from profiles.machine import Limits, Machine
@@ -76,14 +77,24 @@ def place(program: MachineProgram, index: int) -> str:
 
 def travel_speed(points_mm: Floats, speed_mm_s: float, machine: Machine) -> float:
     """The speed along (n, 3) machine points lowered to what X, Y and Z allow."""
-    most = np.array([machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s])
-    if speed_mm_s <= most.min():
-        return speed_mm_s
-    steps = np.diff(points_mm, axis=0)
-    length = np.linalg.norm(steps, axis=1)
-    steps = np.abs(steps[length > 1e-9]) / length[length > 1e-9, None]
-    with np.errstate(divide="ignore"):
-        return float(min(speed_mm_s, (most / steps).min(initial=np.inf)))
+    x, y, z = machine.x.speed_mm_s, machine.y.speed_mm_s, machine.z.speed_mm_s
+    return speed_mm_s if speed_mm_s <= min(x, y, z) else float(min(speed_mm_s, _fastest(points_mm, np.array([x, y, z]))))
+
+
+@kernel
+def _fastest(points_mm: Floats, most_mm_s: Floats) -> float:
+    """The greatest speed along (n, 3) points at which no axis is faster than its most."""
+    fastest = np.inf
+    for k in range(len(points_mm) - 1):
+        squared = 0.0
+        for axis in range(3):
+            squared += (points_mm[k + 1, axis] - points_mm[k, axis]) ** 2
+        length = np.sqrt(squared)
+        for axis in range(3):
+            step = abs(points_mm[k + 1, axis] - points_mm[k, axis])
+            if length > 1e-9 and step > 0.0:
+                fastest = min(fastest, most_mm_s[axis] / (step / length))
+    return fastest
 
 
 def turn_speed(tilt_deg: float, turn_deg: float, machine: Machine) -> float:

@@ -61,7 +61,8 @@ def decompose(
 
     on_record is given what the search looked at and what became of it, as the content of an .npz file. by_hand: planes that are
     cut first and stay, and zones; parts: so many at most, instead of as many as pay; price: what parts take to print, for the
-    rows of the front and the choice between them. Raises PlanError for a plane by hand that cannot be cut.
+    rows of the front and the choice between them: without it nothing is searched for one part. Raises PlanError for a plane by
+    hand that cannot be cut.
     """
     began = perf_counter()
     if parts is not None:
@@ -78,7 +79,9 @@ def decompose(
         raise PlanError(f"--parts {parts}: the planes by hand of {planned.name} alone make {len(problem.start.cuts) + 1} parts")
     trace = None if on_record is None else Trace(name, problem.model, problem.start.signature)
     report = on_stage or (lambda progress: None)
-    if profile.search.method == "published":
+    if parts == 1 and price is None and trace is None:  # nobody looks at the front
+        best, front, rounds = problem.root, Front(problem.root), 0
+    elif profile.search.method == "published":
         continues = partial(_continues, problem)
         best, rounds = search_as_published(problem, ranker_named(ranker), continues, trace, partial(_report, problem, report))
         front = Front(problem.start)

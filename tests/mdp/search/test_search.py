@@ -96,6 +96,13 @@ def test_a_box_is_one_part_and_says_why() -> None:
     assert decomposition.notes == ("no face needs support: the model is printed straight up as one part",)
 
 
+def test_one_part_that_is_asked_for_needs_no_search() -> None:
+    whole = decompose(shapes.branch(), "shape", load(), parts=1)
+    assert (len(whole.parts), whole.rounds, whole.candidates_evaluated) == (1, 0, 0)
+    assert whole.chosen is not None
+    assert whole.residual_area_mm2 == whole.risky_area_mm2 > 0
+
+
 def test_no_feasible_cut_names_the_constraints_with_their_counts() -> None:
     decomposition = _decompose(shapes.tee(), "search.least_volume_share=0.9")
     assert len(decomposition.parts) == 1
