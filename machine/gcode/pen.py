@@ -1,11 +1,11 @@
 """Pen: what the firmware knows after the lines written so far, and the lines of moves that follow from it."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from machine.firmware import Dialect
+from machine.gcode.path_text import Words, as_bytes, path_lines
 from machine.kinematics.coordinates import followed_places
 from mdp.mesh import Floats
 from mdp.pose import Pose
@@ -76,25 +76,20 @@ class Pen:
         return text
 
 
-def write_path(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) -> Iterator[str]:
+def write_path(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: Pen) -> list[str]:
     """One line a point, as the file calls them; a point that rounds to where the tip is gives its filament to the next line."""
     rounded = np.rint(points_mm * 1000.0)
     steps_mm, slower = share_filament(points_mm, rounded, filament_mm)
     filament = pen.filament_mm + np.cumsum(steps_mm)
     pen.filament_mm = float(filament[-1])
-    start, letter = f"{pen.dialect.stroke}", pen.filament_letter
-    relative, before = pen.dialect.filament_relative, pen.pushed
     ending = pen.speed(speed_mm_s / slower)
-    points, pushed_to = rounded[1:].astype(np.int64).tolist(), np.rint(filament * 1e5).astype(np.int64).tolist()
-    for (x, y, z), e in zip(points, pushed_to, strict=True):
-        place = pen.place(x, y, z)
-        if place:
-            word, before = e - before if relative else e, e
-            yield f"{start}{place} {letter}{word / 1e5:.5f}{ending}"
-            ending = ""
-    pen.pushed = before
-    if ending:
+    words = Words(as_bytes(pen.dialect.stroke), ord(pen.filament_letter), pen.dialect.filament_relative, as_bytes(ending))
+    known = np.array([pen.x, pen.y, pen.z, pen.pushed])
+    lines = path_lines(rounded[1:].astype(np.int64), np.rint(filament * 1e5).astype(np.int64), words, known)
+    pen.x, pen.y, pen.z, pen.pushed = known.tolist()
+    if ending and not lines:
         pen.feed = 0
+    return lines
 
 
 def share_filament(points_mm: Floats, rounded: Floats, filament_mm: Floats) -> tuple[Floats, float]:
