@@ -77,9 +77,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def standing(model: str, height_mm: float) -> Mesh:
-    """The model scaled to the height."""
+    """The model scaled to the height, as it is for 0."""
     mesh, _ = read_mesh(locate(model))
-    return Mesh(mesh.vertices * (height_mm / mesh.bounds_mm[1, 2]), mesh.faces)
+    return Mesh(mesh.vertices * (height_mm / mesh.bounds_mm[1, 2] if height_mm else 1.0), mesh.faces)
 
 
 def row(model: str, ours: Figures, theirs: Figures) -> str:
