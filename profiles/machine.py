@@ -272,6 +272,13 @@ class Machine(Frozen):
     head: Head
     clearance_mm: float = Field(1.0, ge=0, le=100, description="least distance kept between head and table, mm")
     lift_mm: float = Field(10.0, ge=0, le=500, description="extra height above everything printed while the table moves, mm")
+    purge_mm: float = Field(
+        0.0,
+        ge=0,
+        le=500,
+        description="length of the line that is printed at the plate's edge, clear of the print, after the start block, so that "
+        "the nozzle is full and clean, mm; 0: none, or the start block has one itself",
+    )
     nozzle_limit_c: float = Field(300.0, gt=0, le=600, description="greatest nozzle temperature, deg C")
     bed_limit_c: float = Field(120.0, ge=0, le=300, description="greatest bed temperature, deg C; 0: no heated bed")
     thumbnails_px: list[tuple[Pixels, Pixels]] = Field(

@@ -13,6 +13,9 @@ class Material(Frozen):
     density_g_cm3: float = Field(1.24, gt=0, le=10, description="density, g/cm3")
     nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature, deg C")
     first_layer_nozzle_c: float = Field(ge=150, le=450, description="nozzle temperature of part 1's first layer, deg C")
+    homing_nozzle_c: float = Field(
+        150.0, ge=0, le=450, description="nozzle while the machine homes and the bed heats, deg C: nothing may ooze at 150"
+    )
     standby_c: float | None = Field(
         None, ge=0, le=450, description="nozzle while a print is paused, deg C; left out: as hot as it prints"
     )

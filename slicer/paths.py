@@ -23,6 +23,7 @@ class Kind(StrEnum):
     SKIRT = "Skirt/Brim"
     SUPPORT = "Support material"
     SUPPORT_INTERFACE = "Support material interface"
+    PURGE = "Custom"
 
 
 def bead_area_mm2(width_mm: float, height_mm: float) -> float:

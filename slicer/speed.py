@@ -28,6 +28,7 @@ def of_kind_mm_s(process: Process) -> dict[Kind, float]:
         Kind.TOP_SKIN: process.top_skin_speed_mm_s,
         Kind.BRIDGE: process.bridge_speed_mm_s,
         Kind.SKIRT: process.first_layer_speed_mm_s,
+        Kind.PURGE: process.first_layer_speed_mm_s,
         Kind.SUPPORT: process.support_speed_mm_s,
         Kind.SUPPORT_INTERFACE: process.support_interface_speed_mm_s,
     }

@@ -18,6 +18,7 @@ from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.profile import Profile
+from slicer.paths import Kind
 
 STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1")
 
@@ -102,7 +103,8 @@ def summary(run: DryRun) -> dict[str, Any]:
     """The figures of `simulate --json` and `export --json`."""
     program = run.program
     travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0)  # a wipe, which pulls back, is none
-    points = run.segments_mm.reshape(-1, 3)
+    purged = np.array([name == Kind.PURGE.value for name in program.types], dtype=np.bool_)[program.type[run.segment_row]]
+    points = run.segments_mm[~purged].reshape(-1, 3)
     return {
         "time_s": run.time_s,
         "filament_mm": float(np.max(program.filament_mm, initial=0.0)),

@@ -31,6 +31,7 @@ def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: f
         "turn_acceleration": machine.turn.acceleration_deg_s2,
         "nozzle_c": material.nozzle_c,
         "first_layer_nozzle_c": material.first_layer_nozzle_c,
+        "homing_nozzle_c": material.homing_nozzle_c,
         "bed_c": material.bed_c,
         "nozzle_mm": machine.head.nozzle_mm,
         "layer_height_mm": process.layer_height_mm,

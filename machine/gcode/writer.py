@@ -18,6 +18,7 @@ from machine.planning.timing import move_times
 from mdp.mesh import Floats
 from mdp.pose import level
 from profiles.profile import Profile
+from slicer.paths import Kind
 
 ROUNDING_MM = 0.0015  # an arc's centre is written in thousandths
 BLOCKS = ("start", "before_part", "after_part", "end")
@@ -92,7 +93,7 @@ def _last_strokes(program: MachineProgram) -> set[int]:
     """Places of the last stroke of each part."""
     strokes, latest = set(), -1
     for place, move in enumerate(program.moves):
-        if isinstance(move, Stroke):
+        if isinstance(move, Stroke) and move.kind is not Kind.PURGE:
             latest = place
         elif isinstance(move, BeginPart) and latest >= 0:
             strokes.add(latest)

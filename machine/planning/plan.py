@@ -10,6 +10,7 @@ from machine.kinematics.table import part_shift, workpiece_points
 from machine.planning import limits
 from machine.planning.acceleration import stroke_accelerations
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel, rows
+from machine.planning.purge import purge_lanes, purge_width_mm
 from machine.planning.reorient import Route, Speeds, route, top_z
 from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, travel_speed, wipe_trail
 from mdp.decomposition import Decomposition, Part
@@ -33,11 +34,15 @@ def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Pr
     tip = Tip(np.zeros(3), level(machine))
     moves: list[Move] = []
     printed: list[Printed] = []
+    lanes = purge_lanes(decomposition.parts, pieces, profile)
     for piece in pieces:
         part = parts[piece.index]
         shift = part_shift(machine, part.pose, part.base.offset_mm)
         begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported_mm2, piece.unsupported_layer)
-        moves += _reach(tip, begin, _first_point(piece) + shift, join_hulls(printed), profile, first=not printed)
+        target = _first_point(piece) + shift
+        moves += (
+            _reach(tip, begin, target, join_hulls(printed), profile) if printed else _begin(tip, begin, target, lanes, profile)
+        )
         for number, layer in enumerate(piece.layers, start=1):
             if layer.paths:
                 moves += _layer(tip, part.index, number, layer, shift, profile)
@@ -49,27 +54,53 @@ def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Pr
     return program
 
 
-def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile: Profile, first: bool) -> Iterator[Move]:
-    """Retract, lift, turn the table, cross over to above the target, go down.
+def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None, profile: Profile) -> Iterator[Move]:
+    """To the first part, over the purge line; lanes: (n, 3) machine points of it.
 
     Where the start block leaves the tip is not known: the first two travels stand for going up, then across.
     """
-    if first:
-        tip.at_mm = np.array([*target[:2], min(top_z(profile.machine, tip.pose), profile.machine.z.limits_mm[1])])
-    else:
+    machine, near = profile.machine, target if lanes is None else lanes[0]
+    tip.at_mm = np.array([*near[:2], min(top_z(machine, tip.pose), machine.z.limits_mm[1])])
+    way = route(machine, join_hulls([]), tip.at_mm, near, tip.pose, part.pose, _speeds(profile), part.index)
+    tip.at_mm = np.array([*way.over_mm, way.z_mm])
+    for speed in (lift_speed(profile), travel_speed(profile)):
+        yield Travel(np.array([tip.at_mm, tip.at_mm]), speed)
+    yield _reorient(tip, part.pose, profile)
+    if lanes is not None:
+        yield from _down_to(tip, near, way.across_z_mm, profile)
+        yield from _purge(tip, lanes, profile)
         yield from retract(tip, profile)
-    way = route(profile.machine, printed, tip.at_mm, target, tip.pose, part.pose, _speeds(profile), part.index)
-    if first:
-        tip.at_mm = np.array([*way.over_mm, way.z_mm])
-        for speed in (lift_speed(profile), travel_speed(profile)):
-            yield Travel(np.array([tip.at_mm, tip.at_mm]), speed)
-    yield from _to_stand(tip, way, profile)
-    if first or tip.pose != part.pose:
-        yield _reorient(tip, part.pose, profile)
-        tip.prime_extra_mm = 0.0 if first else profile.material.prime_extra_mm
     yield part
-    yield from go(tip, [*tip.at_mm[:2], way.across_z_mm], profile)
-    yield from go(tip, [*target[:2], way.across_z_mm], profile)
+    across_mm = way.across_z_mm if lanes is None else float(near[2]) + machine.clearance_mm
+    yield from _down_to(tip, target, min(across_mm, machine.z.limits_mm[1]), profile)
+
+
+def _purge(tip: Tip, lanes: Floats, profile: Profile) -> Iterator[Move]:
+    """The line on the plate, from where the tip stands."""
+    process, width_mm = profile.process, purge_width_mm(profile)
+    path = Path(
+        Kind.PURGE, lanes[:, :2], width_mm, process.first_layer_speed_mm_s, profile.material.flow, np.zeros((0, 2)), False
+    )
+    yield _stroke(path, process.first_layer_height_mm, lanes, profile, stroke_accelerations(profile, True), 0.0)
+    tip.at_mm, tip.trail = lanes[-1], wipe_trail(lanes, width_mm)
+
+
+def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile: Profile) -> Iterator[Move]:
+    """Retract, lift, turn the table, cross over to above the target, go down."""
+    yield from retract(tip, profile)
+    way = route(profile.machine, printed, tip.at_mm, target, tip.pose, part.pose, _speeds(profile), part.index)
+    yield from _to_stand(tip, way, profile)
+    if tip.pose != part.pose:
+        yield _reorient(tip, part.pose, profile)
+        tip.prime_extra_mm = profile.material.prime_extra_mm
+    yield part
+    yield from _down_to(tip, target, way.across_z_mm, profile)
+
+
+def _down_to(tip: Tip, target: Floats, across_z_mm: float, profile: Profile) -> Iterator[Move]:
+    """Up to a height, across to above a target, and down."""
+    yield from go(tip, [*tip.at_mm[:2], across_z_mm], profile)
+    yield from go(tip, [*target[:2], across_z_mm], profile)
     yield from go(tip, list(target), profile)
 
 

@@ -176,10 +176,10 @@ def _ways_clear(machine: Machine, at: Floats, candidate: Route, target: Floats |
     if target is not None:
         raised, over = np.array([*candidate.over_mm, candidate.across_z_mm]), np.array([*target[:2], candidate.across_z_mm])
         ways += [(end, stand, raised), (end, raised, over), (end, over, target)]
-    return all(_clear(machine, pose, a, b) for pose, a, b in ways if float(np.linalg.norm(b - a)) > 1e-9)
+    return all(is_way_clear(machine, pose, a, b) for pose, a, b in ways if float(np.linalg.norm(b - a)) > 1e-9)
 
 
-def _clear(machine: Machine, pose: Pose, start: Floats, end: Floats) -> bool:
+def is_way_clear(machine: Machine, pose: Pose, start: Floats, end: Floats) -> bool:
     """True when each body keeps what it must from table and cradle while the tip goes from start to end."""
     normal = rotation(machine, pose) @ UP
     for tried in (np.array([UP, normal]), directions(normal)):

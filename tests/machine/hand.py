@@ -58,7 +58,7 @@ def printed(
     machine: str = "generic_ac", layers: int = 3
 ) -> tuple[Profile, Decomposition, tuple[SlicedPart, ...], MachineProgram]:
     """Profile, decomposition, sliced parts and program of the post and the arm."""
-    profile = load(machine=machine)
+    profile = load(machine=machine, settings=["machine.purge_mm=0"])  # its line has tests of its own
     decomposition = post_and_arm(profile.machine)
     sliced = tuple(squares(piece, profile, layers) for piece in decomposition.parts)
     return profile, decomposition, sliced, plan(decomposition, sliced, profile)
@@ -74,7 +74,7 @@ def text(machine: str = "generic_ac", layers: int = 3) -> tuple[str, ...]:
 @cache
 def whole(machine: str = "generic_ac") -> tuple[Profile, tuple[str, ...]]:
     """Profile and G-code of a post printed to its top, 60 mm, and the arm on its side."""
-    profile = load(machine=machine)
+    profile = load(machine=machine, settings=["machine.purge_mm=0"])  # its line has tests of its own
     decomposition = post_and_arm(profile.machine)
     sliced = [squares(piece, profile, layers) for piece, layers in zip(decomposition.parts, (300, 5), strict=True)]
     return profile, tuple(write_gcode(plan(decomposition, sliced, profile), profile))

@@ -16,6 +16,7 @@ from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.limits import check_parts
 from machine.planning.plan import plan
+from machine.planning.purge import has_purge
 from machine.view.program import Program
 from machine.view.quantities import minutes
 from mdp.decomposition import Decomposition
@@ -155,7 +156,12 @@ def build(decomposition: Decomposition, profile: Profile, pictures: bool = False
 
         sliced = slice_parts(parts, profile, show)
         report("planning moves")
-        lines = tuple(write_gcode(plan(decomposition, sliced, profile), profile))
+        program = plan(decomposition, sliced, profile)
+        if profile.machine.purge_mm > 0.0 and not has_purge(program):
+            say(
+                f"{decomposition.name}: no place on the plate is clear of the print for a line of machine.purge_mm: there is none"
+            )
+        lines = tuple(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
             compile_pictures()
             lines = with_thumbnails(lines, decomposition, profile)
