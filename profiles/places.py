@@ -43,7 +43,7 @@ def kind_of(name: str) -> str:
     for kind in KINDS:
         if name in known(kind):
             return kind
-    if not is_file_name(name):
+    if not _is_path(name):
         raise _unknown("profile", name, (each for kind in KINDS for each in known(kind)))
     return kind_in(Path(name))
 
@@ -134,7 +134,7 @@ def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, An
     if name in shipped(kind):
         source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
         return tomllib.loads(source.read_text(encoding="utf-8")), name
-    if is_file_name(name):
+    if _is_path(name):
         return parse(Path(name)), str(Path(name).resolve())
     raise _unknown(f"{kind} profile", name, known(kind))
 
@@ -148,6 +148,5 @@ def _unknown(what: str, name: str, names: Iterable[str]) -> ProfileError:
     )
 
 
-def is_file_name(name: str) -> bool:
-    """Whether a profile is named by its file."""
+def _is_path(name: str) -> bool:
     return bool(name) and (Path(name).suffix == ".toml" or os.path.exists(name))

@@ -1,6 +1,7 @@
 """Paths: what the slicer hands over; one object per path, one array row per point, all in the part frame."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from math import pi
 
@@ -78,13 +79,15 @@ class SlicedPart:
     """A part's layers from its base plane upward; index and pose are those of the Part.
 
     unsupported_mm2: area of risky faces that no support could be given, reported as a finding; unsupported_layer: number
-    of the layer with most of it, counted from 1.
+    of the layer with most of it, counted from 1. interface_mm3: plastic that there would not be if the model were not cut, by
+    the index of the part whose base lies there.
     """
 
     index: int
     layers: tuple[Layer, ...]
     unsupported_mm2: float = 0.0
     unsupported_layer: int = 0
+    interface_mm3: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def volume_mm3(self) -> float:

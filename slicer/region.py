@@ -5,16 +5,23 @@ from dataclasses import dataclass
 from math import ceil
 
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, offset, opening
+from slicer.geometry.polygons import Polygons, offset, opening, union
+
+THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
+FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A layer's inside: top is skin with nothing above it, solid is all other skin, sparse takes the infill."""
+    """A layer's inside: top is skin with nothing above it, solid is all other skin, sparse takes the infill.
+
+    uncut: what would be sparse if the model were in one piece, not clipped to the part.
+    """
 
     top: Polygons
     solid: Polygons
     sparse: Polygons
+    uncut: Polygons
 
     def without(self, area: Polygons, width_mm: float) -> "Region":
         """The region without the place of a bridge."""
@@ -23,33 +30,69 @@ class Region:
             left = polygons - area
             return left if left.is_empty() or left.area() == polygons.area() else opening(left, 0.25 * width_mm)
 
-        return Region(rest(self.top), rest(self.solid), rest(self.sparse))
+        return Region(rest(self.top), rest(self.solid), rest(self.sparse), self.uncut)
 
 
-def regions(
-    sections: Sequence[Polygons], insides: Sequence[Polygons], beneath: Polygons | None, process: Process
-) -> list[Region]:
-    """Regions of every layer from the sections and what the walls enclose.
+@dataclass(frozen=True, eq=False)
+class Cover:
+    """What of the uncut model lies around a part's layers.
 
-    A place is solid when one of the next top_layers sections above or bottom_layers below does not cover it: so every
-    vertical line meets that many layers of wall or skin below a surface, on slopes too. beneath: plastic of earlier parts
-    under the first layer, which is then solid throughout; None: the platform.
+    sections, insides: of each layer, and what walls would enclose of it; below, above: of as many layers under the first and
+    over the last one as shells look, the nearest first. later: what of each layer, and of those over the last one, parts
+    printed later take; none of them: ().
+    """
+
+    sections: Sequence[Polygons]
+    insides: Sequence[Polygons]
+    below: Sequence[Polygons]
+    above: Sequence[Polygons]
+    later: Sequence[Polygons] = ()
+
+
+def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process: Process) -> list[Region]:
+    """Regions of every layer of a part from what its walls enclose.
+
+    A place is solid when one of the model's next top_layers sections above or bottom_layers below does not cover it: so every
+    vertical line meets that many layers of wall or skin below a surface, on slopes too. It is also solid where a later part
+    will lie less than interface_top_layers away, and in the first interface_bottom_layers on plastic.
     """
     empty = Polygons()
-    on_plastic = beneath is not None
     top, bottom = shell_layers(process)
-    above = _common([*sections[1:], empty], top) if top else list(insides)
-    below = _common([*reversed(sections[:-1]), beneath if on_plastic else empty], bottom, on_plastic)[::-1]
+    stacked = [*reversed(cover.below), *cover.sections, *cover.above]
+    first = len(cover.below)
+    above = _common(stacked, top)[first + 1 :] if top else insides
+    below = _common(stacked[::-1], bottom)[::-1][first - 1 :] if bottom else insides
     layers = []
     for i, inside in enumerate(insides):
         if inside.is_empty():
-            layers.append(Region(empty, empty, empty))
+            layers.append(Region(empty, empty, empty, empty))
             continue
-        whole = process.infill_density >= 1.0 or (on_plastic and i == 0)
-        sparse = empty if whole else sparse_area(inside, above[i], below[i] if bottom else inside, process)
-        next_section = sections[i + 1] if i + 1 < len(sections) else empty
-        layers.append(_region(inside, sparse, next_section if top else inside, process.line_width_mm))
+        dense = process.infill_density >= 1.0
+        uncut = empty if dense else sparse_area(cover.insides[i], above[i], below[i], process)
+        sparse = empty if on_plastic and i < solid_bottom_layers(process) else _beside_cuts(inside, uncut, cover, i, process)
+        next_section = stacked[first + i + 1] if first + i + 1 < len(stacked) else empty
+        layers.append(_region(inside, sparse, uncut, next_section if top else inside, process.line_width_mm))
     return layers
+
+
+def solid_bottom_layers(process: Process) -> int:
+    """Solid layers of a part on plastic: grooves are filled by skin."""
+    return max(process.interface_bottom_layers, 1 if process.interlock_mm > 0.0 else 0)
+
+
+def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, process: Process) -> Polygons:
+    """What is sparse of a part where the uncut model is, without the skin under later parts."""
+    width_mm, reach = process.line_width_mm, process.interface_top_layers
+    near = [area for area in cover.later[max(layer - reach, 0) : layer + reach + 1] if not area.is_empty()]
+    if uncut.is_empty() or (not near and inside is cover.insides[layer]):
+        return uncut
+    left = uncut ^ inside
+    if not near:
+        return left
+    skin = opening(union(near) ^ inside, 0.5 * THIN * width_mm)
+    left = opening(left if skin.is_empty() else left - offset(skin, 0.5 * width_mm), width_mm)
+    large = [island for island in left.decompose() if island.area() >= FEW_MM2 * width_mm**2]
+    return Polygons.compose(large) if large else Polygons()
 
 
 def shell_layers(process: Process) -> tuple[int, int]:
@@ -74,24 +117,24 @@ def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Pro
     return sparse if len(large) == len(islands) else Polygons.compose(large) if large else Polygons()
 
 
-def _region(inside: Polygons, sparse: Polygons, next_section: Polygons, width_mm: float) -> Region:
+def _region(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, width_mm: float) -> Region:
     """Splits what is not sparse into what is bare above and the rest."""
     if sparse.is_empty():
         solid = inside
     elif abs(sparse.area() - inside.area()) < 1e-6:
-        return Region(Polygons(), Polygons(), sparse)
+        return Region(Polygons(), Polygons(), sparse, uncut)
     else:
         solid = inside - sparse
     top = solid - next_section
     top = top if top.is_empty() else opening(top, width_mm)
     if top.is_empty():
-        return Region(top, solid, sparse)
+        return Region(top, solid, sparse, uncut)
     under = opening(solid - top, 0.25 * width_mm)
-    return Region(solid - under, under, sparse)
+    return Region(solid - under, under, sparse, uncut)
 
 
-def _common(layers: Sequence[Polygons], count: int, last_repeats: bool = False) -> list[Polygons]:
-    """For each i the intersection of layers i .. i + count - 1; beyond the end nothing, or everything if last_repeats.
+def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:
+    """For each i the intersection of layers i .. i + count - 1; nothing beyond the end.
 
     Running intersections of blocks from both sides (van Herk 1992): three booleans a layer, however many are common.
     """
@@ -108,10 +151,9 @@ def _common(layers: Sequence[Polygons], count: int, last_repeats: bool = False) 
     common = []
     for i in range(n):
         end = i + count - 1
-        if end >= n and not last_repeats:
+        if end >= n:
             common.append(Polygons())
         else:
-            end = min(end, n - 1)
             same_block = i // count == end // count
             common.append((forward[end] if i % count == 0 else backward[i]) if same_block else backward[i] ^ forward[end])
     return common

@@ -56,6 +56,7 @@ def slice_part(
         beads = [*_part_beads(stack, i), *_auxiliary_beads(stack, i, part, later)]
         beads = [bead if bead.kind in WALLS else simplify_bead(bead) for bead in beads]
         beads, seams = place_seams(beads, profile.process, around)
+        beads += stack.ending[i]
         layer = _layer(beads, stack, i, part, profile, tip if layers else None)
         if layer.paths:
             tip = layer.paths[-1].points[-1]
@@ -65,7 +66,7 @@ def slice_part(
     _check_not_empty(part, bounds_mm, layers, profile.process)
     missed_mm2, at_mm = stack.supports.unsupported_mm2, stack.heights.tip_mm[stack.supports.worst_layer]
     worst = sum(layer.z_mm <= at_mm for layer in layers) if missed_mm2 > 0 else 0
-    return SlicedPart(part.index, tuple(layers), missed_mm2, worst)
+    return SlicedPart(part.index, tuple(layers), missed_mm2, worst, stack.interface_mm3)
 
 
 def _part_beads(stack: Stack, layer: int) -> list[Bead]:

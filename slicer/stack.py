@@ -1,18 +1,21 @@
 """Stack: what every layer of a part consists of, as regions, before any bead is laid."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import first_layer_process, with_line_width
+from slicer.bead import Bead, first_layer_process, with_line_width
 from slicer.fill.infill import pattern_density
 from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import Heights, layer_heights
+from slicer.interface.cut_walls import cover, cut_walls
 from slicer.interface.interface import interface_edges, plastic_beneath, strengthen_interface
 from slicer.interface.interlock import cut_grooves
+from slicer.interface.model import model_around
+from slicer.interface.plastic import interface_mm3
 from slicer.plate import compensate_elephant_foot, plate_outline
 from slicer.region import Region, regions
 from slicer.section import sections
@@ -20,24 +23,26 @@ from slicer.support.blocker import blocked_areas, far_mm
 from slicer.support.overhang import Overhang, detect_overhangs
 from slicer.support.pedestal import pedestal_layers, without_pedestal
 from slicer.support.support import Supports, generate_supports
-from slicer.walls.walls import Walls, walls
+from slicer.walls.walls import Walls
 
 
 @dataclass(frozen=True, eq=False)
 class Stack:
     """A part's layers, one entry each.
 
-    outlines: whole sections; own: without the pedestal; walls and regions: of own; overhangs: what hangs and what bridges;
+    outlines: whole sections; own: without the pedestal; walls and regions: of own; ending: inner walls that end
+    on the face of a cut; overhangs: what hangs and what bridges;
     processes: the settings, with the extra walls of an interface and the widths of part 1's first layer. beneath: the
     plastic under the first layer, None on the platform; floor: the plate's outline, of use to part 1; pedestal_layers: how
     many of the lowest layers the pedestal takes; density: of the sparse infill's pattern; edges: where a seam would lie on
-    an interface's edge.
+    an interface's edge; interface_mm3: as in SlicedPart.
     """
 
     heights: Heights
     outlines: Sequence[Polygons]
     own: Sequence[Polygons]
     walls: Sequence[Walls]
+    ending: Sequence[tuple[Bead, ...]]
     regions: Sequence[Region]
     overhangs: Sequence[Overhang]
     processes: Sequence[Process]
@@ -47,6 +52,7 @@ class Stack:
     pedestal_layers: int
     density: float
     edges: Floats
+    interface_mm3: Mapping[int, float]
 
     def bank(self, layer: int) -> Polygons | None:
         """The plastic that a layer lies on; None for the platform."""
@@ -60,17 +66,19 @@ def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Se
     heights = layer_heights(mesh, process, on_platform, pedestal_mm)
     pedestal_count = pedestal_layers(heights.tip_mm, pedestal_mm)
     outlines = [clean(loops, process.slit_closing_mm) for loops in sections(mesh, heights.cut_mm)]
-    outlines = cut_grooves(outlines, part, later, heights.cut_mm, process)
     if on_platform:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
-    own = without_pedestal(outlines, mesh, heights.cut_mm, pedestal_mm, pedestal_count) if pedestal_count else outlines
+    uncut = without_pedestal(outlines, mesh, heights.cut_mm, pedestal_mm, pedestal_count) if pedestal_count else outlines
+    own = cut_grooves(uncut, part, later, heights.cut_mm, process)
+    outlines = cut_grooves(outlines, part, later, heights.cut_mm, process) if pedestal_count else own
     processes = strengthen_interface(process, not on_platform, len(outlines))
     if on_platform:
         processes[0] = first_layer_process(process)
-    rows = zip(own, processes, heights.height_mm, strict=True)
-    wall_layers = [walls(s, p.walls, p.line_width_mm, h, p.outer_wall_line_width_mm) for s, p, h in rows]
     below = plastic_beneath(part, earlier, outlines[0])
-    region_layers = regions(own, [w.inside for w in wall_layers], below, process)
+    model = model_around(part, uncut, own, heights, earlier, later, process)
+    rows = zip(own, model.sections, processes, heights.height_mm, strict=True)
+    wall_layers = [cut_walls(s, m, p, h, process.walls) for s, m, p, h in rows]
+    region_layers = regions([w.walls.inside for w in wall_layers], cover(model, own, wall_layers), below is not None, process)
     overhangs = detect_overhangs(mesh, outlines, heights.cut_mm, process, below)
     blocked = blocked_areas(part, later, heights, process.support_distance_mm, far_mm(mesh))
     floor = plate_outline(profile.machine.table)
@@ -81,7 +89,8 @@ def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Se
         heights=heights,
         outlines=outlines,
         own=own,
-        walls=wall_layers,
+        walls=[each.walls for each in wall_layers],
+        ending=[each.ending for each in wall_layers],
         regions=region_layers,
         overhangs=overhangs,
         processes=processes,
@@ -91,4 +100,5 @@ def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Se
         pedestal_layers=pedestal_count,
         density=pattern_density([region.sparse for region in region_layers], infill_process, process.layer_height_mm),
         edges=interface_edges(part, outlines[0], below, later),
+        interface_mm3=interface_mm3(part, own, region_layers, heights, later, process),
     )

@@ -16,7 +16,7 @@ class Interface(Frozen):
     )
     interface_speed_mm_s: float = Field(25.0, gt=0, le=1000, description="speed of a part's first layer on plastic, mm/s")
     interface_layers: int = Field(
-        3, ge=1, le=100, description="layers of a part on plastic that get the interface's temperature, fan and extra walls"
+        3, ge=1, le=100, description="layers of a part on plastic that get the interface's temperature and fan"
     )
     interface_temperature_add_c: float = Field(
         5.0,
@@ -28,7 +28,24 @@ class Interface(Frozen):
         0.3, ge=0, le=1, description="factor on the part fan in a part's layers on plastic: air chills the bond"
     )
     interface_extra_walls: int = Field(
-        1, ge=0, le=20, description="more walls in a part's layers on plastic, where bending stresses it most"
+        3,
+        ge=0,
+        le=50,
+        description="more walls in a part's first layer on plastic, where bending stresses the bond most: a weld to cold plastic "
+        "holds perhaps 0.6 of one to warm plastic, and with three more walls it bears nearly as much bending as the print above",
+    )
+    interface_walls: int = Field(
+        1,
+        ge=1,
+        le=50,
+        description="walls along the face of a cut, inside the model, on which sparse infill ends; along the surface there are "
+        "always as many as walls says",
+    )
+    interface_top_layers: int = Field(
+        2, ge=1, le=1000, description="solid layers under the face of a cut: the floor on which the next part's first layer lies"
+    )
+    interface_bottom_layers: int = Field(
+        0, ge=0, le=1000, description="solid layers of a part on the floor it stands on; 0: its sparse infill begins at once"
     )
     interface_seam_mm: float = Field(
         1.0, ge=0, le=20, description="walls begin no nearer than this to the edge of an interface, mm"

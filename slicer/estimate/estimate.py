@@ -52,9 +52,9 @@ def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
     several = (parts,) if isinstance(parts, Part) else tuple(parts)
     top_mm = max((float(part.mesh.bounds_mm[1, 2]) for part in several), default=0.0)
     total = Estimate(0.0, 0.0, 0.0)
-    for part in several:
+    for k, part in enumerate(several):
         own = profile.of_part(part.index)
-        total += _estimate_part(sample_part(part, own), own, top_mm)
+        total += _estimate_part(sample_part(part, own, several[k + 1 :]), own, top_mm)
     return total
 
 

@@ -13,11 +13,12 @@ from slicer.bead import first_layer_process
 from slicer.estimate.choice import Choice, choose_layers
 from slicer.estimate.hanging import ThickSupport, thick_support
 from slicer.estimate.shell import Shell, shell_of
-from slicer.geometry.polygons import Polygons, clean
+from slicer.geometry.polygons import Polygons, clean, union
 from slicer.heights import Heights, layer_heights
-from slicer.interface.interface import strengthen_interface
+from slicer.interface.interface import sections_of, strengthen_interface, touching
+from slicer.interface.model import joined
 from slicer.plate import plate_outline
-from slicer.region import shell_layers
+from slicer.region import shell_layers, solid_bottom_layers
 from slicer.section import sections
 from slicer.support.pedestal import pedestal_layers
 
@@ -26,8 +27,8 @@ from slicer.support.pedestal import pedestal_layers
 class SampledPart:
     """A part in its own frame.
 
-    processes: of every layer; sections: of the layers that were looked at; pedestal: how many of the lowest layers lift the
-    model; floor: the plate's outline.
+    processes: of every layer; sections: of the layers that were looked at; others: of them and of those over the last one, what
+    parts printed later take; pedestal: how many of the lowest layers lift the model; floor: the plate's outline.
     """
 
     mesh: Mesh
@@ -36,55 +37,84 @@ class SampledPart:
     processes: Sequence[Process]
     choice: Choice
     sections: Mapping[int, Polygons]
+    others: Mapping[int, Polygons]
     support: ThickSupport
     pedestal: int
     floor: Polygons
 
     def shell(self, layer: int) -> Shell:
         """What a chosen layer prints of the part itself."""
-        process = self.processes[layer]
-        solid = process.infill_density >= 1.0 or (layer == 0 and not self.on_platform)
-        above, below = (None, None) if solid else self._covers(layer)
-        return shell_of(self.sections[layer], process, float(self.heights.height_mm[layer]), above, below)
+        process, height_mm = self.processes[layer], float(self.heights.height_mm[layer])
+        own, model = self.sections[layer], self._model(layer)
+        solid = process.infill_density >= 1.0 or (not self.on_platform and layer < solid_bottom_layers(process))
+        covers = None if solid else self._covers(layer, own if model is None else model)
+        return shell_of(own, process, height_mm, covers, model, self._ceiling(layer))
 
-    def _covers(self, layer: int) -> tuple[Polygons, Polygons]:
-        """What of the layers above and below covers a layer, judged by the farthest of its skins and the middle one."""
+    def _covers(self, layer: int, model: Polygons) -> Polygons:
+        """What of a layer the model covers above and below, judged by the farthest of its skins and the middle one."""
         top, bottom = shell_layers(self.processes[layer])
-        above = below = self.sections[layer]
-        for step in {top, (top + 1) // 2} - {0}:
-            above = above ^ self._section(layer + step)
-        for step in {bottom, (bottom + 1) // 2} - {0}:
-            below = below ^ self._section(layer - step)
-        return above, below
+        covered = model
+        for step in {top, (top + 1) // 2, -bottom, -((bottom + 1) // 2)} - {0}:
+            covered = covered ^ self._section(layer + step)
+        return covered
 
     def _section(self, layer: int) -> Polygons:
-        """The section of a layer; over the top and under the platform there is nothing, under a base plane plastic."""
+        """The model in a layer; under the platform there is nothing, under a base plane plastic."""
         if layer < 0 and not self.on_platform:
             return self.sections[0]
-        return self.sections[layer] if 0 <= layer < len(self.heights.tip_mm) else Polygons()
+        model = self._model(layer)
+        return self.sections.get(layer, Polygons()) if model is None else model
+
+    def _model(self, layer: int) -> Polygons | None:
+        """The islands of the model to which a layer belongs; None where no other part touches it."""
+        other = self.others.get(layer, Polygons())
+        if other.is_empty() or layer >= len(self.heights.tip_mm):
+            return None if other.is_empty() else other
+        return joined(self.sections[layer], self.sections[layer], other)
+
+    def _ceiling(self, layer: int) -> Polygons:
+        """What parts printed later take of the layers above, as far as they need a floor."""
+        reach = self.processes[layer].interface_top_layers
+        return union([self.others.get(layer + step, Polygons()) for step in {1, (reach + 1) // 2, reach}])
 
 
-def sample_part(part: Part, profile: Profile) -> SampledPart:
-    """The layers of a part that stand for all of them. Raises SliceError where its mesh is not closed or far too high."""
+def sample_part(part: Part, profile: Profile, later: Sequence[Part] = ()) -> SampledPart:
+    """The layers of a part that stand for all of them. later: the parts printed after it.
+
+    Raises SliceError where its mesh is not closed or far too high.
+    """
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
     heights = layer_heights(mesh, process, on_platform, pedestal_mm)
+    count = len(heights.tip_mm)
     pedestal = pedestal_layers(heights.tip_mm, pedestal_mm)
     choice = choose_layers(mesh, heights, process, max(1 if on_platform else process.interface_layers, pedestal))
-    processes = strengthen_interface(process, not on_platform, len(heights.tip_mm))
+    processes = strengthen_interface(process, not on_platform, count)
     if on_platform:
         processes[0] = first_layer_process(process)
     floor = plate_outline(profile.machine.table)
     support = thick_support(mesh, heights, process, on_platform, floor)
-    looked_at = _with_neighbours(choice, process, len(heights.tip_mm))
-    loops = sections(mesh, heights.cut_mm[looked_at])
-    outlines = {layer: clean(several, 0.0) for layer, several in zip(looked_at, loops, strict=True)}
-    return SampledPart(mesh, on_platform, heights, processes, choice, outlines, support, pedestal, floor)
+    looked_at = _with_neighbours(choice, process)
+    own = [layer for layer in looked_at if layer < count]
+    loops = sections(mesh, heights.cut_mm[own])
+    outlines = {layer: clean(several, 0.0) for layer, several in zip(own, loops, strict=True)}
+    others = _others(part, later, heights, looked_at, process)
+    return SampledPart(mesh, on_platform, heights, processes, choice, outlines, others, support, pedestal, floor)
 
 
-def _with_neighbours(choice: Choice, process: Process, count: int) -> list[int]:
+def _others(part: Part, later: Sequence[Part], heights: Heights, layers: Sequence[int], process: Process) -> dict[int, Polygons]:
+    """What of some layers, which may lie over the last one, later parts take."""
+    near = touching(part, later, process.layer_height_mm * max(process.interface_top_layers, shell_layers(process)[0]))
+    if not near:
+        return {}
+    count, last_mm = len(heights.tip_mm), float(heights.tip_mm[-1])
+    over = [last_mm + (layer - count + 0.5) * process.layer_height_mm for layer in layers if layer >= count]
+    cuts = np.array([*(float(heights.cut_mm[layer]) for layer in layers if layer < count), *over])
+    return dict(zip(layers, sections_of(near, part, cuts), strict=True))
+
+
+def _with_neighbours(choice: Choice, process: Process) -> list[int]:
     """The chosen layers, the lowest, and those that decide where the chosen ones are solid."""
-    top, bottom = shell_layers(process)
-    steps = np.array([0, top, (top + 1) // 2, -bottom, -((bottom + 1) // 2)])
-    layers = np.unique(np.append(choice.layers[:, None] + steps, 0))
-    return [int(layer) for layer in layers if 0 <= layer < count]
+    (top, bottom), reach = shell_layers(process), process.interface_top_layers
+    steps = np.array([0, top, (top + 1) // 2, -bottom, -((bottom + 1) // 2), 1, reach, (reach + 1) // 2])
+    return [int(layer) for layer in np.unique(np.append(choice.layers[:, None] + steps, 0)) if layer >= 0]

@@ -28,13 +28,17 @@ NOTHING = Extent(0.0, 0.0, 0)
 
 @dataclass(frozen=True, eq=False)
 class Shell:
-    """walls[k]: centrelines of wall k from outside, (n, 2) mm; narrow[k]: what wall k leaves; skin, sparse: what is inside."""
+    """walls[k]: centrelines of wall k from outside, (n, 2) mm; narrow[k]: what wall k leaves; skin, sparse: what is inside.
+
+    ending: the place of inner walls that end on the face of a cut.
+    """
 
     walls: tuple[tuple[Floats, ...], ...]
     narrow: tuple[Extent, ...]
     skin: Extent
     sparse: Extent
     islands: int
+    ending: Extent = NOTHING
 
 
 def extent_of(area: Polygons) -> Extent:
@@ -46,8 +50,39 @@ def extent_of(area: Polygons) -> Extent:
     return Extent(area.area(), length, len(area.decompose()))
 
 
-def shell_of(section: Polygons, process: Process, height_mm: float, above: Polygons | None, below: Polygons | None) -> Shell:
-    """The shell of a section. above, below: what covers it so far that it need not be skin; None: it is solid.
+def shell_of(
+    section: Polygons,
+    process: Process,
+    height_mm: float,
+    covered: Polygons | None,
+    model: Polygons | None = None,
+    ceiling: Polygons | None = None,
+) -> Shell:
+    """The shell of a section. covered: what the model covers so far above and below that it need not be skin; None: it is solid.
+
+    model: the islands of the model that it is part of, None: it is the model's own; ceiling: what later parts stand on soon.
+    """
+    rounds = process.walls if model is None else min(process.interface_walls, process.walls)
+    loops, narrow, inside = _walls(section, rounds, process, height_mm)
+    uncut = inside if model is None else _walls(model, process.walls, process, height_mm)[2]
+    ending = NOTHING
+    if model is not None:
+        ending = extent_of(opening(inside - uncut, 0.25 * process.line_width_mm))
+        inside = inside ^ uncut
+    sparse = Polygons()
+    if covered is not None and not inside.is_empty():
+        sparse = sparse_area(uncut, covered, covered, process)
+        sparse = sparse if model is None else sparse ^ inside
+        sparse = sparse if ceiling is None or ceiling.is_empty() else sparse - ceiling
+    skin = inside if sparse.is_empty() else inside - sparse
+    pieces = len(section.decompose())
+    return Shell(loops, narrow, extent_of(skin), extent_of(sparse), pieces, ending)
+
+
+def _walls(
+    section: Polygons, count: int, process: Process, height_mm: float
+) -> tuple[tuple[tuple[Floats, ...], ...], tuple[Extent, ...], Polygons]:
+    """Centrelines of so many walls, what each leaves, and what they enclose.
 
     Walls by offsets alone: a wall turns round where there is core behind it, and what neither it nor the core covers is
     narrow (slicer/walls/walls.py has the exact rule).
@@ -55,7 +90,7 @@ def shell_of(section: Polygons, process: Process, height_mm: float, above: Polyg
     loops: list[tuple[Floats, ...]] = []
     narrow: list[Extent] = []
     area = section
-    for level in range(process.walls):
+    for level in range(count):
         if area.is_empty():
             break
         width = process.line_width_mm if level else outer_wall_width_mm(process)
@@ -72,9 +107,4 @@ def shell_of(section: Polygons, process: Process, height_mm: float, above: Polyg
     inside = area if area.is_empty() else opening(area, spacing_mm(process.line_width_mm, height_mm))
     if area.area() - inside.area() > LEAST_REST_MM2:
         narrow.append(extent_of(opening(area - inside, 0.5 * LEAST_GAP * process.line_width_mm)))
-    area = inside
-    sparse = Polygons()
-    if above is not None and below is not None and not area.is_empty():
-        sparse = sparse_area(area, above, below, process)
-    skin = area if sparse.is_empty() else area - sparse
-    return Shell(tuple(loops), tuple(narrow), extent_of(skin), extent_of(sparse), len(section.decompose()))
+    return tuple(loops), tuple(narrow), inside

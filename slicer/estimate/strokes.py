@@ -83,6 +83,10 @@ def shell_strokes(shell: Shell, process: Process, pace: Pace) -> list[Strokes]:
         strokes += loop_strokes(kind, loops, bead_area_mm2(own, height) * flow, process.small_wall_mm, pace)
     for level, place in enumerate(shell.narrow):
         strokes += _narrow_strokes(Kind.GAP if level else Kind.OUTER_WALL, place, pace)
+    if shell.ending.area_mm2 > 0.0:
+        total = shell.ending.area_mm2 / spacing_mm(width, height)
+        count = max(1, shell.ending.pieces) * max(1, process.walls - process.interface_walls)
+        strokes += _single_strokes(Kind.INNER_WALL, total, shell.ending.area_mm2 * height, count, pace)
     strokes += line_strokes(Kind.SKIN, shell.skin, 1.0, width, process.infill_angle_deg, pace)
     strokes += _skin_gaps(shell.skin, width, pace)
     sparse = process.infill_line_width_mm or width

@@ -68,6 +68,19 @@ def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
     return Polygons.square((x1 - x0 + 2.0 * reach_mm, y1 - y0 + 2.0 * reach_mm)).translate((x0 - reach_mm, y0 - reach_mm))
 
 
+def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
+    """What of polygons lies where a x + b y + c > 0; nothing changes where neither x nor y decides and c is 0 or more."""
+    across = float(np.hypot(a, b))
+    if across < 1e-9 or polygons.is_empty():
+        return polygons if c >= 0.0 else Polygons()
+    x0, y0, x1, y1 = polygons.bounds()
+    far = abs(c) / across + abs(x0) + abs(x1) + abs(y0) + abs(y1) + 1.0
+    along = np.array([a, b]) / across
+    aside = np.array([-along[1], along[0]]) * 2.0 * far
+    near, end = along * (-c / across), along * 2.0 * far
+    return polygons ^ Polygons([np.array([near - aside, end - aside, end + aside, near + aside])])
+
+
 def strips(lines: Sequence[Floats], reach_mm: float) -> Polygons:
     """Everything nearer than the reach to lines (n, 2), with square ends."""
     quads = _quads(np.concatenate([line[:-1] for line in lines]), np.concatenate([line[1:] for line in lines]), reach_mm)

@@ -28,15 +28,23 @@ def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Pol
     return [union(layer) for layer in zip(*layers, strict=True)] if layers else [Polygons()] * len(cuts_mm)
 
 
+def touching(part: Part, others: Sequence[Part], reach_mm: float) -> list[Part]:
+    """Those of other parts whose box, in the part's frame, comes as near to its own as that."""
+    low, high = part.in_part_frame().bounds_mm
+    boxes = [_mesh_in_frame_of(part, other).bounds_mm for other in others]
+    near = [bool(np.all((box[0] < high + reach_mm) & (box[1] > low - reach_mm))) for box in boxes]
+    return [other for other, is_near in zip(others, near, strict=True) if is_near]
+
+
 def _mesh_in_frame_of(part: Part, other: Part) -> Mesh:
     return other.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
 
 
 def strengthen_interface(process: Process, on_plastic: bool, layers: int) -> list[Process]:
-    """The process of every layer: a part on plastic has more walls in its first ones, if it has walls at all."""
+    """The process of every layer: a part on plastic has more walls in its first one, if it has walls at all."""
     extra = process.interface_extra_walls if on_plastic and process.walls else 0
-    stronger = process.model_copy(update={"walls": process.walls + extra}) if extra else process
-    return [stronger if i < process.interface_layers else process for i in range(layers)]
+    first = process.model_copy(update={"walls": process.walls + extra}) if extra else process
+    return [first if i == 0 else process for i in range(layers)]
 
 
 def interface_edges(part: Part, first: Polygons, below: Polygons | None, later: Sequence[Part]) -> Floats:

@@ -38,7 +38,7 @@ def split(
 
 
 def _split_bead(placed: Placed, sides: Floats, shortest_mm: float, other: Callable[[Bead], Bead]) -> list[Placed]:
-    points, within = _cut(np.ascontiguousarray(placed.points), sides)
+    points, within = cut_line(np.ascontiguousarray(placed.points), sides)
     within = _steady(within, np.hypot(*np.diff(points, axis=0).T), shortest_mm)
     if not within.any():
         return [placed]
@@ -66,7 +66,7 @@ def _steady(within: NDArray[np.bool_], lengths: Floats, shortest_mm: float) -> N
     return within
 
 
-def _cut(points: Floats, sides: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def cut_line(points: Floats, sides: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """The polyline (n, 2) with the places added where it crosses sides (k, 4; by rising least y), and which steps lie within."""
     lows = np.minimum(sides[:, 1], sides[:, 3])
     tallest = float(np.abs(sides[:, 3] - sides[:, 1]).max())

@@ -81,6 +81,10 @@ def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
     outer_flow = bulge_flow(outer, height_mm, 1, process.outer_bulge * outer)
     for level, loops in enumerate(walled.loops):
         kind, width, flow = (Kind.INNER_WALL, process.line_width_mm, 1.0) if level else (Kind.OUTER_WALL, outer, outer_flow)
-        rank = -level if process.wall_order == "inner-first" else level - process.walls
-        beads += [Bead(kind, loop, width, rank, flow) for loop in loops]
+        beads += [Bead(kind, loop, width, wall_rank(level, process), flow) for loop in loops]
     return beads
+
+
+def wall_rank(level: int, process: Process) -> int:
+    """Rank of a wall counted from outside."""
+    return -level if process.wall_order == "inner-first" else level - process.walls

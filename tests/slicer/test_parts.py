@@ -28,9 +28,9 @@ def test_progress_rises_to_all_layers(processes: int) -> None:
 
 
 @pytest.mark.parametrize("processes", [1, 2])
-def test_a_part_that_gives_no_path_is_told_from_any_process(processes: int) -> None:
+def test_a_part_that_gives_no_path_and_needs_no_floor_is_told_from_any_process(processes: int) -> None:
     nothing = profile("process.walls=0", "process.infill_density=0", "process.top_layers=0", "process.bottom_layers=0")
-    with pytest.raises(SliceError, match="part 1 gives no path at all"):
+    with pytest.raises(SliceError, match="part 3 gives no path at all"):
         slice_parts(cut(box(10, 10, 24), *PLANES), nothing, processes=processes)
 
 

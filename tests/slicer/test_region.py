@@ -6,7 +6,7 @@ import pytest
 
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, offset, opening
-from slicer.region import _common, regions, shell_layers
+from slicer.region import Cover, Region, _common, regions, shell_layers
 from tests.slicer.hand import profile
 
 WIDTH = 0.45
@@ -22,10 +22,17 @@ def process(top: int = 2, bottom: int = 2, density: float = 0.2, **others: float
     return profile(*(f"process.{key}={value}" for key, value in keys.items())).process
 
 
+def alone(sections: Sequence[Polygons], insides: Sequence[Polygons], beneath: Polygons | None, keys: Process) -> list[Region]:
+    """Regions of a model in one part, or of one on plastic that goes on downward."""
+    top, bottom = shell_layers(keys)
+    cover = Cover(sections, insides, [beneath or Polygons()] * bottom, [Polygons()] * top)
+    return regions(insides, cover, beneath is not None, keys)
+
+
 def areas(
     sections: Sequence[Polygons], beneath: Polygons | None = None, top: int = 2, bottom: int = 2, density: float = 0.2
 ) -> list[tuple[float, ...]]:
-    found = regions(sections, sections, beneath, process(top, bottom, density))
+    found = alone(sections, sections, beneath, process(top, bottom, density))
     return [tuple(round(r.area(), 3) for r in (region.top, region.solid, region.sparse)) for region in found]
 
 
@@ -50,8 +57,34 @@ def test_an_overhang_gets_bottom_layers() -> None:
     assert found[5] == (0, 0, 400)
 
 
-def test_a_part_on_plastic_has_one_solid_interface_layer_and_no_bottom_skin() -> None:
-    assert areas([square(10)] * 6, beneath=square(10), top=1)[:3] == [(0, 100, 0), (0, 0, 100), (0, 0, 100)]
+def test_a_part_on_plastic_is_sparse_at_once_and_solid_where_it_is_asked_for() -> None:
+    tower = [square(10)] * 6
+    assert areas(tower, beneath=square(10), top=1)[:2] == [(0, 0, 100), (0, 0, 100)]
+    found = alone(tower, tower, square(10), process(top=1, interface_bottom_layers=2))
+    assert [region.sparse.area() for region in found] == [0, 0, 100, 100, 100, 0]
+
+
+def test_grooves_are_filled_by_a_solid_first_layer() -> None:
+    tower = [square(10)] * 6
+    found = alone(tower, tower, square(10), process(top=1, interlock_mm=0.2))
+    assert [region.sparse.area() for region in found[:2]] == [0, 100]
+
+
+def test_a_later_part_lies_on_as_many_solid_layers_as_an_interface_has() -> None:
+    tower, keys = [square(20)] * 6, process(top=3, interface_top_layers=2)
+    later = [Polygons()] * 6 + [square(20)] * 3
+    found = regions(tower, Cover(tower, tower, [Polygons()] * 2, later[6:], later), False, keys)
+    assert [region.sparse.area() for region in found] == [0, 0, 400, 400, 0, 0]
+    assert [region.top.area() for region in found] == [0] * 6, "what will be covered is no top skin"
+
+
+def test_where_the_model_ends_beside_a_later_part_the_skin_is_as_thick_as_everywhere() -> None:
+    tower, keys = [square(20)] * 8, process(top=4, bottom=0, interface_top_layers=1)
+    later = [Polygons()] * 8 + [square(10)] * 4
+    found = regions(tower, Cover(tower, tower, [], later[8:], later), False, keys)
+    for region in found[4:]:
+        assert (square(20) - square(10) - region.solid - region.top).area() == pytest.approx(0, abs=1e-6)
+    assert [region.sparse.area() > 50 for region in found] == [True] * 7 + [False]
 
 
 def test_a_part_overhanging_the_plastic_beneath_gets_bottom_skin_there() -> None:
@@ -70,7 +103,7 @@ def test_an_island_of_infill_too_small_to_bother_with_becomes_solid() -> None:
 
 @pytest.mark.parametrize(("least", "kept"), [(24.0, 25.0), (26.0, 0.0)])
 def test_sparse_places_below_the_least_area_become_solid(least: float, kept: float) -> None:
-    found = regions([square(5)] * 9, [square(5)] * 9, None, process(solid_below_mm2=least))
+    found = alone([square(5)] * 9, [square(5)] * 9, None, process(solid_below_mm2=least))
     assert found[4].sparse.area() == pytest.approx(kept)
 
 
@@ -92,23 +125,21 @@ def test_no_layers_asked_for_are_none_however_thick() -> None:
 def test_every_vertical_line_meets_enough_wall_or_skin_below_a_slope(step: float) -> None:
     sections = [square(60 - 2 * step * i) for i in range(12)]
     insides = [offset(section, -1.3) for section in sections]
-    found = regions(sections, insides, None, process(3, 0, solid_below_mm2=0))
+    found = alone(sections, insides, None, process(3, 0, solid_below_mm2=0))
     for i, region in enumerate(found[:-1]):
         for above in sections[i + 1 : i + 4]:
             assert (region.sparse - above).area() < 1e-6
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 12, 1000])
-@pytest.mark.parametrize("last_repeats", [False, True])
-def test_running_intersections_agree_with_intersecting_one_by_one(count: int, last_repeats: bool) -> None:
+def test_running_intersections_agree_with_intersecting_one_by_one(count: int) -> None:
     layers = [square(10).translate((k * 7 % 5, k * 3 % 4)) for k in range(11)]
-    for i, found in enumerate(_common(layers, count, last_repeats)):
+    for i, found in enumerate(_common(layers, count)):
         window = layers[i : i + count]
         expected = square(100)
         for layer in window:
             expected = expected ^ layer
-        whole = len(window) == count or last_repeats
-        assert found.area() == pytest.approx(expected.area() if whole else 0.0)
+        assert found.area() == pytest.approx(expected.area() if len(window) == count else 0.0)
 
 
 def test_opening_drops_what_is_too_narrow_only() -> None:

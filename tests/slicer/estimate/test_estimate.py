@@ -11,6 +11,7 @@ from mdp.read import locate, read_mesh
 from mdp.search.search import decompose
 from profiles.process import Process
 from slicer.estimate.estimate import Estimate, estimate
+from slicer.parts import slice_parts
 from tests.shapes import box, standing, tee
 from tests.slicer.hand import BARE, SOLID, cut, profile, whole
 
@@ -96,3 +97,12 @@ def test_the_dry_run_of_a_demo_takes_as_long_as_estimated(name: str) -> None:
     expected = estimate(decomposition.parts, settings)
     assert expected.time_s == pytest.approx(run.time_s, rel=0.15)
     assert expected.filament_mm == pytest.approx(float(run.program.filament_mm.max()), rel=0.1)
+
+
+def test_an_estimate_knows_that_the_face_of_a_cut_needs_few_walls() -> None:
+    parts, settings = cut(box(30, 30, 30), ((0.9, 0.1, 0.3), 5.0)), profile(*BARE)
+    alone = sum(estimate(part, settings).filament_mm for part in parts)
+    together = estimate(parts, settings).filament_mm
+    sliced_mm3 = sum(piece.volume_mm3 for piece in slice_parts(parts, settings, processes=1))
+    assert together < 0.97 * alone
+    assert together * FILAMENT_MM2 == pytest.approx(sliced_mm3, rel=0.02)

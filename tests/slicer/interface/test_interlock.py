@@ -22,7 +22,7 @@ def stacked() -> list[Part]:
 
 def test_grooves_are_half_of_the_inside_and_keep_clear_of_the_walls() -> None:
     area = as_shapely(grooves(stacked()[1], profile(DEEP).process))
-    side = 24 - 2 * 5 * WIDTH
+    side = 24 - 2 * 7 * WIDTH
     assert area.area == pytest.approx(0.5 * side**2, rel=0.05)
     assert area.bounds[2] == pytest.approx(side / 2, abs=1e-6)
     assert all(part.bounds[3] - part.bounds[1] <= 2 * WIDTH + 1e-4 for part in area.geoms)

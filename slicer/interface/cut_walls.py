@@ -1,0 +1,89 @@
+"""Cut walls: the walls of a layer that has later parts beside it: all of them along the surface, few along the face of a cut."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.bead import Bead, length_mm, spacing_mm
+from slicer.fill.skin import uncovered_area
+from slicer.geometry.polygons import Polygons, close_loop, edges, offset
+from slicer.interface.model import Model
+from slicer.paths import Kind
+from slicer.region import Cover
+from slicer.travel.split import cut_line
+from slicer.walls.walls import Walls, wall_rank, walls
+
+REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cut overlaps it by this
+
+
+@dataclass(frozen=True, eq=False)
+class CutWalls:
+    """walls: those that run round; ending: inner walls along the surface that end on a cut face's; inside: of both.
+
+    model_inside: what the walls would enclose if the model were not cut.
+    """
+
+    walls: Walls
+    ending: tuple[Bead, ...]
+    model_inside: Polygons
+
+
+def cut_walls(section: Polygons, model: Polygons | None, process: Process, height_mm: float, usual: int) -> CutWalls:
+    """The walls of a part's section in its island of the model; None: no other part touches it.
+
+    usual: how many walls the model would have here.
+    """
+    width, outer = process.line_width_mm, process.outer_wall_line_width_mm
+    if model is None:
+        round_ = walls(section, process.walls, width, height_mm, outer)
+        fewer = round_ if usual == process.walls else walls(section, usual, width, height_mm, outer)
+        return CutWalls(round_, (), fewer.inside)
+    whole = walls(model, process.walls, width, height_mm, outer)
+    fewer = whole if usual == process.walls else walls(model, usual, width, height_mm, outer)
+    round_ = walls(section, min(process.interface_walls, process.walls), width, height_mm, outer)
+    if process.interface_walls >= process.walls or round_.inside.is_empty():
+        return CutWalls(round_, (), fewer.inside)
+    place = offset(round_.inside, REACH * width - 0.5 * spacing_mm(width, height_mm))
+    loops, ending = list(round_.loops), []
+    for level in range(process.interface_walls, len(whole.loops)):
+        runs = [run for loop in whole.loops[level] for run in _within(loop, place) if length_mm(run) > width]
+        loops.append(tuple(run[:-1] for run in runs if _is_closed(run)))
+        ending += [Bead(Kind.INNER_WALL, run, width, wall_rank(level, process)) for run in runs if not _is_closed(run)]
+    inside = round_.inside ^ whole.inside
+    lines = [
+        *(bead.points for bead in ending),
+        *(close_loop(loop) for level in loops[process.interface_walls :] for loop in level),
+    ]
+    narrow = round_.narrow + uncovered_area(round_.inside - inside, lines, width)
+    return CutWalls(replace(round_, loops=tuple(loops), narrow=narrow, inside=inside), tuple(ending), fewer.inside)
+
+
+def _is_closed(run: Floats) -> bool:
+    return len(run) > 3 and bool((run[0] == run[-1]).all())
+
+
+def _within(loop: Floats, place: Polygons) -> list[Floats]:
+    """What of a loop (n, 2) lies in a place, as open or closed polylines."""
+    sides = edges(place)
+    if not len(sides):
+        return []
+    sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]), kind="stable")]
+    points, within = cut_line(close_loop(loop), sides)
+    if within.all():
+        return [points]
+    bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
+    runs = [points[a : b + 1] for a, b in pairwise(bounds) if within[a]]
+    if len(runs) > 1 and within[0] and within[-1]:
+        runs = [*runs[1:-1], np.concatenate([runs[-1], runs[0][1:]])]
+    return runs
+
+
+def cover(model: Model, own: Sequence[Polygons], walled: Sequence[CutWalls]) -> Cover:
+    """What lies around the layers of a part, for its regions. own: its sections."""
+    sections = [mine if whole is None else whole for whole, mine in zip(model.sections, own, strict=True)]
+    later = model.others if model.is_cut else ()
+    return Cover(sections, [each.model_inside for each in walled], model.below, model.above, later)

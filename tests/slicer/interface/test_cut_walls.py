@@ -1,0 +1,134 @@
+"""The shell of a cut model: whole outside, thin on the faces of cuts, and a floor under every later part."""
+
+from functools import cache
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from slicer.geometry.polygons import Polygons, contours, offset, strips
+from slicer.paths import Kind
+from slicer.slice import slice_part
+from slicer.stack import Stack, build_stack
+from tests.shapes import from_manifold
+from tests.slicer.hand import BARE, cut, of_kind, profile
+
+SIDE, HEIGHT = 24.0, 30.0
+STRAIGHT, TILTED, STEEP = (0.0, 0.0, 1.0), (0.0, 0.5, 0.8), (0.9, 0.1, 0.3)
+PLAIN = (*BARE, "process.elephant_foot_mm=0", "process.interface_walls=1", "process.interface_top_layers=2")
+# Three walls of 0.45 mm stand 1.24 mm deep, four layers lie 0.8 mm deep: on a slope where both are as near, they leave less.
+SHELL_MM = 0.6
+
+
+def model(shape: str) -> m3.Manifold:
+    if shape == "cube":
+        return m3.Manifold.cube((SIDE, SIDE, HEIGHT), True).translate((0, 0, 0.5 * HEIGHT))
+    return m3.Manifold.cylinder(HEIGHT, 0.5 * SIDE, circular_segments=128)
+
+
+def depth_mm(shape: str, points: Floats) -> Floats:
+    """How deep points of the model's frame lie under its surface."""
+    x, y, z = points.T
+    aside = np.maximum(abs(x), abs(y)) if shape == "cube" else np.hypot(x, y) / np.cos(np.pi / 128)
+    depth: Floats = np.minimum(0.5 * SIDE - aside, np.minimum(z, HEIGHT - z))
+    return depth
+
+
+@cache
+def parts(shape: str, normal: tuple[float, ...]) -> list[Part]:
+    return cut(from_manifold(model(shape)), (normal, float(np.array([0, 0, 0.5 * HEIGHT]) @ normal / np.linalg.norm(normal))))
+
+
+@cache
+def stacks(shape: str, normal: tuple[float, ...], *settings: str) -> list[Stack]:
+    both, keys = parts(shape, normal), profile(*PLAIN, *settings)
+    return [build_stack(part, keys, both[:k], both[k + 1 :]) for k, part in enumerate(both)]
+
+
+def in_model(part: Part, points: Floats, z_mm: float) -> Floats:
+    """Points of a layer in the model's frame."""
+    placed: Floats = (np.insert(points, 2, z_mm + part.base.offset_mm, axis=1)) @ part.rotation
+    return placed
+
+
+CASES = [(shape, normal) for shape in ("cube", "cylinder") for normal in (STRAIGHT, TILTED, STEEP)]
+
+
+@pytest.mark.parametrize(("shape", "normal"), CASES)
+def test_no_infill_is_sparse_within_the_shell_s_thickness_of_the_surface(shape: str, normal: tuple[float, ...]) -> None:
+    seen = 0.0
+    for part, stack in zip(parts(shape, normal), stacks(shape, normal), strict=True):
+        for region, z_mm in zip(stack.regions, stack.heights.cut_mm, strict=True):
+            seen += region.sparse.area()
+            for loop in contours(region.sparse):  # in a convex model the least depth of a polygon is a corner's
+                assert depth_mm(shape, in_model(part, loop, z_mm)).min() > SHELL_MM
+    assert seen > 10000
+
+
+@pytest.mark.parametrize(("shape", "normal"), CASES)
+def test_all_of_a_layer_is_covered_by_beads_but_for_the_infill(shape: str, normal: tuple[float, ...]) -> None:
+    settings = profile(*PLAIN)
+    both = parts(shape, normal)
+    for k, stack in enumerate(stacks(shape, normal)):
+        sliced = slice_part(both[k], settings, both[:k], both[k + 1 :])
+        for at in range(1, len(sliced.layers) - 1, 6):
+            lines = [path for path in sliced.layers[at].paths if path.kind is not Kind.INFILL]
+            covered = Polygons()
+            for path in lines:
+                covered = covered + strips([path.points], 0.5 * path.width_mm)
+            bare = stack.own[at] - covered - stack.regions[at].sparse
+            assert offset(bare, -0.12).area() < 0.002 * stack.own[at].area()
+
+
+@pytest.mark.parametrize(("shape", "normal"), CASES)
+def test_a_later_part_s_first_layer_lies_on_solid_plastic(shape: str, normal: tuple[float, ...]) -> None:
+    (lower, upper), (under, over) = parts(shape, normal), stacks(shape, normal)
+    first = offset(over.own[0], -0.1)
+    x0, y0, x1, y1 = first.bounds()
+    lattice = np.stack(np.meshgrid(np.arange(x0, x1, 0.7), np.arange(y0, y1, 0.7)), axis=-1).reshape(-1, 2)
+    on_base = np.array([p for p in lattice if not (first ^ Polygons.square((0.01, 0.01)).translate(tuple(p))).is_empty()])
+    assert len(on_base) > 400
+    placed = in_model(upper, on_base, -0.12) @ lower.rotation.T - [0, 0, lower.base.offset_mm]
+    layers = np.searchsorted(under.heights.tip_mm, placed[:, 2])
+    for layer, point in zip(layers.tolist(), placed, strict=True):
+        if layer < len(under.regions):
+            dot = Polygons.square((0.01, 0.01), True).translate((point[0], point[1]))
+            assert (dot ^ under.regions[layer].sparse).is_empty()
+
+
+def test_inner_walls_end_on_the_one_along_the_face_of_a_cut() -> None:
+    settings = profile(*PLAIN)
+    lower, upper = parts("cube", STEEP)
+    layer = slice_part(lower, settings, (), [upper]).layers[70]
+    walls = [path for path in layer.paths if path.kind in (Kind.OUTER_WALL, Kind.INNER_WALL)]
+    assert [path.kind for path in walls].count(Kind.OUTER_WALL) == 1
+    inner = [path for path in walls if path.kind is Kind.INNER_WALL]
+    assert len(inner) == settings.process.walls - 1
+    for path in inner:
+        ends = in_model(lower, path.points[[0, -1]], layer.z_mm)
+        assert np.allclose(upper.base.heights_mm(ends), -0.45, atol=0.4), "both ends lie beside the cut"
+
+
+def test_with_as_many_walls_on_a_cut_as_outside_all_run_round() -> None:
+    lower, upper = parts("cube", STEEP)
+    settings = profile(*PLAIN, "process.interface_walls=3")
+    assert len(of_kind(slice_part(lower, settings, (), [upper]), Kind.INNER_WALL)) > 0
+    assert all(not ending for ending in stacks("cube", STEEP, "process.interface_walls=3")[0].ending)
+
+
+def test_the_plastic_of_a_straight_cut_is_a_floor_and_a_rim() -> None:
+    """A floor of two layers where the walls leave room, three more walls in a layer pressed half into it."""
+    under, over = stacks("cube", STRAIGHT)
+    inside = (SIDE - 2 * 1.243) ** 2
+    floor = 0.8 * 0.4 * inside
+    ring = inside - (SIDE - 2 * 2.464) ** 2
+    spare = (SIDE**2 - 0.8 * (inside - ring)) * (1.05 * 0.2 - 0.1)
+    assert under.interface_mm3 == {2: pytest.approx(floor, rel=0.03)}
+    assert over.interface_mm3 == {2: pytest.approx(0.8 * 0.2 * ring + spare, rel=0.03)}
+
+
+def test_a_model_in_one_part_has_no_interface() -> None:
+    (lower, _) = parts("cube", STRAIGHT)
+    assert build_stack(lower, profile(*PLAIN), (), ()).interface_mm3 == {}
