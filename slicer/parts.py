@@ -7,11 +7,13 @@ are forked, which takes milliseconds; a fresh interpreter would spend longer loa
 
 import os
 import signal
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_all_start_methods, get_context
 from multiprocessing.sharedctypes import RawArray
+from threading import Thread
 from typing import Any
 
 from mdp.decomposition import Part
@@ -74,10 +76,18 @@ def _slice_in_turn(
 _job: tuple[Sequence[Part], Profile, Any] | None = None  # what a forked process finds in its copy of the memory
 
 
-def _inherit(parts: Sequence[Part], profile: Profile, counts: Any) -> None:
+def _inherit(parts: Sequence[Part], profile: Profile, counts: Any, parent: int) -> None:
     global _job
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C reaches the whole group: end without a word, the parent speaks
     _job = parts, profile, counts
+    Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """End this process as soon as its parent is gone, whatever ended that: SIGTERM and SIGKILL leave it no time to say so."""
+    while os.getppid() == parent:
+        time.sleep(LOOK_S)
+    os._exit(1)
 
 
 def _slice_forked(k: int) -> SlicedPart:
@@ -97,7 +107,7 @@ def _slice_side_by_side(
     """The highest parts first, so that no long one is left for the end."""
     context = get_context("fork")
     counts: Any = RawArray("i", len(parts))
-    pool = ProcessPoolExecutor(processes, context, _inherit, (parts, profile, counts))
+    pool = ProcessPoolExecutor(processes, context, _inherit, (parts, profile, counts, os.getpid()))
     try:
         order = sorted(range(len(parts)), key=lambda k: (-expected[k], k))
         futures = {k: pool.submit(_slice_forked, k) for k in order}

@@ -1,5 +1,10 @@
 """Parts sliced side by side."""
 
+import os
+import signal
+import subprocess
+import sys
+
 import pytest
 
 from profiles.errors import SliceError
@@ -32,6 +37,37 @@ def test_a_part_that_gives_no_path_and_needs_no_floor_is_told_from_any_process(p
     nothing = profile("process.walls=0", "process.infill_density=0", "process.top_layers=0", "process.bottom_layers=0")
     with pytest.raises(SliceError, match="part 3 gives no path at all"):
         slice_parts(cut(box(10, 10, 24), *PLANES), nothing, processes=processes)
+
+
+SLICING = """
+import os
+import slicer.parts
+from tests.shapes import box
+from tests.slicer.hand import cut, profile
+
+def slice_part(*_):
+    print(os.getpid(), flush=True)
+    while True:
+        pass
+
+slicer.parts.slice_part = slice_part
+slicer.parts.slice_parts(cut(box(10, 10, 24), ((0.0, 0.0, 1.0), 12.0)), profile(), processes=2)
+"""
+
+
+@pytest.mark.parametrize("ended_by", [signal.SIGTERM, signal.SIGKILL])
+def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -> None:
+    with subprocess.Popen([sys.executable, "-c", SLICING], stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        children = [int(parent.stdout.readline()) for _ in range(2)]
+        parent.send_signal(ended_by)
+        try:
+            parent.communicate(timeout=10.0)  # until nobody holds the other end of the pipe
+        except subprocess.TimeoutExpired:
+            for child in children:
+                os.kill(child, signal.SIGKILL)
+            raise
+        assert parent.returncode == -ended_by
 
 
 def test_a_single_part_and_few_layers_are_sliced_here() -> None:
