@@ -4,6 +4,7 @@ from typing import Self
 
 from pydantic import model_validator
 
+from profiles.settings.finish import Finish
 from profiles.settings.infill import Infill
 from profiles.settings.interface import Interface
 from profiles.settings.layers import Layers
@@ -23,7 +24,7 @@ WIDTHS = (
 )
 
 
-class Process(Motion, Interface, Plate, Support, Infill, Shell, Layers):
+class Process(Motion, Interface, Plate, Support, Infill, Finish, Shell, Layers):
     """Slicing and printing settings: those of all its bases, the last one's first."""
 
     @model_validator(mode="after")

@@ -24,7 +24,8 @@ class Bead:
 
     rank: beads of an island are printed by rising rank; those of rank 0 and below are its walls and stay together around
     each outer wall. over_infill: a bridge over the sparse infill of the layer below, which has a speed and a fan of its own.
-    follows: printed right after the bead before it in the list.
+    follows: printed right after the bead before it in the list. overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its
+    width or nothing of it lies on plastic.
     """
 
     kind: Kind
@@ -34,6 +35,7 @@ class Bead:
     flow: float = 1.0
     over_infill: bool = False
     follows: bool = False
+    overhang: int = 0
 
     @property
     def closed(self) -> bool:

@@ -28,9 +28,10 @@ def rising_fan(material: Material, layer: int) -> float:
     return min((layer + 1 - material.fan_off_layers) / max(material.fan_full_layer - material.fan_off_layers, 1), 1.0)
 
 
-def hanging_fan(material: Material, bead: Bead, factor: float) -> float | None:
-    """Part fan of a bead where it differs from the layer's: bridges and overhanging walls."""
-    if bead.kind not in HANGING:
+def hanging_fan(material: Material, bead: Bead, factor: float, layer_fan: float) -> float | None:
+    """Part fan of a bead where it differs from the layer's: of bridges, overhanging walls, half way there of those that lean."""
+    if bead.kind not in HANGING and not bead.overhang:
         return None
     fans = (material.fan_infill_bridge if bead.over_infill else None, material.fan_bridge, material.fan)
-    return factor * next(fan for fan in fans if fan is not None)
+    hanging = factor * next(fan for fan in fans if fan is not None)
+    return hanging if bead.kind in HANGING else round(0.5 * (layer_fan + hanging) / STEP) * STEP

@@ -18,9 +18,11 @@ COLOURS = {
     Kind.SKIN: "#9a5bb5",
     Kind.TOP_SKIN: "#f07a6a",
     Kind.BRIDGE: "#4f8fe0",
+    Kind.IRONING: "#ffb3a7",
     Kind.SKIRT: "#3f7f5f",
     Kind.SUPPORT: "#4caf50",
     Kind.SUPPORT_INTERFACE: "#1b7f3b",
+    Kind.PURGE: "#8c8c8c",
 }
 WALLS = (Kind.OUTER_WALL, Kind.OVERHANG)
 TRAVEL_COLOUR, RETRACTED_COLOUR, SEAM_COLOUR = "#3c8d93", "#c2185b", "#000000"

@@ -21,6 +21,7 @@ class Kind(StrEnum):
     SKIN = "Solid infill"
     TOP_SKIN = "Top solid infill"
     BRIDGE = "Bridge infill"
+    IRONING = "Ironing"
     SKIRT = "Skirt/Brim"
     SUPPORT = "Support material"
     SUPPORT_INTERFACE = "Support material interface"

@@ -1,6 +1,6 @@
 """Slicing: one part of a decomposition becomes layers of paths in its own frame."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,10 +14,11 @@ from slicer.cooling import fan_share, hanging_fan, rising_fan
 from slicer.fill.bridge import bridge_area, bridge_beads, infill_bridge_area, infill_bridge_beads
 from slicer.fill.infill import infill_beads
 from slicer.fill.skin import angle_of_layer_deg, skin_beads
+from slicer.finish.ironing import ironing_beads
 from slicer.geometry.polygons import union
 from slicer.interface.interlock import fill_grooves
 from slicer.paths import Kind, Layer, Path, SlicedPart
-from slicer.speed import layer_time_s, speeds_mm_s
+from slicer.speed import first_layer_mm_s, layer_time_s, speeds_mm_s
 from slicer.stack import Stack, build_stack
 from slicer.support.beads import support_beads
 from slicer.support.pedestal import pedestal_beads
@@ -90,6 +91,7 @@ def _part_beads(stack: Stack, layer: int) -> list[Bead]:
     beads += skin_beads(region.solid, Kind.SKIN, angle, width, height_mm, overlap)
     top_width = process.top_skin_line_width_mm or width
     beads += skin_beads(region.top, Kind.TOP_SKIN, angle, top_width, height_mm, overlap, process.top_skin_monotonic)
+    beads += ironing_beads(stack.ironed[layer], angle, process, height_mm)
     sparse = with_line_width(process, process.infill_line_width_mm)
     return beads + infill_beads(region.sparse, sparse, stack.density, layer, float(stack.heights.tip_mm[layer]), height_mm)
 
@@ -118,22 +120,23 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
     on_platform = part.index == 1
     if index == 0 and not on_platform and process.interlock_mm > 0.0:
         ordered = fill_grooves(ordered, part, process, height_mm)
-    flow, fixed, fan, add_c = material.flow, None, 1.0, 0.0
+    fixed: Mapping[Kind, float] | None = None
+    flow, fan, add_c = material.flow, 1.0, 0.0
     if not on_platform and index < process.interface_layers:
         fan, add_c = process.interface_fan, process.interface_temperature_add_c
     if index == 0:
-        fixed = process.first_layer_speed_mm_s if on_platform else process.interface_speed_mm_s
+        fixed = first_layer_mm_s(process, on_platform)
         flow *= process.first_layer_flow if on_platform else process.interface_flow
     speeds = speeds_mm_s(ordered, profile, height_mm, fixed, flow)
     if on_platform:
         fan = rising_fan(material, index)
-    fans = [hanging_fan(material, p.bead, fan) for p in ordered]
+    layer_fan = fan * fan_share(material, process, layer_time_s(ordered, speeds, profile))
+    fans = [hanging_fan(material, p.bead, fan, layer_fan) for p in ordered]
     paths = tuple(
         Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, own_fan)
         for p, own_fan, speed in zip(ordered, fans, speeds, strict=True)
     )
-    fan *= fan_share(material, process, layer_time_s(ordered, speeds, profile))
-    return Layer(z_mm, height_mm, paths, fan, add_c)
+    return Layer(z_mm, height_mm, paths, layer_fan, add_c)
 
 
 def _check_not_empty(part: Part, bounds_mm: Floats, layers: Sequence[Layer], process: Process) -> None:

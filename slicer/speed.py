@@ -1,6 +1,6 @@
 """Speed: how fast each bead is laid down."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from math import hypot
 
@@ -13,6 +13,7 @@ from slicer.bead import Bead, length_mm
 from slicer.paths import Kind, bead_area_mm2
 from slicer.travel.order import Placed
 
+INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
 
 
@@ -21,12 +22,13 @@ def of_kind_mm_s(process: Process) -> dict[Kind, float]:
     return {
         Kind.OUTER_WALL: process.outer_wall_speed_mm_s,
         Kind.INNER_WALL: process.inner_wall_speed_mm_s,
-        Kind.OVERHANG: process.overhang_speed_mm_s,
+        Kind.OVERHANG: process.overhang_75_speed_mm_s,
         Kind.GAP: process.gap_speed_mm_s,
         Kind.INFILL: process.infill_speed_mm_s,
         Kind.SKIN: process.skin_speed_mm_s,
         Kind.TOP_SKIN: process.top_skin_speed_mm_s,
         Kind.BRIDGE: process.bridge_speed_mm_s,
+        Kind.IRONING: process.ironing_speed_mm_s,
         Kind.SKIRT: process.first_layer_speed_mm_s,
         Kind.PURGE: process.first_layer_speed_mm_s,
         Kind.SUPPORT: process.support_speed_mm_s,
@@ -34,14 +36,24 @@ def of_kind_mm_s(process: Process) -> dict[Kind, float]:
     }
 
 
-def speeds_mm_s(placed: Sequence[Placed], profile: Profile, height_mm: float, fixed_mm_s: float | None, flow: float) -> Floats:
-    """(n,) speeds of a layer's beads; fixed_mm_s replaces the speeds by kind, flow multiplies every bead's flow.
+def first_layer_mm_s(process: Process, on_platform: bool) -> dict[Kind, float]:
+    """Speeds by kind of a part's first layer, on the platform or on plastic."""
+    if not on_platform:
+        return dict.fromkeys(Kind, process.interface_speed_mm_s)
+    inside = process.first_layer_infill_speed_mm_s or process.first_layer_speed_mm_s
+    return dict.fromkeys(Kind, process.first_layer_speed_mm_s) | dict.fromkeys(INSIDE, inside)
+
+
+def speeds_mm_s(
+    placed: Sequence[Placed], profile: Profile, height_mm: float, fixed_mm_s: Mapping[Kind, float] | None, flow: float
+) -> Floats:
+    """(n,) speeds of a layer's beads; fixed_mm_s replaces the process's speeds by kind, flow multiplies every bead's flow.
 
     Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
     below least_speed_mm_s.
     """
     process, table = profile.process, of_kind_mm_s(profile.process)
-    asked = np.array([_of_bead(p.bead, table, process) if fixed_mm_s is None else fixed_mm_s for p in placed])
+    asked = np.array([_of_bead(p.bead, table, process) if fixed_mm_s is None else fixed_mm_s[p.bead.kind] for p in placed])
     areas = np.array([bead_area_mm2(p.bead.width_mm, height_mm) * p.bead.flow * flow for p in placed])
     speeds = np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas)
     lengths = np.array([p.bead.length_mm for p in placed])
@@ -49,14 +61,25 @@ def speeds_mm_s(placed: Sequence[Placed], profile: Profile, height_mm: float, fi
 
 
 def _of_bead(bead: Bead, table: dict[Kind, float], process: Process) -> float:
-    """The kind's speed, over sparse infill a bridge's own; a small closed wall's at most small_wall_speed_mm_s."""
+    """The kind's speed, over sparse infill a bridge's own; at most what a small closed wall and an overhang may have."""
     if bead.over_infill:
         return process.infill_bridge_speed_mm_s
+    if bead.overhang:
+        return min(table[bead.kind], _overhang_mm_s(process)[bead.overhang - 1])
     if bead.kind in RINGS and bead.length_mm <= process.small_wall_mm:
         ends = bead.points[-1] - bead.points[0]
         if float(np.hypot(ends[0], ends[1])) <= bead.width_mm:  # a seam gap leaves a wall a little open
             return min(table[bead.kind], process.small_wall_speed_mm_s)
     return table[bead.kind]
+
+
+def _overhang_mm_s(process: Process) -> tuple[float, ...]:
+    return (
+        process.overhang_75_speed_mm_s,
+        process.overhang_50_speed_mm_s,
+        process.overhang_25_speed_mm_s,
+        process.overhang_0_speed_mm_s,
+    )
 
 
 def travel_time_s(placed: Sequence[Placed], profile: Profile) -> float:

@@ -9,6 +9,8 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import Bead, first_layer_process, with_line_width
 from slicer.fill.infill import pattern_density
+from slicer.finish.compensation import compensate
+from slicer.finish.ironing import ironed_areas
 from slicer.geometry.polygons import Polygons, clean
 from slicer.heights import Heights, layer_heights
 from slicer.interface.cut_walls import cover, cut_walls
@@ -23,6 +25,7 @@ from slicer.support.blocker import blocked_areas, far_mm
 from slicer.support.overhang import Overhang, detect_overhangs
 from slicer.support.pedestal import pedestal_layers, without_pedestal
 from slicer.support.support import Supports, generate_supports
+from slicer.walls.overhang import strengthen_overhangs
 from slicer.walls.walls import Walls
 
 
@@ -30,12 +33,12 @@ from slicer.walls.walls import Walls
 class Stack:
     """A part's layers, one entry each.
 
-    outlines: whole sections; own: without the pedestal; walls and regions: of own; ending: inner walls that end
-    on the face of a cut; overhangs: what hangs and what bridges;
-    processes: the settings, with the extra walls of an interface and the widths of part 1's first layer. beneath: the
-    plastic under the first layer, None on the platform; floor: the plate's outline, of use to part 1; pedestal_layers: how
-    many of the lowest layers the pedestal takes; density: of the sparse infill's pattern; edges: where a seam would lie on
-    an interface's edge; interface_mm3: as in SlicedPart.
+    outlines: whole sections; own: without the pedestal; walls and regions: of own; ending: inner walls that end on the face of
+    a cut; overhangs: what hangs and what bridges; ironed: tops that are smoothed; processes: the settings, with the extra walls
+    of interfaces and overhangs and the widths of part 1's first layer. beneath: the plastic under the first layer, None on the
+    platform; floor: the plate's outline, of use to part 1; pedestal_layers: how many of the lowest layers the pedestal takes;
+    density: of the sparse infill's pattern; edges: where a seam would lie on an interface's edge; interface_mm3: as in
+    SlicedPart.
     """
 
     heights: Heights
@@ -45,6 +48,7 @@ class Stack:
     ending: Sequence[tuple[Bead, ...]]
     regions: Sequence[Region]
     overhangs: Sequence[Overhang]
+    ironed: Sequence[Polygons]
     processes: Sequence[Process]
     supports: Supports
     beneath: Polygons | None
@@ -66,6 +70,7 @@ def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Se
     heights = layer_heights(mesh, process, on_platform, pedestal_mm)
     pedestal_count = pedestal_layers(heights.tip_mm, pedestal_mm)
     outlines = [clean(loops, process.slit_closing_mm) for loops in sections(mesh, heights.cut_mm)]
+    outlines = compensate(outlines, part, later, heights.cut_mm, process)
     if on_platform:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
     uncut = without_pedestal(outlines, mesh, heights.cut_mm, pedestal_mm, pedestal_count) if pedestal_count else outlines
@@ -75,6 +80,7 @@ def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Se
     if on_platform:
         processes[0] = first_layer_process(process)
     below = plastic_beneath(part, earlier, outlines[0])
+    processes = strengthen_overhangs(processes, own, below)
     model = model_around(part, uncut, own, heights, earlier, later, process)
     rows = zip(own, model.sections, processes, heights.height_mm, strict=True)
     wall_layers = [cut_walls(s, m, p, h, process.walls) for s, m, p, h in rows]
@@ -93,6 +99,7 @@ def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Se
         ending=[each.ending for each in wall_layers],
         regions=region_layers,
         overhangs=overhangs,
+        ironed=ironed_areas(region_layers, part, later, heights, process),
         processes=processes,
         supports=generate_supports(hanging, outlines, heights, support_process, below, blocked, floor),
         beneath=below,

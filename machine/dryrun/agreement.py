@@ -12,6 +12,7 @@ from machine.dryrun.placement import unsupported_mm
 from machine.dryrun.replay import beads_of
 from mdp.mesh import Mesh
 from profiles.profile import Profile
+from slicer.finish.compensation import reach_mm
 
 MOST_OUTSIDE = 0.01  # of the extruded length, by more than half a line: seams, brims and thin walls stay far below
 LEAST_FILLED = 0.98  # of the model at 100 % infill
@@ -36,7 +37,7 @@ def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, Dry
 
     Findings: outside (error), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
     """
-    share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm)
+    share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm + reach_mm(profile.process))
     filled = filled_share(run, mesh, profile).share
     deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
     length, loose, reported = unsupported_mm(run.program, deposited, run.contacts)

@@ -12,6 +12,7 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 HANGING = (Kind.OVERHANG.value, Kind.BRIDGE.value)  # the slicer itself says that these hang
+IRONING = Kind.IRONING.value  # goes over what has been laid
 PURGE = "Custom"  # what a start block pushes out beside the plate is meant to fall
 ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # of a part's length in air
 LOST_SHARE = 0.5  # of a part's first layer without anything under it
@@ -58,7 +59,7 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[
 
 def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[Finding]:
     """The first layer of every part in which a great share of the beads finds its room taken."""
-    counted = ~_rows_of_types(program, (PURGE,)) & (length > 0)
+    counted = ~_rows_of_types(program, (PURGE, IRONING)) & (length > 0)
     group = program.part * (int(program.layer.max(initial=0)) + 1) + program.layer
     overlapping = np.bincount(group[counted], weights=contacts.overlapping_mm[counted])
     whole = np.bincount(group[counted], weights=length[counted])

@@ -11,8 +11,23 @@ class Motion(Frozen):
     outer_wall_speed_mm_s: float = Field(40.0, gt=0, le=1000, description="speed of outer walls, mm/s")
     inner_wall_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of inner walls, mm/s")
     skin_speed_mm_s: float = Field(60.0, gt=0, le=1000, description="speed of solid skins, mm/s")
-    overhang_speed_mm_s: float = Field(
-        20.0, gt=0, le=1000, description="speed of overhanging walls, mm/s: slow, so that they set before they sag"
+    overhang_75_speed_mm_s: float = Field(
+        35.0, gt=0, le=1000, description="greatest speed of walls with 50 to 75 % of their width on plastic, mm/s"
+    )
+    overhang_50_speed_mm_s: float = Field(
+        25.0,
+        gt=0,
+        le=1000,
+        description="greatest speed of walls with 25 to 50 % of their width on plastic, mm/s: they must set soon",
+    )
+    overhang_25_speed_mm_s: float = Field(
+        20.0, gt=0, le=1000, description="greatest speed of walls with less than 25 % of their width on plastic, mm/s"
+    )
+    overhang_0_speed_mm_s: float = Field(
+        15.0,
+        gt=0,
+        le=1000,
+        description="greatest speed of walls that nothing carries, mm/s: slow, so that they set before they sag",
     )
     bridge_speed_mm_s: float = Field(
         30.0, gt=0, le=1000, description="speed of bridges, mm/s: faster strands tear, slower ones sag"
@@ -26,6 +41,12 @@ class Motion(Frozen):
         40.0, gt=0, le=1000, description="speed of the dense layers of support, mm/s: their lines span the sparse ones"
     )
     first_layer_speed_mm_s: float = Field(20.0, gt=0, le=1000, description="speed of part 1's first layer, mm/s")
+    first_layer_infill_speed_mm_s: float | None = Field(
+        None,
+        gt=0,
+        le=1000,
+        description="speed of skin and infill in part 1's first layer, mm/s, once its walls hold; absent: first_layer_speed_mm_s",
+    )
     gap_speed_mm_s: float = Field(
         30.0, gt=0, le=1000, description="speed of the lines in gaps between walls, mm/s: their width changes all the time"
     )

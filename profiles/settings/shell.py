@@ -11,6 +11,9 @@ class Shell(Frozen):
     """Walls, seams and skins."""
 
     walls: int = Field(3, ge=0, le=50, description="number of walls")
+    overhang_extra_walls: int = Field(
+        0, ge=0, le=20, description="more walls in layers with overhanging walls: the outer ones hang on the inner ones"
+    )
     wall_order: Literal["inner-first", "outer-first"] = Field(
         "inner-first",
         description="inner-first: the outer wall leans on finished plastic, best over overhangs; outer-first: nothing pushes it "

@@ -3,7 +3,7 @@
 Some layers of a part stand for all of them (slicer/estimate): their walls, skins and infill are known as shapes, their lines by
 counting how often a pattern crosses a boundary, their time by the speeds of the process and the machine's acceleration. It is
 there to choose between decompositions; the dry run has the exact figures. Not looked at: slow overhanging walls and bridges,
-grooves, what later parts take from the support of earlier ones.
+ironing, grooves, what later parts take from the support of earlier ones.
 """
 
 from collections.abc import Sequence
@@ -19,6 +19,7 @@ from slicer.estimate.shell import extent_of
 from slicer.estimate.strokes import Pace, Strokes, line_strokes, loop_strokes, shell_strokes, support_strokes
 from slicer.geometry.polygons import contours, offset
 from slicer.paths import Kind, bead_area_mm2
+from slicer.speed import first_layer_mm_s
 from slicer.support.pedestal import DENSITY, ROOF_LAYERS
 from slicer.walls.brim import brim
 
@@ -75,9 +76,7 @@ def _estimate_part(part: SampledPart, profile: Profile, top_mm: float) -> Estima
 
 
 def _pace(part: SampledPart, layer: int, profile: Profile) -> Pace:
-    process, fixed_mm_s = profile.process, None
-    if layer == 0:
-        fixed_mm_s = process.first_layer_speed_mm_s if part.on_platform else process.interface_speed_mm_s
+    fixed_mm_s = None if layer else first_layer_mm_s(profile.process, part.on_platform)
     return Pace(profile, float(part.heights.height_mm[layer]), fixed_mm_s)
 
 

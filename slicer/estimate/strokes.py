@@ -4,7 +4,7 @@ A straight pattern of lines a distance s apart crosses the boundary of an area o
 (Cauchy-Crofton), so it has P / (pi s) lines, whatever the shape.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, pi, radians, sin, sqrt
 
@@ -44,11 +44,11 @@ class Strokes:
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast a layer of that height is printed; fixed_mm_s replaces the speeds by kind."""
+    """How fast a layer of that height is printed; fixed_mm_s replaces the process's speeds by kind."""
 
     profile: Profile
     height_mm: float
-    fixed_mm_s: float | None = None
+    fixed_mm_s: Mapping[Kind, float] | None = None
 
     @property
     def junction_mm_s(self) -> float:
@@ -58,7 +58,7 @@ class Pace:
     def speed_mm_s(self, kind: Kind, bead_mm2: float, small: bool = False) -> float:
         """Of a kind of bead with that cross-section, no faster than the hot end melts."""
         process = self.profile.process
-        speed = of_kind_mm_s(process)[kind] if self.fixed_mm_s is None else self.fixed_mm_s
+        speed = (self.fixed_mm_s or of_kind_mm_s(process))[kind]
         if small and self.fixed_mm_s is None:
             speed = min(speed, process.small_wall_speed_mm_s)
         return min(speed, self.profile.material.volumetric_limit_mm3_s / bead_mm2)

@@ -2,28 +2,62 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from profiles.process import Process
+from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, offset
 from slicer.paths import Kind
 from slicer.travel.order import Placed
 from slicer.travel.split import split
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
+STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
 SHORTEST = 2.0  # line widths: no stretch is split off for less, the speed would flicker
 NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 
 
 def split_overhangs(placed: Sequence[Placed], section: Polygons, bank: Polygons | None, process: Process) -> list[Placed]:
-    """The beads of a layer with its walls split where they begin and cease to overhang, in the same order.
+    """The beads of a layer with its walls split where less and less of their width lies on plastic, in the same order.
 
     bank: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside the bank has the
     share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share.
     """
+    out = list(placed)
     if bank is None or process.overhang_share <= 0.0:
-        return list(placed)
+        return out
+    shortest_mm = SHORTEST * process.line_width_mm
+    for share in sorted({*STEPS, process.overhang_share}, reverse=True):
+        hanging = hanging_place(section, bank, share, process.line_width_mm)
+        if hanging.area() < shortest_mm * NOISE_MM:
+            break
+        out = split(out, hanging, (*WALLS, Kind.OVERHANG), shortest_mm, partial(_hanging, share=share, process=process))
+    return out
+
+
+def hanging_place(section: Polygons, bank: Polygons, share: float, width_mm: float) -> Polygons:
+    """Where the centreline of a bead has less than a share of its width on the bank."""
+    return section - offset(bank, (0.5 - share) * width_mm + NOISE_MM)
+
+
+def _hanging(bead: Bead, share: float, process: Process) -> Bead:
+    kind = Kind.OVERHANG if share <= process.overhang_share else bead.kind
+    return replace(bead, kind=kind, overhang=sum(step >= share for step in STEPS))
+
+
+def strengthen_overhangs(processes: Sequence[Process], sections: Sequence[Polygons], beneath: Polygons | None) -> list[Process]:
+    """The process of every layer, with overhang_extra_walls more walls where any of them overhangs.
+
+    beneath: plastic under the first layer; None: the platform.
+    """
+    if all(process.overhang_extra_walls == 0 for process in processes):
+        return list(processes)
+    banks = [beneath, *sections[:-1]]
+    return [_strengthened(*row) for row in zip(processes, sections, banks, strict=True)]
+
+
+def _strengthened(process: Process, section: Polygons, bank: Polygons | None) -> Process:
     width = process.line_width_mm
-    hanging = section - offset(bank, max((0.5 - process.overhang_share) * width, NOISE_MM))
-    if hanging.area() < SHORTEST * width * NOISE_MM:
-        return list(placed)
-    return split(placed, hanging, WALLS, SHORTEST * width, lambda bead: replace(bead, kind=Kind.OVERHANG))
+    if bank is None or not process.walls or hanging_place(section, bank, process.overhang_share, width).area() < width**2:
+        return process
+    return process.model_copy(update={"walls": process.walls + process.overhang_extra_walls})

@@ -1,7 +1,7 @@
 // Coarse: the print with far fewer beads, for the eye while it moves: of what is seen from outside every k-th layer, as high as k
 // of them, and straight pieces instead of fine curves. Where the file does not tell what is seen from outside, of all kinds of line.
 
-const SEEN_OUTSIDE = /external perimeter|outer wall|wall-outer|overhang|bridge|top|bottom|solid|skin|support|skirt|brim|raft|custom/i;
+const SEEN_OUTSIDE = /external perimeter|outer wall|wall-outer|overhang|bridge|top|bottom|solid|skin|support|skirt|brim|raft|ironing|custom/i;
 const TOPS = /top|ironing/i; // they close the model whatever layer they lie in
 const BEND_MM = 0.04; // by which a coarse bead may leave the path, a layer
 const AT_MOST = 12; // rows in one bead

@@ -6,7 +6,7 @@ const PLAIN = "#9aa0a8";
 
 const TYPES = [
   [/external perimeter|outer wall|wall-outer/i, "#e69f00"], [/overhang/i, "#0072b2"], [/perimeter|inner wall|wall-inner/i, "#f0e442"],
-  [/bridge/i, "#56b4e9"], [/top/i, "#d55e00"], [/solid|skin|bottom/i, "#b4592b"], [/gap/i, "#8c6bb1"], [/interface/i, "#009e73"],
+  [/bridge/i, "#56b4e9"], [/ironing/i, "#ffb3a7"], [/top/i, "#d55e00"], [/solid|skin|bottom/i, "#b4592b"], [/gap/i, "#8c6bb1"], [/interface/i, "#009e73"],
   [/support/i, "#74c8a3"], [/skirt|brim/i, "#7f8b99"], [/infill|fill/i, "#cc79a7"], [/custom/i, "#5d6570"],
 ];
 const typeColour = (name) => (TYPES.find(([pattern]) => pattern.test(name)) || [0, PLAIN])[1];

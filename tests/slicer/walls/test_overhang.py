@@ -1,6 +1,6 @@
 """Overhanging walls: which stretches, by how much of the bead lies on the layer below, and what becomes of the rest."""
 
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any
 
 import manifold3d as m3
@@ -41,12 +41,13 @@ def test_the_stretch_beyond_the_bank_overhangs_and_nothing_is_lost() -> None:
     pieces = split(
         placed(square(10)), Polygons.square((12, 12)).translate((-1, -1)), Polygons.square((6, 20)).translate((-1, -5))
     )
-    assert [p.bead.kind for p in pieces] == [Kind.OUTER_WALL, Kind.OVERHANG, Kind.OUTER_WALL]
-    assert pieces[1].bead.length_mm == pytest.approx(5 + 10 + 5, abs=0.1)
+    assert [kind for kind, _ in groupby(p.bead.kind for p in pieces)] == [Kind.OUTER_WALL, Kind.OVERHANG, Kind.OUTER_WALL]
+    assert sum(p.bead.length_mm for p in pieces if p.bead.kind is Kind.OVERHANG) == pytest.approx(5 + 10 + 5, abs=0.3)
+    assert max(pieces, key=lambda p: p.bead.length_mm).bead.overhang == 4  # most of it has nothing under it
     assert sum(p.bead.length_mm for p in pieces) == pytest.approx(40)
     assert all((a.points[-1] == b.points[0]).all() for a, b in pairwise(pieces))
-    assert [p.retract for p in pieces] == [True, False, False]
-    assert [len(p.approach) for p in pieces] == [1, 0, 0]
+    assert [p.retract for p in pieces] == [True] + [False] * (len(pieces) - 1)
+    assert [len(p.approach) for p in pieces] == [1] + [0] * (len(pieces) - 1)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +85,7 @@ def test_cones_overhang_from_the_angle_at_which_half_a_bead_is_free(angle: float
     )
     assert np.degrees(np.arctan(0.5 * WIDTH / 0.2)) == pytest.approx(48.4, abs=0.1)
     assert bool(beads) is hangs
-    assert {p.speed_mm_s for p in beads} <= {20.0}
+    assert {p.speed_mm_s for p in beads} <= {25.0, 20.0, 15.0}
 
 
 def test_a_part_on_plastic_overhangs_where_its_base_reaches_beyond() -> None:

@@ -1,0 +1,50 @@
+"""Compensation: layers whose outsides and holes are larger or smaller, so that the print's sizes are the model's.
+
+Plastic bulges and shrinks where it meets air. A cut face meets plastic: what lies beside it, of a part printed later, stays where
+it is, or the parts would leave a gap or be pressed into each other.
+"""
+
+from collections.abc import Sequence
+
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from profiles.process import Process
+from slicer.geometry.polygons import Polygons, area_mm2, closing, contours, offset, union
+from slicer.interface.interface import sections_of
+
+TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps
+
+
+def reach_mm(process: Process) -> float:
+    """How far a layer may lie outside the model's section."""
+    return max(process.outline_compensation_mm, -process.hole_compensation_mm, 0.0)
+
+
+def compensate(
+    outlines: Sequence[Polygons], part: Part, later: Sequence[Part], cuts_mm: Floats, process: Process
+) -> list[Polygons]:
+    """The outlines of a part's layers with outsides and holes compensated, but for its cut faces; cuts_mm: their heights."""
+    if process.outline_compensation_mm == 0.0 and process.hole_compensation_mm == 0.0:
+        return list(outlines)
+    beside = sections_of(later, part, cuts_mm) if later else [Polygons()] * len(outlines)
+    return [compensated(own, others, process) for own, others in zip(outlines, beside, strict=True)]
+
+
+def compensated(own: Polygons, others: Polygons, process: Process) -> Polygons:
+    """A part's section, which others of its model touch, with the sides compensated that no other touches."""
+    if own.is_empty():
+        return own
+    whole = own if others.is_empty() else own + closing(own + others, TOUCHING_MM)
+    grown = reach_mm(process)
+    wider = own if grown == 0.0 else own + (offset(own, grown) - whole)
+    return wider ^ _resized(whole, process)
+
+
+def _resized(whole: Polygons, process: Process) -> Polygons:
+    """A section of the model with larger or smaller outsides and holes."""
+    islands = []
+    for island in whole.decompose():
+        filled = Polygons([loop for loop in contours(island) if area_mm2(loop) > 0])
+        outside, holes = offset(filled, process.outline_compensation_mm), filled - island
+        islands.append(outside if holes.is_empty() else outside - offset(holes, process.hole_compensation_mm))
+    return union(islands)

@@ -1,0 +1,110 @@
+"""Sizes and tops: outsides and holes are compensated where there is air beside them, tops that stay visible are ironed."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from mdp.decomposition import Part
+from mdp.mesh import Mesh
+from slicer.paths import Kind, SlicedPart
+from slicer.slice import slice_part
+from tests.shapes import box, standing
+from tests.slicer.hand import BARE, cut, of_kind, profile, whole
+
+LEANING = (0.6, 0.0, 0.8)
+
+
+def tube() -> Mesh:
+    """20 mm square with a hole of 10 mm square."""
+    return standing(m3.Manifold.cube((20, 20, 2), True) - m3.Manifold.cube((10, 10, 9), True))
+
+
+def outer_sizes_mm(sliced: SlicedPart) -> list[float]:
+    """Sizes along x of the outer walls of the second layer, plastic included."""
+    paths = [path for path in sliced.layers[1].paths if path.kind is Kind.OUTER_WALL]
+    outside, hole = sorted((float(np.ptp(path.points[:, 0])) for path in paths), reverse=True)
+    return [outside + 0.45, hole - 0.45]
+
+
+@pytest.mark.parametrize(("outline_mm", "hole_mm", "sizes"), [(0, 0, (20, 10)), (0.1, 0, (20.2, 10)), (-0.15, 0.2, (19.7, 10.4))])
+def test_outsides_and_holes_are_moved_as_asked(outline_mm: float, hole_mm: float, sizes: tuple[float, float]) -> None:
+    asked = (f"process.outline_compensation_mm={outline_mm}", f"process.hole_compensation_mm={hole_mm}")
+    sliced = slice_part(whole(tube()), profile(*BARE, *asked))
+    assert outer_sizes_mm(sliced) == pytest.approx(sizes, abs=0.01)
+
+
+@pytest.mark.parametrize("asked_mm", [-0.2, 0.2])
+def test_a_cut_face_stays_where_it_is(asked_mm: float) -> None:
+    low, high = cut(box(), (LEANING, 8.0))
+    settings = (*BARE, "process.infill_density=1")
+    for_size = f"process.outline_compensation_mm={asked_mm}"
+    usual, moved = (slice_part(low, profile(*settings, *more), later=[high]) for more in ((), (for_size,)))
+    layer = next(k for k, layer in enumerate(usual.layers) if abs(layer.z_mm - 10.0) < 1e-6)
+    ends = [_ends_along_x(sliced, layer) for sliced in (usual, moved)]
+    assert ends[1][0] - ends[0][0] == pytest.approx(-asked_mm, abs=0.01)  # the outside
+    assert ends[1][1] - ends[0][1] == pytest.approx(0.0, abs=0.02)  # the cut
+
+
+def _ends_along_x(sliced: SlicedPart, layer: int) -> tuple[float, float]:
+    points = np.concatenate([path.points for path in sliced.layers[layer].paths if path.kind is Kind.OUTER_WALL])
+    middle = points[np.abs(points[:, 1]) < 12.0]
+    return float(middle[:, 0].min()), float(middle[:, 0].max())
+
+
+def test_a_top_is_ironed_with_dense_lines_across_its_own() -> None:
+    sliced = slice_part(whole(box(10, 10, 2)), profile(*BARE, "process.ironing=true"))
+    assert {k for k, layer in enumerate(sliced.layers) if any(path.kind is Kind.IRONING for path in layer.paths)} == {9}
+    last = sliced.layers[-1]
+    ironed = [path for path in last.paths if path.kind is Kind.IRONING]
+    assert last.paths[-len(ironed) :] == tuple(ironed)
+    assert {path.speed_mm_s for path in ironed} == {15.0}
+    inside_mm2 = (10.0 - 2 * 3 * 0.41) ** 2
+    assert sum(last.volume_mm3(path) for path in ironed) == pytest.approx(0.15 * 0.2 * inside_mm2, rel=0.1)
+    assert sum(path.length_mm for path in ironed) == pytest.approx(inside_mm2 / 0.1, rel=0.1)
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.05, 0.0, 1.0)])
+def test_nothing_is_ironed_where_another_part_comes(normal: tuple[float, float, float]) -> None:
+    low, high = cut(box(), (normal, 8.0))
+    ironing = profile(*BARE, "process.ironing=true")
+    alone, under = slice_part(low, ironing), slice_part(low, ironing, later=[high])
+    assert sum(path.length_mm for path in of_kind(alone, Kind.IRONING)) > 1000.0
+    assert of_kind(under, Kind.IRONING) == []
+
+
+def overhanging(step_mm: float) -> Part:
+    """Two plates of 2 mm, the upper one wider by step_mm all round."""
+    lower = m3.Manifold.cube((20, 20, 2), True)
+    return whole(standing(lower + m3.Manifold.cube((20 + 2 * step_mm, 20 + 2 * step_mm, 2), True).translate((0, 0, 2))))
+
+
+@pytest.mark.parametrize(
+    ("step_mm", "kind", "speed", "fan"),
+    [
+        (0.08, Kind.OUTER_WALL, 40.0, None),  # 82 % of the bead's width on the layer below
+        (0.17, Kind.OUTER_WALL, 35.0, 0.7),  # 62 %
+        (0.29, Kind.OVERHANG, 25.0, 1.0),  # 36 %
+        (0.40, Kind.OVERHANG, 20.0, 1.0),  # 11 %
+        (0.52, Kind.OVERHANG, 15.0, 1.0),
+    ],
+)
+def test_walls_are_slower_and_cooler_the_less_of_them_lies_on_plastic(
+    step_mm: float, kind: Kind, speed: float, fan: float | None
+) -> None:
+    slow = ("process.least_layer_time_s=0", "process.inner_wall_speed_mm_s=80", "material.fan_layer_time_s=1")
+    layer = slice_part(overhanging(step_mm), profile(*BARE, *slow)).layers[10]
+    wall = max((path for path in layer.paths if path.kind in (Kind.OUTER_WALL, Kind.OVERHANG)), key=lambda path: path.length_mm)
+    assert (wall.kind, wall.speed_mm_s) == (kind, speed)
+    assert wall.fan == (None if fan is None else pytest.approx(fan, abs=0.03))
+
+
+def test_layers_with_overhanging_walls_get_more_of_them_where_that_is_asked_for() -> None:
+    sliced = slice_part(overhanging(0.4), profile(*BARE, "process.overhang_extra_walls=2"))
+    counts = [sum(path.kind is Kind.INNER_WALL for path in sliced.layers[k].paths) for k in (5, 10, 15)]
+    assert counts == [2, 4, 2]
+
+
+def test_skin_of_the_first_layer_may_be_faster_than_its_walls() -> None:
+    paths = slice_part(whole(box(10, 10, 1)), profile(*BARE, "process.first_layer_infill_speed_mm_s=35")).layers[0].paths
+    speeds = {path.kind: path.speed_mm_s for path in paths}
+    assert (speeds[Kind.OUTER_WALL], speeds[Kind.SKIN]) == (20.0, 35.0)
