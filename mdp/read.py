@@ -20,6 +20,7 @@ DEMO = "demo:"
 LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
 OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
 TYPICAL_MM = 100.0
+MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
 
 
 def locate(model: str) -> Path:
@@ -91,8 +92,11 @@ def check_file(path: Path) -> None:
 def _read_surfaces(path: Path) -> list[Surface]:
     check_file(path)
     try:
-        if path.stat().st_size == 0:
+        size = path.stat().st_size
+        if size == 0:
             raise MeshError(f"{path}: is empty")
+        if size > MOST_BYTES:
+            raise MeshError(f"{path}: has {size} bytes, at most {MOST_BYTES} are read: a model of fewer faces is needed")
         return READERS[path.suffix.lower()](path)
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from None

@@ -1,6 +1,5 @@
 """Part settings: what one part of a print is sliced with in place of the process's own values."""
 
-import tomllib
 from collections.abc import Iterable
 from typing import Any
 
@@ -11,6 +10,7 @@ from profiles.machine import Frozen
 from profiles.process import Process
 from profiles.settings.plate import Plate
 from profiles.settings.support import Support
+from profiles.toml_text import read_value
 from profiles.wording import sentences
 
 MOST_PARTS = 1000
@@ -67,7 +67,7 @@ def parse_part_settings(text: str) -> PartSettings:
         raise ProfileError(
             f"--part {text}: PART:KEY=VALUE,... is expected, as 2:walls=4,infill_density=0.4; PART is 1 to {MOST_PARTS}"
         )
-    values = {key.strip().removeprefix("process."): _value(value.strip()) for key, _, value in pairs}
+    values = {key.strip().removeprefix("process."): read_value(value.strip()) for key, _, value in pairs}
     return PartSettings(part=int(number), process=values)
 
 
@@ -101,11 +101,3 @@ def _problems(process: Process, part: int, own: dict[str, Any]) -> Iterable[str]
         process_of_part(process, own)
     except ValidationError as error:
         yield from sentences(error.errors(), Process, "process.")
-
-
-def _value(text: str) -> Any:
-    """A value as TOML has it; what is no TOML is text."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text

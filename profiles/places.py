@@ -1,7 +1,6 @@
 """Places: where profiles stand (shipped with the program, the user's own folder, any file) and what they inherit."""
 
 import os
-import tomllib
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from importlib import resources
@@ -11,10 +10,12 @@ from typing import Any
 from platformdirs import user_config_path
 
 from profiles.errors import ProfileError
+from profiles.toml_text import read_toml
 
 KINDS = {"machine": "machines", "material": "materials", "process": "processes"}
 OF_KIND = {"machine": ("machine",), "material": ("material",), "process": ("process", "search")}
 PARENT = "inherits"
+MOST_INHERITED = 32  # profiles one by way of another
 
 
 def shipped(kind: str) -> list[str]:
@@ -62,6 +63,8 @@ def tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
     document, place = _document(kind, name, seen)
     if place in seen:
         raise ProfileError(f"{name} inherits itself by way of {', '.join(seen[seen.index(place) + 1 :]) or 'its own name'}")
+    if len(seen) >= MOST_INHERITED:
+        raise ProfileError(f"{name} is inherited by way of {len(seen)} profiles: at most {MOST_INHERITED} are allowed")
     problem = strangers(kind, name, document)
     if problem:
         raise ProfileError(problem)
@@ -114,12 +117,12 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 def parse(path: Path, what: str = "profile") -> dict[str, Any]:
     """A TOML file; ProfileError says what is wrong with it. what: the file's name for a person."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return read_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ProfileError(f"{what} {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
     except UnicodeDecodeError:
         raise ProfileError(f"{what} {path} is not a text file: TOML in UTF-8 is expected") from None
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:
         raise ProfileError(f"{what} {path} is not valid TOML: {error}") from None
 
 
@@ -133,7 +136,7 @@ def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, An
         return parse(file), str(file.resolve())
     if name in shipped(kind):
         source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
-        return tomllib.loads(source.read_text(encoding="utf-8")), name
+        return read_toml(source.read_text(encoding="utf-8")), name
     if _is_path(name):
         return parse(Path(name)), str(Path(name).resolve())
     raise _unknown(f"{kind} profile", name, known(kind))

@@ -1,6 +1,5 @@
 """Loading: a machine, a material and a process, by name or from a file, with --set overrides."""
 
-import tomllib
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -13,6 +12,7 @@ from profiles.part_settings import PartSettings, merge_part_settings, process_of
 from profiles.places import KINDS, OF_KIND, kind_of, known, shipped, tables
 from profiles.process import HEIGHTS, WIDTHS, Process
 from profiles.search import Search
+from profiles.toml_text import read_value
 from profiles.wording import sentences
 
 __all__ = ["DEFAULTS", "KINDS", "OF_KIND", "SECTIONS", "Profile", "kind_of", "known", "load", "load_one", "rows", "shipped"]
@@ -131,10 +131,7 @@ def _apply(whole: dict[str, Any], setting: str) -> None:
     if not equals or len(steps) < 2 or steps[0] not in SECTIONS or not all(steps):
         begins = ", ".join(f"{section}." for section in SECTIONS)
         raise ProfileError(f"--set {setting}: KEY=VALUE is expected, where KEY begins with one of {begins}")
-    try:
-        value = tomllib.loads(f"value = {text.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
+    value = read_value(text.strip())
     table = whole
     for step in steps[:-1]:
         table[step] = dict(table.get(step, {})) if isinstance(table.get(step, {}), dict) else {}

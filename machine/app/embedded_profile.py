@@ -91,7 +91,7 @@ def _value(text: str) -> Any:
     plain = {"None": "null", "True": "true", "False": "false"}.get(text, text)
     try:
         return json.loads(plain)
-    except ValueError:
+    except (ValueError, RecursionError):
         return text
 
 

@@ -1,7 +1,6 @@
 """Fault scripts: what goes wrong on a serial line and in a printer, where or how often, the same at every run of a seed."""
 
 import random
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, log
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from profiles.errors import PrinterError
+from profiles.toml_text import read_toml
 
 ByteKind = Literal["drop", "flip", "duplicate", "delay"]
 OkKind = Literal["swallow ok", "truncate ok", "double ok"]
@@ -123,11 +123,11 @@ def _random_fault(rng: random.Random, kind: Kind, lines: range, line_bytes: int,
 def read_script(path: Path) -> FaultScript:
     """The script in a TOML file: `seed` and [[fault]] tables. Raises PrinterError for a file that is none."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = read_toml(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror.lower() if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise PrinterError(f"the fault script {path} cannot be read: {reason}") from None
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:
         raise PrinterError(f"the fault script {path} is not TOML: {error}") from None
     for key in document:
         if key not in ("seed", "fault"):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mdp.formats.surface import Surface, check_placed, check_surface
+from mdp.formats.surface import Surface, check_meshes, check_placed, check_surface
 from mdp.mesh import Floats
 from profiles.errors import MeshError
 
@@ -29,8 +29,8 @@ def read(path: Path) -> list[Surface]:
     document, binary = _chunks(path, path.read_bytes())
     try:
         surfaces = _place_all(path, document, binary)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {error})") from None
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise MeshError(f"{path}: its glTF document is malformed ({type(error).__name__}: {str(error)[:200]})") from None
     if not surfaces:
         raise MeshError(f"{path}: its scene places no mesh")
     return surfaces
@@ -50,6 +50,8 @@ def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
         place += 8 + size
     try:
         return json.loads(chunks.get(JSON_CHUNK, b"")), chunks.get(BINARY_CHUNK, b"")
+    except RecursionError:
+        raise MeshError(f"{path}: its glTF document is malformed (nested too deep)") from None
     except ValueError as error:
         raise MeshError(f"{path}: its glTF document is malformed ({error})") from None
 
@@ -69,7 +71,7 @@ def _place_all(path: Path, document: Any, binary: bytes) -> list[Surface]:
     while pending:
         number, parent, depth = pending.pop()
         placed += 1
-        check_placed(path, placed, faces)
+        check_placed(path, placed)
         if depth > DEEPEST:
             raise MeshError(f"{path}: its nodes contain each other")
         node = document["nodes"][number]
@@ -78,6 +80,7 @@ def _place_all(path: Path, document: Any, binary: bytes) -> list[Surface]:
             surface = _primitive_surface(path, document, binary, primitive, matrix)
             surfaces.append(surface)
             faces += len(surface.faces)
+            check_meshes(path, len(surfaces), faces)
         pending += [(child, matrix, depth + 1) for child in reversed(node.get("children", []))]
     return surfaces
 

@@ -6,6 +6,8 @@ from mdp.formats.polygons import polygon_surface
 from mdp.formats.surface import Surface, parse_floats
 from profiles.errors import MeshError
 
+MOST_INDEX = 2**62  # no file has so many vertices, and more would not fit into an array
+
 
 def read(path: Path) -> list[Surface]:
     """The polygons of an OBJ file as triangles; all objects and groups come as one surface, since they share their vertices.
@@ -35,6 +37,6 @@ def _corners(path: Path, number: int, words: list[str], vertices: int) -> list[i
         named = [int(word.split("/", 1)[0]) for word in words]
     except ValueError:
         raise MeshError(f"{path}: the face in line {number} is malformed: `{' '.join(words[:8])}`") from None
-    if 0 in named or min(named) < -vertices:
+    if 0 in named or min(named) < -vertices or max(named) > MOST_INDEX:
         raise MeshError(f"{path}: the face in line {number} names a vertex that does not exist: `{' '.join(words[:8])}`")
     return [index - 1 if index > 0 else vertices + index for index in named]

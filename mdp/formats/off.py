@@ -39,7 +39,7 @@ def _polygons(path: Path, rows: list[tuple[int, list[str]]]) -> list[list[int]] 
         return parse_integers(path, [words[1:4] for _, words in rows], "a face").reshape(-1, 3)
     polygons = []
     for number, words in rows:
-        corners = int(words[0]) if words[0].isdecimal() else -1
+        corners = int(words[0]) if words[0].isdecimal() and len(words[0]) < 10 else -1
         if corners < 3 or len(words) <= corners:
             raise MeshError(f"{path}: the face in line {number} is malformed: `{' '.join(islice(words, 8))}`")
         polygons.append(parse_integers(path, [words[1 : corners + 1]], f"the face in line {number}").tolist())

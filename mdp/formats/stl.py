@@ -23,11 +23,14 @@ def read(path: Path) -> list[Surface]:
 
     Raises MeshError for a file that is neither kind, one that is cut short and an ASCII facet without exactly three vertices.
     """
-    text = path.read_bytes()
-    count = int.from_bytes(text[80:84], "little") if len(text) >= HEADER else -1
+    with path.open("rb") as file:
+        text = file.read(HEADER)
+        count = int.from_bytes(text[80:84], "little") if len(text) == HEADER else -1
+        ascii_likely = text.lstrip()[:5].lower() in (b"", b"solid")
+        text += file.read() if ascii_likely else file.read(min(FACET * max(count, 0) + 1, path.stat().st_size))
     if count >= 0 and len(text) == HEADER + FACET * count:
         return [_binary(path, text, count)]
-    if FACET_START.search(text) and text.lstrip()[:5].lower() == b"solid":
+    if text.lstrip()[:5].lower() == b"solid" and FACET_START.search(text):
         return [_ascii(path, text)]
     if len(text) < HEADER or b"\0" not in text:
         raise MeshError(f"{path}: is not an STL file: neither binary nor ASCII with `solid` and `facet` in it")

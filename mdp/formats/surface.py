@@ -16,6 +16,7 @@ from profiles.errors import MeshError
 Indices = NDArray[np.int64]
 # What a file may place by reference: doubled at every level, a small file would place more than any memory holds.
 MOST_PLACED = 20_000  # objects, components and nodes
+MOST_PLACED_MESHES = 2_000  # those of them that are meshes, which are united where they touch
 MOST_PLACED_FACES = 20_000_000
 
 
@@ -71,7 +72,7 @@ def parse_integers(path: Path, rows: Iterable[Iterable[str | bytes]], what: str)
     try:
         return np.fromiter(map(int, chain.from_iterable(rows)), np.int64)
     except (ValueError, OverflowError) as error:
-        raise MeshError(f"{path}: {what} holds something that is not a whole number ({error})") from None
+        raise MeshError(f"{path}: {what} holds something that is not a whole number ({str(error)[:80]})") from None
 
 
 def concatenate(pieces: list[Surface]) -> Surface:
@@ -88,7 +89,13 @@ def concatenate(pieces: list[Surface]) -> Surface:
     return Surface(np.concatenate([piece.vertices for piece in pieces]), np.concatenate(faces), colours)
 
 
-def check_placed(path: Path, placed: int, faces: int) -> None:
-    """Raises MeshError when a file places more objects, or more faces with them, than a program can hold."""
-    if placed > MOST_PLACED or faces > MOST_PLACED_FACES:
-        raise MeshError(f"{path}: places more than {MOST_PLACED} objects or {MOST_PLACED_FACES} faces by reference")
+def check_placed(path: Path, placed: int) -> None:
+    """Raises MeshError when a file places more objects than a program can follow."""
+    if placed > MOST_PLACED:
+        raise MeshError(f"{path}: places more than {MOST_PLACED} objects by reference")
+
+
+def check_meshes(path: Path, meshes: int, faces: int) -> None:
+    """Raises MeshError when a file places more meshes, or more faces with them, than a program can hold."""
+    if meshes > MOST_PLACED_MESHES or faces > MOST_PLACED_FACES:
+        raise MeshError(f"{path}: places more than {MOST_PLACED_MESHES} meshes or {MOST_PLACED_FACES} faces by reference")

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from mdp.colour import NO_COLOUR, parse_colour
-from mdp.formats.surface import Indices, Surface, check_placed, check_surface, parse_floats, parse_integers
+from mdp.formats.surface import Indices, Surface, check_meshes, check_placed, check_surface, parse_floats, parse_integers
 from mdp.mesh import Floats
 from profiles.errors import MeshError
 
@@ -36,6 +36,7 @@ DAMAGES: tuple[type[Exception], ...] = (
     struct.error,  # a mangled directory
 )
 LARGEST_MODEL_BYTES = 2**30  # a zip of a few kB can unpack to more than any memory
+MOST_MARKS = 12_000_000  # each element takes 80 bytes of memory and more; eight million triangles are below
 DEEPEST = 32  # components within components; a ring of them would never end
 _IDENTITY = np.vstack([np.eye(3), np.zeros(3)])
 
@@ -64,7 +65,10 @@ class Package:
         try:
             if self.archive.getinfo(name).file_size > LARGEST_MODEL_BYTES:
                 raise MeshError(f"{self.path}: its part {name} unpacks to more than {LARGEST_MODEL_BYTES} bytes")
-            return ElementTree.fromstring(self.archive.read(name))
+            content = self.archive.read(name)
+            if content.count(b"<") > MOST_MARKS or content.count(b"=") > 4 * MOST_MARKS:
+                raise MeshError(f"{self.path}: its part {name} has more than {MOST_MARKS} elements or too many attributes")
+            return ElementTree.fromstring(content)
         except DAMAGES as error:
             raise MeshError(f"{self.path}: its part {name} is missing or malformed ({error})") from None
 
@@ -114,7 +118,7 @@ def _place_all(package: Package) -> list[Surface]:
     while pending:
         placement = pending.pop()
         placed += 1
-        check_placed(package.path, placed, faces)
+        check_placed(package.path, placed)
         model = package.model(placement.part)
         element = model.objects.get(placement.identity)
         if element is None or placement.depth > DEEPEST:
@@ -127,6 +131,7 @@ def _place_all(package: Package) -> list[Surface]:
             surface = model.surfaces[placement.identity]
             surfaces.append(_transformed(package.path, surface, placement.transform, _unit_mm(package.path, model.root)))
             faces += len(surface.faces)
+            check_meshes(package.path, len(surfaces), faces)
             continue
         components = element.findall(f"{CORE}components/{CORE}component")
         pending += [

@@ -1,6 +1,5 @@
 """Reading: a plan's file, each of its values checked; what is wrong is one sentence with file, key, value and what is allowed."""
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite
@@ -15,6 +14,7 @@ from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.machine import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
+from profiles.toml_text import read_toml
 
 MOST_BYTES = 10_000_000
 MOST_ZONES = 1000
@@ -27,13 +27,13 @@ def read_plan(path: Path) -> PlanFile:
     try:
         if path.stat().st_size > MOST_BYTES:
             raise PlanError(f"plan {path} has more than {MOST_BYTES} bytes: it is no plan")
-        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        table = read_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise PlanError(f"plan {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
     except UnicodeDecodeError as error:
         raise PlanError(f"plan {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
-    except (ValueError, RecursionError) as error:  # tomllib's own errors are ValueErrors
-        raise PlanError(f"plan {path} is no TOML: {' '.join(str(error).split())[:200]}") from None
+    except ValueError as error:
+        raise PlanError(f"plan {path} is no TOML: {error}") from None
     return _Reader(path.name).plan(table)
 
 

@@ -71,7 +71,7 @@ def test_components_that_double_without_end_are_refused_before_they_are_placed(t
     doubled = {k: f'<components>{2 * f"""<component objectid="{k - 1}"/>"""}</components>' for k in range(2, 31)}
     objects = {1: files.threemf_mesh(tee()), **doubled}
     sentence = refusal(files.threemf(tmp_path / "a.3mf", objects, '<item objectid="30"/>'))
-    assert sentence == "places more than 20000 objects or 20000000 faces by reference"
+    assert sentence == "places more than 2000 meshes or 20000000 faces by reference"
 
 
 def _painted(path: Path, resources: str, attributes: dict[int, str], of_object: str = "") -> list[int] | None:
