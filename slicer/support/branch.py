@@ -20,6 +20,7 @@ from slicer.support.reachable import (
     carrying_area,
     dilate,
     drop_slivers,
+    widen,
 )
 
 CORNERS = 12  # of a trunk's outline
@@ -195,15 +196,20 @@ def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -
 def _tidy(places: Polygons, reachable: Polygons) -> Polygons:
     """Places whose slivers are wide enough to be followed down."""
     thick = drop_slivers(places)
-    return thick.simplify(FINE_MM) + (dilate(places - thick, THIN_MM) ^ reachable)
+    return thick.simplify(FINE_MM) + _widened(places - thick, reachable)
 
 
 def _islands_below(places: Polygons, reachable: Polygons) -> list[Polygons]:
     """The islands of places, wider where all of an island is a sliver: what is just a thin limb of one can wait."""
     islands: list[Polygons] = []
     for island in places.decompose():
-        islands += (dilate(island, THIN_MM) ^ reachable).decompose() if _sliver(island) else [island.simplify(FINE_MM)]
+        islands += _widened(island, reachable).decompose() if _sliver(island) else [island.simplify(FINE_MM)]
     return islands
+
+
+def _widened(slivers: Polygons, reachable: Polygons) -> Polygons:
+    """Slivers wide enough to be followed down."""
+    return (widen(slivers, THIN_MM) ^ reachable).simplify(FINE_MM)
 
 
 def _sliver(island: Polygons) -> bool:

@@ -26,6 +26,7 @@ EVEN_MM = 1e-6  # heights nearer than this are equal
 SPECK_MM2 = 4.0 * SLIVER_MM**2  # no place that is no sliver is smaller
 LEAST_MM2 = 1e-5  # places smaller than this are rounding
 STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
+WIDEST = 1.3  # times the distance: how far corners of widened places may reach; sharper ones than 100 degrees are cut off
 SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
 
 
@@ -47,6 +48,14 @@ class ReachableAreas:
 def dilate(area: Polygons, distance_mm: float) -> Polygons:
     """The area grown with round corners by at most a distance."""
     return offset_round(area, distance_mm, SEGMENTS) if distance_mm > 0.0 else area
+
+
+def widen(area: Polygons, distance_mm: float) -> Polygons:
+    """The area grown by at least a distance, with hardly more corners than it has.
+
+    What is grown layer after layer must not get round corners: each of them would be two in the next layer.
+    """
+    return offset(area, distance_mm, WIDEST)
 
 
 def only_slivers(places: Polygons) -> bool:
@@ -73,7 +82,7 @@ def carrying_area(places: Polygons, reachable: Polygons, ground: Polygons, lean_
     if rest.area() < LEAST_MM2:
         return straight
     for share in STEPS:
-        aside = dilate(rest, share * lean_mm) ^ reachable
+        aside = widen(rest, share * lean_mm) ^ reachable
         if share == STEPS[-1] or (rest - dilate(aside, lean_mm)).area() < LEAST_MM2:
             break
     return straight + aside
