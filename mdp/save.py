@@ -28,6 +28,11 @@ _MODEL = (
 )
 
 
+FOLDER_FILES = ("decomposition.3mf", "decomposition.json", "plan.toml")  # beside the parts in a folder that is asked for
+PART_FILES = "part-[0-9][0-9]*.stl"  # what part_file gives
+HEADING = b"tiltprint part"  # of the STL files that stl() gives
+
+
 def part_file(index: int) -> str:
     """File name of a part's STL."""
     return f"part-{index:02d}.stl"
@@ -38,7 +43,7 @@ def stl(mesh: Mesh) -> bytes:
     facets = np.zeros(len(mesh.faces), _STL)
     facets["normal"] = mesh.normals
     facets["corners"] = mesh.vertices[mesh.faces]
-    return b"tiltprint part".ljust(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
+    return HEADING.ljust(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
 
 
 def threemf(decomposition: Decomposition) -> bytes:

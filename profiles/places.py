@@ -44,7 +44,7 @@ def kind_of(name: str) -> str:
     for kind in KINDS:
         if name in known(kind):
             return kind
-    if not _is_path(name):
+    if not is_file_name(name):
         raise _unknown("profile", name, (each for kind in KINDS for each in known(kind)))
     return kind_in(Path(name))
 
@@ -137,7 +137,7 @@ def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, An
     if name in shipped(kind):
         source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
         return read_toml(source.read_text(encoding="utf-8")), name
-    if _is_path(name):
+    if is_file_name(name):
         return parse(Path(name)), str(Path(name).resolve())
     raise _unknown(f"{kind} profile", name, known(kind))
 
@@ -151,5 +151,6 @@ def _unknown(what: str, name: str, names: Iterable[str]) -> ProfileError:
     )
 
 
-def _is_path(name: str) -> bool:
+def is_file_name(name: str) -> bool:
+    """Whether a profile is named by its file."""
     return bool(name) and (Path(name).suffix == ".toml" or os.path.exists(name))

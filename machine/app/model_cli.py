@@ -72,11 +72,12 @@ def decompose(
     from machine.app.commands.decompose import decompose
 
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
+    names = (machine, material, process)
     known = plan is not None and exists(plan)
     written = None if known else plan
     outputs = Outputs(folder=out, json=json, html=html, png=png, sheet=sheet, front=front, record=record, plan=written)
     cuts = Cuts(plan if known else None, parts, planes)
-    return decompose(ModelRequest(model, profile, ranker=ranker, orient=orient, outputs=outputs, cuts=cuts))
+    return decompose(ModelRequest(model, profile, ranker=ranker, orient=orient, outputs=outputs, cuts=cuts, profile_names=names))
 
 
 def export(
@@ -107,9 +108,20 @@ def export(
     from machine.app.commands.export import export
 
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
+    names = (machine, material, process)
     outputs = Outputs(gcode=out, json=json, html=html, svg=svg, layer=layer)
     cuts = Cuts(plan, parts)
-    request = ModelRequest(model, profile, ranker=ranker, orient=orient, outputs=outputs, compare=compare, force=force, cuts=cuts)
+    request = ModelRequest(
+        model,
+        profile,
+        ranker=ranker,
+        orient=orient,
+        outputs=outputs,
+        compare=compare,
+        force=force,
+        cuts=cuts,
+        profile_names=names,
+    )
     return export(request)
 
 
@@ -140,9 +152,11 @@ def simulate(
     from machine.app.commands.simulate import simulate
 
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
+    names = (machine, material, process)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
     outputs = Outputs(json=json, html=html)
-    return simulate(ModelRequest(model, profile, chosen, ranker, orient, outputs, cuts=Cuts(plan, parts)), reference, baud)
+    request = ModelRequest(model, profile, chosen, ranker, orient, outputs, cuts=Cuts(plan, parts), profile_names=names)
+    return simulate(request, reference, baud)
 
 
 def view(
@@ -169,8 +183,19 @@ def view(
     from machine.app.commands.view import view
 
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
+    names = (machine, material, process)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
-    request = ModelRequest(model, profile, chosen, ranker, orient, Outputs(html=out), compare, cuts=Cuts(plan, parts))
+    request = ModelRequest(
+        model,
+        profile,
+        chosen,
+        ranker,
+        orient,
+        Outputs(html=out),
+        compare,
+        cuts=Cuts(plan, parts),
+        profile_names=names,
+    )
     return view(request, open_)
 
 

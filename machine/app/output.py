@@ -9,10 +9,9 @@ from os.path import exists, isdir, isfile, islink  # pathlib's raise for a name 
 from pathlib import Path
 from typing import Any
 
+from machine.app.file_roles import STDOUT
 from machine.app.requests import Outputs
 from profiles.errors import OutputError
-
-STDOUT = Path("-")
 
 
 def check_writable(path: Path) -> None:
@@ -93,6 +92,14 @@ def write_bytes(path: Path, content: bytes) -> None:
             _replace(path.resolve(), content)
     except OSError as error:
         raise _not_written(path, error) from None
+
+
+def delete(path: Path) -> None:
+    """Delete a file. Raises OutputError."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"output {path} cannot be deleted: {(error.strerror or str(error)).lower()}") from None
 
 
 def write_lines(path: Path, lines: Iterable[str]) -> None:

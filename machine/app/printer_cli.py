@@ -71,8 +71,9 @@ def print_(
     from machine.app.commands.print import print_model
 
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
+    names = (machine, material, process)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
-    request = ModelRequest(model, profile, chosen, ranker, orient, force=force, cuts=Cuts(plan, parts))
+    request = ModelRequest(model, profile, chosen, ranker, orient, force=force, cuts=Cuts(plan, parts), profile_names=names)
     return print_model(request, PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port)))
 
 

@@ -51,6 +51,7 @@ class ModelRequest:
 
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
     model down the best way first. compare: with the same model in one part. force: go on although the dry run found errors.
+    profile_names: of machine, material and process as the user has given them, names or files.
     """
 
     model: str
@@ -62,6 +63,7 @@ class ModelRequest:
     compare: bool = False
     force: bool = False
     cuts: Cuts = Cuts()
+    profile_names: tuple[str | None, ...] = ()
 
     @property
     def name(self) -> str:

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from machine.app.output import STDOUT, check_outputs, make_folder, write_bytes, write_json
+from machine.app.file_roles import STDOUT, check_model_files
+from machine.app.output import check_outputs, delete, make_folder, write_bytes, write_json
 from machine.app.pictures.front_picture import front_picture
 from machine.app.pictures.picture import contact_sheet, parts_picture
 from machine.app.pictures.png import write_png
@@ -14,16 +15,17 @@ from machine.app.terminal.report import part_settings_lines, parts_table, show
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
 from mdp.plans.writing import plan_text
-from mdp.save import json_values, part_file, stl, threemf
+from mdp.save import FOLDER_FILES, HEADING, PART_FILES, json_values, part_file, stl, threemf
 from profiles.profile import Profile
 
-PLAN = "plan.toml"
+MODEL, FIGURES, PLAN = FOLDER_FILES
 
 
 def decompose(request: ModelRequest) -> int:
     """Find the parts of a model and save what is asked for."""
     outputs = request.outputs
     check_outputs(outputs)
+    check_model_files(request, ())
     decomposed = decompose_model(request)
     decomposition, profile = decomposed.decomposition, decomposed.profile
     figures = json_values(decomposition, decomposed.read_s, decomposed.total_s)
@@ -31,8 +33,9 @@ def decompose(request: ModelRequest) -> int:
         make_folder(outputs.folder)
         for part in decomposition.parts:
             write_bytes(outputs.folder / part_file(part.index), stl(part.mesh))
-        write_bytes(outputs.folder / "decomposition.3mf", threemf(decomposition))
-        write_json(outputs.folder / "decomposition.json", figures)
+        _drop_earlier_parts(outputs.folder, len(decomposition.parts))
+        write_bytes(outputs.folder / MODEL, threemf(decomposition))
+        write_json(outputs.folder / FIGURES, figures)
     for file in (outputs.plan, None if outputs.folder is None else outputs.folder / PLAN):
         if file is not None and not _is_same(file, request.cuts.plan):
             write_bytes(file, plan_text(decomposed.plan).encode())
@@ -45,6 +48,14 @@ def decompose(request: ModelRequest) -> int:
         made = parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
         show(made + part_settings_lines(profile) + advice(decomposition, decomposed.better, profile))
     return 0
+
+
+def _drop_earlier_parts(folder: Path, parts: int) -> None:
+    """Delete the parts that an earlier run has left beside the new ones; files of other programs stay."""
+    now = {part_file(index) for index in range(1, parts + 1)}
+    for file in folder.glob(PART_FILES):
+        if file.name not in now and file.is_file() and file.open("rb").read(len(HEADING)) == HEADING:
+            delete(file)
 
 
 def _is_same(file: Path, plan: Path | None) -> bool:

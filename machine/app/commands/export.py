@@ -1,6 +1,7 @@
 """The export command: a model's G-code, dry-run first."""
 
-from machine.app.output import STDOUT, check_outputs, write_bytes, write_json, write_lines
+from machine.app.file_roles import STDOUT, check_model_files
+from machine.app.output import check_outputs, write_bytes, write_json, write_lines
 from machine.app.pictures.layer import draw_layer, parse_layer
 from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
 from machine.app.pipeline.pipeline import build, decompose_model
@@ -22,6 +23,7 @@ def export(request: ModelRequest) -> int:
     if outputs.gcode == outputs.json == STDOUT:
         raise OutputError("-o - and --json -: only one of them can go to standard output")
     check_outputs(outputs)
+    check_model_files(request, ())
     part, layer = parse_layer(outputs.layer, outputs.svg is not None)
     decomposed = decompose_model(request, to_build=True)
     profile = decomposed.profile

@@ -3,9 +3,11 @@
 from dataclasses import replace
 from pathlib import Path
 
+from machine.app.file_roles import check_model_files, printing_files, program_beside
 from machine.app.output import check_writable
 from machine.app.pipeline.programs import load_program, refuse_errors
 from machine.app.printer.compatibility import check_dialect, check_port, check_printer, check_program, is_rate_limited
+from machine.app.printer.journal_folder import check_new_journal
 from machine.app.printer.stream import PrintJob, print_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
@@ -18,6 +20,9 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     for file in (printing.log, printing.journal):
         if file is not None:
             check_writable(file)
+    check_model_files(request, printing_files(printing))
+    if printing.journal is not None:
+        check_new_journal(printing.journal, None if request.is_gcode else program_beside(printing.journal))
     check_baud(printing.baud)
     answer = check_port(printing.port, printing.baud, printing.sim_speed)
     if not request.is_gcode:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import hypot
 from pathlib import Path
 
+from machine.app.file_roles import check_roles, printing_files
 from machine.app.printer.compatibility import check_dialect
 from machine.app.printer.journal_folder import continue_journal
 from machine.app.printer.serial_log import new_log
@@ -47,6 +48,7 @@ def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, 
     profile = _profile(journal, story.heading, named)
     check_dialect(profile.machine)
     text = _program(journal, story)
+    check_roles((("the journal", journal), ("its program", text.path)), printing_files(printing))
     point = read_interrupted_print(text, story.last, profile, dialect_of(profile.machine).longest_line)
     lines = tuple(text)
     _describe(story, point, profile, len(lines))

@@ -1,8 +1,10 @@
 """The simulate command: the dry run of a model or a G-code file, its plastic held against the model."""
 
 from dataclasses import asdict, replace
+from pathlib import Path
 
-from machine.app.output import STDOUT, check_outputs, write_bytes, write_json
+from machine.app.file_roles import STDOUT, check_model_files
+from machine.app.output import check_outputs, write_bytes, write_json
 from machine.app.pipeline.programs import load_program
 from machine.app.requests import ModelRequest
 from machine.app.terminal.report import agreement_line, part_settings_lines, run_table, show
@@ -21,6 +23,7 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     """
     outputs = request.outputs
     check_outputs(outputs)
+    check_model_files(request, (), ("--model", None if reference is None else Path(reference)))
     if baud is not None:
         check_baud(baud)
     if reference is not None:

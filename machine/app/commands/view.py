@@ -3,6 +3,7 @@
 import webbrowser
 from pathlib import Path
 
+from machine.app.file_roles import check_model_files
 from machine.app.output import check_writable, write_bytes
 from machine.app.pipeline.comparison import compare_with_one_part
 from machine.app.pipeline.programs import load_program
@@ -20,6 +21,7 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
     """Write the page, and show it in the browser where asked; what the dry run finds is shown in it and stops nothing."""
     path = request.outputs.html or _default_page(request.name)
     check_writable(path)
+    check_model_files(request, () if request.outputs.html else (("page", path),))
     if request.compare and request.is_gcode:
         raise ProfileError(f"--compare goes with a model: {request.model} is G-code, which prints in one way only")
     loaded = load_program(request)

@@ -3,8 +3,10 @@
 import os
 from collections.abc import Iterable
 from datetime import datetime
+from os.path import lexists
 from pathlib import Path
 
+from machine.app.file_roles import PROGRAM, program_beside
 from machine.app.output import write_lines
 from machine.app.state_folder import state_folder
 from machine.link.journal import Journal, JournalHeading
@@ -13,7 +15,6 @@ from profiles.errors import OutputError
 from profiles.profile import Profile
 
 KEPT = 20
-PROGRAM = ".gcode"
 
 
 def new_journal(
@@ -25,9 +26,18 @@ def new_journal(
     """
     path = file if file is not None else _new_path(name)
     if source is None:
-        source = path.with_name(path.name + PROGRAM)
+        source = program_beside(path)
+        if file is not None:
+            check_new_journal(file, source)
         write_lines(source, tuple(lines))
     return continue_journal(GcodeFile(source.resolve()), profile, name, path)
+
+
+def check_new_journal(file: Path, program: Path | None = None) -> None:
+    """Refuse a journal that is there, or whose program is: it belongs to another print, which may yet be resumed."""
+    for there in (file, *([] if program is None else [program])):
+        if lexists(there):
+            raise OutputError(f"journal {file}: {there} exists already: each print has one of its own, choose another name")
 
 
 def continue_journal(program: GcodeFile, profile: Profile, name: str, file: Path | None = None) -> Journal:
