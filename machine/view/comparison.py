@@ -1,7 +1,8 @@
 """Comparison: what one way to print a model costs, to be held against other ways."""
 
 import shlex
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from machine.view.parts import page_colours
@@ -11,7 +12,8 @@ from mdp.decomposition import Decomposition
 @dataclass(frozen=True)
 class Alternative:
     """One way to print a model. risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm:
-    length of the seams between parts; message: why it cannot be printed so, or ""."""
+    length of the seams between parts; interface_mm3: plastic that one piece would not have, by the part that stands
+    there; message: why it cannot be printed so, or ""."""
 
     name: str
     orientation: str
@@ -24,6 +26,7 @@ class Alternative:
     message: str = ""
     unsupported_mm2: float | None = None
     seam_mm: float = 0.0
+    interface_mm3: Mapping[int, float] = field(default_factory=dict)
 
 
 def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:

@@ -15,3 +15,12 @@ class Program:
     run: DryRun
     decomposition: Decomposition | None
     sliced: tuple[SlicedPart, ...] = ()
+
+    @property
+    def interface_mm3(self) -> dict[int, float]:
+        """Plastic that there would not be if the model were in one piece, by the part that stands on it; {} where not known."""
+        more: dict[int, float] = {}
+        for piece in self.sliced:
+            for index, mm3 in piece.interface_mm3.items():
+                more[index] = more.get(index, 0.0) + mm3
+        return dict(sorted(more.items()))

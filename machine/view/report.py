@@ -30,6 +30,8 @@ MOVES = {
     MoveKind.TRAVEL: "travel", MoveKind.RETRACT: "retraction", PRIME: "prime", WIPE: "wipe", MoveKind.ROTATE: "turning the table",
 }  # fmt: skip
 UNTOLD = "not told"
+STANDS_ON = "base cm³"
+CUT = "base: plastic where the part stands on earlier ones that one piece would not have"
 RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
 
 
@@ -84,14 +86,16 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
     parsed, seconds = program.run.program, np.diff(ends_s, prepend=0.0)
     decomposition = program.decomposition
     solids = {part.index: _solid(part, profile) for part in decomposition.parts} if decomposition is not None else {}
+    interfaces = program.interface_mm3
     rows = []
     for index in parsed.parts or (0,):
         mine = parsed.part == index
         count = int((parsed.part[layers.first] == index).sum())
         figures = [str(count), duration(float(seconds[mine].sum())), f"{filament_g(parsed.e_mm[mine], profile.material):.1f}"]
-        rows.append([*solids.get(index, [str(index) if index else "all"]), *figures])
-    head = SOLID if solids else SOLID[:1]
-    return _table("Parts", [*head, "layers", "time", "g"], rows, [RISKY] if solids else [])
+        stands_on = [f"{interfaces.get(index, 0.0) / 1000:.2f}"] if interfaces else []
+        rows.append([*solids.get(index, [str(index) if index else "all"]), *figures, *stands_on])
+    head = [*(SOLID if solids else SOLID[:1]), "layers", "time", "g", *([STANDS_ON] if interfaces else [])]
+    return _table("Parts", head, rows, [RISKY] * bool(solids) + [CUT] * bool(interfaces))
 
 
 def _front(decomposition: Decomposition) -> list[Table]:
@@ -158,13 +162,14 @@ def _alternatives(alternatives: Sequence[Alternative]) -> Table:
     """This print beside the model in one part: time, filament, support, risky area."""
     rows = []
     for each in alternatives:
-        costs = ["-"] * 4
+        costs = ["-"] * 5
         if each.time_s is not None:
             filament_mm, mass_g, support_mm3 = each.filament_mm or 0.0, each.filament_g or 0.0, each.support_mm3 or 0.0
-            costs = [duration(each.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", f"{support_mm3 / 1000:.2f}"]
+            volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(each.interface_mm3.values()) / 1000:.2f}"]
+            costs = [duration(each.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes]
         rows.append([each.name, *costs, f"{max(each.risky_mm2, 0.0):.1f}"])
     notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
-    return _table("Compared", ["print", "time", "m", "g", "support cm³", "risky mm²"], rows, notes)
+    return _table("Compared", ["print", "time", "m", "g", "support cm³", "interfaces cm³", "risky mm²"], rows, notes)
 
 
 def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:

@@ -8,7 +8,7 @@ from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
 from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import say
-from machine.app.terminal.report import part_settings_lines, run_table, show
+from machine.app.terminal.report import print_table, show
 from machine.dryrun.dryrun import summary
 from machine.view.page import print_page
 from profiles.errors import OutputError
@@ -40,7 +40,7 @@ def export(request: ModelRequest) -> int:
     if outputs.json is not None:
         comparison = {"compare": alternatives_json(alternatives)} if alternatives else {}
         write_json(outputs.json, summary(program.run) | comparison)
-    table = run_table(program.run) + part_settings_lines(profile) + (compare_table(alternatives) if alternatives else "")
+    table = print_table(program, profile) + (compare_table(alternatives) if alternatives else "")
     if outputs.gcode == STDOUT:
         say(table.removesuffix("\n"))
     elif outputs.json != STDOUT:

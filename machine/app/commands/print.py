@@ -11,7 +11,7 @@ from machine.app.printer.journal_folder import check_new_journal
 from machine.app.printer.stream import PrintJob, print_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
-from machine.app.terminal.report import part_settings_lines, run_table, show
+from machine.app.terminal.report import print_table, show
 from machine.dryrun.starvation import check_baud, find_starvation
 
 
@@ -37,7 +37,7 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     refuse_errors(program, request.force)
     if is_rate_limited(printing.port):
         program = replace(program, run=find_starvation(program.run, program.lines, profile.machine, printing.baud))
-    show(run_table(program.run) + part_settings_lines(profile))
+    show(print_table(program, profile))
     job = PrintJob(request.name, program, profile, Path(request.model) if request.is_gcode else None)
     with serve_watch_page(job.name, program, profile, printing.watch_port) as watchers:
         code = print_program(job, printing, watchers.follow)

@@ -7,7 +7,7 @@ from machine.app.file_roles import STDOUT, check_model_files
 from machine.app.output import check_outputs, write_bytes, write_json
 from machine.app.pipeline.programs import load_program
 from machine.app.requests import ModelRequest
-from machine.app.terminal.report import agreement_line, part_settings_lines, run_table, show
+from machine.app.terminal.report import agreement_line, print_table, show
 from machine.dryrun.agreement import agreement
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import check_baud, find_starvation
@@ -46,5 +46,5 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     if outputs.json is not None:
         write_json(outputs.json, summary(program.run) | ({} if agreed is None else {"model": asdict(agreed)}))
     if outputs.json != STDOUT:
-        show(run_table(program.run) + part_settings_lines(profile) + ("" if agreed is None else agreement_line(agreed)))
+        show(print_table(program, profile) + ("" if agreed is None else agreement_line(agreed)))
     return 1 if program.run.errors else 0

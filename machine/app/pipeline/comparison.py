@@ -102,6 +102,7 @@ def _figures(name: str, orientation: str, parts: int, program: Program, risky_mm
         message=run.errors[0].message if run.errors else "",
         unsupported_mm2=sum(area_mm2 for _, _, area_mm2, _ in run.program.unsupported),
         seam_mm=seam_mm,
+        interface_mm3=program.interface_mm3,
     )
 
 
@@ -118,6 +119,7 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
             "support_area_mm2": each.risky_mm2,
             "unsupported_area_mm2": each.unsupported_mm2,
             "seam_mm": each.seam_mm,
+            "interfaces": [{"part": part, "plastic_mm3": mm3} for part, mm3 in each.interface_mm3.items()],
             "message": each.message,
         }
         for name, each in zip(NAMES, alternatives, strict=True)
@@ -126,7 +128,7 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
 
 def compare_table(alternatives: tuple[Alternative, ...]) -> str:
     """The alternatives for a person."""
-    rows = [["print", "time", "filament", "mass", "support", "risky area"]]
+    rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
     rows += [[each.name, *_costs(each), f"{each.risky_mm2:.1f} mm2"] for each in alternatives]
     head, *lines = table(rows).splitlines()
     notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
@@ -134,9 +136,10 @@ def compare_table(alternatives: tuple[Alternative, ...]) -> str:
 
 
 def _costs(alternative: Alternative) -> list[str]:
-    """Time, filament, mass and support; dashes where it cannot be printed."""
+    """Time, filament, mass, support and interfaces; dashes where it cannot be printed."""
     if alternative.time_s is None:
-        return ["-"] * 4
+        return ["-"] * 5
     filament_m, support_cm3 = (alternative.filament_mm or 0.0) / 1000, (alternative.support_mm3 or 0.0) / 1000
     mass = f"{alternative.filament_g or 0.0:.1f} g"
-    return [duration(alternative.time_s), f"{filament_m:.2f} m", mass, f"{support_cm3:.2f} cm3"]
+    volumes = [f"{support_cm3:.2f} cm3", f"{sum(alternative.interface_mm3.values()) / 1000:.2f} cm3"]
+    return [duration(alternative.time_s), f"{filament_m:.2f} m", mass, *volumes]

@@ -1,12 +1,13 @@
 """Report: the tables that the commands print on stdout."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from textwrap import wrap
 
 from machine.dryrun.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.view.parts import risky_before_mm2
+from machine.view.program import Program
 from machine.view.quantities import duration, minutes
 from mdp.decomposition import Decomposition, FrontRow
 from profiles.profile import Profile
@@ -67,6 +68,11 @@ def _number(area_mm2: float) -> str:
     return f"{max(area_mm2, 0.0):.1f}"
 
 
+def print_table(program: Program, profile: Profile) -> str:
+    """What there is to say of a print: its dry run, what its cuts take, the settings of single parts."""
+    return run_table(program.run) + interfaces_line(program.interface_mm3) + part_settings_lines(profile)
+
+
 def run_table(run: DryRun) -> str:
     """What a dry run found."""
     values = summary(run)
@@ -98,6 +104,16 @@ def _wrap_finding(severity: str, message: str) -> list[str]:
     indent = " " * len(f"{severity}: ")
     lines = wrap(message, WIDEST, initial_indent=f"{severity}: ", subsequent_indent=indent, break_long_words=False)
     return [line.replace(NO_BREAK, " ") for line in lines]
+
+
+def interfaces_line(interface_mm3: Mapping[int, float]) -> str:
+    """What cutting costs in plastic, by the part that stands on each interface; nothing for a model in one piece."""
+    if not interface_mm3:
+        return ""
+    each = ", ".join(f"part{NO_BREAK}{index} {mm3 / 1000:.2f}" for index, mm3 in interface_mm3.items())
+    sentence = f"interfaces take {sum(interface_mm3.values()) / 1000:.2f} cm3 that one piece would not: {each}"
+    lines = wrap(sentence, WIDEST, subsequent_indent="  ", break_long_words=False)
+    return "\n".join(lines).replace(NO_BREAK, " ") + "\n"
 
 
 def agreement_line(agreed: Agreement) -> str:

@@ -51,3 +51,5 @@ def test_table_and_json_hold_the_same_figures() -> None:
     assert f"{rows[1]['support_area_mm2']:.1f} mm2" in lines[3]
     assert [row["time_s"] for row in rows] == [each.time_s for each in found]
     assert rows[0]["seam_mm"] > 0.0 == rows[1]["seam_mm"] == rows[2]["seam_mm"]
+    assert [(each["part"], each["plastic_mm3"] > 0.0) for each in rows[0]["interfaces"]] == [(2, True)]
+    assert rows[1]["interfaces"] == rows[2]["interfaces"] == []

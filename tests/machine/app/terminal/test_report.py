@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machine.app.terminal.report import front_table, parts_table, run_table, table
+from machine.app.terminal.report import front_table, interfaces_line, parts_table, run_table, table
 from machine.dryrun.dryrun import dry_run
 from machine.view.quantities import duration
 from mdp.cut import cut, mesh_of, solid_of
@@ -126,3 +126,9 @@ def test_a_duration_is_hours_minutes_seconds(seconds: float, told: str) -> None:
 
 def test_a_table_aligns_words_left_and_numbers_right() -> None:
     assert table([["part", "mm"], ["1", "10.5"]]) == "part    mm\n1     10.5\n"
+
+
+def test_the_plastic_of_every_interface_is_told_and_of_one_piece_none() -> None:
+    told = interfaces_line({2: 174.0, 3: 301.0})
+    assert told == "interfaces take 0.47 cm3 that one piece would not: part 2 0.17, part 3 0.30\n"
+    assert interfaces_line({}) == ""
