@@ -64,7 +64,7 @@ def test_a_file_without_permission_is_named(tmp_path: Path, monkeypatch: pytest.
     def denied(path: Path) -> bytes:
         raise PermissionError(13, "Permission denied", str(path))
 
-    path = files.written(tmp_path / "a.stl", tee())
+    path = files.written(tmp_path / "a.ply", tee())
     monkeypatch.setattr(Path, "read_bytes", denied)
     assert "cannot be read: Permission denied" in refusal(path)
 
