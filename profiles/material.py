@@ -66,4 +66,11 @@ class Material(Frozen):
     prime_extra_mm: float = Field(
         0.0, ge=0, le=10, description="filament pushed beyond what was retracted after a reorientation, mm"
     )
+    pressure_advance: float | None = Field(
+        None,
+        ge=0,
+        le=2,
+        description="how much the extruder runs ahead of pressure, s: Marlin's M900 K, Klipper's SET_PRESSURE_ADVANCE, "
+        "RepRapFirmware's M572; absent: what the firmware has",
+    )
     volumetric_limit_mm3_s: float = Field(gt=0, le=200, description="most plastic the hot end melts, mm3/s")

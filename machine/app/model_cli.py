@@ -10,6 +10,7 @@ import typer
 from machine.app.requests import Cuts, ModelRequest, Outputs
 from machine.app.terminal.options import (
     BeamWidth,
+    FilamentChanges,
     Force,
     HtmlFile,
     JsonFile,
@@ -22,6 +23,7 @@ from machine.app.terminal.options import (
     Orient,
     PartSettingsGiven,
     PartsGiven,
+    Pauses,
     PlanGiven,
     ProcessGiven,
     ProcessName,
@@ -91,6 +93,8 @@ def export(
     plan: PlanGiven = None,
     parts: PartsGiven = None,
     part: PartSettingsGiven = None,
+    pause: Pauses = None,
+    filament_change: FilamentChanges = None,
     json: JsonFile = None,
     svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer, see --layer")] = None,
     html: HtmlFile = None,
@@ -106,7 +110,9 @@ def export(
 ) -> int:
     """Write the G-code of a model, dry-run first."""
     from machine.app.commands.export import export
+    from machine.planning.stops import parse_stops
 
+    stops = parse_stops(pause or (), filament_change or ())
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     names = (machine, material, process)
     outputs = Outputs(gcode=out, json=json, html=html, svg=svg, layer=layer)
@@ -120,6 +126,7 @@ def export(
         compare=compare,
         force=force,
         cuts=cuts,
+        stops=stops,
         profile_names=names,
     )
     return export(request)
@@ -135,6 +142,8 @@ def simulate(
     plan: PlanGiven = None,
     parts: PartsGiven = None,
     part: PartSettingsGiven = None,
+    pause: Pauses = None,
+    filament_change: FilamentChanges = None,
     json: JsonFile = None,
     reference: Annotated[
         str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
@@ -150,12 +159,16 @@ def simulate(
 ) -> int:
     """Dry-run a model or a G-code file. The plastic is held against the model; exit 1 when a finding is an error."""
     from machine.app.commands.simulate import simulate
+    from machine.planning.stops import parse_stops
 
+    stops = parse_stops(pause or (), filament_change or ())
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     names = (machine, material, process)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
     outputs = Outputs(json=json, html=html)
-    request = ModelRequest(model, profile, chosen, ranker, orient, outputs, cuts=Cuts(plan, parts), profile_names=names)
+    request = ModelRequest(
+        model, profile, chosen, ranker, orient, outputs, cuts=Cuts(plan, parts), stops=stops, profile_names=names
+    )
     return simulate(request, reference, baud)
 
 
@@ -173,6 +186,8 @@ def view(
     plan: PlanGiven = None,
     parts: PartsGiven = None,
     part: PartSettingsGiven = None,
+    pause: Pauses = None,
+    filament_change: FilamentChanges = None,
     compare: Annotated[bool, typer.Option("--compare", help="tell also time and material printed in one part")] = False,
     machine: MachineGiven = None,
     material: MaterialGiven = None,
@@ -181,7 +196,9 @@ def view(
 ) -> int:
     """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
     from machine.app.commands.view import view
+    from machine.planning.stops import parse_stops
 
+    stops = parse_stops(pause or (), filament_change or ())
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     names = (machine, material, process)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
@@ -194,6 +211,7 @@ def view(
         Outputs(html=out),
         compare,
         cuts=Cuts(plan, parts),
+        stops=stops,
         profile_names=names,
     )
     return view(request, open_)

@@ -10,6 +10,7 @@ from machine.app.requests import ConsoleRequest, Cuts, ModelRequest, PrintReques
 from machine.app.terminal.options import (
     Baud,
     BeamWidth,
+    FilamentChanges,
     LogFile,
     MachineGiven,
     MachineName,
@@ -18,6 +19,7 @@ from machine.app.terminal.options import (
     Orient,
     PartSettingsGiven,
     PartsGiven,
+    Pauses,
     PlanGiven,
     PortOrSim,
     ProcessGiven,
@@ -48,6 +50,8 @@ def print_(
     plan: PlanGiven = None,
     parts: PartsGiven = None,
     part: PartSettingsGiven = None,
+    pause: Pauses = None,
+    filament_change: FilamentChanges = None,
     speed: SimSpeed = 0.0,
     watch: Watch = False,
     watch_port: WatchPort = None,
@@ -69,11 +73,15 @@ def print_(
     Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
     """
     from machine.app.commands.print import print_model
+    from machine.planning.stops import parse_stops
 
+    stops = parse_stops(pause or (), filament_change or ())
     profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
     names = (machine, material, process)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
-    request = ModelRequest(model, profile, chosen, ranker, orient, force=force, cuts=Cuts(plan, parts), profile_names=names)
+    request = ModelRequest(
+        model, profile, chosen, ranker, orient, force=force, cuts=Cuts(plan, parts), stops=stops, profile_names=names
+    )
     return print_model(request, PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port)))
 
 

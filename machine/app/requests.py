@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from machine.planning.stops import Stop
     from profiles.profile import Profile
 
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
@@ -52,6 +53,7 @@ class ModelRequest:
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
     model down the best way first. compare: with the same model in one part. force: go on although the dry run found errors.
     profile_names: of machine, material and process as the user has given them, names or files.
+    stops: where the print waits for a person.
     """
 
     model: str
@@ -64,6 +66,7 @@ class ModelRequest:
     force: bool = False
     cuts: Cuts = Cuts()
     profile_names: tuple[str | None, ...] = ()
+    stops: "tuple[Stop, ...]" = ()
 
     @property
     def name(self) -> str:

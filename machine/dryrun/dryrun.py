@@ -20,7 +20,7 @@ from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.paths import Kind
 
-STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1")
+STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1", "M226", "M600")
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,9 @@ class Dialect:
     modes: tuple[str, ...] = ("G21", "G90", "M83")  # said again after the start block, whatever that has left
     progress: str = ""  # {} percent, {} minutes left
     acceleration: str = ""  # {} of strokes, {} of travels, mm/s2
+    pressure_advance: str = ""  # {} of the extruder, s
+    pause: str = "M0"  # waits for a person
+    filament_change: str = "M0"  # the same, with what the firmware does for another filament
     layer: str = ""  # {} layer of all layers, from 1
     before_start: tuple[str, ...] = ()
     after_start: tuple[str, ...] = ()

@@ -30,6 +30,9 @@ STEPPERS = Dialect(
     fan_on="M106 S{}",
     progress="M73 P{} R{}",
     acceleration="SET_VELOCITY_LIMIT ACCEL={}",  # M204 P T would take the lesser of the two for all moves
+    pressure_advance="SET_PRESSURE_ADVANCE ADVANCE={}",
+    pause="PAUSE",
+    filament_change="PAUSE",
     layer="SET_PRINT_STATS_INFO CURRENT_LAYER={}",
     before_start=("SET_PRINT_STATS_INFO TOTAL_LAYER={layers}",),
     part="EXCLUDE_OBJECT_DEFINE NAME=part_{number}",
@@ -99,7 +102,9 @@ SIMULATED = SimulationRules(
     position=position_report,
     temperatures=temperature_report,
     while_heating="",
-    lacks=frozenset({"M108", "M113", "M116", "M154", "M155", "M211", "M302", "M410", "M486", "M568", "M665", "M876", "G43.4"}),
+    lacks=frozenset(
+        {"M108", "M113", "M116", "M154", "M155", "M211", "M302", "M410", "M486", "M568", "M572", "M665", "M876", "M900", "G43.4"}
+    ),
 )
 
 KLIPPER = Firmware(

@@ -17,6 +17,8 @@ DIALECT = Dialect(
     fan_on="M106 S{}",
     progress="M73 P{} R{}",
     acceleration="M204 P{} T{}",
+    pressure_advance="M900 K{}",
+    filament_change="M600",
     parts="M486 T{parts}",
     part_begin="M486 S{index}",
     part_end="M486 S-1",
@@ -43,7 +45,7 @@ SIMULATED = SimulationRules(
     kill=("Error:Printer halted. kill() called!", "//action:poweroff"),
     reports_position=True,
     has_build_options=True,
-    lacks=frozenset({"M116", "M568"}),
+    lacks=frozenset({"M116", "M568", "M572"}),
 )
 
 MARLIN = Firmware(

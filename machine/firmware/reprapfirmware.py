@@ -21,6 +21,9 @@ DIALECT = Dialect(
     fan_full=1,
     progress="M73 P{} R{}",
     acceleration="M204 P{} T{}",
+    pressure_advance="M572 D0 S{}",
+    pause="M226",
+    filament_change="M600",
     parts="M486 T{parts}",
     part_begin='M486 S{index} A"part {number}"',
     part_end="M486 S-1",
@@ -49,7 +52,7 @@ SIMULATED = SimulationRules(
     unhomed="Error: G0/G1: insufficient axes homed",
     kill=("Error: Emergency Stop! Reset the controller to continue.",),
     position=position_report,
-    lacks=frozenset({"M154", "M155", "M113", "M876"}),
+    lacks=frozenset({"M154", "M155", "M113", "M876", "M900"}),
 )
 
 REPRAPFIRMWARE = Firmware(

@@ -9,7 +9,20 @@ from machine.gcode.modes import COMMANDS, E_AXIS, Axes, Modes
 from machine.gcode.words import read_letters, read_number, read_values, read_words, split_command
 
 MOVES = frozenset({"G0", "G1", "G2", "G3"})
-SETTINGS = ("M200", "M201", "M203", "M204", "M205", "M207", "M220", "M221", "SET_VELOCITY_LIMIT", "M900")
+SETTINGS = (
+    "M200",
+    "M201",
+    "M203",
+    "M204",
+    "M205",
+    "M207",
+    "M220",
+    "M221",
+    "SET_VELOCITY_LIMIT",
+    "M900",
+    "M572",
+    "SET_PRESSURE_ADVANCE",
+)
 
 Place = tuple[float | None, ...]  # X Y Z tilt turn E
 

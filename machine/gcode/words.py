@@ -9,6 +9,8 @@ from profiles.errors import GcodeError
 
 Word = tuple[str, float]
 
+PAUSE_REMARK = ";PAUSE:"  # stands behind a command that waits for a person, says why, and tells a sender to pause by itself
+
 NUMBER = r"[-+]?(?:[0-9]{1,12}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})(?![0-9])"  # bounded: no infinity from a thousand digits
 BLOCK = re.compile(rf"(?:[A-Z] *{NUMBER} *)*")
 WORD = re.compile(rf"([A-Z]) *({NUMBER})")

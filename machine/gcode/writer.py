@@ -12,8 +12,9 @@ from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_path
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
+from machine.gcode.words import PAUSE_REMARK
 from machine.planning.acceleration import travel_mm_s2
-from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Retract, Stroke, Travel, Wipe, rows
+from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Pause, Reorient, Retract, Stroke, Travel, Wipe, rows
 from machine.planning.timing import move_times
 from mdp.mesh import Floats
 from mdp.pose import level
@@ -77,6 +78,8 @@ def _lines(
             yield f"{pen.dialect.stroke}{pen.filament()}{pen.speed(move.speed_mm_s)}"
         elif isinstance(move, Reorient):
             yield from _reorient(move, following, pen)
+        elif isinstance(move, Pause):
+            yield from _pause(move, pen)
         elif isinstance(move, BeginPart):
             following = next(coming, None)
             yield from _begin_part(move, len(parts), pen)
@@ -125,6 +128,8 @@ def _start(profile: Profile, parts: list[BeginPart], pen: Pen) -> Iterator[str]:
     if hot not in lines:
         yield hot
     yield from dialect.modes
+    if profile.material.pressure_advance is not None and dialect.pressure_advance:
+        yield dialect.pressure_advance.format(f"{profile.material.pressure_advance:g}")
     for word in dialect.after_start:
         yield from _dialect_line(word, pen)
     if pen.machine.coordinates == "workpiece":
@@ -172,6 +177,13 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
         yield pen.dialect.nozzle.format(number(wanted))
     pen.layer_fan = move.fan
     yield from _set_fan(move.fan, pen)
+
+
+def _pause(move: Pause, pen: Pen) -> Iterator[str]:
+    """The firmware's own word; a sender that pauses by itself goes by the remark."""
+    word = pen.dialect.filament_change if move.change else pen.dialect.pause
+    reason = "filament change" if move.change else "pause"
+    yield f"{word} {PAUSE_REMARK}{reason} before layer {move.layer} of part {move.part}"
 
 
 def _set_fan(share: float, pen: Pen) -> Iterator[str]:

@@ -8,6 +8,7 @@ from threading import Event as Flag
 
 from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
+from machine.gcode.words import PAUSE_REMARK
 from machine.link.exchange import Exchange
 from machine.link.journal import FINISHED, LEFT, Checkpoint, Journal
 from machine.link.line_history import LineHistory, SentLine
@@ -68,6 +69,7 @@ class Feed:
         self.resume_point: ResumePoint | None = None
         self.state, self._trouble, self.started, self.finished = "printing", "", False, False
         self.sent = self._skipped = 0
+        self._program_pause = ""  # what the program says of the pause before its next command
         self._layer_ended = self._reconnected = self._parked = False
         self._start_s = self._shown_s = self._asked_s = self._checked_s = start_s
 
@@ -108,6 +110,7 @@ class Feed:
         """A command that was done by an earlier run."""
         self._track(command)
         self._skipped += 1
+        self._program_pause = ""
 
     def _track(self, command: str) -> bool:
         """Keep modal state and the print's outline in step; True when the command moves something."""
@@ -131,6 +134,8 @@ class Feed:
                 elif command.startswith(("M220", "M221")):
                     self._pending.note_override(command)
                 yield line, command
+            elif PAUSE_REMARK in text:
+                self._program_pause = text.partition(PAUSE_REMARK)[2].strip()
             elif text.startswith(";"):
                 self._position.read_comment(text)
                 self._layer_ended = self._layer_ended or text.startswith(";LAYER_CHANGE")
@@ -144,6 +149,9 @@ class Feed:
             self._verify_position("after the port came back")
         if self._journal is not None and self._check_due(command):
             self._check_position()
+        if self._program_pause:
+            why, self._program_pause = self._program_pause, ""
+            self._pause(f"the program pauses: {why}")
         since_s = self._pending.pause_s
         if since_s is not None and (not _extrudes(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
             self._pause()
@@ -181,9 +189,9 @@ class Feed:
         if wrong := self._position_errors():
             raise RemoteProtocolError(f"{when} the printer stands at {', '.join(wrong)}: its position can no longer be trusted")
 
-    def _pause(self) -> None:
-        """Leave the print, wait until the print is to go on, and come back to the same place."""
-        self.set_state("pausing")
+    def _pause(self, why: str = "") -> None:
+        """Leave the print, wait until the print is to go on, and come back to the same place; why: shown meanwhile."""
+        self.set_state("pausing", why)
         self._record()
         position_known = not self._position_errors()
         moves = plan_park(self.modal, self._job.profile, self._bounds)
@@ -193,7 +201,7 @@ class Feed:
         self.exchange.drain()
         if moves.park is not None:
             self.history.pose = (*moves.park.stand_mm, *self.modal.at[3:])
-        self.set_state("paused")
+        self.set_state("paused", why)
         self._record()
         pending = self._pending
         while not pending.resume:
@@ -258,9 +266,9 @@ class Feed:
         if now_s - self._shown_s >= PROGRESS_S or self._pending.message != message:
             self.show(now_s)
 
-    def set_state(self, state: str) -> None:
+    def set_state(self, state: str, message: str = "") -> None:
         """Show a new state at once."""
-        self.state, self._pending.message = state, ""
+        self.state, self._pending.message = state, message
         self.show(self.exchange.medium.now_s())
 
     @contextmanager

@@ -87,7 +87,16 @@ class Reorient:
     speed_deg_s: float
 
 
-Move = BeginPart | BeginLayer | Stroke | Travel | Wipe | Retract | Reorient
+@dataclass(frozen=True)
+class Pause:
+    """Wait for a person before a layer, counted from 1; change: who puts in another filament. The tip stands aside."""
+
+    part: int
+    layer: int
+    change: bool
+
+
+Move = BeginPart | BeginLayer | Pause | Stroke | Travel | Wipe | Retract | Reorient
 
 
 @dataclass(frozen=True, eq=False)

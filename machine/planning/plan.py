@@ -9,9 +9,10 @@ from machine.kinematics.collision import Printed, hull, join_hulls
 from machine.kinematics.table import part_shift, workpiece_points
 from machine.planning import limits
 from machine.planning.acceleration import stroke_accelerations
-from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Reorient, Stroke, Travel, rows
+from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Pause, Reorient, Stroke, Travel, rows
 from machine.planning.purge import purge_lanes, purge_width_mm
 from machine.planning.reorient import Route, Speeds, route, top_z
+from machine.planning.stops import Stop, stops_by_layer
 from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, travel_speed, wipe_trail
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
@@ -22,11 +23,14 @@ from slicer.paths import Kind, Layer, Path, SlicedPart, bead_area_mm2
 MOST_COASTED = 0.25  # a path coasts over this share of its length at most
 
 
-def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile) -> MachineProgram:
+def plan(
+    decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Profile, stops: Sequence[Stop] = ()
+) -> MachineProgram:
     """The machine program of a decomposition's sliced parts, in print order; parts without a path are left out.
 
-    After the last part the table goes back to level, so that the next print's homing finds it level.
-    Raises MoveError: a point outside the axis limits, or no safe place for the head while the table turns.
+    stops: where the print waits for a person. After the last part the table goes back to level, so that the next print's homing
+    finds it level. Raises SliceError for a stop at a layer that is not there; MoveError: a point outside the axis limits, or no
+    safe place for the head while the table turns.
     """
     parts = {part.index: part for part in decomposition.parts}
     pieces = [piece for piece in sliced if any(layer.paths for layer in piece.layers)]
@@ -35,6 +39,7 @@ def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Pr
     moves: list[Move] = []
     printed: list[Printed] = []
     lanes = purge_lanes(decomposition.parts, pieces, profile)
+    stopped = stops_by_layer(stops, pieces)
     for piece in pieces:
         part = parts[piece.index]
         shift = part_shift(machine, part.pose, part.base.offset_mm)
@@ -44,6 +49,8 @@ def plan(decomposition: Decomposition, sliced: Sequence[SlicedPart], profile: Pr
             _reach(tip, begin, target, join_hulls(printed), profile) if printed else _begin(tip, begin, target, lanes, profile)
         )
         for number, layer in enumerate(piece.layers, start=1):
+            if (part.index, number) in stopped:
+                moves += _stop(tip, Pause(part.index, number, stopped[part.index, number]), profile)
             if layer.paths:
                 moves += _layer(tip, part.index, number, layer, shift, profile)
         printed.append(_printed(piece, part, shift, profile))
@@ -131,6 +138,15 @@ def _layer(tip: Tip, part: int, number: int, layer: Layer, shift: Floats, profil
         coast = profile.material.coast_mm if following is not None and following.retract else 0.0
         yield _stroke(path, layer.height_mm, points, profile, accelerations, coast)
         tip.at_mm, tip.trail = points[-1], wipe_trail(points, path.width_mm)
+
+
+def _stop(tip: Tip, pause: Pause, profile: Profile) -> Iterator[Move]:
+    """Retract and go straight up, above all of table and cradle as far as Z allows: a firmware may then move the head aside."""
+    machine = profile.machine
+    yield from retract(tip, profile)
+    z = max(float(tip.at_mm[2]) + machine.lift_mm, top_z(machine, tip.pose))
+    yield from go(tip, [*tip.at_mm[:2], min(z, machine.z.limits_mm[1])], profile)
+    yield pause
 
 
 def _stroke(

@@ -105,6 +105,10 @@ def _limit(reader: Reader, values: Values) -> None:
         reader.printing = reader.travelling = accel
 
 
+def _pause(reader: Reader, values: Values) -> None:
+    reader.note("M0", 0.0, "")
+
+
 def _nothing(reader: Reader, values: Values) -> None:
     """Commands without a bearing on motion or heat."""
 
@@ -121,4 +125,6 @@ MACROS: dict[str, Callable[[Reader, Values], None]] = {
     "EXCLUDE_OBJECT_START": _nothing,
     "EXCLUDE_OBJECT_END": _nothing,
     "SET_DISPLAY_TEXT": _nothing,
+    "SET_PRESSURE_ADVANCE": _nothing,
+    "PAUSE": _pause,
 }

@@ -216,8 +216,10 @@ REPORTS: dict[str, Command] = {
     "M154": _autoreport_position,
     "M155": _autoreport_temperatures,
     "M486": _nothing,
+    "M572": _nothing,
     "M665": _nothing,
     "M876": _nothing,
+    "M900": _nothing,
     "T0": _nothing,
 }
 COMMANDS: dict[str, Command] = {**MOVING, **HEAT, **REPORTS}

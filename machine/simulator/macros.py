@@ -87,6 +87,7 @@ MACROS: dict[str, Callable[[Board, Values], Work]] = {
     "SET_VELOCITY_LIMIT": _nothing,
     "SET_PRINT_STATS_INFO": _nothing,
     "SET_DISPLAY_TEXT": _nothing,
+    "SET_PRESSURE_ADVANCE": _nothing,
     "EXCLUDE_OBJECT": _nothing,
     "EXCLUDE_OBJECT_DEFINE": _nothing,
     "EXCLUDE_OBJECT_START": _nothing,

@@ -27,7 +27,7 @@ def export(request: ModelRequest) -> int:
     part, layer = parse_layer(outputs.layer, outputs.svg is not None)
     decomposed = decompose_model(request, to_build=True)
     profile = decomposed.profile
-    program = build(decomposed.decomposition, profile, pictures=True)
+    program = build(decomposed.decomposition, profile, pictures=True, stops=request.stops)
     refuse_errors(program, request.force)
     picture = b"" if outputs.svg is None else draw_layer(program.sliced, part, layer)
     if outputs.gcode is not None:

@@ -1,5 +1,6 @@
 """Pipeline: joins the stages, from a model's name to parts, sliced parts, G-code lines and the dry run."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -13,10 +14,13 @@ from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import dry_run
+from machine.firmware import dialect_of
 from machine.gcode.writer import write_gcode
 from machine.planning.limits import check_parts
+from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
 from machine.planning.purge import has_purge
+from machine.planning.stops import Stop
 from machine.view.program import Program
 from machine.view.quantities import minutes
 from mdp.decomposition import Decomposition
@@ -140,10 +144,11 @@ def _hint(decomposition: Decomposition, better: OtherWay | None) -> tuple[str, .
     return (f"{lying} in one piece it {' and '.join(figures)}: try --orient",)
 
 
-def build(decomposition: Decomposition, profile: Profile, pictures: bool = False) -> Program:
+def build(decomposition: Decomposition, profile: Profile, pictures: bool = False, stops: Sequence[Stop] = ()) -> Program:
     """Slice, plan, write and dry-run a decomposition. Raises MoveError, before slicing, for a part outside the axes' ranges.
 
-    pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show.
+    pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show. stops: where the print waits
+    for a person.
     """
     parts = decomposition.parts
     check_parts(parts, profile)
@@ -156,11 +161,9 @@ def build(decomposition: Decomposition, profile: Profile, pictures: bool = False
 
         sliced = slice_parts(parts, profile, show)
         report("planning moves")
-        program = plan(decomposition, sliced, profile)
-        if profile.machine.purge_mm > 0.0 and not has_purge(program):
-            say(
-                f"{decomposition.name}: no place on the plate is clear of the print for a line of machine.purge_mm: there is none"
-            )
+        program = plan(decomposition, sliced, profile, stops)
+        for note in _left_out(program, profile):
+            say(f"{decomposition.name}: {note}")
         lines = tuple(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
             compile_pictures()
@@ -168,3 +171,12 @@ def build(decomposition: Decomposition, profile: Profile, pictures: bool = False
         report("dry run")
         run = dry_run(lines, profile)
     return Program(lines, run, decomposition, sliced)
+
+
+def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
+    """What was asked for and is not in the program."""
+    if profile.machine.purge_mm > 0.0 and not has_purge(program):
+        yield "no place on the plate is clear of the print for a line of machine.purge_mm: there is none"
+    dialect = dialect_of(profile.machine)
+    if profile.material.pressure_advance is not None and not dialect.pressure_advance:
+        yield f"material.pressure_advance is left out: {dialect.firmware} has no command for it"

@@ -31,7 +31,7 @@ def load_program(request: ModelRequest) -> LoadedProgram:
     """The program of a model or of a G-code file. Raises GcodeError for a file that cannot be read."""
     if not request.is_gcode:
         decomposed = decompose_model(request, to_build=True)
-        return LoadedProgram(build(decomposed.decomposition, decomposed.profile), decomposed.profile)
+        return LoadedProgram(build(decomposed.decomposition, decomposed.profile, stops=request.stops), decomposed.profile)
     refuse_cuts(request)
     lines = read_gcode_lines(Path(request.model))
     profile, sections = read_embedded_profile(lines, request.profile, request.chosen_sections)

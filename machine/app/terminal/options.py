@@ -41,6 +41,15 @@ PartSettingsGiven = Annotated[
     list[str] | None,
     typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
 ]
+Pauses = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--pause", metavar="PART:LAYER", help="wait for a person before this layer, or at a height: 1:8.4mm; repeatable"
+    ),
+]
+FilamentChanges = Annotated[
+    list[str] | None, typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable")
+]
 PartsGiven = Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")]
 Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
 

@@ -1,5 +1,6 @@
 """Framing: a command becomes `N<number> <command>*<checksum>`; what may not be sent is refused."""
 
+from machine.gcode.words import PAUSE_REMARK
 from profiles.errors import LocalProtocolError
 
 FRAME = 11  # N, five digits (numbers begin anew in time), blank, *, three digits of the checksum
@@ -45,11 +46,13 @@ def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
 def command_of(line: str, line_number: int, limit: int = LINE_LIMIT) -> str:
     """The command in a line of a program, without comment and blanks; "" when there is none.
 
+    A command with a PAUSE_REMARK is the sender's own affair and counts as none.
     line_number is the line's number in the program, for messages. Raises LocalProtocolError for a character outside printable
     ASCII, for a `*`, and for commands that only the sender itself may give.
     """
-    command = line.partition(";")[0].strip()
-    if not command:
+    command, _, remark = line.partition(";")
+    command = command.strip()
+    if not command or f";{remark}".startswith(PAUSE_REMARK):
         return ""
     if not (command.isascii() and command.isprintable()):
         command = command.replace("\t", " ")

@@ -340,3 +340,15 @@ def test_the_stop_flag_ends_the_wait_for_a_lost_port() -> None:
     watcher.when = {"reconnecting": stop.set}
     outcome = watcher.run(PROGRAM, stop=stop)
     assert (outcome.cancelled, outcome.heaters_off) == (True, False)
+
+
+def test_a_program_that_waits_for_a_person_is_paused_by_the_sender_itself() -> None:
+    plain, paused = watched(), watched()
+    plain.run(PROGRAM)
+    paused.when["paused"] = paused.ask(Command.RESUME)
+    middle = len(START) + len(POSED) + 200
+    program = [*PROGRAM[:middle], "M600 ;PAUSE:filament change before layer 2 of part 1", *PROGRAM[middle:]]
+    assert not paused.run(program).cancelled
+    assert "the program pauses: filament change before layer 2 of part 1" in {progress.message for progress in paused.shown}
+    assert not any(line.startswith("M600") for line in paused.lines())
+    assert strokes(paused.printer) == pytest.approx(strokes(plain.printer))

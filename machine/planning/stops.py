@@ -1,0 +1,67 @@
+"""Stops: layers before which the print waits for a person, or for another filament."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from profiles.errors import SliceError
+
+if TYPE_CHECKING:
+    from slicer.paths import SlicedPart
+
+WRITTEN = re.compile(r"(\d{1,6}):(?:(\d{1,6})|(\d{1,6}(?:\.\d{1,6})?)mm)")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Before which layer of a part (both from 1), or at which height above its base plane; change: for another filament."""
+
+    part: int
+    layer: int | None
+    height_mm: float | None
+    change: bool
+
+    @property
+    def option(self) -> str:
+        """What a person has written."""
+        place = f"{self.height_mm:g}mm" if self.layer is None else str(self.layer)
+        return f"{'--filament-change' if self.change else '--pause'} {self.part}:{place}"
+
+
+def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ...]:
+    """The stops of the options --pause and --filament-change. Raises SliceError where one has another form."""
+    return tuple(_parse(text, change) for texts, change in ((pauses, False), (changes, True)) for text in texts)
+
+
+def _parse(text: str, change: bool) -> Stop:
+    match = WRITTEN.fullmatch(text.strip())
+    if match is None:
+        option = "--filament-change" if change else "--pause"
+        raise SliceError(f"{option} {text}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm")
+    layer, height = match[2], match[3]
+    return Stop(int(match[1]), None if layer is None else int(layer), None if height is None else float(height), change)
+
+
+def stops_by_layer(stops: Sequence[Stop], sliced: Sequence["SlicedPart"]) -> dict[tuple[int, int], bool]:
+    """(part, layer) before which the print stops -> whether for another filament.
+
+    Raises SliceError for a part or a layer that is not there.
+    """
+    return {(stop.part, _layer_of(stop, sliced)): stop.change for stop in stops}
+
+
+def _layer_of(stop: Stop, sliced: Sequence["SlicedPart"]) -> int:
+    piece = next((piece for piece in sliced if piece.index == stop.part), None)
+    if piece is None:
+        raise SliceError(f"{stop.option}: there is no part {stop.part}, the parts are 1 to {max(p.index for p in sliced)}")
+    if stop.layer is not None:
+        if not 1 <= stop.layer <= len(piece.layers):
+            raise SliceError(
+                f"{stop.option}: part {stop.part} has no layer {stop.layer}, its layers are 1 to {len(piece.layers)}"
+            )
+        return stop.layer
+    for number, layer in enumerate(piece.layers, start=1):
+        if layer.z_mm - layer.height_mm >= (stop.height_mm or 0.0) - 1e-6:
+            return number
+    raise SliceError(f"{stop.option}: part {stop.part} is only {piece.layers[-1].z_mm:g} mm high")
