@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, offset, opening, union
+from slicer.geometry.polygons import Polygons, islands, offset, opening, union
 
 THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
 FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
@@ -91,7 +91,7 @@ def _beside_cuts(inside: Polygons, uncut: Polygons, cover: Cover, layer: int, pr
         return left
     skin = opening(union(near) ^ inside, 0.5 * THIN * width_mm)
     left = opening(left if skin.is_empty() else left - offset(skin, 0.5 * width_mm), width_mm)
-    large = [island for island in left.decompose() if island.area() >= FEW_MM2 * width_mm**2]
+    large = [island for island in islands(left) if island.area() >= FEW_MM2 * width_mm**2]
     return Polygons.compose(large) if large else Polygons()
 
 
@@ -112,9 +112,9 @@ def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Pro
         sparse = inside if skin.is_empty() else opening(inside - offset(skin, width_mm), width_mm)
     if process.infill_density <= 0.0 or sparse.is_empty():
         return sparse
-    islands = sparse.decompose()
-    large = [island for island in islands if island.area() >= process.solid_below_mm2]
-    return sparse if len(large) == len(islands) else Polygons.compose(large) if large else Polygons()
+    pieces = islands(sparse)
+    large = [piece for piece in pieces if piece.area() >= process.solid_below_mm2]
+    return sparse if len(large) == len(pieces) else Polygons.compose(large) if large else Polygons()
 
 
 def _region(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, width_mm: float) -> Region:

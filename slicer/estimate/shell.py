@@ -7,7 +7,7 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import HIDDEN_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
-from slicer.geometry.polygons import Polygons, contours, edges, offset, opening
+from slicer.geometry.polygons import Polygons, contours, edges, islands, offset, opening
 from slicer.region import sparse_area
 from slicer.walls.gap import LEAST_GAP, LEAST_LINE
 
@@ -47,7 +47,7 @@ def extent_of(area: Polygons) -> Extent:
         return NOTHING
     sides = edges(area)
     length = float(np.hypot(sides[:, 2] - sides[:, 0], sides[:, 3] - sides[:, 1]).sum())
-    return Extent(area.area(), length, len(area.decompose()))
+    return Extent(area.area(), length, len(islands(area)))
 
 
 def shell_of(
@@ -75,7 +75,7 @@ def shell_of(
         sparse = sparse if model is None else sparse ^ inside
         sparse = sparse if ceiling is None or ceiling.is_empty() else sparse - ceiling
     skin = inside if sparse.is_empty() else inside - sparse
-    pieces = len(section.decompose())
+    pieces = len(islands(section))
     return Shell(loops, narrow, extent_of(skin), extent_of(sparse), pieces, ending)
 
 

@@ -11,7 +11,7 @@ from slicer.fill.anchor import anchor_lines
 from slicer.fill.monotonic import monotonic_lines
 from slicer.fill.pattern import MARGIN_MM, Box, LinePattern, Lines, clip_pattern, horizontal_lines
 from slicer.geometry.clip import border_of
-from slicer.geometry.polygons import Polygons, offset, opening, strips
+from slicer.geometry.polygons import Polygons, islands, offset, opening, strips
 from slicer.paths import Kind
 from slicer.walls.gap import LEAST_GAP, gaps
 
@@ -34,7 +34,7 @@ def skin_beads(
     """
     spacing = spacing_mm(width_mm, height_mm)
     beads: list[Bead] = []
-    for island in area.decompose() if not area.is_empty() else []:
+    for island in islands(area):
         border = border_of(offset(island, -(0.5 * spacing - overlap * width_mm)))
         pieces = clip_pattern(border, _even(angle_deg, spacing))
         if in_order:
@@ -56,7 +56,7 @@ def uncovered_area(area: Polygons, lines: Sequence[Floats], width_mm: float) -> 
     rest = area - strips(lines, 0.5 * width_mm) if lines else area
     if rest.area() < FEW_MM2 * width_mm**2:
         return Polygons()
-    places = [place for place in opening(rest, 0.5 * LEAST_GAP * width_mm).decompose() if place.area() >= FEW_MM2 * width_mm**2]
+    places = [place for place in islands(opening(rest, 0.5 * LEAST_GAP * width_mm)) if place.area() >= FEW_MM2 * width_mm**2]
     return Polygons.compose(places) if places else Polygons()
 
 

@@ -62,6 +62,22 @@ def difference(polygons: Polygons, *others: Polygons) -> Polygons:
     return Polygons.batch_boolean([polygons, *others], OpType.Subtract)
 
 
+def islands(polygons: Polygons) -> list[Polygons]:
+    """The connected pieces, each with its holes.
+
+    A hole that touches the contour round it in some points is a piece of its own for manifold3d, of negative area: it belongs to
+    the piece that it lies in.
+    """
+    pieces = polygons.decompose() if not polygons.is_empty() else []
+    whole = [piece for piece in pieces if piece.area() > 0.0]
+    for hole in pieces if len(whole) < len(pieces) else []:
+        if whole and hole.area() < 0.0:
+            filled = Polygons([loop[::-1] for loop in contours(hole)], FillRule.Positive)
+            at = max(range(len(whole)), key=lambda k: (filled ^ whole[k]).area())
+            whole[at] = whole[at] - filled
+    return whole
+
+
 def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
     """The upright rectangle round polygons, farther out by the reach."""
     x0, y0, x1, y1 = polygons.bounds()

@@ -7,7 +7,7 @@ import numpy as np
 
 from mdp.decomposition import Part
 from profiles.process import Process
-from slicer.geometry.polygons import CLOSING_MM, Polygons, closing, union
+from slicer.geometry.polygons import CLOSING_MM, Polygons, closing, islands, union
 from slicer.heights import Heights
 from slicer.interface.interface import sections_of, touching
 from slicer.region import shell_layers
@@ -78,8 +78,8 @@ def joined(uncut: Polygons, own: Polygons, other: Polygons) -> Polygons | None:
     if own.is_empty() or other.is_empty() or not _boxes_meet(own, other):
         return alone
     whole = closing(union([uncut, other]), CLOSING_MM)
-    islands = [island for island in whole.decompose() if not (island ^ own).is_empty()]
-    return alone if sum(island.area() for island in islands) < uncut.area() + TOUCHING_MM2 else Polygons.compose(islands)
+    touched = [island for island in islands(whole) if not (island ^ own).is_empty()]
+    return alone if sum(island.area() for island in touched) < uncut.area() + TOUCHING_MM2 else Polygons.compose(touched)
 
 
 def _boxes_meet(one: Polygons, other: Polygons) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.distance import signed_distances
-from slicer.geometry.polygons import Polygons, closing, contours, edges, offset, union
+from slicer.geometry.polygons import Polygons, closing, contours, edges, islands, offset, union
 from slicer.support.reachable import (
     EVEN_MM,
     FINE_MM,
@@ -188,9 +188,9 @@ def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -
     area = closing(area, SMOOTH_MM) if tidy else area
     carrying = carrying_area(area, reachable, areas.ground[layer], lean)
     carrying = _draw_in(carrying, lean) if tidy and (area - reachable).is_empty() else carrying
-    islands = _tidy(carrying, reachable).decompose() if tidy else _islands_below(carrying, reachable)
+    below = islands(_tidy(carrying, reachable)) if tidy else _islands_below(carrying, reachable)
     top = max(branch.top_mm for branch in branches)
-    return [branch_of(island, top) for island in islands if island.area() >= LEAST_MM2]
+    return [branch_of(island, top) for island in below if island.area() >= LEAST_MM2]
 
 
 def _tidy(places: Polygons, reachable: Polygons) -> Polygons:
@@ -201,10 +201,10 @@ def _tidy(places: Polygons, reachable: Polygons) -> Polygons:
 
 def _islands_below(places: Polygons, reachable: Polygons) -> list[Polygons]:
     """The islands of places, wider where all of an island is a sliver: what is just a thin limb of one can wait."""
-    islands: list[Polygons] = []
-    for island in places.decompose():
-        islands += _widened(island, reachable).decompose() if _sliver(island) else [island.simplify(FINE_MM)]
-    return islands
+    below: list[Polygons] = []
+    for island in islands(places):
+        below += islands(_widened(island, reachable)) if _sliver(island) else [island.simplify(FINE_MM)]
+    return below
 
 
 def _widened(slivers: Polygons, reachable: Polygons) -> Polygons:
@@ -221,9 +221,9 @@ def _sliver(island: Polygons) -> bool:
 def _draw_in(area: Polygons, lean: float) -> Polygons:
     """The area with its edges drawn in; what is too narrow for that stays."""
     drawn_in = []
-    for island in area.decompose():
+    for island in islands(area):
         core = offset(island, -INSET * lean)
-        bits = [] if core.is_empty() else (island - dilate(core, lean)).decompose()
+        bits = [] if core.is_empty() else islands(island - dilate(core, lean))
         drawn_in += [island] if core.is_empty() else [core, *(bit for bit in bits if bit.area() >= lean**2)]
     return union(drawn_in)
 

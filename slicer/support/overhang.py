@@ -11,7 +11,7 @@ from mdp.overhang import UP, Mask, facing_down
 from mdp.support_need.need import needs_support
 from profiles.process import Process
 from slicer.fill.bridge import LEAST, Bridge, find_bridge
-from slicer.geometry.polygons import Polygons, edges, offset
+from slicer.geometry.polygons import Polygons, edges, islands, offset
 
 RIM_MM = 0.04  # neighbouring strips of a slope overlap by this so that they unite
 
@@ -58,12 +58,12 @@ def _limit(overhang: Overhang, needing: list[Floats]) -> Overhang:
 
 def _sort_islands(hanging: Polygons, bank: Polygons, width_mm: float, longest_mm: float) -> Overhang:
     """Sorts the connected pieces of a hanging place."""
-    islands = hanging.decompose()
-    if all(island.area() < LEAST * width_mm**2 for island in islands):
+    places = islands(hanging)
+    if all(island.area() < LEAST * width_mm**2 for island in places):
         return Overhang(hanging, ())
     banks = edges(offset(bank, 0.25 * width_mm))
     rest, spans = [], []
-    for island in islands:
+    for island in places:
         span = find_bridge(island, banks, width_mm)
         if span is not None and (longest_mm == inf or span.carries(longest_mm)):
             spans.append(span)

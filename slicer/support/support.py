@@ -7,7 +7,7 @@ from math import radians, tan
 import numpy as np
 
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, bounding_box, closing, difference, offset, opening, union
+from slicer.geometry.polygons import Polygons, bounding_box, closing, difference, islands, offset, opening, union
 from slicer.heights import Heights
 from slicer.support.branch import Growth
 from slicer.support.columns import Columns
@@ -102,8 +102,8 @@ def _drop_nearly_held(
 def _drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
     """The hanging places without those that, seen from above, are too small to matter."""
     places = [offset(place, RIM_MM) for place in hanging if not place.is_empty()]
-    islands = union([union(places[k : k + HEAP]) for k in range(0, len(places), HEAP)]).decompose()
-    small = union([island for island in islands if island.area() < least_mm2])
+    seen = islands(union([union(places[k : k + HEAP]) for k in range(0, len(places), HEAP)]))
+    small = union([island for island in seen if island.area() < least_mm2])
     if small.is_empty():
         return list(hanging)
     large = [place if place.is_empty() else place - small for place in hanging]
@@ -181,14 +181,14 @@ def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas, process: P
 
 def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas, process: Process) -> Polygons:
     """A layer's support without what is loose: the islands that had some of it, where they are wide enough for a bead."""
-    boxes = np.array([piece.bounds() for piece in loose.decompose()])
+    boxes = np.array([piece.bounds() for piece in islands(loose)])
     least = 0.5 * np.pi * areas.radius_mm**2
     standing = []
-    for island in body.decompose():
+    for island in islands(body):
         x0, y0, x1, y1 = island.bounds()
         if ((boxes[:, 0] < x1) & (boxes[:, 2] > x0) & (boxes[:, 1] < y1) & (boxes[:, 3] > y0)).any():
             stands = opening((island - loose).simplify(COARSE_MM), 0.45 * process.line_width_mm)
-            standing += [piece for piece in stands.decompose() if piece.area() >= least]
+            standing += [piece for piece in islands(stands) if piece.area() >= least]
         else:
             standing.append(island)
     return Polygons.compose(standing) if standing else Polygons()

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import product
 from math import floor
 
-from slicer.geometry.polygons import Polygons, closing, union
+from slicer.geometry.polygons import Polygons, closing, islands, union
 from slicer.support.branch import Branch, Growth, branch_of, lower_branches
 from slicer.support.columns import JOIN_MM
 from slicer.support.reachable import LEAST_MM2, SMOOTH_MM, ReachableAreas
@@ -55,7 +55,7 @@ def _pieces(area: Polygons) -> list[tuple[tuple[int, int], Polygons]]:
     """An area cut along a fixed lattice, with the lattice's numbers."""
     pieces: dict[tuple[int, int], list[Polygons]] = {}
     square = Polygons.square((CELL_MM, CELL_MM))
-    for island in area.decompose():
+    for island in islands(area):
         x0, y0, x1, y1 = island.bounds()
         (i0, j0), (i1, j1) = _cell(x0, y0), _cell(x1, y1)
         for i, j in product(range(i0, i1 + 1), range(j0, j1 + 1)):

@@ -7,7 +7,7 @@ from math import pi
 
 from mdp.mesh import Floats
 from slicer.bead import Bead, length_mm, width_for_mm
-from slicer.geometry.polygons import Polygons, area_mm2, close_loop, contours, offset
+from slicer.geometry.polygons import Polygons, area_mm2, close_loop, contours, islands, offset
 from slicer.paths import Kind
 from slicer.walls.centreline import centrelines
 
@@ -62,7 +62,7 @@ def strokes(
 ) -> Iterable[tuple[float, list[Stroke]]]:
     """For each place its area and the strokes that fill it; rings keep inside it with beads of at least least_mm."""
     long: list[Polygons] = []
-    for island in places.decompose() if not places.is_empty() else []:
+    for island in islands(places):
         loops = contours(island)
         perimeter = length_mm(close_loop(loops[0])) if loops else 0.0
         if not loops or island.area() < FEW_MM2 * line_width_mm**2:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mdp.mesh import Floats
 from slicer.bead import Bead, bulge_flow, length_mm
 from slicer.geometry.distance import distances
-from slicer.geometry.polygons import Polygons, edges
+from slicer.geometry.polygons import Polygons, edges, islands
 from slicer.paths import Kind
 from slicer.walls.dash import dash
 from slicer.walls.gap import FEW_MM2, LEAST_LINE, RANK, SHORTEST, Stroke, drawn_mm2, flow_of, strokes
@@ -32,7 +32,7 @@ def thin_walls(places: Polygons, section: Polygons, line_width_mm: float, height
     beads: list[Bead] = []
     borders = np.zeros((0, 4)) if places.is_empty() else edges(section)
     boxes = np.hstack([np.minimum(borders[:, :2], borders[:, 2:]), np.maximum(borders[:, :2], borders[:, 2:])])
-    for island in [] if places.is_empty() else places.decompose():
+    for island in islands(places):
         if island.area() < FEW_MM2 * line_width_mm**2:
             continue
         lines = _lines_through(island, borders[_around(boxes, island, AROUND * line_width_mm)], line_width_mm)
