@@ -18,6 +18,7 @@ from typing import Any
 
 from mdp.decomposition import Part
 from profiles.profile import Profile
+from slicer.finish.vase import check_vase
 from slicer.paths import SlicedPart
 from slicer.slice import slice_part
 
@@ -34,6 +35,7 @@ def slice_parts(
 
     Raises SliceError as slice_part does, for the first part in print order that has a reason.
     """
+    check_vase(parts, profile)
     expected = [_layers(part, profile) for part in parts]
     if processes is None:
         processes = _process_count(len(parts), sum(expected))

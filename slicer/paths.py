@@ -39,7 +39,8 @@ class Path:
 
     points: (n, 2) mm, n >= 2; a closed path repeats its first point at the end. flow: factor on the bead's volume.
     approach: (k, 2) mm, points that the travel to the first point passes, k >= 0. retract: pull the filament back
-    during that travel. fan: part fan 0..1 where it differs from the layer's.
+    during that travel. fan: part fan 0..1 where it differs from the layer's. below_mm: how far below the layer's z the path
+    begins and ends; it climbs evenly between.
     """
 
     kind: Kind
@@ -50,6 +51,17 @@ class Path:
     approach: Floats
     retract: bool
     fan: float | None = None
+    below_mm: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def z_mm(self) -> Floats:
+        """(n,) heights of the points over the layer's z, none above it."""
+        begin, end = self.below_mm
+        if begin == end:
+            return np.full(len(self.points), -begin)
+        done = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.points, axis=0).T))])
+        heights: Floats = -begin + (begin - end) * done / done[-1]
+        return heights
 
     @property
     def length_mm(self) -> float:

@@ -15,6 +15,7 @@ from slicer.fill.bridge import bridge_area, bridge_beads, infill_bridge_area, in
 from slicer.fill.infill import infill_beads
 from slicer.fill.skin import angle_of_layer_deg, skin_beads
 from slicer.finish.ironing import ironing_beads
+from slicer.finish.vase import bottom_layers, vase_layers, vase_profile
 from slicer.geometry.polygons import union
 from slicer.interface.interlock import fill_grooves
 from slicer.paths import Kind, Layer, Path, SlicedPart
@@ -46,13 +47,14 @@ def slice_part(
     input gives the same paths. on_layer: called after each layer with its number and how many there are. Raises SliceError
     when the part gives no bead at all.
     """
-    profile = profile.of_part(part.index)
+    profile = vase_profile(profile.of_part(part.index))
     stack = build_stack(part, profile, earlier, later)
     bounds_mm = part.in_part_frame().bounds_mm
     rear = rear_of(bounds_mm)
     layers: list[Layer] = []
     tip, seams = rear, np.zeros((0, 2))
-    for i in range(len(stack.outlines)):
+    usual = bottom_layers(profile.process) if profile.process.spiral_vase else len(stack.outlines)
+    for i in range(min(usual, len(stack.outlines))):
         around = Surroundings(rear, seams, tip, stack.edges, float(stack.heights.cut_mm[i]), i)
         beads = [*_part_beads(stack, i), *_auxiliary_beads(stack, i, part, later)]
         beads = [bead if bead.kind in WALLS else simplify_bead(bead) for bead in beads]
@@ -64,6 +66,8 @@ def slice_part(
             layers.append(layer)
         if on_layer is not None:
             on_layer(i + 1, len(stack.outlines))
+    if usual < len(stack.outlines):
+        layers += vase_layers(stack.outlines, stack.supports.areas, stack.heights, profile, tip)
     _check_not_empty(part, bounds_mm, layers, profile.process)
     missed_mm2, at_mm = stack.supports.unsupported_mm2, stack.heights.tip_mm[stack.supports.worst_layer]
     worst = sum(layer.z_mm <= at_mm for layer in layers) if missed_mm2 > 0 else 0

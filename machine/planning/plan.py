@@ -132,7 +132,7 @@ def _layer(tip: Tip, part: int, number: int, layer: Layer, shift: Floats, profil
     yield BeginLayer(part, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c)
     z = layer.z_mm + float(shift[2])
     for path, following in zip(layer.paths, [*layer.paths[1:], None], strict=True):
-        points = np.column_stack([path.points + shift[:2], np.full(len(path.points), z)])
+        points = np.column_stack([path.points + shift[:2], z + path.z_mm])
         yield from to_path(tip, path, points[0], shift, profile)
         yield from prime(tip, profile)
         coast = profile.material.coast_mm if following is not None and following.retract else 0.0

@@ -20,6 +20,11 @@ class Finish(Frozen):
         le=0.5,
         description="the holes of every layer are wider by this to each side, for they print narrow; below 0 narrower, mm",
     )
+    spiral_vase: bool = Field(
+        False,
+        description="true: above the bottom one wall climbs round without a seam, without inside, top or support; the model is "
+        "in one part, its layers one area without holes",
+    )
     ironing: bool = Field(
         False, description="true: the nozzle goes over uppermost skins once more, in dense lines; never where another part comes"
     )

@@ -17,6 +17,7 @@ from slicer.estimate.duration import line_s
 from slicer.estimate.sampled_part import SampledPart, sample_part
 from slicer.estimate.shell import extent_of
 from slicer.estimate.strokes import Pace, Strokes, line_strokes, loop_strokes, shell_strokes, support_strokes
+from slicer.finish.vase import vase_profile
 from slicer.geometry.polygons import contours, offset
 from slicer.paths import Kind, bead_area_mm2
 from slicer.speed import first_layer_mm_s
@@ -54,7 +55,7 @@ def estimate(parts: Part | Sequence[Part], profile: Profile) -> Estimate:
     top_mm = max((float(part.mesh.bounds_mm[1, 2]) for part in several), default=0.0)
     total = Estimate(0.0, 0.0, 0.0)
     for k, part in enumerate(several):
-        own = profile.of_part(part.index)
+        own = vase_profile(profile.of_part(part.index))
         total += _estimate_part(sample_part(part, own, several[k + 1 :]), own, top_mm)
     return total
 

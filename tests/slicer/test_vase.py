@@ -1,0 +1,83 @@
+"""Vase: a bottom, then one wall that climbs without a seam; what cannot be one is refused with the reason."""
+
+from itertools import pairwise
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from machine.dryrun.dryrun import dry_run
+from machine.gcode.writer import write_gcode
+from machine.planning.plan import plan
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Mesh
+from profiles.errors import SliceError
+from slicer.parts import slice_parts
+from slicer.paths import Kind, bead_area_mm2
+from slicer.slice import slice_part
+from tests.shapes import box, standing, tee
+from tests.slicer.hand import BARE, cut, profile, whole
+
+VASE = (*BARE, "process.spiral_vase=true", "process.bottom_thickness_mm=0")
+
+
+def cup() -> Mesh:
+    """A cone that widens from 10 to 13 mm radius over 6 mm."""
+    return standing(m3.Manifold.cylinder(6, 10, 13, 96))
+
+
+def test_the_wall_climbs_evenly_from_the_bottom_to_the_top() -> None:
+    sliced = slice_part(whole(cup()), profile(*VASE))
+    assert [Kind.SKIN in {path.kind for path in layer.paths} for layer in sliced.layers[:5]] == [True] * 4 + [False]
+    climbing = [path for layer in sliced.layers[5:-1] for path in layer.paths]
+    assert len(climbing) == len(sliced.layers) - 6
+    heights = np.concatenate([path.z_mm + layer.z_mm for layer in sliced.layers[4:] for path in layer.paths])
+    assert (np.diff(heights) >= -1e-9).all()
+    assert (heights[0], heights[-1]) == pytest.approx((0.8, 6.0))
+    ends = [path for layer in sliced.layers[4:] for path in layer.paths]
+    assert max(np.hypot(*(b.points[0] - a.points[-1])) for a, b in pairwise(ends)) < 1e-9
+    assert [path.retract for path in ends] == [True] + [False] * (len(ends) - 1)
+
+
+def test_the_wall_holds_as_much_plastic_as_it_is_long_with_half_of_it_in_the_first_and_the_last_turn() -> None:
+    sliced = slice_part(whole(standing(m3.Manifold.cylinder(6, 10, 10, 96))), profile(*VASE))
+    turn_mm3 = 2 * np.pi * (10 - 0.225) * bead_area_mm2(0.45, 0.2)
+    turns = sum(layer.volume_mm3(path) for layer in sliced.layers[4:] for path in layer.paths) / turn_mm3
+    assert turns == pytest.approx(0.5 + 25 + 0.5, rel=0.01)
+
+
+def test_the_printed_vase_climbs_in_every_line_and_the_dry_run_has_nothing_against_it() -> None:
+    asked = profile(*VASE)
+    part = whole(cup())
+    one = Decomposition("cup", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    lines = tuple(write_gcode(plan(one, slice_parts((part,), asked), asked), asked))
+    assert [each.message for each in dry_run(lines, asked).findings if each.code != "uncalibrated"] == []
+    climbing = lines[lines.index(";Z:3") : lines.index(";Z:3.2")]
+    heights = [float(line.split("Z")[1].split()[0]) for line in climbing if line.startswith("G1 X") and " Z" in line]
+    assert len(heights) > 90
+    assert heights == sorted(heights)
+    assert (heights[0], heights[-1]) == pytest.approx((2.8, 3.0), abs=0.01)
+
+
+def two_towers() -> Mesh:
+    towers = m3.Manifold.cube((5, 5, 8), True).translate((-6, 0, 4)) + m3.Manifold.cube((5, 5, 8), True).translate((6, 0, 4))
+    return standing(towers + m3.Manifold.cube((20, 8, 2), True))
+
+
+def tube() -> Mesh:
+    return standing(m3.Manifold.cylinder(6, 10, 10, 48) - m3.Manifold.cylinder(6, 6, 6, 48).translate((0, 0, 2)))
+
+
+@pytest.mark.parametrize(
+    ("parts", "settings", "reason"),
+    [
+        (cut(box(), ((0.0, 0.0, 1.0), 8.0)), (), "climbs round a model in one part, this one is in 2: --parts 1"),
+        ([whole(tee())], ("process.support=auto",), "prints no support, and at"),
+        ([whole(two_towers())], (), "one outline without holes in every layer: at 2.20 mm there is 2 outlines"),
+        ([whole(tube())], (), "at 2.20 mm there is 2 outlines"),
+    ],
+)
+def test_what_is_no_vase_is_refused_with_the_reason(parts: list[Part], settings: tuple[str, ...], reason: str) -> None:
+    with pytest.raises(SliceError) as refused:
+        slice_parts(parts, profile(*VASE, *settings))
+    assert reason in str(refused.value)
