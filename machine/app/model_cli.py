@@ -10,6 +10,7 @@ import typer
 from machine.app.requests import Cuts, ModelRequest, Outputs
 from machine.app.terminal.options import (
     BeamWidth,
+    Copies,
     FilamentChanges,
     Force,
     HtmlFile,
@@ -95,6 +96,7 @@ def export(
     part: PartSettingsGiven = None,
     pause: Pauses = None,
     filament_change: FilamentChanges = None,
+    copies: Copies = 1,
     json: JsonFile = None,
     svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer, see --layer")] = None,
     html: HtmlFile = None,
@@ -127,6 +129,7 @@ def export(
         force=force,
         cuts=cuts,
         stops=stops,
+        copies=copies,
         profile_names=names,
     )
     return export(request)
@@ -144,6 +147,7 @@ def simulate(
     part: PartSettingsGiven = None,
     pause: Pauses = None,
     filament_change: FilamentChanges = None,
+    copies: Copies = 1,
     json: JsonFile = None,
     reference: Annotated[
         str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
@@ -167,7 +171,7 @@ def simulate(
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
     outputs = Outputs(json=json, html=html)
     request = ModelRequest(
-        model, profile, chosen, ranker, orient, outputs, cuts=Cuts(plan, parts), stops=stops, profile_names=names
+        model, profile, chosen, ranker, orient, outputs, cuts=Cuts(plan, parts), stops=stops, copies=copies, profile_names=names
     )
     return simulate(request, reference, baud)
 
@@ -188,6 +192,7 @@ def view(
     part: PartSettingsGiven = None,
     pause: Pauses = None,
     filament_change: FilamentChanges = None,
+    copies: Copies = 1,
     compare: Annotated[bool, typer.Option("--compare", help="tell also time and material printed in one part")] = False,
     machine: MachineGiven = None,
     material: MaterialGiven = None,
@@ -212,6 +217,7 @@ def view(
         compare,
         cuts=Cuts(plan, parts),
         stops=stops,
+        copies=copies,
         profile_names=names,
     )
     return view(request, open_)

@@ -10,6 +10,7 @@ from machine.app.requests import ConsoleRequest, Cuts, ModelRequest, PrintReques
 from machine.app.terminal.options import (
     Baud,
     BeamWidth,
+    Copies,
     FilamentChanges,
     LogFile,
     MachineGiven,
@@ -52,6 +53,7 @@ def print_(
     part: PartSettingsGiven = None,
     pause: Pauses = None,
     filament_change: FilamentChanges = None,
+    copies: Copies = 1,
     speed: SimSpeed = 0.0,
     watch: Watch = False,
     watch_port: WatchPort = None,
@@ -80,7 +82,16 @@ def print_(
     names = (machine, material, process)
     chosen = chosen_sections(settings, machine=machine, material=material, process=process)
     request = ModelRequest(
-        model, profile, chosen, ranker, orient, force=force, cuts=Cuts(plan, parts), stops=stops, profile_names=names
+        model,
+        profile,
+        chosen,
+        ranker,
+        orient,
+        force=force,
+        cuts=Cuts(plan, parts),
+        stops=stops,
+        copies=copies,
+        profile_names=names,
     )
     return print_model(request, PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port)))
 

@@ -53,7 +53,7 @@ class ModelRequest:
     chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
     model down the best way first. compare: with the same model in one part. force: go on although the dry run found errors.
     profile_names: of machine, material and process as the user has given them, names or files.
-    stops: where the print waits for a person.
+    stops: where the print waits for a person. copies: how many of the model on the plate.
     """
 
     model: str
@@ -67,6 +67,7 @@ class ModelRequest:
     cuts: Cuts = Cuts()
     profile_names: tuple[str | None, ...] = ()
     stops: "tuple[Stop, ...]" = ()
+    copies: int = 1
 
     @property
     def name(self) -> str:

@@ -48,6 +48,8 @@ def refuse_cuts(request: ModelRequest) -> None:
     for option, value in (("--plan", request.cuts.plan), ("--parts", request.cuts.parts)):
         if value is not None:
             raise PlanError(f"{option} {value}: {request.model} is G-code, which is cut already; it goes with a model")
+    if request.copies != 1:
+        raise PlanError(f"--copies {request.copies}: {request.model} is G-code, which is sliced already; it goes with a model")
     for stop in request.stops:
         raise PlanError(f"{stop.option}: {request.model} is G-code, which says itself where it stops; it goes with a model")
     for each in request.profile.parts:

@@ -8,6 +8,7 @@ import numpy as np
 
 from machine.app.output import write_bytes
 from machine.app.pictures.thumbnail import with_thumbnails
+from machine.app.pipeline.copies import check_copies, in_copies
 from machine.app.pipeline.given_plan import check_parts_named, read_given_plan, with_plan_settings
 from machine.app.pipeline.precompile import compile_pictures, compile_program, compile_search
 from machine.app.pipeline.pricing import pricing
@@ -59,6 +60,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     chosen from get no time.
     """
     ranker_named(request.ranker)  # a wrong one is told before anything else is done
+    check_copies(request.copies)
     record_file, given = request.outputs.record, read_given_plan(request)
     profile = with_plan_settings(request.profile, given)
     began = perf_counter()
@@ -89,6 +91,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     for note in (*decomposition.notes, *notes):
         say(f"{request.name}: {note}")
     plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
+    decomposition, profile = in_copies(decomposition, request.copies, profile)
     return Decomposed(decomposition, profile, plan, read_s, perf_counter() - began, better)
 
 

@@ -41,6 +41,7 @@ PartSettingsGiven = Annotated[
     list[str] | None,
     typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
 ]
+Copies = Annotated[int, typer.Option("--copies", metavar="N", help="so many on the plate, of a model printed in one part")]
 Pauses = Annotated[
     list[str] | None,
     typer.Option(

@@ -73,6 +73,8 @@ WRONG = [
     (["profiles", "check", "nowhere.toml"], "nowhere.toml"),
     (["export", "demo:tree", "-o", "x.gcode", "--part", "walls=4"], "--part walls=4: PART:KEY=VALUE,... is expected"),
     (["export", "demo:tree", "-o", "x.gcode", "--part", "2:walls=-4"], "part 2: process.walls is -4: it must be a whole number"),
+    (["export", "demo:tree", "-o", "x.gcode", "--copies", "0"], "--copies is 0: 1 to 1000 is allowed"),
+    (["simulate", "short.gcode", "--copies", "2"], "--copies 2: short.gcode is G-code, which is sliced already"),
     (["export", "demo:tree", "-o", "x.gcode", "--pause", "2"], "--pause 2: PART:LAYER or PART:HEIGHTmm is expected"),
     (["simulate", "short.gcode", "--filament-change", "1:2"], "--filament-change 1:2: short.gcode is G-code, which says itself"),
     (["simulate", "short.gcode", "--part", "2:walls=4"], "--part 2: short.gcode is G-code, which is sliced already"),

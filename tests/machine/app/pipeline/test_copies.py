@@ -1,0 +1,73 @@
+"""Copies: they stand apart on the plate, are printed together, and what does not fit is refused."""
+
+import manifold3d as m3
+import numpy as np
+import pytest
+
+from machine.app.pipeline.copies import in_copies
+from machine.app.pipeline.pipeline import build
+from machine.planning.arrange import places_on_plate
+from mdp.decomposition import Decomposition, Part
+from mdp.mesh import Mesh
+from profiles.errors import PlanError
+from profiles.profile import Profile, load
+from tests.shapes import box, standing
+from tests.slicer.hand import cut, whole
+
+COARSE = ["process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3"]
+
+
+def decomposed(*parts: Part) -> Decomposition:
+    mesh = parts[0].mesh if len(parts) == 1 else box()
+    return Decomposition("box", mesh, parts, 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+
+
+def plate(*settings: str) -> Profile:
+    return load(settings=[*COARSE, *settings])
+
+
+@pytest.mark.parametrize(("count", "reach_mm"), [(1, 0.0), (2, 12.5), (4, 17.7), (5, 25.0), (9, 35.4)])
+def test_copies_stand_in_rows_near_the_middle(count: int, reach_mm: float) -> None:
+    places = np.array(places_on_plate((20.0, 20.0), 5.0, count, plate().machine))
+    assert np.hypot(*places.T).max() == pytest.approx(reach_mm, abs=0.1)
+    apart = np.abs(places[:, None] - places[None]).max(axis=2) + 99.0 * np.eye(count)
+    assert apart.min() >= 25.0 - 1e-9
+
+
+def test_every_copy_is_printed_and_a_layer_of_all_comes_before_the_next() -> None:
+    many, profile = in_copies(decomposed(whole(box(10, 10, 0.9))), 3, plate())
+    program = build(many, profile)
+    assert [each.code for each in program.run.findings if each.code != "uncalibrated"] == []
+    one = build(decomposed(whole(box(10, 10, 0.9))), profile)
+    own = [float(each.run.segment_mm3[_own(each.run)].sum()) for each in (one, program)]
+    assert own[1] == pytest.approx(3.0 * own[0], rel=1e-3)
+    assert program.run.program.layers == one.run.program.layers == 3
+
+
+def _own(run) -> np.ndarray:  # type: ignore[no-untyped-def]
+    return np.array([name not in ("Custom", "Skirt/Brim") for name in run.segment_type])
+
+
+def test_slender_copies_have_the_brim_that_one_alone_would_have() -> None:
+    tower = standing(m3.Manifold.cube((3, 3, 60)))
+    assert in_copies(decomposed(whole(tower)), 4, plate())[1].process.brim_mm == 5.0
+    assert in_copies(decomposed(whole(box())), 4, plate())[1].process.brim_mm == 0.0
+
+
+@pytest.mark.parametrize(
+    ("parts", "count", "sentence"),
+    [
+        ([whole(box())], 100, "measures 20.0 x 20.0 mm, the plate of generic A/C table has room for 37 with 5 mm between them"),
+        (cut(box(), ((0.0, 0.0, 1.0), 8.0)), 2, "box is cut into 2 parts, copies are printed in one piece each: --parts 1"),
+    ],
+)
+def test_copies_that_cannot_be_are_refused(parts: list[Part], count: int, sentence: str) -> None:
+    with pytest.raises(PlanError) as refused:
+        in_copies(decomposed(*parts), count, plate())
+    assert sentence in str(refused.value)
+
+
+def test_a_repeated_mesh_is_closed_and_as_large_as_all_copies() -> None:
+    mesh: Mesh = in_copies(decomposed(whole(box())), 4, plate())[0].mesh
+    assert mesh.volume_mm3 == pytest.approx(4 * 8000.0)
+    assert len(mesh.faces) == 48
