@@ -52,7 +52,7 @@ class Material(Frozen):
         2.0,
         ge=0,
         le=50,
-        description="way back over the path just printed while filament is pulled back, mm; 2 mm rub the drop off, 0: none",
+        description="way back over the paths just printed while filament is pulled back, mm; 2 mm rub the drop off, 0: none",
     )
     coast_mm: float = Field(
         0.0,
@@ -64,7 +64,10 @@ class Material(Frozen):
         0.0, ge=0, le=2, description="filament pushed beyond what was pulled back at the end of every retracted travel, mm"
     )
     prime_extra_mm: float = Field(
-        0.0, ge=0, le=10, description="filament pushed beyond what was retracted after a reorientation, mm"
+        0.0,
+        ge=0,
+        le=10,
+        description="filament pushed beyond what was retracted after a reorientation, along the first stroke inside, mm",
     )
     pressure_advance: float | None = Field(
         None,

@@ -17,6 +17,7 @@ from slicer.fill.skin import angle_of_layer_deg, skin_beads
 from slicer.finish.ironing import ironing_beads
 from slicer.finish.vase import bottom_layers, vase_layers, vase_profile
 from slicer.geometry.polygons import union
+from slicer.interface.interface import begin_inside
 from slicer.interface.interlock import fill_grooves
 from slicer.paths import Kind, Layer, Path, SlicedPart
 from slicer.speed import first_layer_mm_s, layer_time_s, speeds_mm_s
@@ -120,8 +121,9 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
     process, material, outline = profile.process, profile.material, stack.outlines[index]
     z_mm, height_mm = float(stack.heights.tip_mm[index]), float(stack.heights.height_mm[index])
     own = stack.processes[index]
-    ordered = split_overhangs(order_beads(beads, outline, own, tip), outline, stack.bank(index), own)
     on_platform = part.index == 1
+    beads = begin_inside(beads) if index == 0 and not on_platform else beads
+    ordered = split_overhangs(order_beads(beads, outline, own, tip), outline, stack.bank(index), own)
     if index == 0 and not on_platform and process.interlock_mm > 0.0:
         ordered = fill_grooves(ordered, part, process, height_mm)
     fixed: Mapping[Kind, float] | None = None

@@ -10,10 +10,11 @@ from machine.kinematics.table import part_shift, workpiece_points
 from machine.planning import limits
 from machine.planning.acceleration import stroke_accelerations
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Pause, Reorient, Stroke, Travel, rows
+from machine.planning.priming import run_in
 from machine.planning.purge import purge_lanes, purge_width_mm
 from machine.planning.reorient import Route, Speeds, route, top_z
 from machine.planning.stops import Stop, stops_by_layer
-from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, travel_speed, wipe_trail
+from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, trail_after, travel_speed, wipe_trail
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
@@ -99,7 +100,7 @@ def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile:
     yield from _to_stand(tip, way, profile)
     if tip.pose != part.pose:
         yield _reorient(tip, part.pose, profile)
-        tip.prime_extra_mm = profile.material.prime_extra_mm
+        tip.run_in_mm = profile.material.prime_extra_mm
     yield part
     yield from _down_to(tip, target, way.across_z_mm, profile)
 
@@ -133,11 +134,13 @@ def _layer(tip: Tip, part: int, number: int, layer: Layer, shift: Floats, profil
     z = layer.z_mm + float(shift[2])
     for path, following in zip(layer.paths, [*layer.paths[1:], None], strict=True):
         points = np.column_stack([path.points + shift[:2], z + path.z_mm])
+        before = tip.trail
         yield from to_path(tip, path, points[0], shift, profile)
         yield from prime(tip, profile)
         coast = profile.material.coast_mm if following is not None and following.retract else 0.0
-        yield _stroke(path, layer.height_mm, points, profile, accelerations, coast)
-        tip.at_mm, tip.trail = points[-1], wipe_trail(points, path.width_mm)
+        yield run_in(_stroke(path, layer.height_mm, points, profile, accelerations, coast), layer, tip, profile)
+        tip.trail = trail_after(points, path, before if tip.trail is before else before[:0], shift, profile.material.wipe_mm)
+        tip.at_mm = points[-1]
 
 
 def _stop(tip: Tip, pause: Pause, profile: Profile) -> Iterator[Move]:

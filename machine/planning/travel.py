@@ -15,6 +15,7 @@ from slicer.bead import length_mm
 from slicer.paths import Path
 
 STANDING_MM = 1e-6
+TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it
 RING = 4.0  # a path whose ends lie nearer than its width, and that is longer than so many widths, runs round
 
 
@@ -22,13 +23,15 @@ RING = 4.0  # a path whose ends lie nearer than its width, and that is longer th
 class Tip:
     """Where the tip is (machine X Y Z), how the table stands, how far the filament is pulled back.
 
-    trail: (n, 3) the stroke just printed, in the sense in which a wipe goes over it.
+    trail: (n, 3) the strokes just printed, in the sense in which a wipe goes over them. run_in_mm: filament that the next
+    strokes inside are to push beyond their own.
     """
 
     at_mm: Floats
     pose: Pose
     retracted_mm: float = 0.0
     prime_extra_mm: float = 0.0
+    run_in_mm: float = 0.0
     trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
@@ -102,6 +105,28 @@ def prime(tip: Tip, profile: Profile) -> Iterator[Move]:
 def filament_speed(profile: Profile) -> float:
     """mm/s at which filament is pulled back and pushed forward."""
     return min(profile.material.retract_speed_mm_s, profile.machine.extruder_speed_mm_s)
+
+
+def trail_after(points: Floats, path: Path, before: Floats, shift: Floats, wipe_mm: float) -> Floats:
+    """The way of a wipe of wipe_mm after a stroke (n, 3).
+
+    Where the stroke is shorter it goes on, back over the way to its beginning, to the strokes before it in the layer; where
+    there are none, to and fro. before: the way over those, from where the last of them ended; none after a retraction.
+    """
+    trail = wipe_trail(points, path.width_mm)
+    if float(np.linalg.norm(points[-1] - points[0])) >= wipe_mm or length_mm(trail) >= wipe_mm:
+        return trail
+    if len(before) and abs(float(before[0, 2] - points[0, 2])) <= STANDING_MM:
+        z = np.full(len(path.approach), points[0, 2])
+        between = np.column_stack([path.approach.reshape(-1, 2) + shift[:2], z])[::-1]
+        trail = np.vstack([trail, between, first_length(before, wipe_mm)])
+    once = trail
+    for _ in range(TO_AND_FRO):
+        if length_mm(trail) >= wipe_mm:
+            break
+        once = once[::-1]
+        trail = np.vstack([trail, once[1:]])
+    return trail
 
 
 def wipe_trail(points: Floats, width_mm: float) -> Floats:

@@ -1,14 +1,18 @@
 """Interface: what a part finds beneath and beside it, in its own frame."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from profiles.process import Process
+from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, clean, contours, union
+from slicer.paths import Kind
 from slicer.section import sections
+from slicer.travel.order import OUTSIDE
 
 BENEATH_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
 
@@ -45,6 +49,21 @@ def strengthen_interface(process: Process, on_plastic: bool, layers: int) -> lis
     extra = process.interface_extra_walls if on_plastic and process.walls else 0
     first = process.model_copy(update={"walls": process.walls + extra}) if extra else process
     return [first if i == 0 else process for i in range(layers)]
+
+
+def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
+    """The beads of a first layer on plastic, the longest of its infill or skin first where it has no support: what oozed while
+    the table turned is made up for there, not where a wall has its seam.
+    """
+    if any(bead.rank <= OUTSIDE for bead in beads):
+        return list(beads)
+    for kind in (Kind.INFILL, Kind.SKIN):
+        inner = [k for k, bead in enumerate(beads) if bead.kind is kind]
+        if inner:
+            longest = max(inner, key=lambda k: (beads[k].length_mm, -k))
+            first = replace(beads[longest], rank=OUTSIDE)
+            return [first, *beads[:longest], *beads[longest + 1 :]]
+    return list(beads)
 
 
 def interface_edges(part: Part, first: Polygons, below: Polygons | None, later: Sequence[Part]) -> Floats:

@@ -8,11 +8,13 @@ import pytest
 from machine.gcode.writer import write_gcode
 from machine.planning.moves import BeginLayer, MachineProgram, Retract, Stroke, Travel, Wipe
 from machine.planning.plan import plan
-from machine.planning.travel import first_length, wipe_trail
+from machine.planning.travel import first_length, trail_after, wipe_trail
 from machine.reader.parse import parse_gcode
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from profiles.profile import Profile, load
+from slicer.bead import length_mm
+from slicer.paths import Kind, Path
 from slicer.slice import slice_part
 from tests.shapes import box
 from tests.slicer.hand import whole
@@ -108,3 +110,29 @@ def test_a_ring_is_wiped_onward_and_a_line_backward() -> None:
     ring = np.array([[0, 0, 1], [9, 0, 1], [9, 9, 1], [0, 9, 1], [0, 0, 1]], dtype=float)
     assert first_length(wipe_trail(ring, 0.4), 2.0)[-1] == pytest.approx([2, 0, 1])
     assert first_length(wipe_trail(ring[:4], 0.4), 2.0)[-1] == pytest.approx([2, 9, 1])
+
+
+def _short(length: float, approach: tuple[tuple[float, float], ...] = ()) -> Path:
+    points = np.array([[10.0, 0.0], [10.0 + length, 0.0]])
+    return Path(Kind.GAP, points, 0.4, 20.0, 1.0, np.array(approach).reshape(-1, 2), False)
+
+
+def _wiped(path: Path, before: np.ndarray) -> np.ndarray:
+    points = np.column_stack([path.points, np.full(2, 0.2)])
+    return first_length(trail_after(points, path, before, np.zeros(3), 2.0), 2.0)
+
+
+def test_a_wipe_longer_than_its_stroke_goes_on_over_the_way_and_the_strokes_before_it() -> None:
+    before = np.array([[9.0, 0.5, 0.2], [0.0, 0.5, 0.2]])
+    way = _wiped(_short(0.15, ((10.0, 0.5),)), before)
+    assert way == pytest.approx(np.array([[10.15, 0, 0.2], [10, 0, 0.2], [10, 0.5, 0.2], [9, 0.5, 0.2], [8.65, 0.5, 0.2]]))
+
+
+def test_a_wipe_never_goes_back_to_the_layer_below() -> None:
+    way = _wiped(_short(0.6), np.array([[9.0, 0.5, 0.0], [0.0, 0.5, 0.0]]))
+    assert way[:, 0].min() == 10.0
+    assert length_mm(way[:, :2]) == pytest.approx(2.0), "a lone short stroke is wiped to and fro"
+
+
+def test_a_stroke_as_long_as_the_wipe_is_wiped_over_itself() -> None:
+    assert len(_wiped(_short(5.0), np.array([[9.0, 0.5, 0.2], [0.0, 0.5, 0.2]]))) == 2

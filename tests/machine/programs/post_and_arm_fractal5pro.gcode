@@ -117,7 +117,7 @@ EXCLUDE_OBJECT_START NAME=part_2
 SET_PRINT_STATS_INFO CURRENT_LAYER=4
 M107
 M73 P57 R1
-G1 E1.20000 F2100
+G1 E0.80000 F2100
 ;TYPE:External perimeter
 ;WIDTH:0.45
 G1 X4.775 E0.32326 F2400
@@ -126,9 +126,9 @@ G1 X-4.775 E0.32326
 G1 Y-59.775 E0.32325
 G0 X-4.325 Y-59.325 F9000
 ;TYPE:Perimeter
-G1 X4.325 E0.29280 F2400
-G1 Y-50.675 E0.29279
-G1 X-4.325 E0.29279
+G1 X4.325 E0.42613 F2400
+G1 Y-50.675 E0.42613
+G1 X-4.325 E0.42612
 G1 Y-59.325 E0.29279
 ;LAYER_CHANGE
 ;Z:0.4
@@ -233,6 +233,7 @@ M73 P100 R0
 ; machine.turn.acceleration_deg_s2 = 100.0
 ; machine.tool_mm = [0.0, 0.0, 0.0]
 ; machine.junction_speed_mm_s = 5.0
+; machine.receive_bytes = 128
 ; machine.extruder_speed_mm_s = 50.0
 ; machine.extruder_acceleration_mm_s2 = 1500.0
 ; machine.arcs = False
@@ -251,8 +252,11 @@ M73 P100 R0
 ; machine.head.boxes[0].max_mm = [30.0, 40.0, 110.0]
 ; machine.clearance_mm = 2.0
 ; machine.lift_mm = 15.0
+; machine.purge_mm = 0.0
 ; machine.nozzle_limit_c = 260.0
 ; machine.bed_limit_c = 130.0
+; machine.thumbnails_px[0] = [32, 32]
+; machine.thumbnails_px[1] = [400, 300]
 ; machine.uncalibrated[0] = machine.tilt.zero_deg
 ; machine.uncalibrated[1] = machine.turn.zero_deg
 ; machine.uncalibrated[2] = machine.turn.point_mm
@@ -262,6 +266,7 @@ M73 P100 R0
 ; machine.uncalibrated[6] = machine.extruder_speed_mm_s
 ; machine.uncalibrated[7] = machine.extruder_acceleration_mm_s2
 ; machine.uncalibrated[8] = machine.table.thickness_mm
+; machine.sources.machine.thumbnails_px = the two sizes that the documentation of Mainsail asks slicers for
 ; machine.sources.machine.x = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, stepper_x and printer
 ; machine.sources.machine.y = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, stepper_y and printer
 ; machine.sources.machine.z = fractalrobotics/Fractal-5-Pro@25fdd99 Firmware/Klipper-Config-Files/printer.cfg, stepper_z and printer
@@ -285,11 +290,12 @@ M73 P100 R0
 ; machine.sources.machine.tool_mm = Fractal Cortex's transform has no offsets
 ; machine.sources.machine.clearance_mm = chosen
 ; machine.sources.machine.lift_mm = chosen
+; machine.sources.machine.purge_mm = chosen: some 4 mm of filament through a 0.4 mm nozzle, half of what the start blocks of Prusa printers push
 ; machine.gcode.start[0] = G21
 ; machine.gcode.start[1] = G90
 ; machine.gcode.start[2] = M83
 ; machine.gcode.start[3] = M140 S{bed_c}
-; machine.gcode.start[4] = M104 S{first_layer_nozzle_c}
+; machine.gcode.start[4] = M104 S{homing_nozzle_c}
 ; machine.gcode.start[5] = home_ab
 ; machine.gcode.start[6] = G28
 ; machine.gcode.start[7] = M190 S{bed_c}
@@ -301,17 +307,23 @@ M73 P100 R0
 ; machine.gcode.end[3] = M84
 ; machine.gcode.before_part = 
 ; machine.gcode.after_part = 
+; machine.gcode.resume = 
 ; material.name = PLA
 ; material.diameter_mm = 1.75
 ; material.density_g_cm3 = 1.24
 ; material.nozzle_c = 210.0
 ; material.first_layer_nozzle_c = 215.0
+; material.homing_nozzle_c = 150.0
+; material.standby_c = None
 ; material.bed_c = 60.0
 ; material.fan = 1.0
 ; material.fan_least = 0.35
 ; material.fan_layer_time_s = 60.0
 ; material.fan_bridge = None
+; material.fan_infill_bridge = None
 ; material.fan_off_layers = 1
+; material.fan_full_layer = 0
+; material.interlayer_strength_mpa = 20.0
 ; material.flow = 1.0
 ; material.retract_mm = 0.8
 ; material.retract_speed_mm_s = 35.0
@@ -319,6 +331,7 @@ M73 P100 R0
 ; material.coast_mm = 0.0
 ; material.retract_prime_extra_mm = 0.0
 ; material.prime_extra_mm = 0.4
+; material.pressure_advance = None
 ; material.volumetric_limit_mm3_s = 12.0
 ; process.name = standard
 ; process.scale = 1.0
@@ -330,7 +343,14 @@ M73 P100 R0
 ; process.least_layer_height_mm = 0.08
 ; process.most_layer_height_mm = 0.28
 ; process.line_width_mm = 0.45
+; process.first_layer_line_width_mm = None
+; process.outer_wall_line_width_mm = None
+; process.top_skin_line_width_mm = None
+; process.infill_line_width_mm = None
+; process.support_line_width_mm = None
+; process.slit_closing_mm = 0.018
 ; process.walls = 3
+; process.overhang_extra_walls = 0
 ; process.wall_order = inner-first
 ; process.outer_bulge = 0.04
 ; process.top_layers = 4
@@ -338,23 +358,33 @@ M73 P100 R0
 ; process.top_thickness_mm = 0.7
 ; process.bottom_thickness_mm = 0.5
 ; process.solid_below_mm2 = 70.0
+; process.seam = aligned
+; process.seam_gap = 0.1
+; process.outline_compensation_mm = 0.0
+; process.hole_compensation_mm = 0.0
+; process.spiral_vase = False
+; process.ironing = False
+; process.ironing_flow = 0.15
+; process.ironing_spacing_mm = 0.1
+; process.ironing_speed_mm_s = 15.0
 ; process.infill_density = 0.2
 ; process.infill_pattern = grid
 ; process.infill_angle_deg = 45.0
 ; process.infill_overlap = 0.15
 ; process.infill_anchor_mm = 2.5
 ; process.infill_joint_mm = 12.0
-; process.seam = aligned
-; process.seam_gap = 0.1
 ; process.overhang_share = 0.5
 ; process.bridge_longest_mm = 6.0
+; process.arch_longest_mm = 6.0
+; process.first_layer_flow = 1.0
 ; process.bridge_flow = 1.0
+; process.infill_bridge_flow = 1.0
 ; process.support = auto
 ; process.support_style = tree
 ; process.support_on_part = True
 ; process.support_branch_angle_deg = 40.0
 ; process.support_branch_mm = 2.0
-; process.support_branch_growth_deg = 2.0
+; process.support_branch_growth_deg = 1.0
 ; process.support_pattern = lines
 ; process.support_density = 0.15
 ; process.support_walls = 1
@@ -380,19 +410,28 @@ M73 P100 R0
 ; process.interface_layers = 3
 ; process.interface_temperature_add_c = 5.0
 ; process.interface_fan = 0.3
-; process.interface_extra_walls = 1
+; process.interface_extra_walls = 3
+; process.interface_walls = 1
+; process.interface_top_layers = 2
+; process.interface_bottom_layers = 0
 ; process.interface_seam_mm = 1.0
 ; process.interlock_mm = 0.0
 ; process.outer_wall_speed_mm_s = 40.0
 ; process.inner_wall_speed_mm_s = 60.0
 ; process.skin_speed_mm_s = 60.0
-; process.overhang_speed_mm_s = 20.0
+; process.overhang_75_speed_mm_s = 35.0
+; process.overhang_50_speed_mm_s = 25.0
+; process.overhang_25_speed_mm_s = 20.0
+; process.overhang_0_speed_mm_s = 15.0
 ; process.bridge_speed_mm_s = 30.0
+; process.infill_bridge_speed_mm_s = 40.0
 ; process.infill_speed_mm_s = 80.0
 ; process.support_speed_mm_s = 60.0
 ; process.support_interface_speed_mm_s = 40.0
 ; process.first_layer_speed_mm_s = 20.0
+; process.first_layer_infill_speed_mm_s = None
 ; process.gap_speed_mm_s = 30.0
+; process.top_skin_monotonic = True
 ; process.top_skin_speed_mm_s = 40.0
 ; process.small_wall_mm = 40.0
 ; process.small_wall_speed_mm_s = 25.0
@@ -414,15 +453,27 @@ M73 P100 R0
 ; search.least_elevation_deg = 10.0
 ; search.offset_step_mm = 1.0
 ; search.method = best
-; search.beam_width = 2
+; search.beam_width = 4
+; search.objective = scar
+; search.seam_mm = 0.8
+; search.feather_weight = 0.5
+; search.cut_mm2 = 20.0
+; search.second_mm2 = 0.5
+; search.hidden_seam_share = 0.5
+; search.unsupportable_weight = 5.0
+; search.most_longer = 0.05
 ; search.polish = True
 ; search.least_volume_share = 0.02
+; search.preferred_volume_share = 0.1
 ; search.least_interface_mm2 = 4.0
+; search.nozzle_load_n = 5.0
+; search.strength_safety = 1.25
 ; search.fragile_mm = 0.3
 ; search.pedestal_mm = 0.0
 ; search.most_parts = 12
 ; search.time_limit_s = None
-; search.least_gain = 0.005
+; search.least_gain = 0.002
+; search.least_gain_preferred = 0.0001
 ; search.platform_radius_mm = None
 ; search.count_platform_faces = False
 ; search.clearance = True

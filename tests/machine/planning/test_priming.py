@@ -1,0 +1,78 @@
+"""What oozed while the table turned is made up for inside, along a stroke, within what the hot end melts."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from machine.planning.moves import Stroke
+from machine.planning.priming import RUN_MM, run_in
+from machine.planning.travel import Tip
+from mdp.pose import Pose
+from profiles.profile import Profile, load
+from slicer.bead import Bead
+from slicer.interface.interface import begin_inside
+from slicer.paths import Kind, Layer, Path
+from slicer.slice import slice_part
+from tests.shapes import box
+from tests.slicer.hand import BARE, cut
+
+PER_MM = 0.033  # filament of a usual bead
+
+
+def _tip(run_in_mm: float = 0.4) -> Tip:
+    return Tip(np.zeros(3), Pose(0.0, 0.0), run_in_mm=run_in_mm)
+
+
+def _stroke(kind: Kind, *steps_mm: float, speed: float = 25.0) -> Stroke:
+    x = np.concatenate([[0.0], np.cumsum(steps_mm)])
+    points = np.column_stack([x, np.zeros((len(x), 2))])
+    return Stroke(kind, points, PER_MM * np.array(steps_mm), speed, 0.45)
+
+
+def _layer(*kinds: Kind) -> Layer:
+    line = np.array([[0.0, 0.0], [9.0, 0.0]])
+    return Layer(0.1, 0.2, tuple(Path(kind, line, 0.45, 25.0, 1.0, np.zeros((0, 2)), False) for kind in kinds), 0.3)
+
+
+def test_the_filament_is_spread_over_the_first_stretch_and_then_all_is_as_usual() -> None:
+    tip = _tip()
+    stroke = run_in(_stroke(Kind.INFILL, 5.0, 15.0, 30.0), _layer(Kind.INFILL), tip, load())
+    assert stroke.filament_mm == pytest.approx([5 * (PER_MM + 0.4 / RUN_MM), 15 * (PER_MM + 0.4 / RUN_MM), 30 * PER_MM])
+    assert tip.run_in_mm == 0.0
+
+
+def test_no_stroke_takes_more_than_its_own_again_and_the_next_one_takes_the_rest() -> None:
+    tip = _tip()
+    short = run_in(_stroke(Kind.INFILL, 5.0), _layer(Kind.INFILL), tip, load())
+    assert short.filament_mm == pytest.approx([2 * 5 * PER_MM])
+    assert tip.run_in_mm == pytest.approx(0.4 - 5 * PER_MM)
+
+
+def test_an_outer_wall_takes_nothing_where_the_layer_has_anything_inside() -> None:
+    for kinds, more in (((Kind.OUTER_WALL, Kind.INFILL), 0.0), ((Kind.OUTER_WALL,), 0.4)):
+        tip, wall = _tip(), _stroke(Kind.OUTER_WALL, 40.0)
+        run = run_in(wall, _layer(*kinds), tip, load())
+        assert run.filament_mm.sum() - wall.filament_mm.sum() == pytest.approx(more)
+
+
+def test_it_goes_no_faster_than_the_hot_end_melts() -> None:
+    profile: Profile = load(settings=["material.volumetric_limit_mm3_s=2"])
+    stroke = run_in(_stroke(Kind.INFILL, 20.0, speed=25.0), _layer(Kind.INFILL), _tip(), profile)
+    rate = stroke.filament_mm[0] / 20.0 * stroke.speed_mm_s * pi * 1.75**2 / 4
+    assert rate == pytest.approx(2.0)
+
+
+def test_a_part_on_plastic_begins_inside_with_its_infill() -> None:
+    keys = load(settings=BARE)
+    base, top = cut(box(20, 20, 12), ((0, 0, 1), 6.0))
+    first, second = slice_part(top, keys, [base]).layers[:2]
+    assert first.paths[0].kind is Kind.INFILL
+    assert second.paths[0].kind is not Kind.INFILL
+
+
+@pytest.mark.parametrize("kinds", [(Kind.OUTER_WALL, Kind.INNER_WALL), (Kind.SUPPORT, Kind.INFILL)])
+def test_a_layer_that_begins_with_support_or_has_nothing_inside_keeps_its_order(kinds: tuple[Kind, ...]) -> None:
+    line = np.array([[0.0, 0.0], [9.0, 0.0]])
+    beads = [Bead(kind, line, 0.45, -1000 if kind is Kind.SUPPORT else 3) for kind in kinds]
+    assert begin_inside(beads) == beads
