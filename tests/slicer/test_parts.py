@@ -46,7 +46,7 @@ from tests.shapes import box
 from tests.slicer.hand import cut, profile
 
 def slice_part(*_):
-    print(os.getpid(), flush=True)
+    os.write(1, f"{os.getpid()}\\n".encode())  # in one piece, so that two processes' lines do not mix
     while True:
         pass
 
@@ -59,13 +59,14 @@ slicer.parts.slice_parts(cut(box(10, 10, 24), ((0.0, 0.0, 1.0), 12.0)), profile(
 def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -> None:
     with subprocess.Popen([sys.executable, "-c", SLICING], stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
-        children = [int(parent.stdout.readline()) for _ in range(2)]
-        parent.send_signal(ended_by)
+        children = []
         try:
+            children += [int(parent.stdout.readline()) for _ in range(2)]
+            parent.send_signal(ended_by)
             parent.communicate(timeout=10.0)  # until nobody holds the other end of the pipe
-        except subprocess.TimeoutExpired:
-            for child in children:
-                os.kill(child, signal.SIGKILL)
+        except BaseException:
+            for process in (parent.pid, *children):
+                os.kill(process, signal.SIGKILL)
             raise
         assert parent.returncode == -ended_by
 
