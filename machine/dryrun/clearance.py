@@ -13,6 +13,7 @@ from mdp.head import Body, bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
+from slicer.paths import Kind
 
 FIRST_MM = 20.0  # of way between the poses tried first
 MOST_LEFT_MM = 0.05
@@ -77,8 +78,15 @@ def _body(
 
 
 def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
-    """Every turn of the table; of a program that turns all the time (curved layers) an even choice, which is said."""
+    """Every turn of the table; of a program that turns all the time (curved layers) an even choice, which is said.
+
+    What is printed is taken as one convex body. A purge line at the plate's edge would make that far too large; lower than the
+    distance that is kept from the plate, it is part of that.
+    """
     problems = []
+    purge = np.array([name == Kind.PURGE.value for name in program.types], dtype=np.bool_)[program.type[deposited_row]]
+    counted = ~(purge & (deposited[:, :, 2].max(axis=1, initial=0.0) <= machine.clearance_mm))
+    deposited, deposited_row = deposited[counted], deposited_row[counted]
     printed, done = hull(np.zeros((0, 3)), 0.0), 0
     rows = np.flatnonzero(program.kind == MoveKind.ROTATE)
     if len(rows) > MOST_TURNS:

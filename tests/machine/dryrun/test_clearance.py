@@ -92,6 +92,16 @@ def test_a_turn_under_a_low_head_meets_the_rim_and_what_is_printed() -> None:
     assert not [f for f in dry_run(text.format(z=60, a=30).splitlines(), profile).findings if f.code == "collision"]
 
 
+@pytest.mark.parametrize(("kind", "collides"), [("Custom", False), ("Perimeter", True)])
+def test_a_purge_line_at_the_plate_s_edge_makes_no_mountain_of_the_print(kind: str, collides: bool) -> None:
+    text = f"G28\nG92 A0 C0\nM109 S210\nM83\n;WIDTH:0.4\n;TYPE:{kind}\nG0 Z0.2 F600\nG0 X-15 Y-90\nG1 X15 E1 F600\n"
+    text += ";TYPE:Perimeter\nG0 Z30\nG0 X0 Y0\nG1 X5 E1\nG0 Z32\nG0 X0 Y0\nG0 A{a} F600\nM104 S0"
+    profile = _with(Head(nozzle_mm=0.4, silhouette_mm=[(0.5, 0.0)], boxes=[]))
+    profile = profile.model_copy(update={"machine": profile.machine.model_copy(update={"clearance_mm": 1.0})})
+    found = [f for a in (-48, 48) for f in dry_run(text.format(a=a).splitlines(), profile).findings]
+    assert any("the print while the table turns" in finding.message for finding in found) == collides
+
+
 @pytest.mark.parametrize("turn", ["C10000000", "A30 C10000000"])
 def test_a_turn_of_ten_million_degrees_is_tried_as_far_as_the_axis_goes(turn: str) -> None:
     found = dry_run(["G28", "G92 A0 C0", "G1 Z5 F600", f"G1 {turn} F600"], GENERIC).findings
