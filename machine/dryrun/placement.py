@@ -12,6 +12,7 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 HANGING = (Kind.OVERHANG.value, Kind.BRIDGE.value)  # the slicer itself says that these hang
+SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 IRONING = Kind.IRONING.value  # goes over what has been laid
 PURGE = "Custom"  # what a start block pushes out beside the plate is meant to fall
 ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # of a part's length in air
@@ -40,6 +41,7 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[
     """Parts with too much that hangs where the slicer has not said so, and parts that begin in air."""
     own = ~_rows_of_types(program, (PURGE,))
     hanging = np.where(own & ~_rows_of_types(program, HANGING), contacts.air_mm, 0.0)
+    support = _rows_of_types(program, SUPPORT)
     problems = []
     for part in np.unique(program.part[hanging > 0.0]):
         mine = own & (program.part == part)
@@ -50,7 +52,9 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[
         if not (lost or loose > max(LEAST_MM, WARNING_SHARE * whole)):
             continue
         severity: Severity = "error" if lost or loose > ERROR_SHARE * whole else "warning"
-        message = f"{loose:.1f} mm of {whole:.0f} mm are extruded into air, nothing lies under or beside them"
+        of_support = float(hanging[mine & support].sum())
+        message = f"{loose:.1f} mm of {whole:.0f} mm are extruded into air, nothing lies under or beside them: "
+        message += f"{loose - of_support:.1f} mm of the part, {of_support:.1f} mm of its support"
         if lost:
             message = f"the part begins in air: {first:.1f} mm of its first layer have nothing under them"
         problems.append(_at(program, begins & (contacts.air_mm > 0) if lost else mine & (hanging > 0), severity, "air", message))

@@ -101,6 +101,13 @@ def test_a_bead_above_nothing_hangs_in_air_along_all_its_length(z: float) -> Non
     assert [f.code for f in run.findings if f.severity == "error"] == ["air"]
 
 
+def test_what_hangs_is_told_apart_as_the_part_and_its_support() -> None:
+    first, high = ";LAYER_CHANGE\nG1 X20 E1.5 F600\n", ";LAYER_CHANGE\nG0 Z5\nG0 Y20\nG1 X-20 E1.5\n"
+    run = _run(f"{first}{high}G0 Y30\n;TYPE:Support material\nG1 X0 E0.75")
+    (message,) = (finding.message for finding in run.findings if finding.code == "air")
+    assert message.endswith("40.0 mm of the part, 20.0 mm of its support")
+
+
 def test_a_bead_beside_one_in_air_is_carried_by_it_and_one_farther_off_is_not() -> None:
     assert _sums(_run("G1 X20 E1.5 F600\nG0 Y0.4\nG1 X-20 E1.5", 5.0)) == pytest.approx([40.0, 0.0, 40.0])
     assert _sums(_run("G1 X20 E1.5 F600\nG0 Y0.9\nG1 X-20 E1.5", 5.0)) == pytest.approx([80.0, 0.0, 0.0])
