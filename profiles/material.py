@@ -45,6 +45,12 @@ class Material(Frozen):
         description="tensile strength across layers, MPa; PLA printed well reaches 34, 3D Print. Addit. Manuf. 2020; ordinary "
         "prints and other filaments bond less",
     )
+    bridge_longest_mm: float = Field(
+        10.0,
+        ge=1,
+        le=100,
+        description="level places spanned by straight lines up to this long, held at both ends, print without support, mm",
+    )
     flow: float = Field(1.0, ge=0.5, le=1.5, description="factor on all extruded volume")
     retract_mm: float = Field(ge=0, le=15, description="filament pulled back before a travel that crosses outside, mm")
     retract_speed_mm_s: float = Field(35.0, gt=0, le=200, description="speed of retraction and priming, mm/s")

@@ -62,6 +62,9 @@ def load(
         profile = Profile.model_validate(whole)
     except ValidationError as error:
         raise ProfileError("; ".join(sentences(error.errors(), Profile))) from None
+    if profile.process.bridge_longest_mm is None:
+        asked = profile.process.model_copy(update={"bridge_longest_mm": profile.material.bridge_longest_mm})
+        profile = profile.model_copy(update={"process": asked})
     problems = _check_together(profile)
     if problems:
         raise ProfileError("; ".join(problems))

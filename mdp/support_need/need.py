@@ -26,7 +26,7 @@ def limits_of(process: Process, ground_mm: float) -> Limits:
         risky_below=threshold(process.self_supporting_angle_deg),
         ground_mm=ground_mm,
         level_mm=LEVEL_LAYERS * process.layer_height_mm,
-        bridge_mm=process.bridge_longest_mm,
+        bridge_mm=process.bridge_mm,
         arch_mm=process.arch_longest_mm,
         width_mm=process.line_width_mm,
         least_mm2=process.support_least_mm2,

@@ -14,6 +14,7 @@ BINS = 36  # of directions of the sides, over half a turn
 LINES = 24  # over a place at most; else one every line width
 HOPELESS = 0.2  # share of the ends of lines that lie on no bank, beyond which lines need not be drawn
 TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place, as for the slicer's bridges
+ROUNDING_MM = 0.05  # a span may seem longer by this than it was drawn
 
 
 class Sides(NamedTuple):
@@ -104,7 +105,7 @@ def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_
         order = argsort(places[:crossed])
         for c in range(0, crossed - 1, 2):
             span = places[order[c + 1]] - places[order[c]]
-            if span > longest_mm:
+            if span > longest_mm + ROUNDING_MM:
                 return False
             total += span
             loose += 0.0 if banked[order[c]] > 0 and banked[order[c + 1]] > 0 else span

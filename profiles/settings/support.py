@@ -6,6 +6,8 @@ from pydantic import Field
 
 from profiles.machine import Frozen
 
+ANY_MATERIAL_MM = 5.0  # what bridges in whatever is printed
+
 
 class Support(Frozen):
     """Overhangs, bridges and support."""
@@ -13,8 +15,12 @@ class Support(Frozen):
     overhang_share: float = Field(
         0.5, ge=0, le=1, description="walls with less than this share of their width on plastic below count as overhanging"
     )
-    bridge_longest_mm: float = Field(
-        6.0, ge=0, le=100, description="spans up to this print without support; PLA with a fan manages more, PETG hardly, mm"
+    bridge_longest_mm: float | None = Field(
+        None,
+        ge=1,
+        le=100,
+        description="level places spanned by straight lines up to this long, held at both ends, print without support, mm; "
+        "absent: the material's; 1: next to nothing is left without support",
     )
     arch_longest_mm: float = Field(
         6.0,
@@ -83,8 +89,17 @@ class Support(Frozen):
         2.0, ge=0, le=20, description="support is wider by this in its first layer on the platform, so that it sticks, mm"
     )
     support_foot_density: float = Field(
-        0.7, gt=0, le=1, description="share of the support's first layer on the platform that is filled"
+        0.85,
+        gt=0,
+        le=1,
+        description="share of the support's first layer on the platform that is filled; from 0.85 on its lines lie so near each "
+        "other that whatever stands on it has plastic under it",
     )
     support_least_mm2: float = Field(
         1.0, ge=0, le=1000, description="a hanging place smaller than this, seen from above, holds itself, mm2"
     )
+
+    @property
+    def bridge_mm(self) -> float:
+        """The longest bridge without support; a profile that was loaded has put the material's where nothing was asked for."""
+        return ANY_MATERIAL_MM if self.bridge_longest_mm is None else self.bridge_longest_mm

@@ -7,6 +7,7 @@ import numpy as np
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
+from mdp.support_need.spans import ROUNDING_MM
 from profiles.process import Process
 from slicer.bead import Bead
 from slicer.fill.skin import skin_beads
@@ -41,7 +42,7 @@ class Bridge:
 
     def carries(self, longest_mm: float) -> bool:
         """Whether it needs no support: every line from bank to bank, none longer than that."""
-        return self.loose <= TOLERATED and self.longest_mm <= longest_mm
+        return self.loose <= TOLERATED and self.longest_mm <= longest_mm + ROUNDING_MM
 
 
 def find_bridge(hanging: Polygons, banks: Floats, width_mm: float) -> Bridge | None:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, area_mm2, closing, contours, offset, union
+from slicer.geometry.polygons import Polygons, area_mm2, closing, contours, islands, offset, union
 from slicer.interface.interface import sections_of
 
 TOUCHING_MM = 0.01  # sections of parts on either side of a cut are joined over such gaps
@@ -42,9 +42,9 @@ def compensated(own: Polygons, others: Polygons, process: Process) -> Polygons:
 
 def _resized(whole: Polygons, process: Process) -> Polygons:
     """A section of the model with larger or smaller outsides and holes."""
-    islands = []
-    for island in whole.decompose():
+    resized = []
+    for island in islands(whole):
         filled = Polygons([loop for loop in contours(island) if area_mm2(loop) > 0])
         outside, holes = offset(filled, process.outline_compensation_mm), filled - island
-        islands.append(outside if holes.is_empty() else outside - offset(holes, process.hole_compensation_mm))
-    return union(islands)
+        resized.append(outside if holes.is_empty() else outside - offset(holes, process.hole_compensation_mm))
+    return union(resized)

@@ -30,10 +30,10 @@ def detect_overhangs(
     """For every layer the part of its outline above a risky face.
 
     mesh and cuts_mm: part frame. below: plastic under the first layer, None: the platform, on which it may lie. What carries
-    itself by the search's definition (mdp.support_need) does not hang, what bridges layer by layer does not either. Without
-    support whatever has a bank to hold on to is printed as a bridge, however long.
+    itself by the search's definition (mdp.support_need) does not hang; what bridges layer by layer, as arches do, does
+    not either. Without support whatever has a bank to hold on to is printed as a bridge, however long.
     """
-    longest_mm = inf if process.support == "none" else process.bridge_longest_mm
+    level_mm, arch_mm = (inf, inf) if process.support == "none" else (process.bridge_mm, process.arch_longest_mm)
     overhangs = [Overhang(Polygons(), ())] * len(outlines)
     risky = facing_down(mesh, UP, process.self_supporting_angle_deg)
     needing = _by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, below is None))
@@ -43,33 +43,32 @@ def detect_overhangs(
         bank = outlines[i - 1] if i else offset(below, RIM_MM)
         hanging = (outlines[i] - bank) ^ offset(Polygons(triangles), 0.5 * RIM_MM)
         if not hanging.is_empty():
-            overhangs[i] = _sort_islands(hanging, bank, process.line_width_mm, longest_mm)
-            if len(needing.get(i, ())) < len(triangles):
-                overhangs[i] = _limit(overhangs[i], needing.get(i, []))
+            all_need = len(needing.get(i, ())) == len(triangles)
+            need = hanging if all_need else hanging ^ offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM)
+            overhangs[i] = _sort_islands(hanging, need, bank, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
     return overhangs
 
 
-def _limit(overhang: Overhang, needing: list[Floats]) -> Overhang:
-    """What of a layer hangs above those faces."""
-    if overhang.hanging.is_empty() or not needing:
-        return Overhang(Polygons(), overhang.bridges)
-    return Overhang(overhang.hanging ^ offset(Polygons(needing), 0.5 * RIM_MM), overhang.bridges)
+def _sort_islands(
+    hanging: Polygons, need: Polygons, bank: Polygons, width_mm: float, longest_mm: tuple[float, float]
+) -> Overhang:
+    """Sorts the connected pieces of a hanging place.
 
-
-def _sort_islands(hanging: Polygons, bank: Polygons, width_mm: float, longest_mm: float) -> Overhang:
-    """Sorts the connected pieces of a hanging place."""
+    need: what of it needs support by the search's definition; longest_mm: of bridges that do not, and of those that do.
+    """
     places = islands(hanging)
     if all(island.area() < LEAST * width_mm**2 for island in places):
-        return Overhang(hanging, ())
+        return Overhang(need, ())
     banks = edges(offset(bank, 0.25 * width_mm))
     rest, spans = [], []
     for island in places:
         span = find_bridge(island, banks, width_mm)
-        if span is not None and (longest_mm == inf or span.carries(longest_mm)):
+        most_mm = longest_mm[(island ^ need).area() >= LEAST * width_mm**2]
+        if span is not None and (most_mm == inf or span.carries(most_mm)):
             spans.append(span)
         else:
             rest.append(island)
-    return Overhang(Polygons.compose(rest) if rest else Polygons(), tuple(spans))
+    return Overhang(Polygons.compose(rest) ^ need if rest else Polygons(), tuple(spans))
 
 
 def _by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:

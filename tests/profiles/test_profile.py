@@ -30,6 +30,13 @@ def written(folder: Path, text: str, name: str = "mine.toml") -> str:
     return str(folder / name)
 
 
+def test_the_material_decides_how_long_bridges_are_where_the_process_does_not() -> None:
+    spans = {name: load(material=name).process.bridge_mm for name in ("pla", "petg", "abs", "tpu")}
+    assert spans == {"pla": 30.0, "petg": 10.0, "abs": 8.0, "tpu": 5.0}
+    assert load(settings=["material.bridge_longest_mm=22"]).process.bridge_mm == 22.0
+    assert load(material="petg", settings=["process.bridge_longest_mm=17"]).process.bridge_mm == 17.0
+
+
 def test_the_defaults_load() -> None:
     assert load().process.layer_height_mm == 0.2
     assert all(DEFAULTS[kind] in shipped(kind) for kind in KINDS)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import manifold3d as m3
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -137,9 +138,9 @@ def test_flatter_faces_are_supported(angle: float) -> None:
 
 
 def test_a_short_bridge_needs_no_support_and_a_long_one_does() -> None:
-    assert of_kind(slice_part(whole(table(5)), profile()), *PROPS) == []
-    assert len(of_kind(slice_part(whole(table(12)), profile()), *PROPS)) > 10
-    assert len(of_kind(slice_part(whole(table(5)), profile("process.bridge_longest_mm=0")), *PROPS)) > 10
+    assert of_kind(slice_part(whole(table(30)), profile()), *PROPS) == []
+    assert len(of_kind(slice_part(whole(table(31)), profile()), *PROPS)) > 10
+    assert len(of_kind(slice_part(whole(table(5)), profile("process.bridge_longest_mm=1")), *PROPS)) > 10
 
 
 @pytest.mark.parametrize(("diameter", "hangs"), [(4.0, False), (8.0, False), (12.0, True)])
@@ -181,9 +182,9 @@ def test_support_that_may_not_stand_on_the_part_leans_out_to_the_platform() -> N
 
 def test_a_hanging_face_that_no_support_fits_under_is_told_unless_the_plastic_below_is_as_near() -> None:
     slit = m3.Manifold.cube((30, 30, 10)) - m3.Manifold.cube((20, 20, 0.2)).translate((5, 5, 5))
-    assert slice_part(whole(standing(slit)), profile("process.bridge_longest_mm=0")).unsupported_mm2 == 0.0
+    assert slice_part(whole(standing(slit)), profile("process.bridge_longest_mm=1")).unsupported_mm2 == 0.0
     drawer = m3.Manifold.cube((30, 30, 10)) - m3.Manifold.cube((20, 20, 0.5)).translate((5, 5, 5))
-    sliced = slice_part(whole(standing(drawer)), profile("process.bridge_longest_mm=0"))
+    sliced = slice_part(whole(standing(drawer)), profile("process.bridge_longest_mm=1"))
     assert sliced.unsupported_mm2 == pytest.approx(400.0, rel=0.02)
     assert sliced.layers[sliced.unsupported_layer - 1].z_mm == pytest.approx(5.6)
 
@@ -256,8 +257,21 @@ def test_support_gets_a_foot_on_the_platform() -> None:
     assert reach[0] - reach[1] == pytest.approx(3.0, abs=0.3)
 
 
+@pytest.mark.parametrize("style", ["tree", "grid"])
+def test_the_foot_carries_whatever_stands_on_it(style: str) -> None:
+    foot, above = (
+        [path for path in layer.paths if path.kind in PROPS]
+        for layer in slice_part(whole(mushroom()), profile(f"process.support_style={style}")).layers[:2]
+    )
+    laid = shapely.union_all([shapely.LineString(path.points).buffer(0.5 * path.width_mm) for path in foot])
+    lines = shapely.union_all([shapely.LineString(path.points) for path in above])
+    bare = lines - laid
+    assert max(piece.length for piece in getattr(bare, "geoms", [bare])) < 1.0
+    assert bare.length < 0.1 * lines.length
+
+
 SOLIDS: dict[str, Callable[[], Mesh]] = {
-    "a table": lambda: table(30, 12, 16),
+    "a table": lambda: table(34, 12, 16),
     "a mushroom": mushroom,
     "a funnel": lambda: funnel(65.0),
     "a leaning arm": branch,
