@@ -19,13 +19,22 @@ HIDDEN_RESOLUTION_MM = 0.0125  # of what the outer wall hides: PrusaSlicer's res
 
 
 @dataclass(frozen=True, eq=False)
+class Course:
+    """The way of a bead and how wide it is along it. points: (n, 2) mm, a closed one repeats its first; widths: (n,) mm."""
+
+    points: Floats
+    widths: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Bead:
     """points: (n, 2) mm, a closed bead repeats its first point.
 
     rank: beads of an island are printed by rising rank; those of rank 0 and below are its walls and stay together around
     each outer wall. over_infill: a bridge over the sparse infill of the layer below, which has a speed and a fan of its own.
     follows: printed right after the bead before it in the list. overhang: of a wall, 0 to 4: less than all, 75, 50, 25 % of its
-    width or nothing of it lies on plastic.
+    width or nothing of it lies on plastic. line: a wall that does not run round. course: where the width varies, of which
+    width_mm is then the mean; the points lie on it.
     """
 
     kind: Kind
@@ -36,6 +45,8 @@ class Bead:
     over_infill: bool = False
     follows: bool = False
     overhang: int = 0
+    line: bool = False
+    course: Course | None = None
 
     @property
     def closed(self) -> bool:
@@ -45,7 +56,7 @@ class Bead:
     @property
     def one_way(self) -> bool:
         """Whether the bead must begin where it does: walls have their seam there."""
-        return self.closed or self.kind in WALLS
+        return self.closed or (self.kind in WALLS and not self.line)
 
     @cached_property
     def length_mm(self) -> float:

@@ -30,6 +30,7 @@ from slicer.walls.gap import gaps
 from slicer.walls.overhang import split_overhangs
 from slicer.walls.seam import Surroundings, place_seams, rear_of
 from slicer.walls.thin import thin_walls
+from slicer.walls.variable.pieces import in_pieces
 from slicer.walls.walls import wall_beads
 
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
@@ -133,6 +134,7 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
     if index == 0:
         fixed = first_layer_mm_s(process, on_platform)
         flow *= process.first_layer_flow if on_platform else process.interface_flow
+    ordered = in_pieces(ordered, height_mm)
     speeds = speeds_mm_s(ordered, profile, height_mm, fixed, flow)
     if on_platform:
         fan = rising_fan(material, index)

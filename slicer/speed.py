@@ -66,8 +66,9 @@ def _of_bead(bead: Bead, table: dict[Kind, float], process: Process) -> float:
         return process.infill_bridge_speed_mm_s
     if bead.overhang:
         return min(table[bead.kind], _overhang_mm_s(process)[bead.overhang - 1])
-    if bead.kind in RINGS and bead.length_mm <= process.small_wall_mm:
-        ends = bead.points[-1] - bead.points[0]
+    way = bead.points if bead.course is None else bead.course.points
+    if bead.kind in RINGS and length_mm(way) <= process.small_wall_mm:
+        ends = way[-1] - way[0]
         if float(np.hypot(ends[0], ends[1])) <= bead.width_mm:  # a seam gap leaves a wall a little open
             return min(table[bead.kind], process.small_wall_speed_mm_s)
     return table[bead.kind]

@@ -82,8 +82,9 @@ def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Se
     below = plastic_beneath(part, earlier, outlines[0])
     processes = strengthen_overhangs(processes, own, below)
     model = model_around(part, uncut, own, heights, earlier, later, process)
-    rows = zip(own, model.sections, processes, heights.height_mm, strict=True)
-    wall_layers = [cut_walls(s, m, p, h, process.walls) for s, m, p, h in rows]
+    nozzle_mm = profile.machine.head.nozzle_mm
+    rows = zip(own, model.sections, processes, heights.height_mm.tolist(), strict=True)
+    wall_layers = [cut_walls(s, m, p, h, nozzle_mm, process.walls) for s, m, p, h in rows]
     region_layers = regions([w.walls.inside for w in wall_layers], cover(model, own, wall_layers), below is not None, process)
     overhangs = detect_overhangs(mesh, outlines, heights.cut_mm, process, below)
     blocked = blocked_areas(part, later, heights, process.support_distance_mm, far_mm(mesh))

@@ -7,13 +7,14 @@ import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
+from mdp.kernels.arrays import flags, longs
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints
 from slicer.geometry.halfedges import opposites
 from slicer.geometry.segments import Segment, orientation
 
 Indices = NDArray[np.int64]
-MOST_PASSES = 60  # of flipping; real polygons need fewer than ten, rounding must not make it endless
+MOST_FLIPS = 200  # for every side; real polygons need fewer than ten, rounding must not make it endless
 
 
 class Triangulation(NamedTuple):
@@ -57,29 +58,38 @@ def _inside_circle(points: Floats, a: int, b: int, c: int, p: int) -> bool:
 
 
 @kernel
-def _flip(triangulation: Triangulation) -> None:
-    """Flips inner sides in place until every one is locally Delaunay."""
+def _flip(triangulation: Triangulation) -> int:
+    """Flips inner sides in place until every one is locally Delaunay; returns how many times."""
     points, tails, across = triangulation
-    for _ in range(MOST_PASSES):
-        flipped = 0
-        for a in range(len(tails)):
-            b = across[a]
-            if b < a:
-                continue
-            a_prev, b_prev = a - a % 3 + (a + 2) % 3, b - b % 3 + (b + 2) % 3
-            p, q, r, s = tails[a], tails[b], tails[a_prev], tails[b_prev]
-            if not _inside_circle(points, p, q, r, s):
-                continue
-            if doubled_area(points, s, q, r) <= 0.0 or doubled_area(points, r, p, s) <= 0.0:
-                continue
-            outer_a, outer_b = across[a_prev], across[b_prev]
-            tails[a], tails[b] = s, r
-            across[a], across[b] = outer_b, outer_a
-            if outer_b >= 0:
-                across[outer_b] = a
-            if outer_a >= 0:
-                across[outer_a] = b
-            across[a_prev], across[b_prev] = b_prev, a_prev
-            flipped += 1
-        if not flipped:
-            break
+    waiting, stack, queued = len(tails), longs(len(tails), 0), flags(len(tails))
+    for k in range(len(tails)):
+        stack[k], queued[k] = len(tails) - 1 - k, True
+    flips = 0
+    while waiting > 0 and flips < MOST_FLIPS * len(tails):
+        waiting -= 1
+        a = stack[waiting]
+        queued[a] = False
+        b = across[a]
+        if b < 0:
+            continue
+        a_prev, b_prev = a - a % 3 + (a + 2) % 3, b - b % 3 + (b + 2) % 3
+        p, q, r, s = tails[a], tails[b], tails[a_prev], tails[b_prev]
+        if not _inside_circle(points, p, q, r, s):
+            continue
+        if doubled_area(points, s, q, r) <= 0.0 or doubled_area(points, r, p, s) <= 0.0:
+            continue
+        outer_a, outer_b = across[a_prev], across[b_prev]
+        tails[a], tails[b] = s, r
+        across[a], across[b] = outer_b, outer_a
+        if outer_b >= 0:
+            across[outer_b] = a
+        if outer_a >= 0:
+            across[outer_a] = b
+        across[a_prev], across[b_prev] = b_prev, a_prev
+        flips += 1
+        for t in (a - a % 3, b - b % 3):
+            for h in range(t, t + 3):
+                if not queued[h]:
+                    queued[h], stack[waiting] = True, h
+                    waiting += 1
+    return flips

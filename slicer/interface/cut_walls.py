@@ -15,6 +15,7 @@ from slicer.interface.model import Model
 from slicer.paths import Kind
 from slicer.region import Cover
 from slicer.travel.split import cut_line
+from slicer.walls.layer_walls import layer_walls
 from slicer.walls.walls import Walls, wall_rank, walls
 
 REACH = 0.1  # of the line width: an inner wall that ends on the wall along a cut overlaps it by this
@@ -32,23 +33,25 @@ class CutWalls:
     model_inside: Polygons
 
 
-def cut_walls(section: Polygons, model: Polygons | None, process: Process, height_mm: float, usual: int) -> CutWalls:
+def cut_walls(
+    section: Polygons, model: Polygons | None, process: Process, height_mm: float, nozzle_mm: float, usual: int
+) -> CutWalls:
     """The walls of a part's section in its island of the model; None: no other part touches it.
 
-    usual: how many walls the model would have here.
+    usual: how many walls the model would have here. Walls that end on a cut face are all of one width.
     """
     width, outer = process.line_width_mm, process.outer_wall_line_width_mm
     if model is None:
-        round_ = walls(section, process.walls, width, height_mm, outer)
-        fewer = round_ if usual == process.walls else walls(section, usual, width, height_mm, outer)
+        round_ = layer_walls(section, process.walls, process, height_mm, nozzle_mm)
+        fewer = round_ if usual == process.walls else layer_walls(section, usual, process, height_mm, nozzle_mm)
         return CutWalls(round_, (), fewer.inside)
     whole = walls(model, process.walls, width, height_mm, outer)
     fewer = whole if usual == process.walls else walls(model, usual, width, height_mm, outer)
-    round_ = walls(section, min(process.interface_walls, process.walls), width, height_mm, outer)
+    round_ = layer_walls(section, min(process.interface_walls, process.walls), process, height_mm, nozzle_mm)
     if process.interface_walls >= process.walls or round_.inside.is_empty():
         return CutWalls(round_, (), fewer.inside)
     place = offset(round_.inside, REACH * width - 0.5 * spacing_mm(width, height_mm))
-    loops, ending = list(round_.loops), []
+    loops, ending = [*round_.loops, *((),) * (process.interface_walls - len(round_.loops))], []
     for level in range(process.interface_walls, len(whole.loops)):
         runs = [run for loop in whole.loops[level] for run in _within(loop, place) if length_mm(run) > width]
         loops.append(tuple(run[:-1] for run in runs if _is_closed(run)))

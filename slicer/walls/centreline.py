@@ -14,7 +14,7 @@ from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from slicer.bead import length_mm
 from slicer.geometry.chordal_axis import Axis, chordal_axis
-from slicer.geometry.polygons import start_at
+from slicer.geometry.polygons import resample
 from slicer.geometry.triangulation import triangulate
 
 SMOOTHINGS = 3  # moving averages over three points
@@ -58,7 +58,7 @@ def centrelines(outlines: Sequence[Floats], step_mm: float, even: float, shortes
 
     Lines are cut where their width changes by the factor `even`, but not into pieces shorter than shortest_mm.
     """
-    triangulation = triangulate([_resample(loop, step_mm) for loop in outlines])
+    triangulation = triangulate([resample(loop, step_mm) for loop in outlines])
     if triangulation is None:
         return []
     axis = chordal_axis(triangulation)
@@ -72,16 +72,6 @@ def _chains(axis: Axis) -> list[_Chain]:
         _Chain(axis.points[a:b], axis.widths[a:b], (int(axis.ends[k, 0]), int(axis.ends[k, 1])), int(axis.places[k]))
         for k, (a, b) in enumerate(cuts)
     ]
-
-
-def _resample(loop: Floats, step_mm: float) -> Floats:
-    """The loop with points added so that no edge is longer than the step."""
-    steps = start_at(loop, 1) - loop
-    counts = np.maximum(np.ceil(np.hypot(*steps.T) / step_mm), 1).astype(np.int64)
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    share = (np.arange(counts.sum()) - first) / np.repeat(counts, counts)
-    resampled: Floats = np.repeat(loop, counts, axis=0) + share[:, None] * np.repeat(steps, counts, axis=0)
-    return resampled
 
 
 @kernel

@@ -57,9 +57,9 @@ def rear_of(bounds_mm: Floats) -> Floats:
 def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -> tuple[list[Bead], Floats]:
     """The beads with their walls begun at their seams, and the (k, 2) seams of the outer walls.
 
-    The walls come as loops (n, 2), solid on their left, and become polylines. A wall stops short of its beginning by
-    seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width inside
-    instead, over its inner walls.
+    The walls that run round come as loops (n, 2), solid on their left, and become polylines. A wall stops short of its
+    beginning by seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width
+    inside instead, over its inner walls.
     """
     interfaces = _at_height(around, process.interface_seam_mm)
     seams: dict[int, Floats] = {}
@@ -67,7 +67,7 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
     for kind in WALLS:
         known = np.array(list(seams.values())).reshape(-1, 2)
         for k, bead in enumerate(beads):
-            if bead.kind is kind:
+            if bead.kind is kind and not bead.line:
                 loop = np.ascontiguousarray(bead.points)
                 lead_mm = 0.0
                 if kind is Kind.INNER_WALL:

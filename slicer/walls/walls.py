@@ -6,12 +6,15 @@ beads fit, no wall turns round; the place is handed out as narrow and gets one c
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import HIDDEN_RESOLUTION_MM, Bead, bulge_flow, outer_wall_width_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, contours, offset, offset_round, opening
 from slicer.paths import Kind
 from slicer.walls.gap import LEAST_GAP, LEAST_LINE
+from slicer.walls.variable.variable import EVEN_MM, Wall
 
 BLUNT = 1.1  # mitre limit that claims nothing beyond a corner; what it leaves there is looked at again with round beads
 LEAST_REST_MM2 = 1e-3
@@ -22,13 +25,14 @@ SLACK_MM = 0.01  # so that coinciding boundaries of an opening and its original 
 class Walls:
     """loops[k]: centrelines of wall k from outside; free: narrow places of the section itself; narrow: between walls.
 
-    inside: what the walls enclose, bounded half a spacing inside the innermost centreline.
+    inside: what the walls enclose, bounded half a spacing inside the innermost centreline. varying: walls as wide as the place.
     """
 
     loops: tuple[tuple[Floats, ...], ...]
     free: Polygons
     narrow: Polygons
     inside: Polygons
+    varying: tuple[Wall, ...] = ()
 
 
 def walls(section: Polygons, count: int, width_mm: float, height_mm: float, outer_mm: float | None = None) -> Walls:
@@ -82,7 +86,18 @@ def wall_beads(walled: Walls, process: Process, height_mm: float) -> list[Bead]:
     for level, loops in enumerate(walled.loops):
         kind, width, flow = (Kind.INNER_WALL, process.line_width_mm, 1.0) if level else (Kind.OUTER_WALL, outer, outer_flow)
         beads += [Bead(kind, loop, width, wall_rank(level, process), flow) for loop in loops]
-    return beads
+    return beads + [_varying_bead(wall, process, height_mm) for wall in walled.varying]
+
+
+def _varying_bead(wall: Wall, process: Process, height_mm: float) -> Bead:
+    """A wall of varying width as a bead; one that fills a place from side to side bulges on both."""
+    kind = Kind.INNER_WALL if wall.level else Kind.OUTER_WALL
+    width = wall.width_mm
+    flow = bulge_flow(width, height_mm, wall.free, process.outer_bulge * process.line_width_mm)
+    even = float(np.ptp(wall.widths)) <= EVEN_MM
+    return Bead(
+        kind, wall.points, width, wall_rank(wall.level, process), flow, line=not wall.closed, course=None if even else wall.course
+    )
 
 
 def wall_rank(level: int, process: Process) -> int:

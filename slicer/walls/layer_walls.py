@@ -1,0 +1,72 @@
+"""Islands: which pieces of a section need walls of varying width, and what all its walls enclose.
+
+An island that is nowhere narrower than its walls want gets the classic walls, which the variable ones would be too.
+"""
+
+from itertools import chain
+
+from profiles.process import Process
+from slicer.bead import HIDDEN_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
+from slicer.geometry.polygons import Polygons, difference, islands, offset, offset_round, opening, strips
+from slicer.walls.variable.pieces import split_course
+from slicer.walls.variable.rule import ROOM, Rule
+from slicer.walls.variable.variable import Wall, variable_walls
+from slicer.walls.walls import SLACK_MM, Walls, walls
+
+LEAST_WIDTH, MOST_WIDTH = 0.6, 2.0  # of beads, in diameters of the nozzle
+NARROW = 0.1  # of the line width: what walls leave that is narrower than that is a corner
+
+
+def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) -> Rule:
+    """The rule of so many walls of a process in layers of that height."""
+    outer, inner = outer_wall_width_mm(process), process.line_width_mm
+    taken = inner - spacing_mm(inner, height_mm)
+    least = max(LEAST_WIDTH * nozzle_mm, height_mm)
+    most = max(MOST_WIDTH * nozzle_mm, outer, inner)
+    return Rule(count, outer - taken, inner - taken, taken, least, most)
+
+
+def layer_walls(section: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float) -> Walls:
+    """Up to `count` walls of a section, of varying width where the process wants them and islands are narrow."""
+    width, outer = process.line_width_mm, process.outer_wall_line_width_mm
+    if process.wall_generator == "classic" or count == 0:
+        return walls(section, count, width, height_mm, outer)
+    rule = bead_rule(count, process, height_mm, nozzle_mm)
+    thick: list[Polygons] = []
+    narrow: list[Polygons] = []
+    for island in islands(section):
+        (thick if _is_thick(island, rule) else narrow).append(island)
+    classic = walls(Polygons.compose(thick), count, width, height_mm, outer)
+    if not narrow:
+        return classic
+    varying = tuple(chain.from_iterable(variable_walls(island, rule) for island in narrow))
+    inside = _enclosed(Polygons.compose(narrow), varying, rule)
+    return Walls(classic.loops, classic.free, classic.narrow, classic.inside + inside, varying)
+
+
+def _wall_mm(rule: Rule) -> float:
+    """How deep all walls reach."""
+    return 0.5 * rule.round + rule.outer + (rule.walls - 1) * rule.inner
+
+
+def _is_thick(island: Polygons, rule: Rule) -> bool:
+    """Whether all walls and more than a bead between them fit everywhere."""
+    deep = _wall_mm(rule) + 0.5 * ROOM * rule.inner
+    core = offset(island, -deep)
+    if core.is_empty():
+        return False
+    rest = island - offset(core, deep + SLACK_MM)
+    return bool(rest.is_empty() or offset(rest, -0.5 * NARROW * rule.inner).is_empty())
+
+
+def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polygons:
+    """What the walls leave inside, where it has room for more than one bead."""
+    inside = offset_round(section, -_wall_mm(rule)).simplify(HIDDEN_RESOLUTION_MM)
+    middle = [
+        strips([piece], 0.5 * width)
+        for wall in varying
+        if wall.level == rule.walls
+        for piece, width in split_course(wall.course.points, wall.course.widths)
+    ]
+    inside = difference(inside, *middle) if middle else inside
+    return inside if inside.is_empty() else opening(inside, 0.5 * rule.inner)

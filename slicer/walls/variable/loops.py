@@ -1,0 +1,132 @@
+"""Loops: the closed beads of one level, by walking round the places of a skeleton where so many beads lie side by side.
+
+The triangles where a loop has room make areas of the triangulation; walking round an area from corner to corner, the loop lies on
+the rib of each, at the depth of its level. Where the walk turns back at the axis, the loop crosses it: it is closed whatever the
+shape (the walk takes the place of the stitching of Kuipers et al. 2020, section 3.4).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.arrays import flags, floats, longs, table
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+from slicer.geometry.triangulation import Triangulation
+from slicer.walls.variable.counts import Counts
+from slicer.walls.variable.rule import Rule, depth_of, loops_of, spacing_of
+from slicer.walls.variable.skeleton import Skeleton, after, before
+
+MITRE = 100.0  # deg: round a sharper corner of a hole the loop is cut off
+SMOOTH = 0.05  # radians: no mitre for less
+PER_CORNER = 6  # points that a corner of a triangle gives at most
+
+
+class Ribs(NamedTuple):
+    """Points of loops. feet: (n, 2); ways: (n, 2) what is added to a foot for every mm of depth; reach: (n,) half thickness.
+
+    depth, spacing: (n,) of the loop there; starts: (k + 1,) where each loop begins.
+    """
+
+    feet: Floats
+    ways: Floats
+    reach: Floats
+    depth: Floats
+    spacing: Floats
+    starts: NDArray[np.int64]
+
+
+@kernel
+def trace_loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int) -> Ribs:
+    """All loops of a level, 0 outermost."""
+    across = triangulation.across
+    many = len(skeleton.radii)
+    depth, active, seen = floats(many, 0.0), flags(many), flags(3 * many)
+    room = 0
+    for t in range(many):
+        if loops_of(rule, counts.beads[t]) > level:
+            depth[t] = depth_of(rule, counts.beads[t], counts.radii[t], level)
+            active[t] = skeleton.radii[t] > depth[t]
+            room += 3 * PER_CORNER if active[t] else 0
+    out = Ribs(table(room, 2), table(room, 2), floats(room, 0.0), floats(room, 0.0), floats(room, 0.0), longs(room + 1, 0))
+    n = loops = 0
+    for start in range(3 * many):
+        if seen[start] or not active[start // 3]:
+            continue
+        h = start
+        while not seen[h]:
+            seen[h] = True
+            t = h // 3
+            spacing = spacing_of(rule, counts.beads[t], counts.radii[t], level)
+            begun = n
+            n = _rib(triangulation, skeleton, h, out, n)
+            other = across[h]
+            if other >= 0 and active[other // 3]:
+                n = _turn(triangulation, skeleton, (h, after(other)), out, n)
+                h = after(other)
+            else:
+                if other >= 0:
+                    room_there = loops_of(rule, counts.beads[other // 3]) > level
+                    n = _cross(skeleton, (t, other // 3), depth[t], room_there, out, n)
+                h = after(h)
+            for k in range(begun, n):
+                out.depth[k], out.spacing[k] = depth[t], spacing
+        loops += 1
+        out.starts[loops] = n
+    return Ribs(out.feet[:n], out.ways[:n], out.reach[:n], out.depth[:n], out.spacing[:n], out.starts[: loops + 1])
+
+
+@part
+def _add(out: Ribs, n: int, foot: tuple[float, float], way: tuple[float, float], reach: float) -> int:
+    out.feet[n, 0], out.feet[n, 1] = foot
+    out.ways[n, 0], out.ways[n, 1] = way
+    out.reach[n] = reach
+    return n + 1
+
+
+@part
+def _rib(triangulation: Triangulation, skeleton: Skeleton, h: int, out: Ribs, n: int) -> int:
+    """Adds the place on the rib of a corner; in the tip of a triangle in a corner of the polygon, that on its bisector."""
+    points, tails, across = triangulation
+    x, y = skeleton.centres[h // 3, 0], skeleton.centres[h // 3, 1]
+    fx, fy, reach = skeleton.feet[h, 0], skeleton.feet[h, 1], skeleton.radii[h // 3]
+    if across[h] < 0 and across[before(h)] < 0:
+        fx, fy = points[tails[h], 0], points[tails[h], 1]
+        return _add(out, n, (fx, fy), ((x - fx) / reach, (y - fy) / reach), reach)
+    long = np.hypot(x - fx, y - fy)
+    return _add(out, n, (fx, fy), ((x - fx) / long, (y - fy) / long), long)
+
+
+@part
+def _turn(triangulation: Triangulation, skeleton: Skeleton, corners: tuple[int, int], out: Ribs, n: int) -> int:
+    """Adds the mitre between two ribs from one point, where the polygon's outline turns into it."""
+    points, tails, _ = triangulation
+    a, b = corners
+    p = tails[b]
+    ax, ay = skeleton.centres[a // 3, 0] - skeleton.feet[a, 0], skeleton.centres[a // 3, 1] - skeleton.feet[a, 1]
+    bx, by = skeleton.centres[b // 3, 0] - skeleton.feet[b, 0], skeleton.centres[b // 3, 1] - skeleton.feet[b, 1]
+    turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+    if turn > -SMOOTH:
+        return n
+    reach = min(np.hypot(ax, ay), np.hypot(bx, by))
+    begin = np.arctan2(ay, ax)
+    many = int(np.ceil(abs(np.degrees(turn)) / MITRE))
+    for k in range(min(many, PER_CORNER - 2)):
+        angle = begin + turn * (k + 0.5) / many
+        stretch = 1.0 / np.cos(0.5 * turn / many)
+        n = _add(out, n, (points[p, 0], points[p, 1]), (stretch * np.cos(angle), stretch * np.sin(angle)), reach / stretch)
+    return n
+
+
+@part
+def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there: bool, out: Ribs, n: int) -> int:
+    """Adds the place where the loop crosses the axis on the way to a node beyond it."""
+    t, other = nodes
+    here, there = skeleton.radii[t], skeleton.radii[other]
+    share = 0.0 if there >= depth else (depth - there) / (here - there)
+    if not room_there:
+        share = max(share, 0.5)
+    x = skeleton.centres[other, 0] + share * (skeleton.centres[t, 0] - skeleton.centres[other, 0])
+    y = skeleton.centres[other, 1] + share * (skeleton.centres[t, 1] - skeleton.centres[other, 1])
+    return _add(out, n, (x, y), (0.0, 0.0), there + share * (here - there))

@@ -1,0 +1,138 @@
+"""Skeleton: the medial axis of polygons as the circumcentres of their Delaunay triangles, with the ribs from it to the boundary.
+
+The triangles of closely sampled contours are the nodes of the axis, their inner sides its edges (Kuipers et al. 2020, section
+3.1, take the Voronoi diagram of the segments: samples need no parabolas and no exact arithmetic). A corner of a triangle is named
+by the half-edge that begins there.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.arrays import flags, floats, ints, table
+from mdp.kernels.kernel import kernel, part
+from mdp.mesh import Floats
+from slicer.geometry.segments import Segment, nearest_share, orientation
+from slicer.geometry.triangulation import Triangulation
+
+SLOPE = 0.2164  # sine of 12.5 deg: sides that meet at less than 25 deg enclose a place that narrows, others a corner
+
+OPPOSITE = -0.8  # cosine of the angle between the ways to opposite sides, at most
+
+
+class Skeleton(NamedTuple):
+    """m nodes. centres: (m, 2); radii: (m,) distance to the boundary; feet: (3 m, 2) the points of the boundary nearest to each.
+
+    central: (3 m,) inner sides across which the axis runs between two opposite sides of the polygon, not into a corner of it.
+    """
+
+    centres: Floats
+    radii: Floats
+    feet: Floats
+    central: NDArray[np.bool_]
+
+
+@part
+def after(h: int) -> int:
+    """The next half-edge of the same triangle."""
+    return h - 2 if h % 3 == 2 else h + 1
+
+
+@part
+def before(h: int) -> int:
+    """The half-edge before in the same triangle."""
+    return h + 2 if h % 3 == 0 else h - 1
+
+
+@kernel
+def skeleton_of(triangulation: Triangulation) -> Skeleton:
+    """The skeleton of a triangulated polygon."""
+    points, tails, across = triangulation
+    following, preceding = ints(len(points), 0), ints(len(points), 0)
+    for h in range(len(tails)):
+        if across[h] < 0:
+            following[tails[h]], preceding[tails[after(h)]] = tails[after(h)], tails[h]
+    count = len(tails) // 3
+    out = Skeleton(table(count, 2), floats(count, 0.0), table(len(tails), 2), flags(len(tails)))
+    for t in range(count):
+        _place(triangulation, t, out)
+        for turn in range(2):
+            near = far = 3 * t
+            for h in range(3 * t, 3 * t + 3):
+                _foot(points, (preceding[tails[h]], tails[h], following[tails[h]]), h, out)
+                near = h if _away(out, h) < _away(out, near) else near
+                far = h if _away(out, h) > _away(out, far) else far
+            out.radii[t] = _away(out, near)
+            if turn == 0:
+                _centre(out, near, far)
+        for h in range(3 * t, 3 * t + 3):
+            a, b = tails[h], tails[after(h)]
+            side = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
+            if across[h] < 0 and orientation(side, out.centres[t, 0], out.centres[t, 1]) <= 0.0:
+                out.radii[t] = 0.0
+    for h in range(len(tails)):
+        other = across[h]
+        if other > h:
+            out.central[h] = 0.5 * (_slope2(out, h) + _slope2(out, other)) < SLOPE * SLOPE
+            out.central[other] = out.central[h]
+    return out
+
+
+@part
+def _place(triangulation: Triangulation, t: int, out: Skeleton) -> None:
+    """Fills in the circumcentre of a triangle."""
+    points, tails, _ = triangulation
+    a, b, c = tails[3 * t], tails[3 * t + 1], tails[3 * t + 2]
+    bx, by = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    cx, cy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
+    doubled = 2.0 * (bx * cy - by * cx)
+    if abs(doubled) < 1e-12:
+        out.centres[t, 0], out.centres[t, 1] = points[a, 0] + (bx + cx) / 3.0, points[a, 1] + (by + cy) / 3.0
+        return
+    b2, c2 = bx * bx + by * by, cx * cx + cy * cy
+    out.centres[t, 0] = points[a, 0] + (cy * b2 - by * c2) / doubled
+    out.centres[t, 1] = points[a, 1] + (bx * c2 - cx * b2) / doubled
+
+
+@part
+def _foot(points: Floats, around: tuple[int, int, int], h: int, out: Skeleton) -> None:
+    """Fills in the foot of a corner, on the two sides that meet there."""
+    x, y = out.centres[h // 3, 0], out.centres[h // 3, 1]
+    least = np.inf
+    for k in range(2):
+        a, b = around[k], around[k + 1]
+        side = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
+        share = nearest_share(side, x, y)
+        fx, fy = side.x0 + share * (side.x1 - side.x0), side.y0 + share * (side.y1 - side.y0)
+        away = np.hypot(fx - x, fy - y)
+        if away < least:
+            least = away
+            out.feet[h, 0], out.feet[h, 1] = fx, fy
+
+
+@part
+def _away(out: Skeleton, h: int) -> float:
+    """How far the foot of a corner is from its node."""
+    return float(np.hypot(out.feet[h, 0] - out.centres[h // 3, 0], out.feet[h, 1] - out.centres[h // 3, 1]))
+
+
+@part
+def _centre(out: Skeleton, near: int, far: int) -> None:
+    """Moves a node between two opposite sides to their middle, for samples do not lie right across from each other."""
+    t, short, long = near // 3, _away(out, near), _away(out, far)
+    ax, ay = out.feet[near, 0] - out.centres[t, 0], out.feet[near, 1] - out.centres[t, 1]
+    bx, by = out.feet[far, 0] - out.centres[t, 0], out.feet[far, 1] - out.centres[t, 1]
+    if short > 0.0 and ax * bx + ay * by < OPPOSITE * short * long:
+        share = 0.5 * (long - short) / short
+        out.centres[t, 0], out.centres[t, 1] = out.centres[t, 0] - share * ax, out.centres[t, 1] - share * ay
+
+
+@part
+def _slope2(out: Skeleton, h: int) -> float:
+    """Square of how fast the radius changes along the axis across side h: cosine of half the angle between its two ribs."""
+    t, other = h // 3, after(h)
+    ax, ay = out.feet[h, 0] - out.centres[t, 0], out.feet[h, 1] - out.centres[t, 1]
+    bx, by = out.feet[other, 0] - out.centres[t, 0], out.feet[other, 1] - out.centres[t, 1]
+    long = np.hypot(ax, ay) * np.hypot(bx, by)
+    return 0.5 * (1.0 + (ax * bx + ay * by) / long) if long > 1e-12 else 1.0

@@ -1,0 +1,148 @@
+"""Variable walls: the beads of polygons, as many side by side as fit and as wide as the place (Kuipers et al. 2020)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from mdp.mesh import Floats
+from slicer.bead import HIDDEN_RESOLUTION_MM, Course, length_mm
+from slicer.geometry.distance import distances
+from slicer.geometry.polygons import RESOLUTION_MM, Polygons, close_loop, contours, edges, resample
+from slicer.geometry.triangulation import Triangulation, triangulate
+from slicer.walls.variable.counts import Counts, count_beads
+from slicer.walls.variable.course import corners, smoothed
+from slicer.walls.variable.lines import Line, lines_of, trace_chains
+from slicer.walls.variable.loops import trace_loops
+from slicer.walls.variable.rule import Rule
+from slicer.walls.variable.skeleton import Skeleton, skeleton_of
+
+STEP = 0.35  # nominal spacings: sampling of the boundary
+SHORTEST = 1.0  # nominal spacings: a shorter loop is none
+TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
+WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
+EVEN_MM = 0.03  # widths that differ by less are one
+DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
+DASH = 0.25
+SLACK_MM = 0.01  # by which a place may be narrower than the least bead
+SHORT = 0.05  # of its width: a dash is no shorter
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """points: (n, 2) mm; widths: (n,) mm; level: 0 outermost; closed: runs on from the last point to the first.
+
+    free: sides on which no bead lies beside it.
+    """
+
+    points: Floats
+    widths: Floats
+    level: int
+    closed: bool
+    free: int
+
+    @property
+    def course(self) -> Course:
+        """The whole way, back to the first point where it is closed."""
+        if self.closed:
+            return Course(close_loop(self.points), np.append(self.widths, self.widths[0]))
+        return Course(self.points, self.widths)
+
+    @property
+    def width_mm(self) -> float:
+        """Mean width."""
+        course = self.course
+        return float(
+            np.average(0.5 * (course.widths[1:] + course.widths[:-1]), weights=np.hypot(*np.diff(course.points, axis=0).T))
+        )
+
+
+def variable_walls(polygons: Polygons, rule: Rule) -> list[Wall]:
+    """All walls of polygons."""
+    triangulation = triangulate([resample(loop, STEP * rule.inner) for loop in contours(polygons)])
+    if triangulation is None:
+        return []
+    skeleton = skeleton_of(triangulation)
+    counts = count_beads(triangulation.across, skeleton, rule)
+    found: list[Wall] = []
+    for level in range(rule.walls):
+        loops = _loops(triangulation, skeleton, counts, rule, level)
+        if not loops:
+            break
+        found += loops
+    lines = [_along(line, rule) for line in lines_of(trace_chains(triangulation.across, skeleton, counts, rule))]
+    lines += [_dash(*dot, rule) for dot in _dots(skeleton, counts)]
+    borders = edges(polygons) if any(line.level == 0 for line in lines) else np.zeros((0, 4))
+    kept = (_kept_inside(line, borders, rule) for line in lines)
+    return found + [_simplified(line) for line in kept if len(line.points) > 1]
+
+
+def _loops(triangulation: Triangulation, skeleton: Skeleton, counts: Counts, rule: Rule, level: int) -> list[Wall]:
+    """The loops of a level."""
+    ribs = trace_loops(triangulation, skeleton, counts, rule, level)
+    loops = []
+    for a, b in pairwise(ribs.starts.tolist()):
+        rough = ribs.feet[a:b] + ribs.ways[a:b] * ribs.depth[a:b, None]
+        if length_mm(close_loop(rough)) < SHORTEST * rule.inner:
+            continue
+        depth, spacing = (smoothed(rough, each[a:b], TRANSITION * rule.inner, True) for each in (ribs.depth, ribs.spacing))
+        depth = np.minimum(depth, ribs.reach[a:b])
+        points = ribs.feet[a:b] + ribs.ways[a:b] * depth[:, None]
+        widths = spacing + rule.round if level else 2.0 * depth
+        loops.append(_simplified(Wall(points, widths, level, True, int(level == 0))))
+    return loops
+
+
+def _along(line: Line, rule: Rule) -> Wall:
+    """The bead along a line."""
+    closed = line.ends[0] == line.ends[1]
+    widths = smoothed(line.points, line.widths, TRANSITION * rule.inner, closed)
+    x, y = (smoothed(line.points, np.ascontiguousarray(each), 0.5 * TRANSITION * rule.inner, closed) for each in line.points.T)
+    points, free = np.column_stack([x, y]), 2 * int(line.level == 0)
+    if closed:
+        return Wall(points[:-1], widths[:-1], line.level, True, free)
+    points[0], points[-1] = line.points[0], line.points[-1]
+    if line.level == 0 and length_mm(points) < DOT * widths.max():
+        return _dash(points[0], points[-1], float(widths.mean()), rule)
+    return Wall(points, widths, line.level, False, free)
+
+
+def _dots(skeleton: Skeleton, counts: Counts) -> Iterator[tuple[Floats, Floats, float]]:
+    """Begin, end and width of round places with room for a single bead."""
+    last = np.full(2, np.inf)
+    for t in np.flatnonzero(counts.dots):
+        centre, radius = skeleton.centres[t], float(skeleton.radii[t])
+        if float(np.hypot(*(centre - last))) > radius:
+            yield centre, centre, 2.0 * radius
+        last = centre
+
+
+def _dash(begin: Floats, end: Floats, width: float, rule: Rule) -> Wall:
+    """A dash in place of a dot, which no printer draws: as much thinner as it is longer."""
+    thinner = max((1.0 - DASH) * width, rule.least)
+    step = end - begin
+    length = float(np.hypot(*step))
+    way = step / length if length > 1e-6 else np.array([1.0, 0.0])
+    middle, half = 0.5 * (begin + end), 0.5 * (length + max(width - thinner, SHORT * width))
+    return Wall(np.array([middle - half * way, middle + half * way]), np.full(2, thinner), 0, False, 2)
+
+
+def _kept_inside(line: Wall, borders: Floats, rule: Rule) -> Wall:
+    """A line that lies alone no wider than its place, without ends where not even the least bead fits."""
+    if line.level > 0:
+        return line
+    room = 2.0 * distances(line.points, borders)
+    fits = np.flatnonzero(room > rule.least - SLACK_MM)
+    first, last = (fits[0], fits[-1]) if len(fits) and not line.closed else (0, len(room) - 1 if len(fits) else -1)
+    widths = np.maximum(np.minimum(line.widths, room), rule.least)
+    return replace(line, points=line.points[first : last + 1], widths=widths[first : last + 1])
+
+
+def _simplified(wall: Wall) -> Wall:
+    points, widths = wall.points, wall.widths
+    if wall.closed:
+        points, widths = close_loop(points), np.append(widths, widths[0])
+    keep = np.flatnonzero(corners(points, widths, HIDDEN_RESOLUTION_MM if wall.level else RESOLUTION_MM, WIDTH_STEP_MM))
+    keep = keep[:-1] if wall.closed else keep
+    return replace(wall, points=points[keep], widths=widths[keep])

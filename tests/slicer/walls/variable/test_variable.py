@@ -1,0 +1,159 @@
+"""Variable walls fill a place with as many beads as fit, within the nozzle's range, and stay inside it."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import manifold3d as m3
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slicer.bead import ROUND_SIDES, length_mm
+from slicer.geometry.polygons import Polygons
+from slicer.paths import Kind
+from slicer.slice import slice_part
+from slicer.walls.layer_walls import bead_rule, layer_walls
+from slicer.walls.variable.pieces import split_course
+from slicer.walls.variable.variable import Wall, variable_walls
+from slicer.walls.walls import wall_beads
+from tests.shapes import from_manifold
+from tests.slicer.hand import SOLID, as_shapely, content, of_kind, profile, volume_mm3, whole
+
+WIDTH, HEIGHT, NOZZLE = 0.45, 0.2, 0.4
+PROCESS = profile("process.wall_generator=variable").process
+RULE = bead_rule(3, PROCESS, HEIGHT, NOZZLE)
+Points = list[tuple[float, float]]
+
+
+def plate(thickness: float, length: float = 12.0) -> Polygons:
+    return Polygons.square((length, thickness))
+
+
+def plastic(walls: Sequence[Wall]) -> shapely.Geometry:
+    """What walls cover, laid in pieces of one width as they are printed."""
+    pieces = [piece for wall in walls for piece in split_course(wall.course.points, wall.course.widths)]
+    return shapely.union_all([shapely.LineString(points).buffer(0.5 * width) for points, width in pieces])
+
+
+def across(walls: Sequence[Wall], x: float) -> int:
+    """How many beads lie side by side at x."""
+    line = shapely.LineString([(x, -50), (x, 50)])
+    met = [line.intersection(shapely.LineString(wall.course.points)) for wall in walls]
+    return sum(int(shapely.get_num_geometries(each)) for each in met if not each.is_empty)
+
+
+def farthest_out_mm(walls: Sequence[Wall], section: Polygons) -> float:
+    over = plastic(walls).difference(as_shapely(section))
+    return (
+        0.0
+        if over.is_empty
+        else float(shapely.distance(as_shapely(section), shapely.points(shapely.get_coordinates(over))).max())
+    )
+
+
+@pytest.mark.parametrize(
+    ("thickness", "beads"), [(0.2, 0), (0.25, 1), (0.5, 1), (0.7, 2), (1.0, 2), (1.3, 3), (1.6, 4), (2.0, 5), (2.4, 6), (3.0, 7)]
+)
+def test_a_plate_gets_as_many_beads_as_fit(thickness: float, beads: int) -> None:
+    assert across(variable_walls(plate(thickness), RULE), 6.0) == beads
+
+
+@pytest.mark.parametrize("thickness", np.arange(0.25, 3.1, 0.15).round(2).tolist())
+def test_a_plate_is_filled_from_side_to_side(thickness: float) -> None:
+    walls = variable_walls(plate(thickness), RULE)
+    middle = shapely.box(3, 0, 9, thickness)
+    assert plastic(walls).intersection(middle).area > 0.995 * middle.area
+    spacings = sum(wall.width_mm - HEIGHT * ROUND_SIDES for wall in walls for _ in range(across([wall], 6.0)))
+    assert spacings + HEIGHT * ROUND_SIDES == pytest.approx(thickness, abs=0.02)
+
+
+def test_the_count_changes_where_the_thickness_does() -> None:
+    wedge = Polygons([np.array([[0, -0.1], [28, -1.4], [28, 1.4], [0, 0.1]])])
+    walls = variable_walls(wedge, RULE)
+    counts = np.array([across(walls, x) for x in np.arange(2.0, 26.0, 0.35)])
+    highest = np.maximum.accumulate(counts)
+    assert [(a, b) for a, b in pairwise(highest.tolist()) if a != b] == [(1, 2), (2, 3), (3, 4), (4, 5), (5, 6)]
+    assert (highest - counts).max() <= 1  # where one bead ends before two begin
+
+
+def test_outer_walls_of_a_thin_plate_are_walls_of_half_its_thickness() -> None:
+    (loop,) = variable_walls(plate(0.8), RULE)
+    assert loop.closed
+    assert loop.level == 0
+    assert loop.widths == pytest.approx(0.4 + 0.5 * HEIGHT * ROUND_SIDES, abs=1e-3)
+    assert np.abs(loop.points[:, 1] - 0.4).max() == pytest.approx(0.4 - 0.5 * loop.widths[0], abs=1e-3)
+
+
+def test_a_wall_of_one_bead_is_an_outer_wall_that_does_not_run_round() -> None:
+    (bead,) = wall_beads(layer_walls(plate(0.5), 3, PROCESS, HEIGHT, NOZZLE), PROCESS, HEIGHT)
+    assert bead.kind is Kind.OUTER_WALL
+    assert bead.line
+    assert not bead.one_way
+    assert bead.width_mm == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_thick_island_has_the_classic_walls() -> None:
+    block = Polygons.square((20, 20))
+    both = [
+        layer_walls(block, 3, profile(f"process.wall_generator={each}").process, HEIGHT, NOZZLE)
+        for each in ("variable", "classic")
+    ]
+    assert both[0].varying == ()
+    assert [loop.tolist() for level in both[0].loops for loop in level] == [
+        loop.tolist() for level in both[1].loops for loop in level
+    ]
+
+
+def test_a_ring_of_one_bead_runs_round() -> None:
+    (bead,) = variable_walls(Polygons.circle(6, 128) - Polygons.circle(5.4, 128), RULE)
+    assert bead.closed
+    assert length_mm(bead.course.points) == pytest.approx(2 * np.pi * 5.7, rel=0.01)
+    assert bead.widths == pytest.approx(0.6, abs=0.02)
+
+
+@pytest.mark.parametrize("diameter", np.arange(0.3, 2.4, 0.1).round(1).tolist())
+def test_a_pin_is_filled_by_rings_or_a_dash_inside_it(diameter: float) -> None:
+    pin = Polygons.circle(0.5 * diameter, 64)
+    walls = variable_walls(pin, RULE)
+    assert plastic(walls).area > (0.6 if diameter < 0.5 else 0.8) * pin.area()
+    assert farthest_out_mm(walls, pin) < 0.05 * WIDTH
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4)), min_size=4, max_size=9), st.floats(0.3, 2.0), st.floats(0.0, 1.5))
+def test_all_beads_of_any_polygon_lie_in_it_with_widths_a_nozzle_prints(points: Points, hole: float, aside: float) -> None:
+    section = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(hole, 16).translate((aside, 0))
+    walls = variable_walls(section, RULE)
+    assert farthest_out_mm(walls, section) < 0.05 * WIDTH
+    widths = np.concatenate([wall.widths for wall in walls]) if walls else np.array([WIDTH])
+    assert widths.min() > 0.6 * NOZZLE - 1e-9
+    assert widths.max() < 2.0 * NOZZLE + 1e-9
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(3, 7), st.floats(0.3, 2.0), st.floats(0, 90))
+def test_a_star_of_thin_arms_is_filled(arms: int, thickness: float, turn: float) -> None:
+    star = Polygons()
+    for k in range(arms):
+        star += Polygons.square((6, thickness)).translate((0, -thickness / 2)).rotate(360 * k / arms + turn)
+    walled = layer_walls(star, 3, PROCESS, HEIGHT, NOZZLE)
+    filled = shapely.union_all(
+        [plastic(walled.varying), as_shapely(walled.inside) if not walled.inside.is_empty() else shapely.Point()]
+    )
+    rest = as_shapely(star).difference(filled).buffer(-0.01).buffer(0.01)
+    assert max((part.area for part in shapely.get_parts(rest)), default=0.0) < WIDTH**2
+
+
+def test_a_comb_gets_its_volume_within_its_walls_the_same_every_time() -> None:
+    comb = m3.Manifold.cube((25, 3, 2))
+    for k in range(10):
+        comb += m3.Manifold.cube((0.3 + 0.1 * k, 8, 2)).translate((1 + 2.3 * k, 2.5, 0))
+    part, chosen = whole(from_manifold(comb)), profile(*SOLID, "process.elephant_foot_mm=0", "process.wall_generator=variable")
+    sliced = slice_part(part, chosen)
+    assert volume_mm3(sliced, *Kind) == pytest.approx(comb.volume(), rel=0.02)
+    assert volume_mm3(sliced, Kind.GAP) < 0.01 * comb.volume()
+    widths = [path.width_mm for path in of_kind(sliced, Kind.OUTER_WALL)]
+    assert min(widths) == pytest.approx(0.3, abs=0.01)
+    assert content(sliced) == content(slice_part(part, chosen))
