@@ -9,13 +9,14 @@ from mdp.decomposition import Part
 from profiles.process import Process
 from slicer.bead import Bead, width_for_mm
 from slicer.fill.skin import skin_beads
-from slicer.geometry.polygons import Polygons, offset, opening
+from slicer.geometry.polygons import Polygons, islands, offset, opening
 from slicer.heights import Heights
 from slicer.interface.interface import sections_of
 from slicer.paths import Kind, bead_area_mm2
 from slicer.region import Region
 
 RANK = 100  # after all else of an island
+LEAST_MM2 = 2.0
 
 
 def ironed_areas(
@@ -31,7 +32,13 @@ def ironed_areas(
         region.top if other.is_empty() else region.top - offset(other, width)
         for region, other in zip(regions, above, strict=True)
     ]
-    return [top if top.is_empty() else opening(top, 0.5 * width) for top in tops]
+    return [_worth_it(opening(top, 0.5 * width)) for top in tops]
+
+
+def _worth_it(area: Polygons) -> Polygons:
+    """The pieces of an area that are worth the way."""
+    pieces = [piece for piece in islands(area) if piece.area() >= LEAST_MM2] if not area.is_empty() else []
+    return Polygons.compose(pieces) if pieces else Polygons()
 
 
 def ironing_beads(area: Polygons, angle_deg: float, process: Process, height_mm: float) -> list[Bead]:

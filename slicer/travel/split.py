@@ -39,6 +39,8 @@ def split(
 
 def _split_bead(placed: Placed, sides: Floats, shortest_mm: float, other: Callable[[Bead], Bead]) -> list[Placed]:
     points, within = cut_line(np.ascontiguousarray(placed.points), sides)
+    if not within.any():
+        return [placed]
     within = _steady(within, np.hypot(*np.diff(points, axis=0).T), shortest_mm)
     if not within.any():
         return [placed]

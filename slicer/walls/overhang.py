@@ -31,7 +31,8 @@ def split_overhangs(placed: Sequence[Placed], section: Polygons, bank: Polygons 
         hanging = hanging_place(section, bank, share, process.line_width_mm)
         if hanging.area() < shortest_mm * NOISE_MM:
             break
-        out = split(out, hanging, (*WALLS, Kind.OVERHANG), shortest_mm, partial(_hanging, share=share, process=process))
+        kinds = (*WALLS, Kind.OVERHANG) if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
+        out = split(out, hanging, kinds, shortest_mm, partial(_hanging, share=share, process=process))
     return out
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import Bead
+from slicer.bead import Bead, length_mm
 from slicer.paths import Kind, Layer, Path, SlicedPart
 from slicer.slice import slice_part
 from slicer.walls.seam import Surroundings, place_seams, rear_of
@@ -41,8 +41,19 @@ def seam_of(loop: Floats, rule: str, **surroundings: Any) -> tuple[float, float]
 
 def outer_seams(sliced: SlicedPart, first: int = 2) -> Floats:
     """Where the longest outer wall of each layer begins."""
-    walls = [[p for p in layer.paths if p.kind in (Kind.OUTER_WALL, Kind.OVERHANG)] for layer in sliced.layers[first:]]
-    return np.array([max(each, key=lambda p: p.length_mm).points[0] for each in walls if each])
+    walls = [[p.points for p in layer.paths if p.kind in (Kind.OUTER_WALL, Kind.OVERHANG)] for layer in sliced.layers[first:]]
+    return np.array([max(joined(each), key=length_mm)[0] for each in walls if each])
+
+
+def joined(pieces: list[Floats]) -> list[Floats]:
+    """Whole walls of pieces that follow each other, where they overhang more and less."""
+    out = pieces[:1]
+    for piece in pieces[1:]:
+        if (piece[0] == out[-1][-1]).all():
+            out[-1] = np.concatenate([out[-1], piece[1:]])
+        else:
+            out.append(piece)
+    return out
 
 
 @pytest.mark.parametrize("rule", ["aligned", "corner"])
