@@ -70,6 +70,7 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
         ("process.layer_height_mm=5", "process.layer_height_mm is 5: it must be a number from 0.02 to 2"),
         ("process.layer_height_mm=nan", "process.layer_height_mm is nan: it must be a number from 0.02 to 2"),
         ("process.scale=0", "process.scale is 0: it must be a number above 0 and up to 100000"),
+        ("process.bridge_longest_mm=0", "process.bridge_longest_mm is 0: it must be a number from 1 to 100"),
         ("search.least_volume_share=1", "search.least_volume_share is 1: it must be a number from 0 and below 1"),
         ("process.walls=2.5", "process.walls is 2.5: it must be a whole number from 0 to 50"),
         ("process.walls=true", "process.walls is true: it must be a whole number from 0 to 50"),
