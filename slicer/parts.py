@@ -1,8 +1,9 @@
 """Parts: all parts of a decomposition sliced, in processes side by side where that pays.
 
-A part's paths depend on nothing but the parts and the profile, so the result is the same bit for bit either way. Processes
-are forked, which takes milliseconds; a fresh interpreter would spend longer loading the kernels than slicing usually takes
-(measured: tools/RESULTS.md), so systems without fork slice part after part.
+First the support of all parts is planned together, for what one part's support stands on may be printed with another. From
+then on a part's paths depend on nothing but the plan and the profile, so the result is the same bit for bit either way.
+Processes are forked, which takes milliseconds; a fresh interpreter would spend longer loading the kernels than slicing
+usually takes (measured: tools/RESULTS.md), so systems without fork slice part after part.
 """
 
 import os
@@ -18,13 +19,17 @@ from typing import Any
 
 from mdp.decomposition import Part
 from profiles.profile import Profile
+from slicer.demand.plan import plan_supports
+from slicer.demand.site import Site, survey
 from slicer.finish.vase import check_vase
 from slicer.paths import SlicedPart
-from slicer.slice import slice_part
+from slicer.slice import slice_site
+from slicer.support.support import Supports
 
 FEWEST_LAYERS = 250  # fewer are sliced sooner than processes are forked and their paths brought back
 LOOK_S = 0.2
 
+Planned = Sequence[tuple[Site, Supports]]
 OnProgress = Callable[[int, int, int, int], None]  # parts begun, parts, layers done, layers of all parts (an estimate)
 
 
@@ -36,20 +41,16 @@ def slice_parts(
     Raises SliceError as slice_part does, for the first part in print order that has a reason.
     """
     check_vase(parts, profile)
-    expected = [_layers(part, profile) for part in parts]
+    planned = plan_supports([survey(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)])
+    expected = [len(site.outlines) for site, _ in planned]
     if processes is None:
         processes = _process_count(len(parts), sum(expected))
     if processes < 2:
-        return _slice_in_turn(parts, profile, expected, on_progress)
+        return _slice_in_turn(planned, expected, on_progress)
     try:
-        return _slice_side_by_side(parts, profile, expected, on_progress, processes)
+        return _slice_side_by_side(planned, expected, on_progress, processes)
     except BrokenProcessPool:  # a process was killed from outside: this one does the work
-        return _slice_in_turn(parts, profile, expected, on_progress)
-
-
-def _layers(part: Part, profile: Profile) -> int:
-    """How many layers a part will have, about: what takes time."""
-    return max(1, round(float(part.in_part_frame().bounds_mm[1, 2]) / profile.of_part(part.index).process.layer_height_mm))
+        return _slice_in_turn(planned, expected, on_progress)
 
 
 def _process_count(parts: int, layers: int) -> int:
@@ -59,29 +60,27 @@ def _process_count(parts: int, layers: int) -> int:
     return min(parts, cores)
 
 
-def _slice_in_turn(
-    parts: Sequence[Part], profile: Profile, expected: Sequence[int], on_progress: OnProgress | None
-) -> tuple[SlicedPart, ...]:
+def _slice_in_turn(planned: Planned, expected: Sequence[int], on_progress: OnProgress | None) -> tuple[SlicedPart, ...]:
     sliced: list[SlicedPart] = []
     done = 0
-    for k, part in enumerate(parts):
+    for k, (site, supports) in enumerate(planned):
 
         def on_layer(layer: int, of: int, before: int = done, begun: int = k + 1) -> None:
             if on_progress is not None:
-                on_progress(begun, len(parts), before + layer, sum(expected))
+                on_progress(begun, len(planned), before + layer, sum(expected))
 
-        sliced.append(slice_part(part, profile, parts[:k], parts[k + 1 :], on_layer))
+        sliced.append(slice_site(site, supports, on_layer))
         done += len(sliced[-1].layers)
     return tuple(sliced)
 
 
-_job: tuple[Sequence[Part], Profile, Any] | None = None  # what a forked process finds in its copy of the memory
+_job: tuple[Planned, Any] | None = None  # what a forked process finds in its copy of the memory
 
 
-def _inherit(parts: Sequence[Part], profile: Profile, counts: Any, parent: int) -> None:
+def _inherit(planned: Planned, counts: Any, parent: int) -> None:
     global _job
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C reaches the whole group: end without a word, the parent speaks
-    _job = parts, profile, counts
+    _job = planned, counts
     Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
@@ -95,29 +94,29 @@ def _end_with(parent: int) -> None:
 def _slice_forked(k: int) -> SlicedPart:
     """In a forked process: slice a part, counting its layers where the parent reads them."""
     assert _job is not None
-    parts, profile, counts = _job
+    planned, counts = _job
 
     def on_layer(layer: int, of: int) -> None:
         counts[k] = layer
 
-    return slice_part(parts[k], profile, parts[:k], parts[k + 1 :], on_layer)
+    return slice_site(*planned[k], on_layer)
 
 
 def _slice_side_by_side(
-    parts: Sequence[Part], profile: Profile, expected: Sequence[int], on_progress: OnProgress | None, processes: int
+    planned: Planned, expected: Sequence[int], on_progress: OnProgress | None, processes: int
 ) -> tuple[SlicedPart, ...]:
     """The highest parts first, so that no long one is left for the end."""
     context = get_context("fork")
-    counts: Any = RawArray("i", len(parts))
-    pool = ProcessPoolExecutor(processes, context, _inherit, (parts, profile, counts, os.getpid()))
+    counts: Any = RawArray("i", len(planned))
+    pool = ProcessPoolExecutor(processes, context, _inherit, (planned, counts, os.getpid()))
     try:
-        order = sorted(range(len(parts)), key=lambda k: (-expected[k], k))
+        order = sorted(range(len(planned)), key=lambda k: (-expected[k], k))
         futures = {k: pool.submit(_slice_forked, k) for k in order}
         waiting = set(futures.values())
         while waiting:
             waiting = wait(waiting, LOOK_S, FIRST_COMPLETED).not_done
             if on_progress is not None:
-                on_progress(sum(count > 0 for count in counts), len(parts), sum(counts), sum(expected))
-        return tuple(futures[k].result() for k in range(len(parts)))
+                on_progress(sum(count > 0 for count in counts), len(planned), sum(counts), sum(expected))
+        return tuple(futures[k].result() for k in range(len(planned)))
     finally:
         pool.shutdown(cancel_futures=True)

@@ -87,20 +87,33 @@ class Layer:
         return path.length_mm * bead_area_mm2(path.width_mm, self.height_mm) * path.flow
 
 
+@dataclass(frozen=True)
+class Unsupported:
+    """A hanging place that could be given no support: its area seen from above, the layer with most of it, and why."""
+
+    mm2: float
+    layer: int
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class SlicedPart:
     """A part's layers from its base plane upward; index and pose are those of the Part.
 
-    unsupported_mm2: area of risky faces that no support could be given, reported as a finding; unsupported_layer: number
-    of the layer with most of it, counted from 1. interface_mm3: plastic that there would not be if the model were not cut, by
-    the index of the part whose base lies there.
+    unsupported: the places of it that no support could be given, reported as findings, the largest first, their layers
+    counted from 1. interface_mm3: plastic that there would not be if the model were not cut, by the index of the part whose
+    base lies there.
     """
 
     index: int
     layers: tuple[Layer, ...]
-    unsupported_mm2: float = 0.0
-    unsupported_layer: int = 0
+    unsupported: tuple[Unsupported, ...] = ()
     interface_mm3: Mapping[int, float] = field(default_factory=dict)
+
+    @property
+    def unsupported_mm2(self) -> float:
+        """Area of all places without support."""
+        return sum(place.mm2 for place in self.unsupported)
 
     @property
     def volume_mm3(self) -> float:

@@ -1,6 +1,7 @@
 """Slicing: one part of a decomposition becomes layers of paths in its own frame."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,19 +12,22 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import WALLS, Bead, simplify_bead, with_line_width
 from slicer.cooling import fan_share, hanging_fan, rising_fan
+from slicer.demand.reason import explain
+from slicer.demand.site import Site, survey
 from slicer.fill.bridge import bridge_area, bridge_beads, infill_bridge_area, infill_bridge_beads
 from slicer.fill.infill import infill_beads
 from slicer.fill.skin import angle_of_layer_deg, skin_beads
 from slicer.finish.ironing import ironing_beads
-from slicer.finish.vase import bottom_layers, vase_layers, vase_profile
+from slicer.finish.vase import bottom_layers, vase_layers
 from slicer.geometry.polygons import union
 from slicer.interface.interface import begin_inside
 from slicer.interface.interlock import fill_grooves
-from slicer.paths import Kind, Layer, Path, SlicedPart
+from slicer.paths import Kind, Layer, Path, SlicedPart, Unsupported
 from slicer.speed import first_layer_mm_s, layer_time_s, speeds_mm_s
 from slicer.stack import Stack, build_stack
 from slicer.support.beads import support_beads
 from slicer.support.pedestal import pedestal_beads
+from slicer.support.support import Supports
 from slicer.travel.order import order_beads
 from slicer.walls.brim import brim
 from slicer.walls.gap import gaps
@@ -45,12 +49,19 @@ def slice_part(
 ) -> SlicedPart:
     """The part's layers from its base plane upward.
 
-    earlier, later: the parts printed before and after this one; the part with index 1 stands on the platform. The same
-    input gives the same paths. on_layer: called after each layer with its number and how many there are. Raises SliceError
-    when the part gives no bead at all.
+    earlier, later: the parts printed before and after this one; the part with index 1 stands on the platform. Support is
+    the part's own, on its own ground (slice_parts hands it down to earlier parts). The same input gives the same paths.
+    on_layer: called after each layer with its number and how many there are. Raises SliceError when the part gives no bead
+    at all.
     """
-    profile = vase_profile(profile.of_part(part.index))
-    stack = build_stack(part, profile, earlier, later)
+    site = survey(part, profile, earlier, later)
+    return slice_site(site, site.supports, on_layer)
+
+
+def slice_site(site: Site, supports: Supports, on_layer: Callable[[int, int], None] | None = None) -> SlicedPart:
+    """The layers of a surveyed part with the support planned for it, as slice_part."""
+    part, later, profile = site.part, site.later, site.profile
+    stack = build_stack(site, supports)
     bounds_mm = part.in_part_frame().bounds_mm
     rear = rear_of(bounds_mm)
     layers: list[Layer] = []
@@ -71,9 +82,15 @@ def slice_part(
     if usual < len(stack.outlines):
         layers += vase_layers(stack.outlines, stack.supports.areas, stack.heights, profile, tip)
     _check_not_empty(part, bounds_mm, layers, profile.process)
-    missed_mm2, at_mm = stack.supports.unsupported_mm2, stack.heights.tip_mm[stack.supports.worst_layer]
-    worst = sum(layer.z_mm <= at_mm for layer in layers) if missed_mm2 > 0 else 0
-    return SlicedPart(part.index, tuple(layers), missed_mm2, worst, stack.interface_mm3)
+    return SlicedPart(part.index, tuple(layers), _unsupported(site, supports, layers), stack.interface_mm3)
+
+
+def _unsupported(site: Site, supports: Supports, layers: Sequence[Layer]) -> tuple[Unsupported, ...]:
+    """The places that got no support, with the numbers of the layers that print anything."""
+    tops = np.array([layer.z_mm for layer in layers])
+    places = explain(site, supports) if supports.unsupported_mm2 > 0.0 else ()
+    count = np.searchsorted(tops, site.heights.tip_mm, side="right")
+    return tuple(replace(place, layer=int(count[place.layer])) for place in places)
 
 
 def _part_beads(stack: Stack, layer: int) -> list[Bead]:

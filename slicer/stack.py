@@ -3,28 +3,21 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
-from profiles.profile import Profile
 from slicer.bead import Bead, first_layer_process, with_line_width
+from slicer.demand.site import Site
 from slicer.fill.infill import pattern_density
-from slicer.finish.compensation import compensate
 from slicer.finish.ironing import ironed_areas
-from slicer.geometry.polygons import Polygons, clean
-from slicer.heights import Heights, layer_heights
+from slicer.geometry.polygons import Polygons
+from slicer.heights import Heights
 from slicer.interface.cut_walls import cover, cut_walls
-from slicer.interface.interface import interface_edges, plastic_beneath, strengthen_interface
-from slicer.interface.interlock import cut_grooves
+from slicer.interface.interface import interface_edges, strengthen_interface
 from slicer.interface.model import model_around
 from slicer.interface.plastic import interface_mm3
-from slicer.plate import compensate_elephant_foot, plate_outline
 from slicer.region import Region, regions
-from slicer.section import sections
-from slicer.support.blocker import blocked_areas, far_mm
-from slicer.support.overhang import Overhang, detect_overhangs
-from slicer.support.pedestal import pedestal_layers, without_pedestal
-from slicer.support.support import Supports, generate_supports
+from slicer.support.overhang import Overhang
+from slicer.support.support import Supports
 from slicer.walls.overhang import strengthen_overhangs
 from slicer.walls.walls import Walls
 
@@ -63,50 +56,35 @@ class Stack:
         return self.outlines[layer - 1] if layer else self.beneath
 
 
-def build_stack(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequence[Part]) -> Stack:
-    """The stack of a part that is printed after `earlier` and before `later` parts."""
-    process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
-    pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
-    heights = layer_heights(mesh, process, on_platform, pedestal_mm)
-    pedestal_count = pedestal_layers(heights.tip_mm, pedestal_mm)
-    outlines = [clean(loops, process.slit_closing_mm) for loops in sections(mesh, heights.cut_mm)]
-    outlines = compensate(outlines, part, later, heights.cut_mm, process)
-    if on_platform:
-        outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
-    uncut = without_pedestal(outlines, mesh, heights.cut_mm, pedestal_mm, pedestal_count) if pedestal_count else outlines
-    own = cut_grooves(uncut, part, later, heights.cut_mm, process)
-    outlines = cut_grooves(outlines, part, later, heights.cut_mm, process) if pedestal_count else own
-    processes = strengthen_interface(process, not on_platform, len(outlines))
-    if on_platform:
+def build_stack(site: Site, supports: Supports) -> Stack:
+    """The stack of a part with the support that was planned for it."""
+    process, part, later, heights = site.profile.process, site.part, site.later, site.heights
+    processes = strengthen_interface(process, site.beneath is not None, len(site.outlines))
+    if site.beneath is None:
         processes[0] = first_layer_process(process)
-    below = plastic_beneath(part, earlier, outlines[0])
-    processes = strengthen_overhangs(processes, own, below)
-    model = model_around(part, uncut, own, heights, earlier, later, process)
-    nozzle_mm = profile.machine.head.nozzle_mm
-    rows = zip(own, model.sections, processes, heights.height_mm.tolist(), strict=True)
+    processes = strengthen_overhangs(processes, site.own, site.beneath)
+    model = model_around(part, site.uncut, site.own, heights, site.earlier, later, process)
+    nozzle_mm = site.profile.machine.head.nozzle_mm
+    rows = zip(site.own, model.sections, processes, heights.height_mm.tolist(), strict=True)
     wall_layers = [cut_walls(s, m, p, h, nozzle_mm, process.walls) for s, m, p, h in rows]
-    region_layers = regions([w.walls.inside for w in wall_layers], cover(model, own, wall_layers), below is not None, process)
-    overhangs = detect_overhangs(mesh, outlines, heights.cut_mm, process, below)
-    blocked = blocked_areas(part, later, heights, process.support_distance_mm, far_mm(mesh))
-    floor = plate_outline(profile.machine.table)
-    support_process = with_line_width(process, process.support_line_width_mm)
+    inside, covers = [w.walls.inside for w in wall_layers], cover(model, site.own, wall_layers)
+    region_layers = regions(inside, covers, site.beneath is not None, process)
     infill_process = with_line_width(process, process.infill_line_width_mm)
-    hanging = [overhang.hanging for overhang in overhangs]
     return Stack(
         heights=heights,
-        outlines=outlines,
-        own=own,
+        outlines=site.outlines,
+        own=site.own,
         walls=[each.walls for each in wall_layers],
         ending=[each.ending for each in wall_layers],
         regions=region_layers,
-        overhangs=overhangs,
+        overhangs=site.overhangs,
         ironed=ironed_areas(region_layers, part, later, heights, process),
         processes=processes,
-        supports=generate_supports(hanging, outlines, heights, support_process, below, blocked, floor),
-        beneath=below,
-        floor=floor,
-        pedestal_layers=pedestal_count,
+        supports=supports,
+        beneath=site.beneath,
+        floor=site.floor,
+        pedestal_layers=site.pedestal_layers,
         density=pattern_density([region.sparse for region in region_layers], infill_process, process.layer_height_mm),
-        edges=interface_edges(part, outlines[0], below, later),
-        interface_mm3=interface_mm3(part, own, region_layers, heights, later, process),
+        edges=interface_edges(part, site.outlines[0], site.beneath, later),
+        interface_mm3=interface_mm3(part, site.own, region_layers, heights, later, process),
     )

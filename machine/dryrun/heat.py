@@ -75,10 +75,11 @@ def _profile(program: ParsedProgram, profile: Profile) -> list[Finding]:
         which = f"{count} numbers of {machine.name} are" if count > 1 else f"one number of {machine.name} is"
         message = f"{which} in no source, measure them (docs/calibration.md): {', '.join(machine.uncalibrated)}"
         problems.append(Finding("warning", "uncalibrated", 0, 0, 0, message))
-    for line, part, area, layer in program.unsupported:
-        where = f", most of them in layer {layer}" if layer else ""
-        message = f"{area:g} mm2 of risky faces of part {part} could be given no support{where}"
-        problems.append(Finding("warning", "unsupported", line, part, layer, message))
+    for place in program.unsupported:
+        where = f", most of them in layer {place.layer}" if place.layer else ""
+        why = f": {place.reason}" if place.reason else ""
+        message = f"{place.mm2:g} mm2 of risky faces of part {place.part} could be given no support{where}{why}"
+        problems.append(Finding("warning", "unsupported", place.line, place.part, place.layer, message))
     return problems
 
 

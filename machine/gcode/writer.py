@@ -151,8 +151,8 @@ def _begin_part(move: BeginPart, parts: int, pen: Pen) -> Iterator[str]:
     machine = pen.machine
     yield f";PART:{move.index} of {parts}"
     yield f";POSE:{machine.tilt.letter}{angle(move.pose.tilt_deg)} {machine.turn.letter}{angle(move.pose.turn_deg)}"
-    if move.unsupported_mm2 > 0:
-        yield f";UNSUPPORTED:{move.unsupported_mm2:.2f}@{move.unsupported_layer}"
+    for place in move.unsupported:
+        yield f";UNSUPPORTED:{place.mm2:.2f}@{place.layer} {place.reason}"
     pen.values |= {"part": move.index, "tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "part_layers": move.layers}
     pen.kind, pen.width_mm = None, 0.0
     pen.part += 1

@@ -8,21 +8,20 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats
 from mdp.pose import Pose
-from slicer.paths import Kind
+from slicer.paths import Kind, Unsupported
 
 
 @dataclass(frozen=True)
 class BeginPart:
     """The moves after this print part `index` at `pose`; turn and tilt have been reached by a Reorient.
 
-    unsupported_mm2: area of its risky faces that no support could be given; unsupported_layer: the layer with most of it.
+    unsupported: the places of it that no support could be given.
     """
 
     index: int
     pose: Pose
     layers: int
-    unsupported_mm2: float = 0.0
-    unsupported_layer: int = 0
+    unsupported: tuple[Unsupported, ...] = ()
 
 
 @dataclass(frozen=True)

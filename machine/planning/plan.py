@@ -44,7 +44,7 @@ def plan(
     for piece in pieces:
         part = parts[piece.index]
         shift = part_shift(machine, part.pose, part.base.offset_mm)
-        begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported_mm2, piece.unsupported_layer)
+        begin = BeginPart(part.index, part.pose, len(piece.layers), piece.unsupported)
         target = _first_point(piece) + shift
         moves += (
             _reach(tip, begin, target, join_hulls(printed), profile) if printed else _begin(tip, begin, target, lanes, profile)

@@ -32,6 +32,17 @@ class Event:
     row: int
 
 
+@dataclass(frozen=True)
+class Unheld:
+    """What a comment tells of a place that no support could be given; layer 0 and an empty reason: not told."""
+
+    line: int
+    part: int
+    mm2: float
+    layer: int
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class ParsedProgram:
     """A G-code text as arrays with one row per move (n rows).
@@ -41,7 +52,7 @@ class ParsedProgram:
     F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
     type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
     acceleration: mm/s2 told by M204, inf where the axes decide. layers: number of layer changes. parts: numbers of the parts
-    in order. unsupported: (line, part, mm2, layer).
+    in order. unsupported: the places that no support could be given.
     """
 
     line: NDArray[np.int64]
@@ -62,7 +73,7 @@ class ParsedProgram:
     ignored: dict[str, tuple[int, int]]
     layers: int
     parts: tuple[int, ...]
-    unsupported: tuple[tuple[int, int, float, int], ...]
+    unsupported: tuple[Unheld, ...]
 
 
 @dataclass(frozen=True, eq=False)

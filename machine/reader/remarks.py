@@ -2,6 +2,7 @@
 
 import re
 
+from machine.reader.parsed import Unheld
 from machine.reader.state import Reader
 
 
@@ -26,9 +27,10 @@ def remark(reader: Reader, text: str) -> None:
             reader.part, reader.layer = int(number), 0
             reader.parts.append(reader.part)
     elif key == "UNSUPPORTED":
-        area, _, layer = value.partition("@")
+        area, _, place = value.partition("@")
+        layer, _, reason = place.partition(" ")
         worst = int(layer) if re.fullmatch("[0-9]{1,6}", layer) else 0
-        reader.unsupported.append((reader.number, reader.part, _positive(area), worst))
+        reader.unsupported.append(Unheld(reader.number, reader.part, _positive(area), worst, reason))
     elif key == "LAYER" and re.fullmatch("-?[0-9]{1,6}", value):
         _layer(reader)
 

@@ -8,7 +8,7 @@ from math import inf
 from machine.firmware import Dialect, dialect_of
 from machine.gcode.modes import Modes, axes_of
 from machine.gcode.words import Word
-from machine.reader.parsed import OWN, Event
+from machine.reader.parsed import OWN, Event, Unheld
 from profiles.machine import Machine
 
 DEFAULT_FEED = 1500.0
@@ -56,7 +56,7 @@ class Reader:
     rows: "array[float]" = field(default_factory=lambda: array("d"))
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)
-    unsupported: list[tuple[int, int, float, int]] = field(default_factory=list)
+    unsupported: list[Unheld] = field(default_factory=list)
 
     def row(self, before: list[float], feed: float) -> None:
         """A move from a place to where the machine is now."""

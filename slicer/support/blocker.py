@@ -1,4 +1,4 @@
-"""Blocker: where support would be in the way of parts printed later."""
+"""Blocker: where support would be in the way of parts printed later, or the head in that of the table."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
+from mdp.pose import UP
 from slicer.geometry.polygons import Polygons, union
 from slicer.heights import Heights
 
@@ -25,10 +26,20 @@ def blocked_areas(part: Part, later: Sequence[Part], heights: Heights, gap_mm: f
     While a part is printed the head moves above its base plane, so nothing may stand there, be it near that part or not.
     Planes count as lower by gap_mm. The half-planes end far_mm from the origin of the part's frame.
     """
+    return _above_planes(part, [(other.base.normal, other.base.offset_mm - gap_mm) for other in later], heights, far_mm)
+
+
+def low_areas(part: Part, least_mm: float, heights: Heights, far_mm: float) -> list[Polygons]:
+    """For each layer what lies nearer to the table than that: there the head would meet it."""
+    return _above_planes(part, [(-UP, -least_mm)], heights, far_mm)
+
+
+def _above_planes(part: Part, planes: Sequence[tuple[Floats, float]], heights: Heights, far_mm: float) -> list[Polygons]:
+    """For each layer what of it lies above any plane: unit normal and offset in the workpiece frame."""
     layers: list[list[Polygons]] = [[] for _ in heights.tip_mm]
-    for other in later:
-        normal = part.rotation @ other.base.normal
-        offset = other.base.offset_mm - normal[2] * part.base.offset_mm - gap_mm
+    for upward, offset_mm in planes:
+        normal = part.rotation @ upward
+        offset = offset_mm - normal[2] * part.base.offset_mm
         below_mm = offset - np.maximum(normal[2] * heights.bottom_mm, normal[2] * heights.tip_mm)
         across = float(np.hypot(normal[0], normal[1]))
         for layer, rest in zip(layers, below_mm.tolist(), strict=True):

@@ -95,10 +95,12 @@ def reachable_areas(
     below: Polygons | None,
     blocked: Sequence[Polygons],
     floor: Polygons,
+    handed: Polygons | None = None,
 ) -> ReachableAreas:
     """The areas of as many layers as there are `blocked`, for the part with these outlines.
 
-    below: plastic just under the base plane, None: the platform, all of whose floor is ground.
+    below: plastic just under the base plane, None: the platform, all of whose floor is ground. handed: places on the base
+    plane that support of an earlier part can reach.
     """
     count, radius = len(blocked), process.line_width_mm
     top, bottom = heights.tip_mm, heights.bottom_mm
@@ -119,6 +121,8 @@ def reachable_areas(
         stands = [wide[near - 1]] if near > 0 and process.support_on_part else []
         if base is not None and m == root:
             stands.append(base)
+        if handed is not None and m == 0:
+            stands.append(handed)
         ground.append(union(stands))
         if m == 0 and below is None:
             start = offset(floor, -radius)

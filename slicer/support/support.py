@@ -1,17 +1,16 @@
 """Support: from hanging places down to ground, what of it is printed, and what hanging places it cannot hold."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import radians, tan
 
 import numpy as np
 
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, bounding_box, closing, difference, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, closing, difference, islands, offset, opening, union
 from slicer.heights import Heights
 from slicer.support.branch import Growth
 from slicer.support.columns import Columns
-from slicer.support.overhang import RIM_MM
+from slicer.support.missed import LEAST_MM2, drop_small, find_missed, window
 from slicer.support.reachable import (
     COARSE_MM,
     EVEN_MM,
@@ -25,28 +24,27 @@ from slicer.support.reachable import (
 from slicer.support.root import add_roots
 from slicer.support.tree import Tree
 
-LEAST_MM2 = 1e-3  # places smaller than this are rounding
-HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
 SLACK_MM = 0.01  # what rounding may add to the lean
 
 
 @dataclass(frozen=True, eq=False)
 class Supports:
-    """Of every layer: where support is printed, where it is dense, and which hanging places nothing holds."""
+    """Of every layer: where support is printed, where it is dense, which hanging places want it, which of them nothing holds."""
 
     areas: tuple[Polygons, ...]
     dense: tuple[Polygons, ...]
+    wanted: tuple[Polygons, ...]
     missed: tuple[Polygons, ...]
+
+    @property
+    def wanted_mm2(self) -> float:
+        """Hanging area, seen from above, that needs support."""
+        return float(sum(place.area() for place in self.wanted))
 
     @property
     def unsupported_mm2(self) -> float:
         """Hanging area, seen from above, that none could reach."""
         return float(sum(place.area() for place in self.missed))
-
-    @property
-    def worst_layer(self) -> int:
-        """The layer with most of it, counted from 0."""
-        return int(np.argmax([place.area() for place in self.missed]))
 
 
 def generate_supports(
@@ -65,21 +63,32 @@ def generate_supports(
     """
     nothing = (Polygons(),) * len(outlines)
     if process.support == "none":
-        return Supports(nothing, nothing, nothing)
+        return Supports(nothing, nothing, nothing, nothing)
     free_hanging = _drop_nearly_held(hanging, outlines, heights, process, below)
-    wanted = _drop_small(free_hanging, process.support_least_mm2)
+    wanted = drop_small(free_hanging, process.support_least_mm2)
     count = max((k for k, place in enumerate(wanted) if not place.is_empty()), default=-1)
     if count < 0:
-        return Supports(nothing, nothing, nothing)
+        return Supports(nothing, nothing, nothing, nothing)
     areas = reachable_areas(outlines, heights, process, below, blocked[:count], floor)
-    bodies, contacts = _descend(wanted, areas, process)
-    printed = _keep_standing(add_roots(bodies, outlines, areas, process), areas, process, below is None)
-    missed = _find_unsupported(wanted, printed, outlines, areas, process)
-    dense = _dense(printed, contacts, areas, process)
+    printed, dense = stand(*grow(wanted, {}, areas, process), outlines, areas, process, below is None)
+    missed = find_missed(wanted, printed, outlines, areas, process, below is None)
     if below is None:
-        printed[0] = (_foot(printed[0], outlines, areas, process) - blocked[0]) ^ floor
+        printed[0] = widen_foot(printed[0], outlines, areas, process, floor - blocked[0])
     rest = nothing[len(printed) :]
-    return Supports((*printed, *rest), (*dense, *rest), missed)
+    return Supports((*printed, *rest), (*dense, *rest), tuple(wanted), missed)
+
+
+def stand(
+    bodies: Sequence[Polygons],
+    contacts: Sequence[Polygons],
+    outlines: Sequence[Polygons],
+    areas: ReachableAreas,
+    process: Process,
+    on_platform: bool,
+) -> tuple[list[Polygons], list[Polygons]]:
+    """What of grown support stands, and where of it is dense: per layer."""
+    printed = _keep_standing(add_roots(bodies, outlines, areas, process), areas, process, on_platform)
+    return printed, _dense(printed, contacts, areas, process)
 
 
 def _drop_nearly_held(
@@ -99,45 +108,28 @@ def _drop_nearly_held(
     return free
 
 
-def _drop_small(hanging: Sequence[Polygons], least_mm2: float) -> list[Polygons]:
-    """The hanging places without those that, seen from above, are too small to matter."""
-    places = [offset(place, RIM_MM) for place in hanging if not place.is_empty()]
-    seen = islands(union([union(places[k : k + HEAP]) for k in range(0, len(places), HEAP)]))
-    small = union([island for island in seen if island.area() < least_mm2])
-    if small.is_empty():
-        return list(hanging)
-    large = [place if place.is_empty() else place - small for place in hanging]
-    return [place if place.area() >= LEAST_MM2 else Polygons() for place in large]
+def grow(
+    wanted: Sequence[Polygons], begins: Mapping[int, Polygons], areas: ReachableAreas, process: Process
+) -> tuple[list[Polygons], list[Polygons]]:
+    """Support from the top down: per layer all of it, and where it begins.
 
-
-def _window(k: int, areas: ReachableAreas, process: Process) -> range:
-    """The layers, from the highest down, on which a hanging place of layer k may rest.
-
-    The distance across keeps support as much lower under a slope that is just too flat.
+    wanted: the hanging places of each layer; begins: places of a layer at which support has to begin.
     """
-    drop = float(areas.bottom_mm[k]) - process.support_gap_mm
-    slack = process.support_distance_mm / max(tan(radians(process.self_supporting_angle_deg)), 0.5)
-    highest = int(np.searchsorted(areas.top_mm, drop + EVEN_MM, side="right")) - 1
-    lowest = int(np.searchsorted(areas.top_mm, drop - slack - EVEN_MM))
-    return range(highest, min(lowest, highest) - 1, -1) if highest >= 0 else range(0)
-
-
-def _descend(wanted: Sequence[Polygons], areas: ReachableAreas, process: Process) -> tuple[list[Polygons], list[Polygons]]:
-    """Support from the top down: per layer all of it, and where it begins."""
     count, radius = len(areas.reachable), areas.radius_mm
     grows: Columns | Tree = Tree(Growth.of(process, radius)) if process.support_style == "tree" else Columns(Polygons())
     bodies, contacts = [Polygons()] * count, [Polygons()] * count
     beginning: dict[int, list[tuple[Polygons, int]]] = {}
     for k, place in enumerate(wanted):
-        span = _window(k, areas, process)
+        span = window(k, areas, process)
         if not place.is_empty() and len(span):
             beginning.setdefault(min(span[0], count - 1), []).append((place, span[-1]))
     pending: list[tuple[Polygons, int]] = []
     for m in range(count - 1, -1, -1):
         pending += beginning.get(m, [])
         body = _body(grows.area, radius)
-        if pending:
-            contact = _contact(union([place for place, _ in pending]), body, areas.reachable[m], radius)
+        asked = [place for place, _ in pending] + ([begins[m]] if m in begins else [])
+        if asked:
+            contact = _contact(union(asked), body, areas.reachable[m], radius)
             grows = grows.add_contact(contact, areas.reachable[m], float(areas.top_mm[m]))
             contacts[m] = _body(contact, radius)
             body = body + contacts[m]
@@ -194,11 +186,11 @@ def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas, process:
     return Polygons.compose(standing) if standing else Polygons()
 
 
-def _foot(area: Polygons, outlines: Sequence[Polygons], areas: ReachableAreas, process: Process) -> Polygons:
-    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow."""
+def widen_foot(area: Polygons, outlines: Sequence[Polygons], areas: ReachableAreas, process: Process, free: Polygons) -> Polygons:
+    """The first layer on the platform, wider so that it sticks, as far as the gaps to the part allow; free: of the plate."""
     over = int(np.searchsorted(areas.bottom_mm, areas.top_mm[0] + process.support_gap_mm - EVEN_MM))
     beside = offset(outlines[0], process.support_distance_mm)
-    return dilate(area, process.support_foot_mm) - union([beside, *outlines[1:over]])
+    return (dilate(area, process.support_foot_mm) - union([beside, *outlines[1:over]])) ^ free
 
 
 def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: ReachableAreas, process: Process) -> list[Polygons]:
@@ -214,26 +206,3 @@ def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: Rea
         near = opening(area ^ union([*over, *under]), 0.45 * process.line_width_mm)
         dense.append(near)
     return dense
-
-
-def _find_unsupported(
-    wanted: Sequence[Polygons], printed: Sequence[Polygons], outlines: Sequence[Polygons], areas: ReachableAreas, process: Process
-) -> tuple[Polygons, ...]:
-    """What of the hanging places neither lies over printed support, half a bead beyond its edge, nor spans from there to
-    the part.
-    """
-    missed = []
-    half, reach = 0.5 * process.line_width_mm, 2.0 * process.support_distance_mm + 1.0
-    for k, place in enumerate(wanted):
-        if place.is_empty():
-            missed.append(place)
-            continue
-        held = union([printed[m] for m in _window(k, areas, process) if m < len(printed)])
-        held = held if held.is_empty() else offset(held, half)
-        bare = place - held
-        if k and not held.is_empty() and bare.area() >= LEAST_MM2:
-            spanned = closing((held + outlines[k - 1]) ^ bounding_box(bare, reach), 0.5 * process.support_distance_mm + RIM_MM)
-            bare = bare - spanned
-        missed.append(bare if bare.area() >= LEAST_MM2 else Polygons())
-    small = _drop_small(missed, process.support_least_mm2)
-    return tuple(small)

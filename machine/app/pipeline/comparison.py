@@ -100,7 +100,7 @@ def _figures(name: str, orientation: str, parts: int, program: Program, risky_mm
         support_mm3=support_mm3,
         risky_mm2=max(risky_mm2, 0.0),
         message=run.errors[0].message if run.errors else "",
-        unsupported_mm2=sum(area_mm2 for _, _, area_mm2, _ in run.program.unsupported),
+        unsupported_mm2=sum(place.mm2 for place in run.program.unsupported),
         seam_mm=seam_mm,
         interface_mm3=program.interface_mm3,
     )

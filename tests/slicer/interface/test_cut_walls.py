@@ -8,6 +8,7 @@ import pytest
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats
+from slicer.demand.site import survey
 from slicer.geometry.polygons import Polygons, contours, offset, strips
 from slicer.paths import Kind
 from slicer.slice import slice_part
@@ -44,7 +45,8 @@ def parts(shape: str, normal: tuple[float, ...]) -> list[Part]:
 @cache
 def stacks(shape: str, normal: tuple[float, ...], *settings: str) -> list[Stack]:
     both, keys = parts(shape, normal), profile(*PLAIN, *settings)
-    return [build_stack(part, keys, both[:k], both[k + 1 :]) for k, part in enumerate(both)]
+    sites = [survey(part, keys, both[:k], both[k + 1 :]) for k, part in enumerate(both)]
+    return [build_stack(site, site.supports) for site in sites]
 
 
 def in_model(part: Part, points: Floats, z_mm: float) -> Floats:
@@ -131,4 +133,5 @@ def test_the_plastic_of_a_straight_cut_is_a_floor_and_a_rim() -> None:
 
 def test_a_model_in_one_part_has_no_interface() -> None:
     (lower, _) = parts("cube", STRAIGHT)
-    assert build_stack(lower, profile(*PLAIN), (), ()).interface_mm3 == {}
+    site = survey(lower, profile(*PLAIN), (), ())
+    assert build_stack(site, site.supports).interface_mm3 == {}

@@ -19,6 +19,7 @@ from tests.slicer.hand import as_shapely, profile
 
 ROUNDING_MM = 0.03
 SPECK_MM2 = 0.02
+LEDGE = 2.0  # line widths that carry themselves
 
 
 def supported(part: Part, *settings: str, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> tuple[Any, Supports]:
@@ -65,19 +66,25 @@ def assert_sound(values: Any, found: Supports) -> None:
             )
             loose = printed[m] - shapely.union_all([*carried, *stands[-6:], *base])
             assert loose.buffer(-ROUNDING_MM).area < SPECK_MM2, f"layer {m} hangs in the air: {loose.bounds}"
+    untold = {}
     for k in np.flatnonzero([not place.is_empty for place in hanging]).tolist():
         rest = hanging[k] - missed[k].buffer(0.02)
         deep = process.support_gap_mm + process.support_distance_mm + 2 * process.layer_height_mm
         near = [printed[m] for m in range(k) if 0 <= bottom[k] - top[m] + 1e-6 <= deep + 1e-6]
-        near += [solid[j] for j in range(k - 1) if bottom[k] - top[j] <= process.support_gap_mm + 1e-6]
+        sags = process.support_gap_mm + process.layer_height_mm + 1e-6
+        near += [solid[j] for j in range(k - 1) if bottom[k] - top[j] <= sags]
         held = shapely.union_all(near).buffer(0.5 * width + ROUNDING_MM)
         reach = 0.5 * process.support_distance_mm + 0.06
         wall = solid[k - 1] if k else shapely.Polygon()
         spanned = shapely.union_all([held, wall]).buffer(reach, join_style="mitre").buffer(-reach, join_style="mitre")
         bare = rest - shapely.union_all([held, spanned.buffer(0.02)])
-        bare = bare.buffer(-ROUNDING_MM) if bottom[k] > process.support_gap_mm + 1e-6 else shapely.Polygon()
-        most = max((piece.area for piece in getattr(bare, "geoms", [bare])), default=0.0)
-        assert most <= process.support_least_mm2, f"layer {k}: {most} mm2 are neither held nor told {bare.bounds}"
+        bare = bare.buffer(-ROUNDING_MM) if bottom[k] > sags else shapely.Polygon()
+        untold[k] = (bare, shapely.union_all([held, wall]))
+    above = shapely.union_all([bare for bare, _ in untold.values()]).buffer(2 * ROUNDING_MM)
+    for k, (bare, carrying) in untold.items():
+        wide = bare - (carrying - above).buffer(LEDGE * width + ROUNDING_MM, join_style="mitre")
+        most = max((piece.area for piece in getattr(wide, "geoms", [wide])), default=0.0)
+        assert most <= process.support_least_mm2, f"layer {k}: {most} mm2 are neither held nor told {wide.bounds}"
 
 
 def _keeps_gaps(m: int, area: Any, solid: list[Any], bottom: Any, top: Any, process: Any) -> None:

@@ -1,0 +1,65 @@
+"""Reason: why a hanging place could be given no support, one sentence each."""
+
+import numpy as np
+
+from mdp.clearance import least_tip_height_mm
+from slicer.demand.site import Site
+from slicer.geometry.polygons import Polygons, contours, islands, offset, union
+from slicer.heights import Heights
+from slicer.paths import Unsupported
+from slicer.support.blocker import blocked_areas
+from slicer.support.missed import seen_from_above
+from slicer.support.reachable import EVEN_MM
+from slicer.support.support import Supports
+
+MOST = 0.5  # share of a place that one reason has to hold for
+
+
+def explain(site: Site, supports: Supports) -> tuple[Unsupported, ...]:
+    """Every place that got no support, the largest first; layers are counted from 0."""
+    told = []
+    for island in islands(seen_from_above(supports.missed)):
+        places = {k: place ^ island for k, place in enumerate(supports.missed) if not place.is_empty()}
+        areas = {k: place.area() for k, place in places.items()}
+        worst = max(areas, key=lambda k: areas[k], default=-1)
+        if worst >= 0 and areas[worst] > 0.0:
+            told.append(Unsupported(sum(areas.values()), worst, _reason(worst, places[worst], site)))
+    return tuple(sorted(told, key=lambda place: (-place.mm2, place.layer)))
+
+
+def _reason(layer: int, place: Polygons, site: Site) -> str:
+    """Why none of the ways to hold a place of a layer was open."""
+    process, heights, least_mm2 = site.process, site.heights, MOST * place.area()
+    drop = float(heights.bottom_mm[layer]) - process.support_gap_mm
+    top = max(int(np.searchsorted(heights.tip_mm, drop + EVEN_MM, side="right")) - 1, 0)
+    if site.beneath is None and (place - offset(site.floor, -process.line_width_mm)).area() >= least_mm2:
+        return "the plate ends before"
+    under = Heights(heights.tip_mm[top : top + 1], heights.height_mm[top : top + 1], heights.cut_mm[top : top + 1])
+    for other in site.later:
+        if (place ^ blocked_areas(site.part, [other], under, process.support_distance_mm, site.far_mm)[0]).area() >= least_mm2:
+            return f"support would stand where the head prints part {other.index}"
+    room_mm = process.support_gap_mm + process.support_bottom_gap_mm + process.layer_height_mm
+    lowest = int(np.searchsorted(heights.tip_mm, drop - room_mm + EVEN_MM))
+    if (place ^ union(list(site.outlines[lowest : max(layer - 1, 0)]))).area() >= least_mm2:
+        return "there is no room for support between it and the plastic below"
+    aside_mm = process.support_distance_mm + process.line_width_mm
+    if layer and (place ^ offset(site.outlines[top], aside_mm)).area() >= least_mm2:
+        return "there is no room for support beside the walls"
+    met = _part_at_table(place, float(heights.bottom_mm[layer]), site)
+    if met is not None:
+        return f"the head would meet the table if support were printed there with part {met}"
+    return f"support would have to lean by more than {process.support_branch_angle_deg:g} deg to find ground"
+
+
+def _part_at_table(place: Polygons, z_mm: float, site: Site) -> int | None:
+    """The part with which support could be printed under a place if the table were not in the way of the head."""
+    corners = np.concatenate(contours(place))
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    base_mm, machine = site.part.base.offset_mm, site.profile.machine
+    beneath, under = (np.append(middle, base_mm + z) @ site.part.rotation for z in (z_mm, 0.0))
+    if site.beneath is not None and beneath[2] < least_tip_height_mm(machine, site.part.pose):
+        return site.part.index
+    other = next((part for part in reversed(site.earlier) if part.base.heights_mm(under[None])[0] > 0.0), None)
+    if other is None or other.index == 1 or under[2] >= least_tip_height_mm(machine, other.pose):
+        return None
+    return other.index

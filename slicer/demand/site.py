@@ -1,0 +1,115 @@
+"""Site: a part as its support finds it: layers, what hangs in them, what lies beneath, where nothing may stand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mdp.decomposition import Part
+from profiles.process import Process
+from profiles.profile import Profile
+from slicer.bead import first_layer_process, with_line_width
+from slicer.finish.compensation import compensate
+from slicer.finish.vase import vase_profile
+from slicer.geometry.polygons import Polygons, clean
+from slicer.heights import Heights, layer_heights
+from slicer.interface.interface import plastic_beneath
+from slicer.interface.interlock import cut_grooves
+from slicer.plate import compensate_elephant_foot, plate_outline
+from slicer.section import sections
+from slicer.support.blocker import blocked_areas, far_mm
+from slicer.support.overhang import Overhang, detect_overhangs
+from slicer.support.pedestal import pedestal_layers, without_pedestal
+from slicer.support.support import Supports, generate_supports
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A part's layers, one entry each, before anything is laid.
+
+    outlines: whole sections; own: without the pedestal; uncut: own without the grooves for later parts; overhangs: what hangs
+    and what bridges; beneath: the plastic under the first layer, None on the platform; floor: the plate's outline, of use to
+    part 1; pedestal_layers: how many of the lowest layers the pedestal takes. profile: the part's own.
+    """
+
+    part: Part
+    earlier: Sequence[Part]
+    later: Sequence[Part]
+    profile: Profile
+    heights: Heights
+    outlines: Sequence[Polygons]
+    own: Sequence[Polygons]
+    uncut: Sequence[Polygons]
+    overhangs: Sequence[Overhang]
+    beneath: Polygons | None
+    floor: Polygons
+    pedestal_layers: int
+    far_mm: float
+
+    @property
+    def process(self) -> Process:
+        """The settings of support, with the width of its lines."""
+        process = self.profile.process
+        return with_line_width(process, process.support_line_width_mm)
+
+    @cached_property
+    def supports(self) -> Supports:
+        """The support that stands on the platform, on the part itself and on what lies beneath its base plane."""
+        blocked = blocked_areas(self.part, self.later, self.heights, self.process.support_distance_mm, self.far_mm)
+        hanging = [overhang.hanging for overhang in self.overhangs]
+        return generate_supports(hanging, self.outlines, self.heights, self.process, self.beneath, blocked, self.floor)
+
+    def up_to(self, top_mm: float) -> "Site":
+        """The site with empty layers on top as far as that height."""
+        tip, thick = self.heights.tip_mm, self.process.layer_height_mm
+        count = int(np.ceil((top_mm - tip[-1]) / thick - 1e-9))
+        if count <= 0:
+            return self
+        tips = tip[-1] + thick * np.arange(1, count + 1)
+        heights = Heights(
+            np.append(tip, tips),
+            np.append(self.heights.height_mm, np.full(count, thick)),
+            np.append(self.heights.cut_mm, tips - 0.5 * thick),
+        )
+        nothing = [Polygons()] * count
+        return replace(
+            self,
+            heights=heights,
+            outlines=[*self.outlines, *nothing],
+            own=[*self.own, *nothing],
+            uncut=[*self.uncut, *nothing],
+            overhangs=[*self.overhangs, *[Overhang(Polygons(), ())] * count],
+        )
+
+
+def survey(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequence[Part]) -> Site:
+    """The site of a part that is printed after `earlier` and before `later` parts; profile: of the whole print."""
+    profile = vase_profile(profile.of_part(part.index))
+    process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
+    pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
+    heights = layer_heights(mesh, process, on_platform, pedestal_mm)
+    pedestal_count = pedestal_layers(heights.tip_mm, pedestal_mm)
+    outlines = [clean(loops, process.slit_closing_mm) for loops in sections(mesh, heights.cut_mm)]
+    outlines = compensate(outlines, part, later, heights.cut_mm, process)
+    if on_platform:
+        outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)
+    uncut = without_pedestal(outlines, mesh, heights.cut_mm, pedestal_mm, pedestal_count) if pedestal_count else outlines
+    own = cut_grooves(uncut, part, later, heights.cut_mm, process)
+    outlines = cut_grooves(outlines, part, later, heights.cut_mm, process) if pedestal_count else own
+    below = plastic_beneath(part, earlier, outlines[0])
+    return Site(
+        part=part,
+        earlier=earlier,
+        later=later,
+        profile=profile,
+        heights=heights,
+        outlines=outlines,
+        own=own,
+        uncut=uncut,
+        overhangs=detect_overhangs(mesh, outlines, heights.cut_mm, process, below),
+        beneath=below,
+        floor=plate_outline(profile.machine.table),
+        pedestal_layers=pedestal_count,
+        far_mm=far_mm(mesh),
+    )
