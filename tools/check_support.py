@@ -1,0 +1,85 @@
+"""How much of what needs support gets none, model by model, before and after support is handed down to earlier parts.
+
+    python tools/check_support.py FOLDER_OR_FILE ... [--every N] [--machine NAME] [--set KEY=VALUE ...]
+
+One row a model: parts, mm2 seen from above that need support, mm2 that the parts' own ground leaves without and that the plan of
+all parts does, the share of the latter, mm3 inside the outlines of support both ways, core seconds of both, and why each place
+gets none.
+"""
+
+import argparse
+from pathlib import Path
+from time import process_time
+
+from compare_prints import files, mesh_of
+
+from machine.app.pipeline.pricing import pricing
+from mdp.search.search import decompose
+from profiles.errors import UserError
+from profiles.profile import Profile, load
+from slicer.demand.plan import plan_supports
+from slicer.demand.reason import explain
+from slicer.demand.site import survey
+from slicer.support.support import Supports
+
+HEAD = (
+    "model",
+    "parts",
+    "needs mm2",
+    "own ground leaves",
+    "plan leaves",
+    "share",
+    "support mm3",
+    "planned",
+    "s",
+    "plan s",
+    "why",
+)
+
+
+def main() -> None:
+    """Read the options, print the table."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("models", nargs="+", type=Path)
+    options.add_argument("--every", type=int, default=1)
+    options.add_argument("--machine", default="generic_ac")
+    options.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    given = options.parse_args()
+    profile = load(machine=given.machine, settings=given.set)
+    print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|")
+    for file in files(given.models, given.every):
+        print(row(file, profile), flush=True)
+
+
+def row(file: Path, profile: Profile) -> str:
+    """One model's line."""
+    try:
+        parts = decompose(mesh_of(file, profile), file.name, profile, price=pricing(profile)).parts
+        began = process_time()
+        sites = [survey(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
+        own = [site.supports for site in sites]
+        planning = process_time()
+        planned = plan_supports(sites)
+    except UserError as error:
+        return f"| {file.name} | {error} |"
+    needs_mm2 = sum(supports.wanted_mm2 for supports in own)
+    left_mm2 = [sum(each.unsupported_mm2 for each in several) for several in (own, [each for _, each in planned])]
+    volumes = [_mm3(several, profile) for several in (own, [each for _, each in planned])]
+    why = [
+        f"part {site.part.index} layer {place.layer + 1}: {place.mm2:.1f} mm2, {place.reason}"
+        for site, supports in planned
+        for place in explain(site, supports)
+    ]
+    cells = [file.name, len(parts), f"{needs_mm2:.1f}", *(f"{mm2:.1f}" for mm2 in left_mm2)]
+    cells += [f"{left_mm2[1] / max(needs_mm2, 1e-9):.4f}", *(f"{mm3:.0f}" for mm3 in volumes)]
+    cells += [f"{planning - began:.2f}", f"{process_time() - planning:.2f}", "; ".join(why)]
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+def _mm3(several: list[Supports], profile: Profile) -> float:
+    """Volume inside the outlines of support, by layers of the usual height."""
+    return profile.process.layer_height_mm * float(sum(area.area() for supports in several for area in supports.areas))
+
+
+if __name__ == "__main__":
+    main()
