@@ -15,7 +15,7 @@ from slicer.paths import Kind, bead_area_mm2
 
 WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
 ROUND_SIDES = 1.0 - pi / 4.0
-HIDDEN_RESOLUTION_MM = 0.0125  # of what the outer wall hides: PrusaSlicer's resolution of G-code
+PATH_RESOLUTION_MM = 0.0125  # of paths as they are printed, the same as PrusaSlicer's resolution of G-code
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +78,17 @@ def _length(points: Floats) -> float:
 
 
 def simplify_bead(bead: Bead) -> Bead:
-    """The bead without points that lie within HIDDEN_RESOLUTION_MM of the line between their neighbours; a loop's start stays."""
-    if len(bead.points) < 3:
-        return bead
-    corners = _corners(bead.points, HIDDEN_RESOLUTION_MM)
-    return bead if corners.all() else replace(bead, points=bead.points[corners])
+    """The bead with its points simplified."""
+    points = simplify(bead.points)
+    return bead if points is bead.points else replace(bead, points=points)
+
+
+def simplify(points: Floats) -> Floats:
+    """A polyline (n, 2) without points that lie within PATH_RESOLUTION_MM of the line between those that stay; its ends stay."""
+    if len(points) < 3:
+        return points
+    corners = _corners(points, PATH_RESOLUTION_MM)
+    return points if corners.all() else points[corners]
 
 
 @kernel

@@ -10,7 +10,7 @@ from mdp.mesh import Floats
 from profiles.errors import SliceError
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import WALLS, Bead, simplify_bead, with_line_width
+from slicer.bead import WALLS, Bead, simplify, simplify_bead, with_line_width
 from slicer.cooling import fan_share, hanging_fan, rising_fan
 from slicer.demand.reason import explain
 from slicer.demand.site import Site, survey
@@ -158,7 +158,7 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
     layer_fan = fan * fan_share(material, process, layer_time_s(ordered, speeds, profile))
     fans = [hanging_fan(material, p.bead, fan, layer_fan) for p in ordered]
     paths = tuple(
-        Path(p.bead.kind, p.points, p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, own_fan)
+        Path(p.bead.kind, simplify(p.points), p.bead.width_mm, float(speed), p.bead.flow * flow, p.approach, p.retract, own_fan)
         for p, own_fan, speed in zip(ordered, fans, speeds, strict=True)
     )
     return Layer(z_mm, height_mm, paths, layer_fan, add_c)

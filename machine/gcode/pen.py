@@ -1,6 +1,7 @@
 """Pen: what the firmware knows after the lines written so far, and the lines of moves that follow from it."""
 
 from dataclasses import dataclass, field
+from math import ceil
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from slicer.paths import Kind
 
 UNKNOWN = -(10**12)
 SAME = 1.001  # less than the firmware and the dry run care for
+STEPS = 20  # a short stroke that must go slower does so by twentieths, or the speeds of its like would flicker
 
 
 @dataclass
@@ -104,7 +106,7 @@ def share_filament(points_mm: Floats, rounded: Floats, filament_mm: Floats) -> t
     if shared_whole == 0.0:
         return filament_mm, 1.0
     more = whole / shared_whole
-    return shared * more, more if more > SAME else 1.0
+    return shared * more, ceil(more * STEPS) / STEPS if more > SAME else 1.0
 
 
 def thousandths(points_mm: Floats) -> list[list[int]]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import HIDDEN_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
+from slicer.bead import PATH_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, contours, edges, islands, offset, opening
 from slicer.region import sparse_area
 from slicer.walls.gap import LEAST_GAP, LEAST_LINE
@@ -103,7 +103,7 @@ def _walls(
         least = (LEAST_GAP if level else LEAST_LINE) * process.line_width_mm
         bare = area.area() - covered.area() > LEAST_REST_MM2
         narrow.append(extent_of(opening(area - covered, 0.5 * least)) if bare else NOTHING)
-        area = core.simplify(HIDDEN_RESOLUTION_MM)
+        area = core.simplify(PATH_RESOLUTION_MM)
     inside = area if area.is_empty() else opening(area, spacing_mm(process.line_width_mm, height_mm))
     if area.area() - inside.area() > LEAST_REST_MM2:
         narrow.append(extent_of(opening(area - inside, 0.5 * LEAST_GAP * process.line_width_mm)))

@@ -6,7 +6,7 @@ An island that is nowhere narrower than its walls want gets the classic walls, w
 from itertools import chain
 
 from profiles.process import Process
-from slicer.bead import HIDDEN_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
+from slicer.bead import PATH_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, difference, islands, offset, offset_round, opening, strips
 from slicer.walls.variable.pieces import split_course
 from slicer.walls.variable.rule import ROOM, Rule
@@ -61,7 +61,7 @@ def _is_thick(island: Polygons, rule: Rule) -> bool:
 
 def _enclosed(section: Polygons, varying: tuple[Wall, ...], rule: Rule) -> Polygons:
     """What the walls leave inside, where it has room for more than one bead."""
-    inside = offset_round(section, -_wall_mm(rule)).simplify(HIDDEN_RESOLUTION_MM)
+    inside = offset_round(section, -_wall_mm(rule)).simplify(PATH_RESOLUTION_MM)
     middle = [
         strips([piece], 0.5 * width)
         for wall in varying

@@ -10,7 +10,7 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.process import Process
-from slicer.bead import HIDDEN_RESOLUTION_MM, Bead, bulge_flow, outer_wall_width_mm, spacing_mm
+from slicer.bead import PATH_RESOLUTION_MM, Bead, bulge_flow, outer_wall_width_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, contours, offset, offset_round, opening
 from slicer.paths import Kind
 from slicer.walls.gap import LEAST_GAP, LEAST_LINE
@@ -49,7 +49,7 @@ def walls(section: Polygons, count: int, width_mm: float, height_mm: float, oute
         if not rest.is_empty():
             free, narrow = (rest, narrow) if level == 0 else (free, narrow + rest)
         levels.append(tuple(contours(line)))
-        area = core.simplify(HIDDEN_RESOLUTION_MM)
+        area = core.simplify(PATH_RESOLUTION_MM)
         if core.is_empty():
             break
     core = offset(area, -spacing)

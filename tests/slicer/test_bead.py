@@ -1,11 +1,13 @@
 """Widths of the beads by kind and in part 1's first layer."""
 
+import manifold3d as m3
 import numpy as np
 import pytest
 
+from slicer.bead import PATH_RESOLUTION_MM, simplify
 from slicer.paths import Kind
 from slicer.slice import slice_part
-from tests.shapes import box, tee
+from tests.shapes import box, standing, tee
 from tests.slicer.hand import SOLID, cut, of_kind, profile, volume_mm3, whole
 
 WIDTHS = {Kind.OUTER_WALL: 0.35, Kind.INNER_WALL: 0.45, Kind.TOP_SKIN: 0.4, Kind.SKIN: 0.45, Kind.INFILL: 0.6, Kind.SUPPORT: 0.3}
@@ -55,3 +57,20 @@ def test_the_first_layers_flow_is_its_own() -> None:
         sum(map(b.volume_mm3, b.paths)) / sum(map(a.volume_mm3, a.paths)) for a, b in zip(plain.layers, rich.layers, strict=True)
     ]
     assert ratios == pytest.approx([1.1, 1.0, 1.0, 1.0, 1.0])
+
+
+def test_a_simplified_line_keeps_its_ends_and_lies_within_the_resolution() -> None:
+    x = np.linspace(0.0, 20.0, 401)
+    line = np.column_stack([x, 0.3 * np.sin(x)])
+    simple = simplify(line)
+    assert len(simple) < 60
+    assert (simple[[0, -1]] == line[[0, -1]]).all()
+    assert np.abs(np.interp(x, *simple.T) - line[:, 1]).max() < 1.2 * PATH_RESOLUTION_MM
+
+
+def test_walls_of_a_fine_mesh_have_no_specks() -> None:
+    column = whole(standing(m3.Manifold.cylinder(2.0, 6.0, 6.0, 1440)))
+    for path in of_kind(slice_part(column, profile(*SOLID)), Kind.OUTER_WALL, Kind.INNER_WALL):
+        lengths = np.hypot(*np.diff(path.points, axis=0).T)
+        assert (lengths < 0.1).sum() <= 1, "but for the rest before the seam"
+        assert np.ptp(np.hypot(*path.points[1:-1].T)) < PATH_RESOLUTION_MM

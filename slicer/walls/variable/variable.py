@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from mdp.mesh import Floats
-from slicer.bead import HIDDEN_RESOLUTION_MM, Course, length_mm
+from slicer.bead import PATH_RESOLUTION_MM, Course, length_mm
 from slicer.geometry.distance import distances
 from slicer.geometry.polygons import RESOLUTION_MM, Polygons, close_loop, contours, edges, resample
 from slicer.geometry.triangulation import Triangulation, triangulate
@@ -143,6 +143,6 @@ def _simplified(wall: Wall) -> Wall:
     points, widths = wall.points, wall.widths
     if wall.closed:
         points, widths = close_loop(points), np.append(widths, widths[0])
-    keep = np.flatnonzero(corners(points, widths, HIDDEN_RESOLUTION_MM if wall.level else RESOLUTION_MM, WIDTH_STEP_MM))
+    keep = np.flatnonzero(corners(points, widths, PATH_RESOLUTION_MM if wall.level else RESOLUTION_MM, WIDTH_STEP_MM))
     keep = keep[:-1] if wall.closed else keep
     return replace(wall, points=points[keep], widths=widths[keep])

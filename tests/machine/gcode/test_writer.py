@@ -195,3 +195,12 @@ def test_parts_layers_and_types_are_read_back_from_the_comments() -> None:
     assert {parsed.types[k] for k in parsed.type[strokes]} == {"External perimeter", "Perimeter"}
     assert set(parsed.width_mm[strokes]) == {0.45}
     assert set(parsed.height_mm[strokes]) == {0.2}
+
+
+def test_speeds_of_short_strokes_differ_by_twentieths_or_not_at_all() -> None:
+    speeds = set()
+    for length in np.linspace(0.01, 0.03, 41):
+        stroke = Stroke(Kind.GAP, np.array([[7.0, 3.0, 0.2], [7.0 + length, 3.0, 0.2]]), np.array([0.4 * length]), 10.0, 0.4)
+        line = next(line for line in write_gcode(MachineProgram("p", (stroke,)), load()) if line.startswith("G1 X7"))
+        speeds.add(float(line.partition(" F")[2]))
+    assert speeds == {600.0, 571.0, 545.0}

@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.bead import HIDDEN_RESOLUTION_MM, Bead, length_mm, spacing_mm
+from slicer.bead import PATH_RESOLUTION_MM, Bead, length_mm, spacing_mm
 from slicer.geometry.polygons import Polygons, close_loop, contours
 from slicer.paths import Kind, bead_area_mm2
 from slicer.section import sections
@@ -118,7 +118,7 @@ def test_walls_stay_inside_any_polygon(points: Points) -> None:
     polygon = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(2.0, 24)
     for level, loops in enumerate(walls(polygon, 3, WIDTH, HEIGHT).loops):
         for loop in loops:
-            coarse = 0.01 + level * HIDDEN_RESOLUTION_MM
+            coarse = 0.01 + level * PATH_RESOLUTION_MM
             assert distances_mm(polygon, loop).min() > WIDTH / 2 + level * SPACING - coarse
 
 
