@@ -62,7 +62,8 @@ class Search(Frozen):
         ge=1,
         le=1000,
         description="how many times an area counts that needs support and has nothing but air beneath it along its part's "
-        "direction: no support can stand there, and what leans there from the side holds badly",
+        "direction: support leans there from the side or stands on support printed with other parts, which takes more plastic "
+        "and holds less well",
     )
     most_longer: float = Field(
         0.05,

@@ -42,7 +42,7 @@ def needs_support(mesh: Mesh, process: Process, on_platform: bool) -> Mask:
 @dataclass(frozen=True, eq=False)
 class SupportNeed:
     """Of a whole model, for all directions a search asks for. weight: how many times an area over air counts, which support can
-    only be given by leaning, if at all."""
+    only be given by leaning or from support of other parts."""
 
     surface: LinkedFaces
     process: Process
