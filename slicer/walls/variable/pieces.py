@@ -17,7 +17,7 @@ from slicer.travel.order import Placed
 from slicer.walls.variable.variable import EVEN_MM
 
 SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,
-MOST_SPREAD_MM = 0.05  # but one where they change by that much
+MOST_SPREAD_MM = 0.04  # but one where they change by that much
 
 
 def in_pieces(placed: Sequence[Placed], height_mm: float) -> list[Placed]:

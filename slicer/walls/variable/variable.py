@@ -9,7 +9,7 @@ import numpy as np
 from mdp.mesh import Floats
 from slicer.bead import PATH_RESOLUTION_MM, Course, length_mm
 from slicer.geometry.distance import distances
-from slicer.geometry.polygons import RESOLUTION_MM, Polygons, close_loop, contours, edges, resample
+from slicer.geometry.polygons import Polygons, close_loop, contours, edges, resample
 from slicer.geometry.triangulation import Triangulation, triangulate
 from slicer.walls.variable.counts import Counts, count_beads
 from slicer.walls.variable.course import corners, smoothed
@@ -21,6 +21,7 @@ from slicer.walls.variable.skeleton import Skeleton, skeleton_of
 STEP = 0.35  # nominal spacings: sampling of the boundary
 SHORTEST = 1.0  # nominal spacings: a shorter loop is none
 TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
+SEEN_RESOLUTION_MM = 0.005  # of outer walls, whose points are close where ribs are
 WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
 EVEN_MM = 0.03  # widths that differ by less are one
 DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
@@ -143,6 +144,6 @@ def _simplified(wall: Wall) -> Wall:
     points, widths = wall.points, wall.widths
     if wall.closed:
         points, widths = close_loop(points), np.append(widths, widths[0])
-    keep = np.flatnonzero(corners(points, widths, PATH_RESOLUTION_MM if wall.level else RESOLUTION_MM, WIDTH_STEP_MM))
+    keep = np.flatnonzero(corners(points, widths, PATH_RESOLUTION_MM if wall.level else SEEN_RESOLUTION_MM, WIDTH_STEP_MM))
     keep = keep[:-1] if wall.closed else keep
     return replace(wall, points=points[keep], widths=widths[keep])
