@@ -39,7 +39,8 @@ def plan(
     tip = Tip(np.zeros(3), level(machine))
     moves: list[Move] = []
     printed: list[Printed] = []
-    lanes = purge_lanes(decomposition.parts, pieces, profile)
+    begins_level = bool(pieces) and parts[pieces[0].index].pose == tip.pose  # the line is on the plate as it was homed
+    lanes = purge_lanes(decomposition.parts, pieces, profile) if begins_level else None
     stopped = stops_by_layer(stops, pieces)
     for piece in pieces:
         part = parts[piece.index]

@@ -39,7 +39,8 @@ def _usual(profile: Profile) -> dict[str, Frozen]:
     for kind, sections in OF_KIND.items():
         models = load_one(_shipped_machine(profile.machine.name) if kind == "machine" else DEFAULTS[kind])
         usual |= {section: models[section] for section in sections}
-    return usual
+    spans = {"bridge_longest_mm": profile.material.bridge_longest_mm}  # a process that says nothing leaves it to the material
+    return usual | {"process": usual["process"].model_copy(update=spans)}
 
 
 def _shipped_machine(name: str) -> str:

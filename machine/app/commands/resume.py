@@ -32,7 +32,7 @@ from machine.link.status import PrinterStatus
 from machine.reader.gcode_file import GcodeFile
 from machine.view.program import Program
 from profiles.errors import JournalError
-from profiles.profile import Profile, section
+from profiles.profile import SECTIONS, Profile, section
 
 UNSURE_MM = 0.005
 
@@ -88,7 +88,8 @@ def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> P
 
     Raises JournalError when that is another machine, ProfileError when the journal's profile is not valid.
     """
-    profile = Profile.model_validate({name: section(name, table) for name, table in heading.profile.items()})
+    sections = {name: section(name, table) for name, table in heading.profile.items() if name in SECTIONS}
+    profile = Profile.model_validate(sections | {"parts": heading.profile.get("parts", [])})
     if named is None:
         return profile
     gcode = profile.machine.gcode.model_copy(update={"resume": named.machine.gcode.resume})
