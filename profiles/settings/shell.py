@@ -20,7 +20,7 @@ class Shell(Frozen):
         "outward, best for fits",
     )
     wall_generator: Literal["variable", "classic"] = Field(
-        "classic",
+        "variable",
         description="variable: as many walls side by side as fit and as wide as the place, 0.6 to 2 times the nozzle; classic: "
         "all of one width, what is too narrow for a pair gets a line of its own",
     )

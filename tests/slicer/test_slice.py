@@ -145,7 +145,7 @@ def test_the_same_part_gives_the_same_bytes() -> None:
 
 def test_every_path_has_length_and_width_and_speed() -> None:
     for path in of_kind(slice_part(whole(branch()), profile()), *OWN):
-        assert path.length_mm > 0.1
+        assert path.length_mm > 0.04
         assert 0.15 < path.width_mm < 0.91
         assert 0 < path.speed_mm_s <= 80
         assert path.points.shape[1] == path.approach.shape[1] == 2

@@ -124,6 +124,12 @@ def _tee() -> m3.Manifold:
     return m3.Manifold.cube((4.0, 4.0, 30.0), True).translate((0.0, 0.0, 15.0)) + bar
 
 
+def _fin() -> m3.Manifold:
+    """A fin of the tee, thinner and thinner, for walls of varying width."""
+    outline = np.array([[0.0, -0.8], [9.0, -0.2], [9.0, 0.2], [0.0, 0.8]])
+    return m3.Manifold.extrude(m3.CrossSection([outline]), 12.0)
+
+
 def _sweep() -> None:
     """The largest kernel, and those that lay out a surface for it."""
     sweep(_remainder(), LEANING[None], 1.0)
@@ -147,14 +153,15 @@ def _program(profile: Profile) -> None:
     """Slice, plan, write and dry-run a tee in two parts."""
     coarse = {"layer_height_mm": 0.3, "line_width_mm": 0.6, "first_layer_height_mm": 0.3, "support": "auto", "walls": 2}
     profile = profile.model_copy(update={"process": profile.process.model_copy(update=coarse)})
-    above, below = cut(_tee(), PLANE)
+    solid = _tee() + _fin()
+    above, below = cut(solid, PLANE)
     parts = []
-    for index, (base, solid) in enumerate(((PLATFORM, below), (PLANE, above)), start=1):
+    for index, (base, piece) in enumerate(((PLATFORM, below), (PLANE, above)), start=1):
         leaning = poses(profile.machine, LEANING)
         pose = leaning[0] if leaning and index > 1 else level(profile.machine)
-        mesh = mesh_of(solid)
+        mesh = mesh_of(piece)
         parts.append(Part(index, mesh, base, pose, rotation(profile.machine, pose), mesh.volume_mm3, 0.0))
-    decomposition = Decomposition("warm", mesh_of(_tee()), tuple(parts), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
+    decomposition = Decomposition("warm", mesh_of(solid), tuple(parts), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
     sliced = [slice_part(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
     run = dry_run(list(write_gcode(plan(decomposition, sliced, profile), profile)), profile)
     agreement(run, decomposition.mesh, profile)

@@ -16,8 +16,9 @@ from slicer.travel.combing import NOWHERE
 from slicer.travel.order import Placed
 from slicer.walls.variable.variable import EVEN_MM
 
+MOST_OVER_MM = 0.022  # by which a piece is wider than its narrowest place: half of it reaches over the section there
 SHORTEST_MM = 0.2  # a piece that ends because widths change by EVEN_MM is no shorter,
-MOST_SPREAD_MM = 0.04  # but one where they change by that much
+MOST_SPREAD_MM, LEAST_MM = 0.03, 0.045  # but for one where they change by that much, which is no shorter than this
 
 
 def in_pieces(placed: Sequence[Placed], height_mm: float) -> list[Placed]:
@@ -30,7 +31,8 @@ def split_course(points: Floats, widths: Floats) -> Iterator[tuple[Floats, float
     points, widths = _with_small_steps(points, widths)
     steps, means = np.hypot(*np.diff(points, axis=0).T), 0.5 * (widths[1:] + widths[:-1])
     for a, b in pairwise(_cuts(steps.tolist(), means.tolist())):
-        yield points[a : b + 1], float(np.average(means[a:b], weights=np.maximum(steps[a:b], 1e-9)))
+        mean = float(np.average(means[a:b], weights=np.maximum(steps[a:b], 1e-9)))
+        yield points[a : b + 1], min(mean, float(widths[a : b + 1].min()) + MOST_OVER_MM)
 
 
 def _pieces(placed: Placed, course: Course | None, height_mm: float) -> Iterator[Placed]:
@@ -68,7 +70,8 @@ def _cuts(steps: list[float], widths: list[float]) -> list[int]:
     low = high = widths[0]
     for k, (step, width) in enumerate(zip(steps, widths, strict=True)):
         spread = max(high, width) - min(low, width)
-        if spread > MOST_SPREAD_MM or (spread > EVEN_MM and length >= SHORTEST_MM and left >= SHORTEST_MM):
+        least_mm = LEAST_MM if spread > MOST_SPREAD_MM else SHORTEST_MM
+        if spread > EVEN_MM and length >= least_mm and left >= least_mm:
             cuts.append(k)
             length, low, high = 0.0, width, width
         length, left = length + step, left - step

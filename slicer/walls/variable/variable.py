@@ -18,10 +18,10 @@ from slicer.walls.variable.loops import trace_loops
 from slicer.walls.variable.rule import Rule
 from slicer.walls.variable.skeleton import Skeleton, skeleton_of
 
-STEP = 0.35  # nominal spacings: sampling of the boundary
+STEP = 0.42  # nominal spacings: sampling of the boundary
 SHORTEST = 1.0  # nominal spacings: a shorter loop is none
 TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
-SEEN_RESOLUTION_MM = 0.005  # of outer walls, whose points are close where ribs are
+SEEN_RESOLUTION_MM = 0.004  # of outer walls, whose points are close where ribs are
 WIDTH_STEP_MM = 0.004  # a point whose width is that near to the one between its neighbours says nothing
 EVEN_MM = 0.03  # widths that differ by less are one
 DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead, length_mm
-from slicer.paths import Kind, Layer, Path, SlicedPart
+from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import slice_part
 from slicer.walls.seam import Surroundings, place_seams, rear_of
 from tests.shapes import box, branch, standing
@@ -149,12 +149,14 @@ def test_no_seam_lies_on_the_edge_where_a_later_part_begins() -> None:
     edge = rim(8.0, 0.7, 20.0)
     for rule in ("aligned", "rear", "corner", "nearest", "random"):
         sliced = slice_part(base, profile(*BARE, f"process.seam={rule}", "process.interface_seam_mm=1.5"), later=[top])
-        starts = [(p.points[0], lay.z_mm - 0.5 * lay.height_mm) for lay in sliced.layers for p in outer(lay)]
+        starts = [(points[0], lay.z_mm - 0.5 * lay.height_mm) for lay in sliced.layers for points in outer(lay)]
         assert min(distance_mm(at, z, edge) for at, z in starts[:-4]) > 1.49
 
 
-def outer(layer: Layer) -> list[Path]:
-    return [p for p in layer.paths if p.kind is Kind.OUTER_WALL and (p.points[0] - p.points[-1] < 0.2).all()]
+def outer(layer: Layer) -> list[Floats]:
+    """Outer walls that run round, with their stretches of other widths."""
+    walls = joined([p.points for p in layer.paths if p.kind is Kind.OUTER_WALL])
+    return [points for points in walls if (np.abs(points[0] - points[-1]) < 0.2).all()]
 
 
 def rim(radius: float, tilt: float, offset: float) -> Floats:

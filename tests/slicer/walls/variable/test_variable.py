@@ -82,8 +82,8 @@ def test_outer_walls_of_a_thin_plate_are_walls_of_half_its_thickness() -> None:
     (loop,) = variable_walls(plate(0.8), RULE)
     assert loop.closed
     assert loop.level == 0
-    assert loop.widths == pytest.approx(0.4 + 0.5 * HEIGHT * ROUND_SIDES, abs=1e-3)
-    assert np.abs(loop.points[:, 1] - 0.4).max() == pytest.approx(0.4 - 0.5 * loop.widths[0], abs=1e-3)
+    assert loop.widths == pytest.approx(0.4 + 0.5 * HEIGHT * ROUND_SIDES, abs=0.01)
+    assert np.abs(loop.points[:, 1] - 0.4).max() == pytest.approx(0.4 - 0.5 * loop.widths[0], abs=0.005)
 
 
 def test_a_wall_of_one_bead_is_an_outer_wall_that_does_not_run_round() -> None:
@@ -91,7 +91,7 @@ def test_a_wall_of_one_bead_is_an_outer_wall_that_does_not_run_round() -> None:
     assert bead.kind is Kind.OUTER_WALL
     assert bead.line
     assert not bead.one_way
-    assert bead.width_mm == pytest.approx(0.5, abs=1e-3)
+    assert bead.width_mm == pytest.approx(0.5, abs=0.005)
 
 
 def test_a_thick_island_has_the_classic_walls() -> None:
