@@ -84,7 +84,7 @@ def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.
     distance that is kept from the plate, it is part of that.
     """
     problems = []
-    purge = np.array([name == Kind.PURGE.value for name in program.types], dtype=np.bool_)[program.type[deposited_row]]
+    purge = program.rows_of_types(Kind.PURGE.value)[deposited_row]
     counted = ~(purge & (deposited[:, :, 2].max(axis=1, initial=0.0) <= machine.clearance_mm))
     deposited, deposited_row = deposited[counted], deposited_row[counted]
     printed, done = hull(np.zeros((0, 3)), 0.0), 0

@@ -12,7 +12,7 @@ from mdp.mesh import Floats, Mesh
 from slicer.geometry.segments import squared_distance_in_space
 from slicer.paths import Kind
 
-AROUND = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, "Custom")
+AROUND = (Kind.SKIRT.value, Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.PURGE.value)
 PIECE_MM = 1.0
 ASIDE = np.array([3.1e-7, 1.7e-7])  # keeps upright rays off the edges of CAD faces
 

@@ -103,8 +103,7 @@ def summary(run: DryRun) -> dict[str, Any]:
     """The figures of `simulate --json` and `export --json`."""
     program = run.program
     travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0)  # a wipe, which pulls back, is none
-    purged = np.array([name == Kind.PURGE.value for name in program.types], dtype=np.bool_)[program.type[run.segment_row]]
-    points = run.segments_mm[~purged].reshape(-1, 3)
+    points = run.segments_mm[~program.rows_of_types(Kind.PURGE.value)[run.segment_row]].reshape(-1, 3)
     return {
         "time_s": run.time_s,
         "filament_mm": float(np.max(program.filament_mm, initial=0.0)),

@@ -14,7 +14,7 @@ from slicer.paths import Kind
 HANGING = (Kind.OVERHANG.value, Kind.BRIDGE.value)  # the slicer itself says that these hang
 SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 IRONING = Kind.IRONING.value  # goes over what has been laid
-PURGE = "Custom"  # what a start block pushes out beside the plate is meant to fall
+PURGE = Kind.PURGE.value  # what a start block pushes out beside the plate is meant to fall
 ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # of a part's length in air
 LOST_SHARE = 0.5  # of a part's first layer without anything under it
 OVERLAPPING_SHARE = 0.4  # of a layer's length
@@ -39,9 +39,9 @@ def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> li
 
 def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[Finding]:
     """Parts with too much that hangs where the slicer has not said so, and parts that begin in air."""
-    own = ~_rows_of_types(program, (PURGE,))
-    hanging = np.where(own & ~_rows_of_types(program, HANGING), contacts.air_mm, 0.0)
-    support = _rows_of_types(program, SUPPORT)
+    own = ~program.rows_of_types(PURGE)
+    hanging = np.where(own & ~program.rows_of_types(*HANGING), contacts.air_mm, 0.0)
+    support = program.rows_of_types(*SUPPORT)
     problems = []
     for part in np.unique(program.part[hanging > 0.0]):
         mine = own & (program.part == part)
@@ -63,7 +63,7 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[
 
 def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[Finding]:
     """The first layer of every part in which a great share of the beads finds its room taken."""
-    counted = ~_rows_of_types(program, (PURGE, IRONING)) & (length > 0)
+    counted = ~program.rows_of_types(PURGE, IRONING) & (length > 0)
     group = program.part * (int(program.layer.max(initial=0)) + 1) + program.layer
     overlapping = np.bincount(group[counted], weights=contacts.overlapping_mm[counted])
     whole = np.bincount(group[counted], weights=length[counted])
@@ -78,11 +78,6 @@ def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> l
     return problems
 
 
-def _rows_of_types(program: ParsedProgram, names: tuple[str, ...]) -> NDArray[np.bool_]:
-    marked: NDArray[np.bool_] = np.array([name in names for name in program.types], dtype=np.bool_)[program.type]
-    return marked
-
-
 def _at(program: ParsedProgram, rows: NDArray[np.bool_], severity: Severity, code: str, message: str) -> Finding:
     row = int(np.flatnonzero(rows)[0])
     return Finding(severity, code, int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
@@ -90,8 +85,8 @@ def _at(program: ParsedProgram, rows: NDArray[np.bool_], severity: Severity, cod
 
 def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> tuple[float, float, float]:
     """Lengths, mm: extruded, in air where the slicer has not said so, in air where it has."""
-    own = ~_rows_of_types(program, (PURGE,))
-    reported = _rows_of_types(program, HANGING)
+    own = ~program.rows_of_types(PURGE)
+    reported = program.rows_of_types(*HANGING)
     length = np.linalg.norm(deposited.segments_mm[:, 1] - deposited.segments_mm[:, 0], axis=1)[own[deposited.rows]]
     return float(length.sum()), float(contacts.air_mm[own & ~reported].sum()), float(contacts.air_mm[own & reported].sum())
 
@@ -102,10 +97,9 @@ def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64],
     segments: (m, 2, 3) deposited, workpiece frame; rows: (m,) their rows in the program.
     """
     heights = np.where(program.height_mm[rows] > 0, program.height_mm[rows], profile.process.first_layer_height_mm)
-    purge = np.array([name == PURGE for name in program.types], dtype=np.bool_)
     lowest = segments[:, :, 2].max(axis=1) <= heights + ROUNDING_MM
     over, edge = _over_mm(segments[:, :, :2], profile.machine.table)
-    beyond = lowest & ~purge[program.type[rows]] & (over > ROUNDING_MM)
+    beyond = lowest & ~program.rows_of_types(PURGE)[rows] & (over > ROUNDING_MM)
     marked, badness = np.zeros(len(program.line), dtype=np.bool_), np.zeros(len(program.line))
     marked[rows[beyond]] = True
     badness[rows] = over

@@ -5,8 +5,8 @@ import numpy as np
 from machine.dryrun.findings import Finding
 from machine.reader.parsed import MoveKind, ParsedProgram
 from profiles.profile import Profile
+from slicer.paths import Kind
 
-PURGE = "Custom"
 SLACK_MM = 0.02
 
 
@@ -32,8 +32,7 @@ def _parts(program: ParsedProgram) -> list[Finding]:
 
 def _layers(program: ParsedProgram) -> list[Finding]:
     """In every part the first layer that lies lower than the one before it."""
-    purge = np.array([name == PURGE for name in program.types], dtype=np.bool_)[program.type]
-    rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~purge)
+    rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value))
     z, height = program.end[rows, 2], program.height_mm[rows]
     same = (np.diff(program.part[rows]) == 0) & np.all(program.end[rows[1:], 3:] == program.end[rows[:-1], 3:], axis=1)
     lower = np.flatnonzero(same & (np.diff(program.layer[rows]) != 0) & (np.diff(z) < -0.25 * height[1:] - SLACK_MM))

@@ -75,6 +75,11 @@ class ParsedProgram:
     parts: tuple[int, ...]
     unsupported: tuple[Unheld, ...]
 
+    def rows_of_types(self, *names: str) -> NDArray[np.bool_]:
+        """(n,) which rows belong to these ;TYPE: names."""
+        marked: NDArray[np.bool_] = np.array([name in names for name in self.types], dtype=np.bool_)[self.type]
+        return marked
+
 
 @dataclass(frozen=True, eq=False)
 class PoseRun:
