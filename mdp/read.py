@@ -51,7 +51,8 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
     Scaled, then rotated about x, then y, then z, then moved so that its box rests on z = 0 and is centred in x and y.
     Raises MeshError with one sentence: unreadable, damaged, open, flat, or of a size that no printer makes.
     """
-    surfaces = _read_surfaces(path)
+    with np.errstate(all="ignore"):  # what overflows is no finite number, or too large: both are said in a sentence below
+        surfaces = _read_surfaces(path)
     try:
         _check_size(surfaces, scale)
         if scale != 1.0:
@@ -107,11 +108,15 @@ def _check_size(surfaces: list[Surface], scale: float) -> None:
     if not scale > 0 or not np.isfinite(scale):
         raise MeshError(f"cannot be scaled by {scale:g}; process.scale must be above 0")
     corners = np.concatenate([surface.vertices[surface.faces.ravel()] for surface in surfaces])
-    size_mm = scale * float(np.ptp(corners, axis=0).max())
+    with np.errstate(over="ignore"):
+        size_mm = scale * float(np.ptp(corners, axis=0).max())
     if size_mm == 0.0 or LEAST_MM <= size_mm <= MOST_MM:
         return
-    factor = min(OTHER_UNITS, key=lambda unit: abs(np.log(size_mm * unit / TYPICAL_MM)))
     bound = f"less than {LEAST_MM:g} mm" if size_mm < LEAST_MM else f"more than {MOST_MM:g} mm"
+    fitting = [unit for unit in OTHER_UNITS if LEAST_MM <= size_mm * unit <= MOST_MM]
+    if not fitting:
+        raise MeshError(f"its largest extent is {size_mm:.4g} mm, {bound}: no common unit makes that a size to print")
+    factor = min(fitting, key=lambda unit: abs(np.log(size_mm * unit / TYPICAL_MM)))
     raise MeshError(
         f"its largest extent is {size_mm:.4g} mm, {bound}; "
         f"if its coordinates are {OTHER_UNITS[factor]}, give --set process.scale={scale * factor:g}"

@@ -2,6 +2,7 @@
 
 import json
 import struct
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -78,3 +79,18 @@ def test_a_face_of_six_hundred_concave_corners_is_read(tmp_path: Path) -> None:
     mesh, notes = read_mesh(save(tmp_path / "a.obj", "\n".join(lines).encode()))
     assert notes == ()
     assert mesh.volume_mm3 == pytest.approx(600 * 0.5 * 20 * 12 * np.sin(2 * np.pi / 600) * 10)
+
+
+@pytest.mark.parametrize("number", ["1e999", "nan", "1e308", "-1e308"])
+def test_numbers_that_overflow_end_in_a_sentence_without_warnings_before_it(tmp_path: Path, number: str) -> None:
+    box = files.placed(20, 20, 20)
+    turned = f'<item objectid="1" transform="{number} 0 0 0 1 0 0 0 1 0 0 0"/>'
+    paths = [
+        save(tmp_path / "a.obj", files.obj(box).replace(b"20.0", number.encode(), 1)),
+        save(tmp_path / "a.glb", files.glb(box, {"scale": [float(number), 1.0, 1.0]})),
+        files.threemf(tmp_path / "a.3mf", {1: files.threemf_mesh(box)}, turned, "meter"),
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for path in paths:
+            assert "finite" in refusal(path) or "no common unit" in refusal(path)
