@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 WELD_SHARES = (1e-6, 1e-5, 1e-4)  # of the model's size: the rounding of ASCII files first, gaps of 0.01 mm in 100 mm last
 SHRINK = 0.01  # of the model's size: what a repair may take off its box
 SAME_VOLUME = 1e-5
+MOST_CHANGED = 0.01  # of the volume: what the reading of edges that many faces share may change
+MOST_READINGS = 5
 SHARED = 0.5  # of the volume: a body that counts half of itself twice is not understood
 
 
@@ -60,6 +62,7 @@ def _read_as_solid(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manif
     """The surface and its manifold3d solid, which must enclose the same volume.
 
     An edge of four faces leaves open which of them go on in which; where manifold3d pairs them otherwise, the edge is made two.
+    Where even that leaves a difference, what manifold3d made of it is taken, unless it is another shape.
     """
     for change in (lambda surface: surface, split_shared_edges):
         tried = change(solid)
@@ -67,7 +70,30 @@ def _read_as_solid(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manif
         if abs(whole.volume() - volume_of(tried)) <= SAME_VOLUME * abs(whole.volume()):
             _note(notes, (len(tried.faces) - len(solid.faces)) // 2, "parted {} edge{} that four faces share")
             return tried, whole
-    raise MeshError(f"cannot be made a valid solid: its volume is {volume_of(solid):.5g} mm3 or {whole.volume():.5g} mm3")
+    return _keep_what_was_read(solid, whole, notes)
+
+
+def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> tuple[Surface, "m3.Manifold"]:
+    """What manifold3d made of the surface, until it reads its own triangles as what they are. Raises MeshError for another shape."""
+    for _ in range(MOST_READINGS):
+        before_mm3 = whole.volume()
+        if whole.is_empty():
+            break
+        whole = solid_of(surface_of(whole))
+        if abs(whole.volume() - before_mm3) <= SAME_VOLUME * abs(before_mm3):
+            break
+    cleaned, enclosed_mm3, taken_mm3 = surface_of(whole), volume_of(solid), whole.volume()
+    box = _bounds(solid)
+    same = abs(taken_mm3 - enclosed_mm3) <= MOST_CHANGED * taken_mm3 and len(cleaned.faces) > 0
+    if not same or np.abs(_bounds(cleaned) - box).max() > SHRINK * (box[1] - box[0]).max():
+        raise MeshError(
+            f"cannot be made a valid solid: its faces enclose {enclosed_mm3:.5g} mm3, what can be kept of them "
+            f"{taken_mm3:.5g} mm3; make it manifold in another program first (Blender: 3D-Print Toolbox, Make Manifold)"
+        )
+    percent = round(100 * (taken_mm3 / enclosed_mm3 - 1), 4) + 0.0
+    changed = f"{taken_mm3:.6g} mm3 remain of {enclosed_mm3:.6g} mm3 ({percent:+g} %)"
+    notes.append(f"left out folds where more than two faces share an edge: {changed}")
+    return cleaned, whole
 
 
 def _count_once(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> Surface:

@@ -8,9 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mdp.formats import readers
 from mdp.formats.surface import Surface
 from mdp.mesh import Floats, Mesh
+from mdp.read import locate
 from mdp.repair.repair import repair
+from mdp.repair.shells import solid_of, surface_of, volume_of
 from profiles.errors import MeshError
 from tests.checks import assert_closed
 from tests.mdp.files import both, inside_out, placed, plus, without
@@ -235,3 +238,21 @@ def test_unused_vertices_are_dropped_and_the_order_of_the_others_stays() -> None
     vertices = np.concatenate([[[500.0, 0, 0]], tee().vertices])
     solid, notes = repair([Surface(vertices, tee().faces.astype(np.int64) + 1)])
     assert (len(solid.vertices), notes) == (len(tee().vertices), [])
+
+
+@pytest.mark.parametrize(("grid", "change_percent"), [(78, "-0.05"), (22, "+0.6956")])
+def test_folds_of_a_coarsely_rounded_model_are_left_out_and_the_difference_is_told(grid: int, change_percent: str) -> None:
+    fine = readers.READERS[".ply"](locate("demo:lattice"))[0]
+    step_mm = np.ptp(fine.vertices, axis=0).max() / grid
+    surface, notes = repair([Surface(np.round(fine.vertices / step_mm) * step_mm, fine.faces)])
+    kept = surface_of(solid_of(surface))
+    assert volume_of(kept) == pytest.approx(volume_of(surface), rel=1e-5)
+    assert notes[-1].startswith("left out folds where more than two faces share an edge")
+    assert change_percent in notes[-1]
+
+
+def test_a_model_rounded_to_another_shape_is_refused_with_what_to_do() -> None:
+    fine = readers.READERS[".ply"](locate("demo:lattice"))[0]
+    step_mm = np.ptp(fine.vertices, axis=0).max() / 18
+    with pytest.raises(MeshError, match=r"enclose 7530.* kept of them 7655.*make it manifold in another program first"):
+        repair([Surface(np.round(fine.vertices / step_mm) * step_mm, fine.faces)])
