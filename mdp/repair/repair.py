@@ -74,12 +74,11 @@ def _read_as_solid(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manif
 
 
 def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> tuple[Surface, "m3.Manifold"]:
-    """What manifold3d made of the surface, until it reads its own triangles as what they are. Raises MeshError for another shape."""
+    """What manifold3d made of the surface, until it reads that as what it is. Raises MeshError for another shape."""
     for _ in range(MOST_READINGS):
-        before_mm3 = whole.volume()
         if whole.is_empty():
             break
-        whole = solid_of(surface_of(whole))
+        before_mm3, whole = whole.volume(), solid_of(surface_of(whole))
         if abs(whole.volume() - before_mm3) <= SAME_VOLUME * abs(before_mm3):
             break
     cleaned, enclosed_mm3, taken_mm3 = surface_of(whole), volume_of(solid), whole.volume()
