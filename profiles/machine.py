@@ -54,6 +54,11 @@ class LinearAxis(Frozen):
     limits_mm: Limits = Field(description="least and greatest position the firmware accepts, mm")
     speed_mm_s: float = Field(gt=0, le=5000, description="greatest speed, mm/s")
     acceleration_mm_s2: float = Field(gt=0, le=100000, description="acceleration, mm/s2")
+    home_mm: float | None = Field(
+        None,
+        description="what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, "
+        "mm; left out: the least of limits_mm for X and Y, the greatest for Z",
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -90,6 +95,11 @@ class RotaryAxis(Frozen):
     )
     speed_deg_s: float = Field(gt=0, le=3600, description="greatest speed, deg/s")
     acceleration_deg_s2: float = Field(gt=0, le=100000, description="acceleration, deg/s2")
+    home_deg: float | None = Field(
+        None,
+        description="what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, "
+        "deg; left out: it is homed to zero_deg, and believed at the least of limits_deg after a restart",
+    )
 
     @property
     def reach_deg(self) -> Limits:
@@ -292,6 +302,15 @@ class Machine(Frozen):
     def tilts(self) -> bool:
         """False for a machine with three axes only."""
         return self.shape == "table"
+
+    @property
+    def home(self) -> tuple[float, float, float, float, float]:
+        """X Y Z tilt turn, mm and deg, that Marlin believes in after a restart (module/motion.cpp: current_position is begun with
+        X_HOME_POS, Y_HOME_POS, Z_HOME_POS, I_HOME_POS, J_HOME_POS)."""
+        ends = (self.x.limits_mm[0], self.y.limits_mm[0], self.z.limits_mm[1], self.tilt.limits_deg[0], self.turn.limits_deg[0])
+        named = (self.x.home_mm, self.y.home_mm, self.z.home_mm, self.tilt.home_deg, self.turn.home_deg)
+        x, y, z, tilt, turn = (end if home is None else home for home, end in zip(named, ends, strict=True))
+        return x, y, z, tilt, turn
 
     @model_validator(mode="before")
     @classmethod

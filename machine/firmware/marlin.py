@@ -46,6 +46,8 @@ SIMULATED = SimulationRules(
     reports_position=True,
     has_build_options=True,
     lacks=frozenset({"M116", "M568", "M572"}),
+    # module/motion.cpp, bugfix-2.1.x: current_position begins with the home positions; apply_motion_limits asks axis_was_homed.
+    starts_at_home=True,
 )
 
 MARLIN = Firmware(

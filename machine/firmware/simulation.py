@@ -36,7 +36,8 @@ class SimulationRules:
     said of such commands; out_of_range "": the target is clamped without a word. cold_moves: a cold move is made without
     filament. kill: said when it stops for ever; after_kill: said, with ok, to every line from then on. has_build_options: it
     is built with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it.
-    while_heating: behind the temperatures of a command that waits for them. lacks: commands it does not know.
+    while_heating: behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home:
+    after a restart it believes itself at its home positions, and keeps only axes that were homed inside the limits.
     """
 
     identity: str
@@ -60,3 +61,4 @@ class SimulationRules:
     temperatures: TemperatureReport = temperature_report
     while_heating: str = " W:?"
     lacks: frozenset[str] = frozenset()
+    starts_at_home: bool = False

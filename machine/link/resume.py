@@ -3,6 +3,9 @@
 Three cases, by what the printer itself reports: it has worked on and stands where a line of the program ends (nothing is
 repeated), it has not restarted and knows its place (the tip travels back), it has restarted (the axes are taken to stand where
 they stood, the tip rises along the nozzle, X and Y are homed). Z and the table are never homed onto a print.
+
+A restart shows in what it changes: the greeting of the firmware, line numbers that begin anew, a position that the firmware
+believes in before anything is homed: 0 0 0, or Marlin's home positions (profiles.machine.Machine.home).
 """
 
 from collections.abc import Iterable
@@ -24,6 +27,7 @@ from machine.link.status import PrinterStatus
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.errors import JournalError, SilenceError
+from profiles.machine import Machine
 from profiles.profile import Profile
 
 TOO_LITTLE = "hardly anything was printed: the program begins anew"
@@ -39,6 +43,7 @@ NO_ANSWER = (
 )
 SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
 SAME = 0.02  # mm or deg: M114 reports hundredths
+HOME_KEYS = ("x.home_mm", "y.home_mm", "z.home_mm", "tilt.home_deg", "turn.home_deg")
 NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: questions have numbers too
 
 
@@ -121,7 +126,9 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     """Decide. Raises JournalError where going on would be a guess, SilenceError where the printer has reported nothing."""
     if status.position is None and status.last_number is None:
         raise SilenceError(NO_ANSWER)
-    standing = _match_position(point, status)
+    alive = has_not_restarted(point, status)
+    begun = stands_as_begun(status, profile.machine)
+    standing = _match_position(point, status) if alive or not (begun or status.greeted) else None
     if standing is not None:
         before = (*heat_commands(standing.modal, profile), *standing.modal.lines())
         done = "the printer stands where this line begins: nothing is repeated"
@@ -129,19 +136,32 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     if not point.stroked:
         return ResumePlan(ResumePoint(1, ()), f"{TOO_LITTLE}, clear the table of the little there may be")
     _check(point, profile)
-    alive = has_not_restarted(point, status)
     span = f"lines {point.line} to {point.last} may have been printed already"
-    at = _reported_position(point, status) if alive or (alive is None and _nonzero(status)) else None
-    if at is not None:
+    at = _reported_position(point, status) if alive or (alive is None and not begun) else None
+    if at is not None and not status.greeted:
         before = _approach(point, profile, *at)
         return ResumePlan(ResumePoint(point.line, before), f"the printer has not restarted and knows its place; {span}")
-    if alive is not None and _nonzero(status):
-        raise JournalError(
-            f"the printer has not counted its lines on since the print, but stands at {_in_words(status)}: it was moved; "
-            "if it was not, switch the printer off and on first"
-        )
+    if not status.greeted:
+        _check_begun(status, begun, profile)
     before = _homed_approach(point, profile)
     return ResumePlan(ResumePoint(point.line, before), f"the printer has restarted; {span}", homes=True)
+
+
+def _check_begun(status: PrinterStatus, begun: bool, profile: Profile) -> None:
+    """Refuse a printer that does not stand as a restart leaves it, for it may have been homed or moved since."""
+    if not begun:
+        keys = ", ".join(f"machine.{key}" for key in HOME_KEYS)
+        raise JournalError(
+            f"the printer's line numbers have begun anew, but it says that it stands at {_in_words(status)}: "
+            "it was homed or moved since; switch it off and on, move nothing, and resume again. "
+            "If it says the same place then, that is where its firmware "
+            f"starts: write it as {keys} into a profile of this machine and name that with --machine"
+        )
+    if status.last_number and _nonzero(status):  # at 0 0 0 nothing was homed
+        raise JournalError(
+            f"the printer has restarted and stands at its home positions, but another program has sent it "
+            f"{status.last_number} lines since: it may have been homed; switch it off and on, move nothing, and resume again"
+        )
 
 
 def _check(point: InterruptedPrint, profile: Profile) -> None:
@@ -168,8 +188,27 @@ def _match_position(point: InterruptedPrint, status: PrinterStatus) -> ProgramSt
     return None
 
 
+def stands_as_begun(status: PrinterStatus, machine: Machine) -> bool:
+    """Whether the printer stands where a firmware believes itself before anything was homed: at 0 0 0, or (Marlin) each axis at
+    its home position, which is 0, an end of its limits or what the profile says. True where it reports no position. A firmware
+    that does not count lines begins at 0 0 0 (Klipper, RepRapFirmware).
+    """
+    if not _nonzero(status) or status.position is None:
+        return True
+    if status.last_number is None:
+        return False
+    reported, letters = dict(status.position.axes), axes_of(machine).letters
+    axes: list[tuple[float, ...]] = [(axis.home_mm,) if axis.home_mm is not None else (0.0, *axis.limits_mm)
+                                     for axis in (machine.x, machine.y, machine.z)]  # fmt: skip
+    for axis in (machine.tilt, machine.turn):
+        axes.append((axis.home_deg,) if axis.home_deg is not None else (0.0, axis.zero_deg, *axis.limits_deg))
+    axes.append((0.0,))
+    pairs = [(reported[letter], starts) for letter, starts in zip(letters, axes, strict=True) if letter in reported]
+    return all(any(abs(value - start) <= SAME for start in starts) for value, starts in pairs)
+
+
 def _nonzero(status: PrinterStatus) -> bool:
-    """Whether the printer says that it stands somewhere; one that has just started stands at 0 0 0."""
+    """Whether the printer says that it stands somewhere else than at 0 0 0."""
     return status.position is not None and sum(abs(value) > SAME for _, value in status.position.axes) >= SEVERAL
 
 

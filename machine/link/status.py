@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Ok, Position, Temperature, read_event
+from machine.link.protocol.events import Banner, Event, Ok, Position, Start, Temperature, read_event
 from machine.link.protocol.framing import frame
 from machine.link.shutdown import Listener
 
@@ -21,11 +21,15 @@ STILL_S = 300.0  # a printer that still works on its queue answers when that is 
 
 @dataclass(frozen=True)
 class PrinterStatus:
-    """The number of the last line the printer has taken, where it says it stands, its temperatures; None: not reported."""
+    """The number of the last line the printer has taken, where it says it stands, its temperatures; None: not reported.
+
+    greeted: the firmware said its greeting meanwhile: it has just restarted.
+    """
 
     last_number: int | None
     position: Position | None
     temperature: Temperature
+    greeted: bool = False
 
 
 @dataclass
@@ -35,10 +39,17 @@ class _StatusAnswers:
     number: int | None = None
     position: Position | None = None
     temperature: Temperature = field(default_factory=Temperature)
+    greeted: bool = False
+
+    def hear_greeting(self, event: Event) -> None:
+        """A board that restarts begins its line numbers anew."""
+        if isinstance(event, Start | Banner):
+            self.greeted, self.number = True, None if self.number is None else 0
 
     def read_number(self, line: bytes) -> bool:
         """Whether the far number was answered, by a refusal or, where numbers are not checked, by what M105 is answered with."""
         event = read_event(line)
+        self.hear_greeting(event)
         if last_line := LAST_LINE.search(line):
             self.number = int(last_line[1])
         return last_line is not None or (isinstance(event, Ok) and event.temperature is not None)
@@ -46,6 +57,7 @@ class _StatusAnswers:
     def read_position(self, line: bytes) -> bool:
         """Take a position; whether the temperature that is asked for after it has come."""
         event = read_event(line)
+        self.hear_greeting(event)
         if isinstance(event, Position):
             self.position = event
         elif isinstance(event, Ok):
@@ -68,6 +80,12 @@ def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> Pri
     else:
         return PrinterStatus(None, None, Temperature())
     listener.wait_for(lambda line: False, medium.now_s() + 0.5)  # the rest of the refusal
-    wire.write(b"M400\nM114\nM105\n")
-    listener.wait_for(answers.read_position, medium.now_s() + STILL_S)
-    return PrinterStatus(answers.number, answers.position, answers.temperature)
+    for _ in range(TRIES):  # what was asked is lost when the board restarts meanwhile
+        before, answers.greeted = answers.greeted, False
+        wire.write(b"M400\nM114\nM105\n")
+        listener.wait_for(lambda line: answers.read_position(line) or answers.greeted, medium.now_s() + STILL_S)
+        again, answers.greeted = answers.greeted, answers.greeted or before
+        if not again:
+            break
+        listener.wait_for(lambda line: False, medium.now_s() + ANSWER_S)
+    return PrinterStatus(answers.number, answers.position, answers.temperature, answers.greeted)

@@ -28,7 +28,8 @@ class BuildOptions:
 
     realtime: Marlin's REALTIME_REPORTING_COMMANDS; geometry: its M115_GEOMETRY_REPORT; waits: its NO_TIMEOUTS, `wait` every
     second when idle; resend_ok: an `ok` follows each Resend (Smoothieware has none); must_home: X Y Z are not moved before they
-    are homed (Klipper, RepRapFirmware, Marlin's NO_MOTION_BEFORE_HOMING).
+    are homed (Klipper, RepRapFirmware, Marlin's NO_MOTION_BEFORE_HOMING); home_start: after a restart it believes itself at its
+    home positions as Marlin does, otherwise at 0 0 0.
     """
 
     advanced_ok: bool = True
@@ -41,6 +42,7 @@ class BuildOptions:
     waits: bool = False
     resend_ok: bool = True
     must_home: bool = False
+    home_start: bool = True
     queue: int | None = None
 
 
@@ -112,7 +114,7 @@ class Board:
         self.machine, self.build, self.say = machine, build, say
         self.rules = simulation_of(machine)
         self.now_s = 0.0
-        self.motion = Motion(machine, self.note, kept)
+        self.motion = Motion(machine, self.note, kept, build.home_start)
         self.nozzle = Heater("nozzle", machine.nozzle_limit_c, NOZZLE_S)
         self.bed = Heater("bed", machine.bed_limit_c, BED_S)
         self.events: list[tuple[float, str]] = []

@@ -64,29 +64,32 @@ class Motion:
         machine: Machine,
         note: Callable[[str], None] = lambda what: None,
         kept: int | None = None,
+        home_start: bool = True,
     ) -> None:
         rules = simulation_of(machine)
         axes = (machine.x, machine.y, machine.z)
         self._axes = axes_of(machine)
         self.letters = self._axes.letters
         self.limits = [a.limits_mm for a in axes] + [machine.tilt.limits_deg, machine.turn.limits_deg]
-        self._home = [machine.x.limits_mm[0], machine.y.limits_mm[0], machine.z.limits_mm[1]]
-        self._home += [machine.tilt.zero_deg, machine.turn.zero_deg]
+        rotary = (machine.tilt, machine.turn)
+        self._home = [*machine.home[:3], *(a.zero_deg if a.home_deg is None else a.home_deg for a in rotary)]
+        self._starts_at_home = rules.starts_at_home and home_start
         self.executed = ExecutedMoves(kept)
         self.planner = Planner(self.executed.add, rules.blocks, rules.min_segment_s)
         self._machine, self._note = machine, note
         self._tcp = TcpKinematics(machine)
-        self._real = [0.0] * 6  # where the axes stand when all planned blocks are over, filament as a running total
+        # Where the axes stand when all planned blocks are over, filament as a running total.
+        self._real = [*machine.home[:3], machine.tilt.zero_deg, machine.turn.zero_deg, 0.0] if self._starts_at_home else [0.0] * 6
         self._offset = [0.0] * 5
         self.clamped = self.halts = 0
         self.forget()
 
     def forget(self) -> None:
-        """The board restarts: the axes stay where they are, the firmware believes them at zero and knows its defaults."""
+        """The board restarts: the axes stay where they are, the firmware believes them at home or zero and knows its defaults."""
         machine = self._machine
-        self.place = [0.0] * 6
+        self.place = [*machine.home, 0.0] if self._starts_at_home else [0.0] * 6
         self.modes = Modes(self._axes, feed=60.0 * FIRST_FEED)
-        self._offset = self._real[:5]
+        self._offset = [real - place for real, place in zip(self._real[:5], self.place, strict=False)]
         self.follows = False
         self.soft_limits = True
         self.homed: set[int] = set()
@@ -111,11 +114,13 @@ class Motion:
         return place
 
     def _clamp(self, place: list[float]) -> None:
-        """Marlin stops at its soft limits without a word."""
+        """Marlin stops at soft limits without a word, on axes that were homed; on others what the program meant is counted."""
         for axis, (low, high) in enumerate(self.limits):
-            if not low - SLACK <= place[axis] <= high + SLACK:
+            limited = axis in self.homed or not self._starts_at_home
+            told = place[axis] + (0.0 if limited else self.modes.offset[axis])
+            if not low - SLACK <= told <= high + SLACK:
                 self.clamped += 1
-                place[axis] = min(max(place[axis], low), high)
+                place[axis] = min(max(place[axis], low), high) if limited else place[axis]
 
     def turned(self, angles_deg: Mapping[int, float]) -> list[float]:
         """Where a turn of single axes to the program's coordinates leads."""

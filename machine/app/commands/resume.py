@@ -84,7 +84,7 @@ def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, 
 
 
 def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> Profile:
-    """The journal's own profile, homed as the machine says that was named.
+    """The journal's own profile, homed and after a restart believed as the machine says that was named.
 
     Raises JournalError when that is another machine, ProfileError when the journal's profile is not valid.
     """
@@ -92,8 +92,10 @@ def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> P
     profile = Profile.model_validate(sections | {"parts": heading.profile.get("parts", [])})
     if named is None:
         return profile
-    gcode = profile.machine.gcode.model_copy(update={"resume": named.machine.gcode.resume})
-    machine = profile.machine.model_copy(update={"gcode": gcode})
+    old, new = profile.machine, named.machine
+    homed = {name: getattr(old, name).model_copy(update={"home_mm": getattr(new, name).home_mm}) for name in ("x", "y", "z")}
+    homed |= {name: getattr(old, name).model_copy(update={"home_deg": getattr(new, name).home_deg}) for name in ("tilt", "turn")}
+    machine = old.model_copy(update=homed | {"gcode": old.gcode.model_copy(update={"resume": new.gcode.resume})})
     if named.machine != machine:
         raise JournalError(
             f"journal {journal} is of a print on {profile.machine.name}; --machine gives another machine ({named.machine.name}), "

@@ -19,6 +19,7 @@ from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHe
 from machine.link.medium import Medium, Wire
 from machine.link.progress import Progress
 from machine.link.protocol.events import Position, Temperature
+from machine.link.protocol.framing import frame
 from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
@@ -302,9 +303,66 @@ def with_block(profile: Profile, block: str) -> Profile:
     return profile.model_copy(update={"machine": profile.machine.model_copy(update={"gcode": gcode})})
 
 
+AT_HOME = {"X": -160.0, "Y": -160.0, "Z": 260.0, "A": -95.0, "C": -3600.0, "E": 0.0}  # what the real Marlin says after a reset
+
+
+def test_a_marlin_that_has_restarted_believes_itself_at_its_home_positions_and_is_resumed() -> None:
+    way = plan_resume(point(LINE), found(AT_HOME), PROFILE)
+    assert way.reason.startswith("the printer has restarted")
+    assert way.homes
+    assert "G92 X" in " ".join(way.start.before)
+
+
 def test_a_printer_that_was_moved_since_it_restarted_is_refused() -> None:
-    with pytest.raises(JournalError, match="stands at X50 Y50 Z50: it was moved"):
+    with pytest.raises(JournalError, match="stands at X50 Y50 Z50: it was homed or moved since; switch it off and on"):
         plan_resume(point(LINE), found({"X": 50.0, "Y": 50.0, "Z": 50.0}), PROFILE)
+
+
+def test_a_printer_at_its_home_positions_that_took_lines_since_may_have_been_homed() -> None:
+    with pytest.raises(JournalError, match="another program has sent it 7 lines since: it may have been homed"):
+        plan_resume(point(LINE), found(AT_HOME, last=7), PROFILE)
+
+
+def test_a_printer_whose_greeting_was_heard_has_restarted_wherever_it_believes_to_stand() -> None:
+    greeted = replace(found({"X": 50.0, "Y": 50.0, "Z": 50.0}), greeted=True)
+    assert plan_resume(point(LINE), greeted, PROFILE).homes
+
+
+def test_home_positions_of_the_profile_tell_where_a_restarted_firmware_believes_to_stand() -> None:
+    elsewhere = found({"X": -5.0, "Y": 330.0, "Z": 300.0, "A": 0.0, "C": 0.0})
+    with pytest.raises(JournalError, match=r"write it as machine\.x\.home_mm"):
+        plan_resume(point(LINE), elsewhere, PROFILE)
+    told = load(settings=["machine.x.home_mm=-5", "machine.y.home_mm=330", "machine.z.home_mm=300"])
+    assert plan_resume(point(LINE), elsewhere, told).homes
+
+
+def test_home_positions_say_nothing_about_a_firmware_that_does_not_count_lines() -> None:
+    assert not plan_resume(point(LINE), found(AT_HOME, last=None), PROFILE).homes
+
+
+def test_a_board_that_restarts_while_it_is_asked_has_begun_its_numbers_anew() -> None:
+    printer = VirtualPrinter(PROFILE.machine, faults=FaultScript((Fault("reset", at=2, unit="line"),)))
+    line = printer.medium.open(PATH, 0)
+    line.write(frame(1, "M110 N500") + b"\n")
+    told = status.query_status(line, printer.medium, lambda: None)
+    assert (told.greeted, told.last_number) == (True, 0)
+    assert told.position is not None
+    assert dict(told.position.axes) == AT_HOME
+
+
+def test_the_command_resumes_after_a_power_cut(
+    text: GcodeFile, whole: np.ndarray, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    journal, cut = tmp_path / "journal", Fault("reset", at=255, unit="line")
+    with SimulatedPrinter(PROFILE.machine, faults=[cut]) as printer:
+        assert main(["print", str(text.path), "--port", printer.path, "--journal", str(journal), "--force"]) == 1
+        assert "the printer restarted in the middle of the print" in capsys.readouterr().err
+        assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 0
+        told, record = capsys.readouterr().err, printer.record
+    assert "the printer has restarted; lines" in told
+    assert record.clamped == 0
+    assert [event for _, event in record.events if event.startswith("homed")] == ["homed XYZ", "homed XY"]
+    assert record.end[-1, :5].tolist() == pytest.approx(whole[-1, :5])
 
 
 def test_a_program_that_does_not_tell_where_it_stands_is_refused() -> None:

@@ -564,7 +564,7 @@ def test_scenario_39_a_pause_comes_back_to_tilt_turn_filament_and_feed() -> None
             control.ask(Command.RESUME)
         states.append(told.state)
 
-    tilted = ["G1 Z60 F900", "G1 A30 C725 F6000", "G1 X20 Y30 F6000"]
+    tilted = ["G1 Z60 F900", "G92 A0 C0", "G1 A30 C725 F6000", "G1 X20 Y30 F6000"]
     strokes = [line.replace("F6000", "").strip() for line in STROKES]
     jumps = [f"G0 X{20 + k}" if k % 10 == 9 else "G4 P0" for k in range(150)]
     body = [line for pair in zip(strokes, jumps, strict=True) for line in pair]

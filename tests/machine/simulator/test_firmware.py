@@ -1,5 +1,6 @@
 """The simulated Marlin has the real one's behaviour: what its source and its measurements say, one by one."""
 
+from dataclasses import replace
 from math import inf
 
 import pytest
@@ -11,12 +12,12 @@ from machine.simulator.firmware import SimulatedFirmware
 from profiles.profile import load
 
 MACHINE = load().machine
-PLAIN = BuildOptions(advanced_ok=False)
+PLAIN = BuildOptions(advanced_ok=False, home_start=False)
 HOT = "M104 S200\nM109 S200\nM83\n"
 
 
 def printer(build: BuildOptions = PLAIN) -> SimulatedFirmware:
-    return SimulatedFirmware(MACHINE, build)
+    return SimulatedFirmware(MACHINE, replace(build, home_start=False))
 
 
 def answer(firmware: SimulatedFirmware, text: str | bytes, until_s: float = inf) -> list[str]:

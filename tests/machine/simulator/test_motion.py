@@ -8,7 +8,7 @@ from profiles.profile import load
 
 def _seconds(words: dict[str, float], told: dict[str, float]) -> float:
     """How long one move takes that stands alone, with a corner speed of nothing."""
-    motion = Motion(load().machine.model_copy(update={"junction_speed_mm_s": 0.0}))
+    motion = Motion(load().machine.model_copy(update={"junction_speed_mm_s": 0.0}), home_start=False)
     motion.accelerate(told)
     motion.reach(motion.target(words), 0.0)
     return motion.planner.ahead()[0].duration_s

@@ -19,7 +19,7 @@ MACHINE = load().machine
 
 
 def ran(lines: list[str], until_s: float = float("inf")) -> SimulatedFirmware:
-    firmware = SimulatedFirmware(MACHINE, BuildOptions(busy=False))
+    firmware = SimulatedFirmware(MACHINE, BuildOptions(busy=False, home_start=False))
     firmware.receive("".join(f"{line}\n" for line in lines).encode())
     firmware.advance(until_s)
     return firmware
@@ -75,7 +75,7 @@ def test_tiny_moves_are_stretched_while_few_wait() -> None:
 
 
 def test_a_starving_printer_stops_in_mid_stroke_and_counts_it() -> None:
-    firmware = SimulatedFirmware(MACHINE, BuildOptions(busy=False))
+    firmware = SimulatedFirmware(MACHINE, BuildOptions(busy=False, home_start=False))
     for k in range(1, 11):
         firmware.receive(b"G1 X%d F6000\n" % (k * 5))
         firmware.advance(float(k))
@@ -85,7 +85,7 @@ def test_a_starving_printer_stops_in_mid_stroke_and_counts_it() -> None:
 
 
 def test_waits_of_the_program_are_no_underruns() -> None:
-    firmware = SimulatedFirmware(MACHINE, BuildOptions(busy=False))
+    firmware = SimulatedFirmware(MACHINE, BuildOptions(busy=False, home_start=False))
     for second, line in enumerate(["G1 X5", "G4 S1", "G1 X10", "M400", "G1 X15", "G28", "G1 X20", "M109 S60", "G1 X25"], 1):
         firmware.receive(f"{line}\n".encode())
         firmware.advance(100.0 * second)
@@ -95,7 +95,7 @@ def test_waits_of_the_program_are_no_underruns() -> None:
 @pytest.mark.parametrize(("baud", "starves"), [(115200, True), (1000000, False)])
 def test_whether_a_line_starves_the_printer_depends_on_its_rate(baud: int, starves: bool) -> None:
     """0.15 mm at 60 mm/s want 400 lines a second; 115200 baud carry 270 of these, 1 MBd 2,300."""
-    firmware = SimulatedFirmware(MACHINE, BuildOptions(advanced_ok=False, busy=False))
+    firmware = SimulatedFirmware(MACHINE, BuildOptions(advanced_ok=False, busy=False, home_start=False))
     line = Uart(Cable(firmware, speed=1.0), baud)
     lines = b"".join(frame(1000 + k, f"G1 X{k * 0.15:.3f} Y0.000 E0.01 F3600") for k in range(1, 801))
     line.exchange(b"M302 P1\nM83\nM110 N1000\n" + lines, 0.0)
@@ -131,7 +131,7 @@ def test_a_halt_forgets_the_filament_that_was_not_pushed() -> None:
 
 def test_a_short_record_keeps_the_last_moves_and_all_sums() -> None:
     lines = ["M302 P1", "M83", *(f"G1 X{k % 50} E0.1 F6000" for k in range(1, 2001)), "M400"]
-    long, short = ran(lines).record(), SimulatedFirmware(MACHINE, BuildOptions(busy=False), kept=100)
+    long, short = ran(lines).record(), SimulatedFirmware(MACHINE, BuildOptions(busy=False, home_start=False), kept=100)
     short.receive("".join(f"{line}\n" for line in lines).encode())
     short.advance()
     few = short.record()

@@ -1,6 +1,7 @@
 import os
 import select
 import time
+from dataclasses import replace
 from math import inf, pi
 
 import numpy as np
@@ -22,7 +23,7 @@ HOT = "M104 S200\nM109 S200\n"
 
 
 def printer(build: BuildOptions | None = None) -> SimulatedFirmware:
-    return SimulatedFirmware(MACHINE, build or BuildOptions(advanced_ok=False))
+    return SimulatedFirmware(MACHINE, replace(build or BuildOptions(advanced_ok=False), home_start=False))
 
 
 def answer(firmware: SimulatedFirmware, text: str | bytes, until_s: float = inf) -> list[str]:
@@ -283,7 +284,10 @@ def test_a_machine_with_other_letters_is_spoken_to_in_them() -> None:
 
 
 def test_the_terminal_answers_a_plain_serial_program() -> None:
-    with SimulatedPrinter(MACHINE) as simulated, serial.Serial(simulated.path, 250000, timeout=PATIENCE_S) as host:
+    with (
+        SimulatedPrinter(MACHINE, build=BuildOptions(home_start=False)) as simulated,
+        serial.Serial(simulated.path, 250000, timeout=PATIENCE_S) as host,
+    ):
         host.write(b"M105\nG1 X5\n")
         assert host.readline().startswith(b"ok T:20.00")
         assert host.readline() == b"ok P14 B3\n"

@@ -42,14 +42,14 @@ def counts(firmware: SimulatedFirmware) -> list[int]:
 
 def test_the_axes_go_where_the_real_firmware_s_went() -> None:
     """M=(100,100,0), A30 C90, X110 Y100 Z20: counts 8000, 8107, 8928 at 80, 80 and 400 steps a mm."""
-    firmware = SimulatedFirmware(measured())
+    firmware = SimulatedFirmware(measured(), BuildOptions(home_start=False))
     answer(firmware, "G0 X100 Y100\nG43.4\nG0 A30 C90\nG0 X110 Y100 Z20\nM400\n")
     assert counts(firmware)[:3] == pytest.approx([8000, 8107, 8928], abs=1)
     assert answer(firmware, "M114\n")[0].startswith("X:110.00 Y:100.00 Z:20.00 A:30.00 C:90.00 E:0.00 Count X:8000 Y:8107 Z:8928")
 
 
 def test_following_switched_at_a_turned_table_believes_the_axes_elsewhere_without_moving_them() -> None:
-    firmware = SimulatedFirmware(measured())
+    firmware = SimulatedFirmware(measured(), BuildOptions(home_start=False))
     answer(firmware, "G43.4\nG0 X110 Y200 Z20\nG0 A30 C90\nM400\n")
     before, stood = counts(firmware), firmware.board.motion.at(1e9)
     answer(firmware, "G49\nM400\n")
@@ -66,7 +66,7 @@ def test_place_and_positions_are_each_other_s_inverse_and_agree_with_the_dry_run
 
 
 def test_a_turn_keeps_the_tip_on_the_workpiece_within_a_hair() -> None:
-    firmware = SimulatedFirmware(measured())
+    firmware = SimulatedFirmware(measured(), BuildOptions(home_start=False))
     answer(firmware, "G43.4\nG0 X120 Y110 Z5\nM400\nG1 A20 C50 F3000\nM400\n")
     record = firmware.record()
     turn = record.paths()[record.begin_s > record.begin_s[0]].reshape(-1, 3)
@@ -76,7 +76,7 @@ def test_a_turn_keeps_the_tip_on_the_workpiece_within_a_hair() -> None:
 
 
 def test_the_record_covers_every_move_in_the_workpiece_frame() -> None:
-    firmware = SimulatedFirmware(CHOSEN.machine)
+    firmware = SimulatedFirmware(CHOSEN.machine, BuildOptions(home_start=False))
     answer(firmware, "G0 X5 Y5\nG1 Z3\nG0 A10\nM302 P1\nM83\nG1 X7 E1\nG1 E-1\nM400\n")
     record = firmware.record()
     assert record.paths().shape == (5, 2, 3) == (record.moves, 2, 3)
@@ -85,7 +85,7 @@ def test_the_record_covers_every_move_in_the_workpiece_frame() -> None:
 
 def test_a_whole_print_in_workpiece_coordinates_lays_what_the_reader_reads() -> None:
     lines = list(write_gcode(printed()[3], CHOSEN))
-    firmware = SimulatedFirmware(CHOSEN.machine, BuildOptions(advanced_ok=False))
+    firmware = SimulatedFirmware(CHOSEN.machine, BuildOptions(advanced_ok=False, home_start=False))
     answer(firmware, "".join(f"{command}\n" for k, line in enumerate(lines, 1) if (command := command_of(line, k, 120))))
     record, parsed = firmware.record(), parse_gcode(lines, CHOSEN.machine)
     strokes, planned = record.end[:, 5] - record.start[:, 5] > 1e-9, parsed.kind == MoveKind.EXTRUDE

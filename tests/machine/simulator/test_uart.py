@@ -18,7 +18,7 @@ from tests.machine.peers import PATIENCE_S
 
 MACHINE = load().machine
 LINE = b"M117 " + b"x" * 57 + b"\n"  # 63 bytes, as a usual stroke with number and checksum
-RING = BuildOptions(advanced_ok=False, rx_ring=128)
+RING = BuildOptions(advanced_ok=False, rx_ring=128, home_start=False)
 
 
 def uart(
@@ -70,7 +70,7 @@ def test_what_happens_does_not_depend_on_how_often_it_is_looked_at() -> None:
 
 
 def test_a_flood_overflows_the_ring_and_tails_are_run_unchecked() -> None:
-    firmware, line = uart(250000, BuildOptions(advanced_ok=False, rx_ring=128, busy=False))
+    firmware, line = uart(250000, BuildOptions(advanced_ok=False, rx_ring=128, busy=False, home_start=False))
     line.exchange(b"".join(frame(n, f"G1 X{n % 90}.123 Y{n % 70}.456 E0.03214 F3000") for n in range(1, 400)), 0.0)
     said = line.exchange(b"", 60.0).decode()
     assert firmware.record().lost_bytes > 0

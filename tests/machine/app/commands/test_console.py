@@ -151,7 +151,7 @@ def test_a_person_types_gets_help_and_leaves_with_ctrl_d() -> None:
     with Person("console", "--port", "sim") as person:
         person.see(PROMPT)
         person.press("M114\n")
-        person.see("X:0.00 Y:0.00")
+        person.see("X:-160.00 Y:-160.00")
         person.see(PROMPT)
         person.press("/help\n")
         person.see("/stop     emergency stop (M112) at once")
