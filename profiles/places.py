@@ -7,9 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from platformdirs import user_config_path
-
 from profiles.errors import ProfileError
+from profiles.folders import settings_folder
 from profiles.toml_text import read_toml
 
 KINDS = {"machine": "machines", "material": "materials", "process": "processes"}
@@ -26,12 +25,15 @@ def shipped(kind: str) -> list[str]:
 
 def own_folder(kind: str) -> Path:
     """The user's folder for profiles of a kind: in $XDG_CONFIG_HOME, else where the platform keeps settings."""
-    return user_config_path("tiltprint", appauthor=False, roaming=True) / "profiles" / KINDS[kind]
+    return settings_folder() / "profiles" / KINDS[kind]
 
 
 def own(kind: str) -> list[str]:
     """Names of the user's own profiles of a kind, sorted; one named as a shipped profile stands in its place."""
-    return sorted(file.stem for file in own_folder(kind).glob("*.toml"))
+    try:
+        return sorted(file.stem for file in own_folder(kind).glob("*.toml"))
+    except PermissionError:  # the home of another user, as sudo may leave it
+        return []
 
 
 def known(kind: str) -> list[str]:

@@ -33,7 +33,7 @@ CONFINED = {
     "prompt_toolkit": ("machine/app/",),
     "PIL": ("machine/app/pictures/",),
     "tomlkit": ("machine/calibration/", "mdp/plans/writing.py"),
-    "platformdirs": ("machine/app/state_folder.py", "mdp/kernels/cache.py", "profiles/places.py"),
+    "platformdirs": ("profiles/folders.py",),
     "torch": ("mdp/learning/",),
     "lightgbm": ("mdp/learning/",),
     "xgboost": ("mdp/learning/",),

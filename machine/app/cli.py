@@ -49,6 +49,15 @@ def _options(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
+    try:
+        return _run(arguments)
+    finally:
+        kernels = sys.modules.get("mdp.kernels.cache")  # loading it for nothing would cost what it saves
+        if kernels is not None and kernels.trouble():
+            sys.stderr.write(f"tiltprint: the next run compiles the kernels again: {kernels.trouble()}\n")
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     # numpy's library for products waits for its threads by spinning: on a busy machine that costs more than the products.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -70,11 +79,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if _interrupted(error):
             return _complain("interrupted", 130)
         if isinstance(error, OSError) and error.errno in FULL:
-            return _complain(f"{error.filename or 'standard output'} cannot be written: no space is left")
+            return _complain(f"{error.filename or _full()} cannot be written: no space is left")
         from machine.app.crash import log_bug
 
         return _complain(f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, given)}", 3)
     return int(code or 0)
+
+
+def _full() -> str:
+    """What a full disk has refused where the error does not say: standard output still holds what it could not write."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        return "standard output"
+    return "a file"
 
 
 def _interrupted(error: BaseException | None) -> bool:

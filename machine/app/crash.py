@@ -8,7 +8,7 @@ from contextlib import suppress
 from importlib.metadata import distributions
 from pathlib import Path
 
-from machine.app.state_folder import state_folder
+from profiles.folders import state_folder
 
 KEPT = 20  # logs of bugs
 TOLD = {"tiltprint", "numpy", "numba", "manifold3d", "pyserial", "pydantic", "typer", "rich"}

@@ -9,9 +9,10 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
+from tempfile import TemporaryFile
 from time import time
 
-from platformdirs import user_cache_path
+from profiles.folders import cache_folder, lost_at_end
 
 PACKAGES = Path(__file__).resolve().parents[2]
 IMPORTED = re.compile(rb"^from ((?:profiles|mdp|slicer|machine)(?:\.\w+)+) import", re.MULTILINE)
@@ -24,10 +25,31 @@ def home() -> Path:
     named = os.environ.get("NUMBA_CACHE_DIR")
     if named:
         return Path(named)
-    return user_cache_path("tiltprint", appauthor=False) / "kernels"
+    kernels = cache_folder() / "kernels"
+    if kernels.parent == lost_at_end():
+        os.environ["NUMBA_CACHE_DIR"] = str(kernels)  # for the processes that help to compile
+        note_trouble(f"no folder of this user can be written: set XDG_CACHE_HOME, or NUMBA_CACHE_DIR in place of {kernels}")
+    return kernels
 
 
 _loaded: set[str] = set()  # names of the folders of the files whose kernels are loaded
+_troubles: list[str] = []
+
+
+def note_trouble(reason: str) -> None:
+    """Note why kernels that are compiled now are not there for the next run."""
+    if reason not in _troubles:
+        _troubles.append(reason)
+
+
+def note_unwritten(place: Path, error: OSError) -> None:
+    """The same for a folder that cannot be written."""
+    note_trouble(f"{place} cannot be written: {(error.strerror or str(error)).lower()}")
+
+
+def trouble() -> str:
+    """Why what was compiled is lost, "" where it is not."""
+    return _troubles[0] if _troubles else ""
 
 
 @cache
@@ -56,13 +78,24 @@ def digest(files: list[Path]) -> str:
     return whole.hexdigest()[:16]
 
 
-def folder(file: Path) -> Path:
-    """The folder of a file's kernels; those of its older versions go when they are old enough."""
+def folder(file: Path) -> Path | None:
+    """The folder of a file's kernels, None where it cannot be written; folders of older versions go when they are old."""
     own = home() / f"{file.parent.name}.{file.stem}-{digest(sources(file))}"
     if not own.exists():
         _clear(own.parent, f"{file.parent.name}.{file.stem}-*")
     _loaded.add(own.name)
-    return own
+    return own if _can_be_written(own) else None
+
+
+@cache
+def _can_be_written(own: Path) -> bool:
+    try:
+        own.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=own).close()
+    except OSError as error:
+        note_unwritten(own.parent, error)
+        return False
+    return True
 
 
 def mark(purpose: str) -> Path:

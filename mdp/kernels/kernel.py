@@ -9,11 +9,11 @@ Arguments that would be more than six go together in a NamedTuple.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 from numba import config, njit
 
-from mdp.kernels.cache import folder
+from mdp.kernels.cache import folder, note_unwritten
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -34,10 +34,27 @@ inlined: Compile = njit(error_model="numpy", inline="always", no_cpython_wrapper
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function for calls from Python and cache it, in a folder below the one that NUMBA_CACHE_DIR names or our own."""
-    given = config.CACHE_DIR
-    config.CACHE_DIR = str(folder(Path(function.__code__.co_filename)))
+    own = folder(Path(function.__code__.co_filename))
+    if own is None:  # numba would look for other places, where it never sees that a part has changed
+        uncached: Callable[P, R] = njit(**KERNEL | {"cache": False})(function)
+        return uncached
+    given, config.CACHE_DIR = config.CACHE_DIR, str(own)
     try:
         compiled: Callable[P, R] = njit(**KERNEL)(function)
+        _forgive(compiled, own.parent)
         return compiled
     finally:
         config.CACHE_DIR = given
+
+
+def _forgive(compiled: Any, place: Path) -> None:
+    """A kernel that cannot be cached, on a full disk, is used all the same."""
+    save = compiled._cache.save_overload
+
+    def save_if_possible(*overload: Any) -> None:
+        try:
+            save(*overload)
+        except OSError as error:
+            note_unwritten(place, error)
+
+    compiled._cache.save_overload = save_if_possible

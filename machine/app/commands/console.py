@@ -15,7 +15,6 @@ from machine.app.printer.command_session import CommandSession, LeftError, StopE
 from machine.app.printer.compatibility import check_speed, describe_answer, identify_printer
 from machine.app.printer.serial_log import TappedWire, new_log
 from machine.app.requests import SIMULATED, ConsoleRequest
-from machine.app.state_folder import state_folder
 from machine.app.terminal.interrupts import calling, interrupting
 from machine.app.terminal.progress import say
 from machine.firmware import dialect_of
@@ -36,6 +35,7 @@ from machine.link.protocol.events import (
 )
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import LocalProtocolError, PrinterError
+from profiles.folders import state_folder
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession

@@ -23,7 +23,7 @@ from mdp.cost.forecast import Surface
 from mdp.cost.hidden import hidden_shares
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
-from mdp.kernels.cache import mark
+from mdp.kernels.cache import mark, note_unwritten, trouble
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation
@@ -95,8 +95,13 @@ def _tell() -> float:
 
 def _keep(what: str) -> None:
     cached = mark(what)
-    cached.parent.mkdir(parents=True, exist_ok=True)
-    cached.touch()
+    if trouble():
+        return
+    try:
+        cached.parent.mkdir(parents=True, exist_ok=True)
+        cached.touch()
+    except OSError as error:
+        note_unwritten(cached.parent, error)
 
 
 def _start(what: str) -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from machine.app.file_roles import PROGRAM, program_beside
 from machine.app.output import write_lines
-from machine.app.state_folder import state_folder
 from machine.link.journal import Journal, JournalHeading
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import OutputError
+from profiles.folders import state_folder
 from profiles.profile import Profile
 
 KEPT = 20

@@ -10,8 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from machine.app.state_folder import state_folder
 from machine.link.medium import SERIAL, Medium, Traffic, Wire
+from profiles.folders import state_folder
 
 KEPT = 10  # logs of each kind
 LIMIT_BYTES = 64_000_000  # of one log: about 600,000 lines with their answers

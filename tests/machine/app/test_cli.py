@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -133,6 +134,9 @@ def test_a_full_disk_under_standard_output_is_no_bug(monkeypatch: pytest.MonkeyP
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("machine.app.commands.profiles.list_profiles", full)
+    assert main(["profiles", "list"]) == 1
+    assert capsys.readouterr().err == "tiltprint: a file cannot be written: no space is left\n"
+    monkeypatch.setattr("sys.stdout", SimpleNamespace(flush=full))
     assert main(["profiles", "list"]) == 1
     assert capsys.readouterr().err == "tiltprint: standard output cannot be written: no space is left\n"
 

@@ -23,6 +23,10 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     packages = tmp_path / "program" / "mdp"
     packages.mkdir(parents=True)
     shutil.copytree(cache.PACKAGES / "mdp" / "kernels", packages / "kernels")
+    profiles = packages.parent / "profiles"
+    profiles.mkdir()
+    for name in ("__init__.py", "errors.py", "folders.py"):
+        shutil.copy(cache.PACKAGES / "profiles" / name, profiles)
     (packages / "__init__.py").touch()
     (packages / "near.py").write_text(KERNEL_FILE, encoding="utf-8")
     (packages / "far.py").write_text(PART_FILE, encoding="utf-8")
@@ -68,3 +72,23 @@ def test_every_kernel_of_the_packages_is_compiled_by_the_decorators_of_the_kerne
     packages = [cache.PACKAGES / name for name in ("mdp", "slicer", "machine")]
     files = [file for package in packages for file in package.rglob("*.py") if file.name != "kernel.py"]
     assert [file.name for file in files if "njit" in file.read_text(encoding="utf-8")] == []
+
+
+def test_a_kernel_that_cannot_be_cached_works_and_the_reason_is_noted(tmp_path: Path, program: Path) -> None:
+    code = (
+        "import errno; from mdp.near import near; from mdp.kernels.cache import trouble\n"
+        "def full(*overload): raise OSError(errno.ENOSPC, 'No space left on device')\n"
+        "near._cache._cache_file.save = full\n"
+        "print(near(2.0), trouble())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=program.parent, capture_output=True, text=True, check=True)
+    assert done.stdout == f"21.0 {tmp_path / 'cached'} cannot be written: no space left on device\n"
+
+
+def test_a_cache_that_is_no_folder_is_not_replaced_by_one_beside_the_source(
+    tmp_path: Path, program: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+    assert result_and_compilations(program).startswith("21.0")
+    assert list(program.rglob("*.nbi")) == []

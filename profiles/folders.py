@@ -1,0 +1,101 @@
+"""Folders: where the user's settings, compiled kernels and traces of runs are, also where there is no home for them.
+
+A container's user often has no name, no home, or one that cannot be written. Then the folder for temporary files has one for
+this user alone; where that belongs to somebody else, this run makes one of its own and removes it at its end.
+"""
+
+import atexit
+import os
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+from platformdirs import user_cache_path, user_config_path, user_state_path
+
+from profiles.errors import OutputError
+
+PRIVATE = 0o700
+
+
+def settings_folder() -> Path:
+    """Where the user's own settings are, in $XDG_CONFIG_HOME or where the platform keeps such; it need not be there."""
+    with suppress(RuntimeError):  # a user without a home
+        return user_config_path("tiltprint", appauthor=False, roaming=True)
+    return _writable(iter((_temporary() / "settings",)))
+
+
+def cache_folder() -> Path:
+    """An existing folder that can be written, in $XDG_CACHE_HOME or where the platform keeps such."""
+    return _writable(_candidates("cache"))
+
+
+def state_folder() -> Path:
+    """The same for logs and journals, in $XDG_STATE_HOME; private, for what a person prints concerns nobody else."""
+    folder = _writable(_candidates("state"))
+    if stat.S_IMODE(folder.stat().st_mode) & ~PRIVATE:
+        with suppress(OSError):  # somebody else's: what is written there is private by itself
+            folder.chmod(PRIVATE)
+    return folder
+
+
+def lost_at_end() -> Path | None:
+    """The folder that goes with this run, when it has one."""
+    return _of_this_run() if _of_this_run.cache_info().currsize else None
+
+
+def _candidates(kind: str) -> Iterator[Path]:
+    with suppress(RuntimeError):
+        yield {"cache": user_cache_path, "state": user_state_path}[kind]("tiltprint", appauthor=False)
+    yield _temporary() / kind
+
+
+def _writable(folders: Iterator[Path]) -> Path:
+    for folder in folders:
+        if _is_ours(folder):
+            return folder
+    return _of_this_run()
+
+
+def _is_ours(folder: Path) -> bool:
+    """Whether the folder can be written; it is made where it is missing. One for temporary files must be private to this user."""
+    try:
+        if folder.parent == _temporary():
+            folder.parent.mkdir(PRIVATE, exist_ok=True)
+            if not _is_private(folder.parent):
+                return False
+        folder.mkdir(PRIVATE, parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)
+
+
+def _is_private(folder: Path) -> bool:
+    status = folder.lstat()
+    if not hasattr(os, "geteuid"):  # Windows: each user has a folder for temporary files of their own
+        return stat.S_ISDIR(status.st_mode)
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid() and not stat.S_IMODE(status.st_mode) & ~PRIVATE
+
+
+def _temporary() -> Path:
+    """This user's folder among the temporary files. Raises OutputError where there can be none."""
+    try:
+        place = Path(tempfile.gettempdir())
+    except FileNotFoundError:
+        raise OutputError("no folder for temporary files can be written: name one by the variable TMPDIR") from None
+    return place / (f"tiltprint-{os.geteuid()}" if hasattr(os, "geteuid") else "tiltprint")
+
+
+@cache
+def _of_this_run() -> Path:
+    folder, owner = Path(tempfile.mkdtemp(prefix="tiltprint-")), os.getpid()
+
+    def remove() -> None:
+        if os.getpid() == owner:  # and not a process that was forked from it
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    return folder
