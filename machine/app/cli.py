@@ -15,6 +15,7 @@ from typer.exceptions import TyperException
 from machine.app import model_cli, printer_cli
 from machine.app.setup_cli import calibrate, profiles_app
 from machine.app.terminal.interrupts import outside_compiler
+from machine.app.terminal.plain import plain_line
 from machine.app.terminal.usage import sentence
 from profiles.errors import UserError
 
@@ -105,7 +106,7 @@ def _interrupted(error: BaseException | None) -> bool:
 
 
 def _complain(message: str, code: int = 1) -> int:
-    sys.stderr.write(f"tiltprint: {message}\n")
+    sys.stderr.write(f"tiltprint: {plain_line(message)}\n")
     return code
 
 

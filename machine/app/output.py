@@ -82,14 +82,17 @@ def check_folder(path: Path) -> None:
         raise OutputError(f"output {path}: {nearest} is not writable")
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all, through a link that stands in its place. Raises OutputError."""
+def write_bytes(path: Path, content: bytes, private: bool = False) -> None:
+    """Write a file whole or not at all, through a link that stands in its place; private: for this user only.
+
+    Raises OutputError.
+    """
     check_writable(path)
     try:
         if _is_device(path):
             path.write_bytes(content)
         else:
-            _replace(path.resolve(), content)
+            _replace(path.resolve(), content, 0o600 if private else 0o666 & ~_umask())
     except OSError as error:
         raise _not_written(path, error) from None
 
@@ -102,9 +105,9 @@ def delete(path: Path) -> None:
         raise OutputError(f"output {path} cannot be deleted: {(error.strerror or str(error)).lower()}") from None
 
 
-def write_lines(path: Path, lines: Iterable[str]) -> None:
+def write_lines(path: Path, lines: Iterable[str], private: bool = False) -> None:
     """Write text lines, whole or not at all; the path - stands for standard output."""
-    _write_text(path, "\n".join(lines) + "\n")
+    _write_text(path, "\n".join(lines) + "\n", private)
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -112,11 +115,11 @@ def write_json(path: Path, value: Any) -> None:
     _write_text(path, json.dumps(value, indent=2) + "\n")
 
 
-def _write_text(path: Path, text: str) -> None:
+def _write_text(path: Path, text: str, private: bool = False) -> None:
     if path == STDOUT:
         sys.stdout.write(text)
     else:
-        write_bytes(path, text.encode())
+        write_bytes(path, text.encode(), private)
 
 
 def _is_device(path: Path) -> bool:
@@ -124,18 +127,14 @@ def _is_device(path: Path) -> bool:
     return exists(path) and not isfile(path) and not isdir(path)
 
 
-def _replace(path: Path, content: bytes) -> None:
+def _replace(path: Path, content: bytes, mode: int) -> None:
     """Write beside the target, then rename, so that no half-written file is ever seen."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".tiltprint-", delete=False) as file:
-        beside = Path(file.name)
-        try:
-            file.write(content)
-            file.flush()
-            beside.chmod(0o666 & ~_umask())
-        except BaseException:
-            beside.unlink()
-            raise
+    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".tiltprint-")
+    beside = Path(name)
     try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+        beside.chmod(mode)
         beside.replace(path)
     except BaseException:
         beside.unlink(missing_ok=True)

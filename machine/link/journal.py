@@ -22,6 +22,9 @@ EVERY_LINES = 16  # the sender never gets so many lines ahead of the newest reco
 EVERY_S = 0.1  # which is not older than this when something has happened since
 SYNC_S = 1.0  # so old may the disk be after a power cut of the computer
 LONGEST_BYTES = 1_000_000  # of one record; the first one holds the resolved profile
+PRIVATE = 0o600  # what a person prints concerns nobody else
+# Windows would write carriage returns into a file that is not opened as binary.
+_FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | getattr(os, "O_BINARY", 0)
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ class Journal:
         self._noted_s = 0.0
         self._dirty, self._end = threading.Event(), threading.Event()
         try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+            self._file = os.open(path, _FLAGS, PRIVATE)
         except FileExistsError:
             raise OutputError(f"journal {path} exists already: each print has one of its own, choose another name") from None
         except OSError as error:

@@ -1,10 +1,11 @@
 """Live: the page and the state of a running print, served to this computer alone while the print lasts.
 
-Nothing can be ordered through it. Only requests for the local host by name are answered, or a page from elsewhere could read the
-state by letting its own name point here (DNS rebinding).
+Nothing can be ordered through it. The address holds a token, for other users of this computer reach its ports too. Only requests
+for the local host by name are answered, or a page from elsewhere could try by letting its own name point here (DNS rebinding).
 """
 
 import json
+import secrets
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -58,6 +59,7 @@ class Watched:
     def __init__(self, page: bytes) -> None:
         self.page = page
         self.address = ""
+        self.place = f"/{secrets.token_urlsafe(16)}/"
         self._progress: Progress | None = None
         self._ended = ""
         self._asked, self._told = Event(), Event()
@@ -88,7 +90,7 @@ def serve(page: bytes, port: int = 0) -> Iterator[Watched]:
         server = _Server((HOST, port), _handler(watched))
     except OSError as error:
         raise OutputError(f"--watch-port {port} cannot be used: {(error.strerror or str(error)).lower()}") from None
-    watched.address = f"http://{HOST}:{server.server_port}/"
+    watched.address = f"http://{HOST}:{server.server_port}{watched.place}"
     thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
     thread.start()
     try:
@@ -123,12 +125,12 @@ def _handler(watched: Watched) -> type[BaseHTTPRequestHandler]:
         def do_GET(self) -> None:
             if self.headers.get("Host", "").rpartition(":")[0] not in NAMES and self.headers.get("Host") not in NAMES:
                 self._answer(HTTPStatus.FORBIDDEN, "text/plain", b"this page is for this computer only\n")
-            elif self.path == "/":
+            elif secrets.compare_digest(self.path.encode(), watched.place.encode()):
                 self._answer(HTTPStatus.OK, "text/html; charset=utf-8", watched.page)
-            elif self.path == "/state":
+            elif secrets.compare_digest(self.path.encode(), f"{watched.place}state".encode()):
                 self._answer(HTTPStatus.OK, "application/json", watched.state())
             else:
-                self._answer(HTTPStatus.NOT_FOUND, "text/plain", b"there is only / and /state\n")
+                self._answer(HTTPStatus.NOT_FOUND, "text/plain", b"this page is at the address that the print has told\n")
 
         def _answer(self, status: HTTPStatus, kind: str, content: bytes) -> None:
             self.send_response(status)

@@ -8,6 +8,7 @@ from statistics import median
 
 import numpy as np
 
+from machine.app.terminal.plain import plain_line
 from machine.calibration.fit import SIGNS, Touch
 from machine.calibration.program import Course, course
 from machine.calibration.sheet import Sheet
@@ -44,7 +45,7 @@ def ask_touches(name: str, machine: Machine, height_mm: float, radius_mm: float 
     """The touches as a person types them. judge is shown the finished sheet: None takes it, a number is a touch (from 1) to be
     looked at again, a text is said before the last touch is asked again. Raises ProfileError at the end of input.
     """
-    sys.stdout.write(INTRO.format(machine=machine.name))
+    sys.stdout.write(INTRO.format(machine=plain_line(machine.name)))
     answers: list[Answer] = [height_mm, None]
     place, known, enough = 0, 1, -1
     while True:

@@ -7,7 +7,7 @@ from machine.app.pipeline.comparison import alternatives_json, compare_table, co
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
 from machine.app.requests import ModelRequest
-from machine.app.terminal.progress import say
+from machine.app.terminal.progress import say_lines
 from machine.app.terminal.report import print_table, show
 from machine.dryrun.dryrun import summary
 from machine.view.page import print_page
@@ -42,7 +42,7 @@ def export(request: ModelRequest) -> int:
         write_json(outputs.json, summary(program.run) | comparison)
     table = print_table(program, profile) + (compare_table(alternatives) if alternatives else "")
     if outputs.gcode == STDOUT:
-        say(table.removesuffix("\n"))
+        say_lines(table.removesuffix("\n"))
     elif outputs.json != STDOUT:
         show(table)
     return 0

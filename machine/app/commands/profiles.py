@@ -5,6 +5,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from machine.app.terminal.plain import plain_line, plain_lines
+from machine.app.terminal.progress import say
 from profiles.check import check_file
 from profiles.errors import ProfileError
 from profiles.machine import Frozen, Machine
@@ -17,7 +19,7 @@ def list_profiles() -> int:
     for kind in KINDS:
         sys.stdout.write(f"{kind}: {', '.join(shipped(kind))}\n")
         if own(kind):
-            sys.stdout.write(f"{kind}, yours ({own_folder(kind)}): {', '.join(own(kind))}\n")
+            sys.stdout.write(plain_lines(f"{kind}, yours ({own_folder(kind)}): {', '.join(own(kind))}") + "\n")
     return 0
 
 
@@ -32,7 +34,7 @@ def show(name: str, as_json: bool, settings: Sequence[str]) -> int:
     for section, model in sections.items():
         for key, value, meaning in rows(section, model):
             comment = "; ".join(each for each in (meaning, _origin(model, key)) if each)
-            sys.stdout.write(f"{key} = {json.dumps(value)}" + (f"  # {comment}\n" if comment else "\n"))
+            sys.stdout.write(plain_lines(f"{key} = {json.dumps(value)}" + (f"  # {comment}" if comment else "")) + "\n")
     return 0
 
 
@@ -53,9 +55,9 @@ def check(file: Path) -> int:
     if not problems and kind_of(str(file)) == "machine":
         problems = _block_problems(load_one(str(file))["machine"])
     for problem in problems:
-        sys.stderr.write(f"tiltprint: {problem if str(file) in problem else f'{file}: {problem}'}\n")
+        say(f"tiltprint: {problem if str(file) in problem else f'{file}: {problem}'}")
     if not problems:
-        sys.stdout.write(f"{file}: no problem found\n")
+        sys.stdout.write(plain_line(f"{file}: no problem found") + "\n")
     return 1 if problems else 0
 
 

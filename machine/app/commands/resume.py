@@ -13,7 +13,7 @@ from machine.app.printer.stream import Observers, PrintJob, report_end, stream_p
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import SIMULATED, PrintRequest
 from machine.app.terminal.interrupts import interrupting
-from machine.app.terminal.progress import say
+from machine.app.terminal.progress import say, say_lines
 from machine.dryrun.dryrun import dry_run
 from machine.firmware import dialect_of
 from machine.link.journal import Checkpoint, JournalContents, JournalHeading, mark_resumed, read_journal
@@ -55,7 +55,7 @@ def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, 
 
     def begin(status: PrinterStatus) -> ResumePoint:
         way = plan_resume(point, status, profile)
-        say(_sentence(way, point, profile))
+        say_lines(_sentence(way, point, profile))
         if not yes and not _agreed():
             raise CancelledError
         # From here on the printer counts its lines anew: only the new journal can tell whether it has restarted.

@@ -8,6 +8,7 @@ from machine.app.output import check_writable, write_bytes
 from machine.app.pipeline.comparison import compare_with_one_part
 from machine.app.pipeline.programs import load_program
 from machine.app.requests import ModelRequest
+from machine.app.terminal.plain import plain_line
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import show
 from machine.view.findings import relevant_findings
@@ -33,7 +34,7 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
     alternatives = compare_with_one_part(program, profile) if request.compare else ()
     content = print_page(request.name, program, profile, known, alternatives)
     write_bytes(path, content)
-    show(f"{path}: {len(content) / 1e6:.1f} MB, {_in_words(program, known)}\n")
+    show(plain_line(f"{path}: {len(content) / 1e6:.1f} MB, {_in_words(program, known)}") + "\n")
     if open_browser and not webbrowser.open(path.resolve().as_uri()):
         say(f"no browser could be started: open {path} in one")
     return 0

@@ -29,7 +29,7 @@ def new_journal(
         source = program_beside(path)
         if file is not None:
             check_new_journal(file, source)
-        write_lines(source, tuple(lines))
+        write_lines(source, tuple(lines), private=True)
     return continue_journal(GcodeFile(source.resolve()), profile, name, path)
 
 
@@ -50,7 +50,7 @@ def _new_path(name: str) -> Path:
     """A new file's path, named after the time and the model."""
     folder = state_folder() / "journals"
     try:
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(0o700, exist_ok=True)
         _thin(folder)
     except OSError as error:
         raise OutputError(f"folder {folder} cannot be written: {(error.strerror or str(error)).lower()}") from None

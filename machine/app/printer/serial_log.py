@@ -107,7 +107,7 @@ class SerialLog:
 
     def _open(self, file: Path) -> BufferedWriter | None:
         try:
-            return file.open("wb")
+            return open(file, "wb", opener=_open_private)
         except OSError as error:
             self._fail(error)
             return None
@@ -115,6 +115,10 @@ class SerialLog:
     def _fail(self, error: OSError) -> None:
         self.trouble = (error.strerror or str(error)).lower()
         self._out = None
+
+
+def _open_private(file: str, flags: int) -> int:
+    return os.open(file, flags, 0o600)
 
 
 class TappedWire:
@@ -167,7 +171,7 @@ def new_log(kind: str, title: str, file: Path | None = None) -> SerialLog:
         return SerialLog(file, title)
     folder = state_folder() / "logs"
     try:
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(0o700, exist_ok=True)
         _thin(folder.glob(f"{kind}-*.log"))
     except OSError:  # what cannot be thinned stays; the log itself says whether it can be written
         pass

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import Protocol
 
+from machine.app.terminal.plain import plain_line, plain_lines
+
 PLAIN_EVERY_S = 5.0
 PLAIN_AGAIN_S = 60.0  # what has not changed is said again: still alive
 
@@ -19,7 +21,12 @@ class Report(Protocol):
 
 def say(text: str) -> None:
     """One line on stderr."""
-    sys.stderr.write(f"{text}\n")
+    say_lines(plain_line(text))
+
+
+def say_lines(text: str) -> None:
+    """Several lines on stderr."""
+    sys.stderr.write(f"{plain_lines(text)}\n")
     sys.stderr.flush()
 
 
@@ -43,7 +50,7 @@ def reporting() -> Iterator[Report]:
         task = progress.add_task("", total=None)
 
         def show(text: str, share: float | None = None) -> None:
-            progress.update(task, description=text, total=None if share is None else 1.0, completed=share or 0.0)
+            progress.update(task, description=plain_line(text), total=None if share is None else 1.0, completed=share or 0.0)
 
         yield show
 

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
 
+from machine.app.terminal.plain import plain_lines
 from machine.dryrun.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.view.parts import risky_before_mm2
@@ -132,5 +133,5 @@ def _count(number: int, things: str) -> str:
 
 def show(text: str) -> None:
     """A result on stdout."""
-    sys.stdout.write(text)
+    sys.stdout.write(plain_lines(text))
     sys.stdout.flush()

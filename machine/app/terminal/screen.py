@@ -14,6 +14,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from machine.app.terminal.plain import plain_line
 from machine.dryrun.dryrun import DryRun
 from machine.link.progress import Progress
 from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event
@@ -116,7 +117,7 @@ def render(state: ScreenState, now: datetime) -> RenderableType:
         *_words(state.words),
     ]
     if state.hint or state.keys:
-        lines.append(Text(state.hint or KEYS, style="bold yellow" if state.hint else "dim"))
+        lines.append(Text(plain_line(state.hint or KEYS), style="bold yellow" if state.hint else "dim"))
     return Group(*lines)
 
 
@@ -125,7 +126,7 @@ def _head(state: ScreenState) -> RenderableType:
     row.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
     row.add_column(justify="right", no_wrap=True)
     shown = state.progress.state
-    row.add_row(Text(state.title, style="bold"), Text(shown, style=f"bold {COLOURS.get(shown, 'red')}"))
+    row.add_row(Text(plain_line(state.title), style="bold"), Text(shown, style=f"bold {COLOURS.get(shown, 'red')}"))
     return row
 
 
@@ -181,7 +182,8 @@ def _times(progress: Progress, now: datetime) -> Text:
 
 
 def _words(words: tuple[str, ...]) -> list[Text]:
-    return [Text(f"  {word if len(word) <= WORD_LENGTH else word[:WORD_LENGTH] + '...'}", style="cyan") for word in words]
+    short = (word if len(word) <= WORD_LENGTH else word[:WORD_LENGTH] + "..." for word in words)
+    return [Text(f"  {plain_line(word)}", style="cyan") for word in short]
 
 
 def _phrases_line(phrases: list[str]) -> Text:

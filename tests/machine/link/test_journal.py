@@ -134,6 +134,7 @@ def test_the_program_of_a_model_is_kept_beside_its_journal(tmp_path: Path) -> No
     assert heading.program == str((tmp_path / "j.gcode").resolve())
     assert list(GcodeFile(Path(heading.program))) == ["G28", "G1 X5"]
     assert heading.sha256 == GcodeFile(tmp_path / "j.gcode").sha256()
+    assert [oct(file.stat().st_mode & 0o777) for file in (journal.path, tmp_path / "j.gcode")] == ["0o600"] * 2
 
 
 def test_a_journal_that_cannot_be_kept_is_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

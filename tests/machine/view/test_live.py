@@ -32,9 +32,17 @@ def watched(monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched]:
         yield running
 
 
+def port_of(watched: Watched) -> int:
+    return int(watched.address.split(":")[2].split("/")[0])
+
+
 def asked(watched: Watched, path: str, method: str = "GET", **headers: str) -> tuple[HTTPResponse, bytes]:
-    """What the server answers."""
-    connection = http.client.HTTPConnection("127.0.0.1", int(watched.address.split(":")[2].strip("/")), timeout=PATIENCE_S)
+    """What the server answers to a path below the address that was told."""
+    return asked_without_token(watched, watched.place.rstrip("/") + path, method, **headers)
+
+
+def asked_without_token(watched: Watched, path: str, method: str = "GET", **headers: str) -> tuple[HTTPResponse, bytes]:
+    connection = http.client.HTTPConnection("127.0.0.1", port_of(watched), timeout=PATIENCE_S)
     connection.request(method, path, headers=headers)
     answer = connection.getresponse()
     content = answer.read()
@@ -54,6 +62,19 @@ def test_the_page_and_the_state_are_served(watched: Watched) -> None:
 @pytest.mark.parametrize("path", ["/etc/passwd", "/../state", "/state/", "/?state", "/favicon.ico"])
 def test_nothing_else_is_served(watched: Watched, path: str) -> None:
     assert asked(watched, path)[0].status == 404
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/state", "/AAAAAAAAAAAAAAAAAAAAAA/", "/AAAAAAAAAAAAAAAAAAAAAA/state", "//state", "/\u00e9"]
+)
+def test_who_does_not_know_the_token_of_the_address_is_shown_nothing(watched: Watched, path: str) -> None:
+    answer, content = asked_without_token(watched, path)
+    assert (answer.status, content) == (404, b"this page is at the address that the print has told\n")
+
+
+def test_every_print_has_another_token(watched: Watched) -> None:
+    assert len(watched.place) >= 22
+    assert Watched(b"").place != watched.place
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "HEAD", "OPTIONS"])
@@ -84,11 +105,11 @@ def test_no_other_page_may_frame_it_or_keep_it(watched: Watched) -> None:
 def test_who_hangs_up_leaves_the_terminal_alone(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("machine.view.live.LAST_WORD_S", 0.0)
     with serve(b"x" * 20_000_000) as running:
-        port = int(running.address.split(":")[2].strip("/"))
+        port = port_of(running)
         for _ in range(3):
             with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as rude:
                 rude.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                rude.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                rude.sendall(f"GET {running.place} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
                 rude.recv(10)
         assert asked(running, "/state")[0].status == 200
     assert capfd.readouterr().err == ""
@@ -96,20 +117,20 @@ def test_who_hangs_up_leaves_the_terminal_alone(capfd: pytest.CaptureFixture[str
 
 def test_it_listens_on_this_computer_only(watched: Watched) -> None:
     assert watched.address.startswith("http://127.0.0.1:")
-    port = int(watched.address.split(":")[2].strip("/"))
+    port = port_of(watched)
     with pytest.raises(OSError, match=r"refused|unreachable"), socket.create_connection(("127.0.0.2", port), timeout=PATIENCE_S):
         pass
 
 
 def test_a_port_in_use_is_refused_with_a_sentence(watched: Watched) -> None:
-    port = int(watched.address.split(":")[2].strip("/"))
+    port = port_of(watched)
     with pytest.raises(OutputError, match=rf"--watch-port {port} cannot be used: address already in use"), serve(b"", port):
         pass
 
 
 def test_the_server_ends_with_the_print() -> None:
     with serve(b"page") as running:
-        port = int(running.address.split(":")[2].strip("/"))
+        port = port_of(running)
     with pytest.raises(ConnectionRefusedError), socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S):
         pass
 

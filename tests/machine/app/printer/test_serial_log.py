@@ -73,6 +73,8 @@ def test_the_newest_ten_logs_are_kept_each_with_its_pieces(tmp_path: Path, monke
     with new_log("console", "") as other:
         pass
     kept = sorted(path.name for path in (tmp_path / "tiltprint" / "logs").iterdir())
+    assert oct(other.file.stat().st_mode & 0o777) == "0o600"  # what a person prints concerns nobody else
+    assert oct(other.file.parent.stat().st_mode & 0o777) == "0o700"
     assert kept == sorted([other.file.name, *(p.name for f in files[3:] for p in (f, piece_of(f, 1)))])
 
 
