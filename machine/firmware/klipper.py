@@ -111,6 +111,6 @@ KLIPPER = Firmware(
     name="Klipper",
     signs=("klipper",),
     dialects={"klipper": AXES, "klipper_steppers": STEPPERS},
-    line=LineRules(resends=False, silence_s=1800.0),
+    line=LineRules(resends=False, silence_s=1800.0, revival="send FIRMWARE_RESTART by tiltprint console"),
     simulated=SIMULATED,
 )

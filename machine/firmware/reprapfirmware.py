@@ -59,6 +59,6 @@ REPRAPFIRMWARE = Firmware(
     name="RepRapFirmware",
     signs=("reprapfirmware", "duet"),
     dialects={"reprapfirmware": DIALECT},
-    line=LineRules(resends=False, reports_rotary_axes=True),
+    line=LineRules(resends=False, reports_rotary_axes=True, revival="send M999, or press its reset button,"),
     simulated=SIMULATED,
 )

@@ -8,6 +8,7 @@ from machine.link.medium import Medium, Wire
 from machine.link.protocol.connection import GREETING_STATES, Connection
 from machine.link.protocol.events import Event, Ok, Position
 from machine.link.protocol.framing import LINE_LIMIT
+from machine.link.protocol.slow_commands import is_waited_for
 from machine.link.protocol.states import State
 from machine.link.protocol.timeout import Timing
 from profiles.errors import PortError
@@ -44,6 +45,12 @@ class Exchange:
         self.greeted = False
         self._on_event, self._on_turn, self._on_lost = on_event, on_turn, on_lost
         self._position: Position | None = None
+
+    @property
+    def waits(self) -> bool:
+        """Whether the printer is at a command that is waited for when the print is ended: homing, above all."""
+        window = self.connection.window
+        return any(is_waited_for(window.command(line.number)) for line in window.flight)
 
     def greet(self) -> None:
         """Agree on line numbers and learn how the printer answers."""

@@ -266,6 +266,10 @@ class Feed:
         if now_s - self._shown_s >= PROGRESS_S or self._pending.message != message:
             self.show(now_s)
 
+    def heed_emergency(self) -> None:
+        """While the print is being ended: only the emergency stop still counts. Raises EmergencyError."""
+        self._pending.heed_emergency()
+
     def set_state(self, state: str, message: str = "") -> None:
         """Show a new state at once."""
         self.state, self._pending.message = state, message

@@ -9,14 +9,14 @@ from time import monotonic
 
 from machine.link.port import Port
 from machine.link.protocol.decoder import LineDecoder
-from machine.link.protocol.events import Area, Busy, Event, FirmwareFault, Identity, Ok, Position
+from machine.link.protocol.events import NAME, Area, Busy, Event, FirmwareFault, Identity, Ok, Position, Resend, lacks_checksum
+from machine.link.protocol.framing import FAR_NUMBER, frame
 
 TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and as many with its start
 QUICK_S = 1.5  # at another rate: it has started by then
 ASK_S = 1.0  # between questions; those asked during the start are lost
 POSITION_S = 1.0  # a printer that names itself but not its place
 RATES = (115200, 250000, 1000000, 230400)  # what firmwares are built with, the likeliest first
-NAME = "FIRMWARE_NAME:"
 KEY = re.compile(r"\s+[A-Z_]+:")  # Marlin writes SOURCE_CODE_URL, RepRapFirmware ELECTRONICS behind the name
 VERSION = re.compile(r" FIRMWARE_VERSION: ?(\S+)")
 GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of printers have words
@@ -89,7 +89,8 @@ class _Inquiry:
         self._decoder = LineDecoder()
         self._words = self._fault = self._letters = ""
         self._area: Area | None = None
-        self._ok = self._busy = self.named = self.placed = False
+        self._ok = self._busy = self.named = self.placed = self._refused = False
+        self._next_number = 0  # that a firmware which insists on numbers and checksums wants
 
     def listen(self, question: str, timeout_s: float, until: Callable[[], bool]) -> None:
         """Ask again and again until the answer is whole, or the time is over."""
@@ -98,17 +99,28 @@ class _Inquiry:
         self._ok = False
         while not until() and not self._fault and not self._stop.is_set() and (now_s := monotonic()) < end_s:
             if now_s >= next_s:
-                self._port.write(f"\n{question}\n".encode("ascii"))  # the newline ends what stood on the line before
+                self._write(question)
                 next_s = now_s + ASK_S
             if data := self._port.read():
+                before = (self._refused, self._next_number)
                 for event in self._decoder.receive(data, now_s):
                     self._read(event)
+                if before != (self._refused, self._next_number):
+                    next_s = now_s  # asked in another way at once
+
+    def _write(self, question: str) -> None:
+        """The newline ends what stood on the line before. Where unnumbered lines are refused, a far one brings the number."""
+        if self._next_number:
+            self._port.write(b"\n" + frame(self._next_number, question))
+            self._next_number = 0
+        else:
+            self._port.write(b"\n" + frame(FAR_NUMBER, question) if self._refused else f"\n{question}\n".encode("ascii"))
 
     def answer(self) -> Answer:
         """What all of it amounts to."""
         if self._fault:
             return Answer(Kind.STRANGER if GRBL_SAYS.fullmatch(self._fault) else Kind.HALTED, self._fault)
-        if self._words or self._ok:
+        if self._words or self._ok or self._refused:
             return Answer(Kind.PRINTER, self._words, self._letters, self._limits())
         if self._busy:
             return Answer(Kind.BUSY)
@@ -122,6 +134,10 @@ class _Inquiry:
             self._fault = event.text
         elif isinstance(event, Busy):
             self._busy = True
+        elif lacks_checksum(event):
+            self._refused = True
+        elif isinstance(event, Resend) and self._refused:
+            self._next_number = event.line
         elif isinstance(event, Area):
             self._area = event
         elif isinstance(event, Identity):
@@ -130,8 +146,8 @@ class _Inquiry:
             self._read_position(event)
         elif isinstance(event, Ok):
             self._ok = True
-            if NAME in event.text:  # Klipper names itself behind its ok
-                self._words = event.text[event.text.index(NAME) :]
+            if event.identity is not None:
+                self._words = event.identity.text
             if event.position is not None:
                 self._read_position(event.position)
             self.named = bool(self._words)

@@ -99,6 +99,12 @@ class PendingCommands:
                 return
             self.accept(request, state, now_s)
 
+    def heed_emergency(self) -> None:
+        """While a print is being ended only the emergency stop still counts. Raises EmergencyError."""
+        while self.control is not None and (request := self.control.take()) is not None:
+            if request.command is Command.EMERGENCY_STOP:
+                raise EmergencyError
+
     def accept(self, request: PendingCommand, state: str, now_s: float) -> None:
         """Take one request. Raises CancelledError, EmergencyError."""
         command = request.command

@@ -1,33 +1,54 @@
 """Leaving a printer safely in mid-print: moves stopped, heaters and fan off, the tip lifted; and the emergency stop."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
 
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import FirmwareFault, Ok, Position, Temperature, read_event
+from machine.link.protocol.events import FirmwareFault, Ok, Position, Resend, Temperature, is_halt, lacks_checksum, read_event
+from machine.link.protocol.framing import FAR_NUMBER, frame, number_lines
 from profiles.errors import PortError
 
-# The newline ends a half line. The lines carry no numbers, so they are understood whatever was lost before: M108 ends a wait
-# for heat and M410 a move where the firmware reads them out of turn. Nothing homes or turns the table: the head may be
-# inside the part.
-ORDERS = b"\nM108\nM410\nM104 S0\nM140 S0\nM107\nM105\n"
+# M108 ends a wait for heat and M410 a move where the firmware reads them out of turn. Nothing homes or turns the table: the
+# head may be inside the part.
+HEATERS_OFF = ("M104 S0", "M140 S0", "M107", "M105")
+ORDERS = ("M108", "M410", *HEATERS_OFF)
+# Marlin takes a homing move that M410 has stopped for one that missed its end stop, and halts (Endstops::validate_homing_move,
+# kill "Homing Failed"): homing is waited for, the orders come behind it.
+HOMING_ORDERS = ("M108", *HEATERS_OFF)
 AGAIN_S = 2.0  # noise may eat an order; without the proof they are given again this often
 OLD_REPORTS_S = 1.0  # a report from before the orders proves nothing; a printer that never falls silent is not waited for
 SETTLE_S = 20.0  # lines that the printer had already taken are run first
+HOMING_S = 600.0  # five axes at the speed of the slowest; a dwell is not ended by anything either
 LIFT_S = 10.0  # a lift of some millimetres at any Z axis' speed
-STOP = b"\nM112\n"  # without number: an emergency parser reads it from the raw bytes, any other firmware as a line of its own
 STOP_AGAIN_S, STOP_MOST_S = 0.5, 2.0
 PARTIAL_BYTES = 4096
 
 
 @dataclass
-class Listener:
-    """What a wire says, line by line, outside of a conversation."""
+class Orders:
+    """Commands outside of a conversation, given without numbers so that they are understood whatever was lost before.
+
+    A firmware that insists on checksums refuses them ("Missing checksum": OctoPrint's virtual printer with forceChecksum,
+    Repetier). It is asked for its line number, by a line whose number is too far ahead, and gets them once more with both.
+    on_turn: called meanwhile, may raise to end the listening; insists: the firmware wants numbers and checksums.
+    """
 
     wire: Wire
     medium: Medium
-    on_turn: Callable[[], None] = lambda: None  # may raise to end the listening
+    on_turn: Callable[[], None] = lambda: None
+    insists: bool = False
+    _waiting: tuple[str, ...] = field(default=())  # commands to be given as soon as the number is known
     _partial: bytes = b""
+
+    def give(self, commands: Sequence[str], is_wanted: Callable[[bytes], bool], end_s: float) -> bool:
+        """Write commands and listen until a line is wanted (True) or the time has come (False)."""
+        if self.insists:
+            self._ask_number(commands)
+        else:
+            # The newline ends a half line.
+            self.wire.write("".join(["\n", *(f"{command}\n" for command in commands)]).encode("ascii"))
+        return self.wait_for(lambda line: self._heed(line, commands) or is_wanted(line), end_s)
 
     def wait_for(self, is_wanted: Callable[[bytes], bool], end_s: float) -> bool:
         """Listen until a line is wanted (True) or the time has come (False)."""
@@ -35,26 +56,84 @@ class Listener:
             self.on_turn()
             *lines, self._partial = (self._partial + self.wire.read()).split(b"\n")
             self._partial = self._partial[-PARTIAL_BYTES:]
-            if any(is_wanted(line) for line in lines):
+            wanted = [is_wanted(line) for line in lines]  # all of them are heard: a halt may follow an ok at once
+            if any(wanted):
                 return True
         return False
 
+    def _heed(self, line: bytes, commands: Sequence[str]) -> bool:
+        """Answer a refusal and the number that follows; what was written is not wanted by that."""
+        event = read_event(line)
+        if lacks_checksum(event) and not self.insists:
+            self.insists = True
+            self._ask_number(commands)
+        elif isinstance(event, Resend) and self._waiting:
+            self.wire.write(number_lines(event.line, self._waiting))
+            self._waiting = ()
+        return False
 
-def heaters_off(wire: Wire, medium: Medium, timeout_s: float = SETTLE_S) -> bool:
-    """Stop the printer and switch the heaters off; True when its own report shows targets of 0.
+    def _ask_number(self, commands: Sequence[str]) -> None:
+        self._waiting = tuple(commands)
+        self.wire.write(b"\n" + frame(FAR_NUMBER, "M105"))
 
-    Raises PortError when the port is gone.
+
+class Heaters(Enum):
+    """What is known of the heaters at an end."""
+
+    OFF = "the printer reports its heaters off"
+    HALTED = "the printer has halted and switched its heaters off by itself"
+    UNPROVED = "its heaters may still be on, look at the printer"
+
+
+def heaters_off(
+    wire: Wire,
+    medium: Medium,
+    timeout_s: float = SETTLE_S,
+    homing: bool = False,
+    on_turn: Callable[[], None] = lambda: None,
+) -> Heaters:
+    """Stop the printer and switch the heaters off; what its own words prove.
+
+    homing: it is at a command that must not or cannot be stopped and is waited for, HOMING_S at most. on_turn: called meanwhile,
+    may raise. Raises PortError when the port is gone.
     """
     wire.discard()
+    halted, start_s, old = False, medium.now_s(), b""
+    while (data := wire.read()) and medium.now_s() - start_s < OLD_REPORTS_S:
+        *lines, old = (old + data)[-PARTIAL_BYTES:].split(b"\n")
+        halted = halted or any(_shows_kill(line) for line in lines)
+    orders, shown = Orders(wire, medium, on_turn), _Shown(halted)
+    commands = HOMING_ORDERS if homing else ORDERS
+
+    def is_over(line: bytes) -> bool:
+        """An `ok` tells the end of homing, for G28 is answered when it is done; not the one that belongs to a Resend."""
+        return shown.ends(line) or (shown.answered and not orders.insists)
+
+    if homing and not halted and orders.give(commands, is_over, start_s + HOMING_S):
+        commands = ORDERS
     start_s = medium.now_s()
-    while wire.read() and medium.now_s() - start_s < OLD_REPORTS_S:
-        pass
-    listener, end_s = Listener(wire, medium), start_s + timeout_s
-    while (now_s := medium.now_s()) < end_s:
-        wire.write(ORDERS)
-        if listener.wait_for(_shows_heaters_off, min(now_s + AGAIN_S, end_s)):
-            return True
-    return False
+    while not shown.off and (now_s := medium.now_s()) < start_s + timeout_s:
+        if orders.give(commands, shown.ends, min(now_s + AGAIN_S, start_s + timeout_s)) or shown.halted:
+            break
+    return Heaters.OFF if shown.off else Heaters.HALTED if shown.halted else Heaters.UNPROVED
+
+
+class _Shown:
+    """What the answers to the orders have shown."""
+
+    def __init__(self, halted: bool) -> None:
+        self.halted, self.off, self.answered = halted, False, False
+
+    def ends(self, line: bytes) -> bool:
+        """Whether nothing more needs to be asked."""
+        event = read_event(line)
+        report = event.temperature if isinstance(event, Ok) else event
+        self.answered = self.answered or isinstance(event, Ok)
+        self.halted = self.halted or _shows_kill(line)
+        self.off = self.off or (
+            isinstance(report, Temperature) and report.nozzle_target_c == 0 and report.bed_target_c in (0, None)
+        )
+        return self.off or self.halted
 
 
 def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float) -> Position | None:
@@ -67,21 +146,22 @@ def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float) -> Posi
         positions.extend([position] if position is not None else [])
         return isinstance(event, Ok) and event.temperature is not None
 
-    wire.write(f"\nM83\nG91\nG1 {words} F{feed_mm_min:.0f}\nG90\nM400\nM114\nM105\n".encode("ascii"))
-    arrived = Listener(wire, medium).wait_for(reports_done, medium.now_s() + LIFT_S)
+    step = ("M83", "G91", f"G1 {words} F{feed_mm_min:.0f}", "G90", "M400", "M114", "M105")
+    arrived = Orders(wire, medium).give(step, reports_done, medium.now_s() + LIFT_S)
     return positions[-1] if arrived and positions else None
 
 
 def emergency_stop(wire: Wire, medium: Medium) -> bool:
-    """M112 ahead of everything that waits to be sent, and once more; True when the printer says that it has halted."""
+    """M112 ahead of everything that waits to be sent, and once more; True when the printer says that it has halted.
+
+    Without number: an emergency parser reads it from the raw bytes, any other firmware as a line of its own.
+    """
     try:
         wire.discard()
-        wire.write(STOP)
-        start_s, listener = medium.now_s(), Listener(wire, medium)
-        if listener.wait_for(_shows_halt, start_s + STOP_AGAIN_S):
+        start_s, orders = medium.now_s(), Orders(wire, medium)
+        if orders.give(("M112",), _shows_halt, start_s + STOP_AGAIN_S):
             return True
-        wire.write(STOP)
-        return listener.wait_for(_shows_halt, start_s + STOP_MOST_S)
+        return orders.give(("M112",), _shows_halt, start_s + STOP_MOST_S)
     except PortError:
         return False
 
@@ -90,7 +170,5 @@ def _shows_halt(line: bytes) -> bool:
     return isinstance(read_event(line), FirmwareFault)
 
 
-def _shows_heaters_off(line: bytes) -> bool:
-    event = read_event(line)
-    report = event.temperature if isinstance(event, Ok) else event
-    return isinstance(report, Temperature) and report.nozzle_target_c == 0 and report.bed_target_c in (0, None)
+def _shows_kill(line: bytes) -> bool:
+    return is_halt(read_event(line))

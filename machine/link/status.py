@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.events import Banner, Event, Ok, Position, Start, Temperature, read_event
-from machine.link.protocol.framing import frame
-from machine.link.shutdown import Listener
+from machine.link.protocol.framing import FAR_NUMBER, frame
+from machine.link.shutdown import Orders
 
 LAST_LINE = re.compile(rb"Last Line: (\d{1,10})")
-FAR_NUMBER = 999_999
+QUESTIONS = ("M400", "M114", "M105")
 TRIES, ANSWER_S = 3, 4.0  # a board that restarts when its port is opened spends two seconds in its boot loader
 STILL_S = 300.0  # a printer that still works on its queue answers when that is empty
 
@@ -72,20 +72,19 @@ def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> Pri
 
     Raises PortError, and what on_turn(), called meanwhile, raises to end the asking.
     """
-    answers, listener = _StatusAnswers(), Listener(wire, medium, on_turn)
+    answers, orders = _StatusAnswers(), Orders(wire, medium, on_turn)
     for _ in range(TRIES):
         wire.write(b"\n" + frame(FAR_NUMBER, "M105"))
-        if listener.wait_for(answers.read_number, medium.now_s() + ANSWER_S):
+        if orders.wait_for(answers.read_number, medium.now_s() + ANSWER_S):
             break
     else:
         return PrinterStatus(None, None, Temperature())
-    listener.wait_for(lambda line: False, medium.now_s() + 0.5)  # the rest of the refusal
+    orders.wait_for(lambda line: False, medium.now_s() + 0.5)  # the rest of the refusal
     for _ in range(TRIES):  # what was asked is lost when the board restarts meanwhile
         before, answers.greeted = answers.greeted, False
-        wire.write(b"M400\nM114\nM105\n")
-        listener.wait_for(lambda line: answers.read_position(line) or answers.greeted, medium.now_s() + STILL_S)
+        orders.give(QUESTIONS, lambda line: answers.read_position(line) or answers.greeted, medium.now_s() + STILL_S)
         again, answers.greeted = answers.greeted, answers.greeted or before
         if not again:
             break
-        listener.wait_for(lambda line: False, medium.now_s() + ANSWER_S)
+        orders.wait_for(lambda line: False, medium.now_s() + ANSWER_S)
     return PrinterStatus(answers.number, answers.position, answers.temperature, answers.greeted)

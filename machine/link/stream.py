@@ -13,7 +13,7 @@ from machine.link.progress import Progress, Schedule
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint
-from machine.link.shutdown import SETTLE_S, emergency_stop, heaters_off, lift_tip
+from machine.link.shutdown import SETTLE_S, Heaters, emergency_stop, heaters_off, lift_tip
 from machine.link.status import PrinterStatus, query_status
 from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError
 from profiles.profile import Profile
@@ -26,7 +26,8 @@ HEATERS_OFF_S: dict[type[PrinterError], float] = {FirmwareError: 1.0, SilenceErr
 @dataclass(frozen=True)
 class Outcome:
     """How a print ended. heaters_off, after a cancel: whether the printer's own report proves it; None when
-    the program ran to its own end, or when nothing of it had been sent.
+    the program ran to its own end, or when nothing of it had been sent. halted: the printer has stopped for good; what lets
+    it print again, "" when it lives.
     """
 
     cancelled: bool
@@ -37,6 +38,7 @@ class Outcome:
     firmware: str
     warnings: tuple[str, ...]
     heaters_off: bool | None = None
+    halted: str = ""
 
 
 def print_lines(
@@ -139,10 +141,11 @@ class _Print:
             raise
         return self._outcome(start_s, None)
 
-    def _cancel(self) -> bool | None:
+    def _cancel(self) -> Heaters | None:
         if not self.feed.started:
             return None
-        self.feed.set_state("cancelling")
+        waits = "the printer is waited for: what it does now (homing, a dwell) must not be stopped" if self.exchange.waits else ""
+        self.feed.set_state("cancelling", waits)
         return self._shut_down(SETTLE_S)
 
     def _stop(self) -> str:
@@ -150,25 +153,35 @@ class _Print:
         halted = emergency_stop(self.exchange.wire, self.medium)
         self.feed.set_state("cancelling")
         if halted:
-            return "emergency stop: the printer has halted; switch it off and on before the next print"
+            return f"emergency stop: the printer has halted; {self._revival()}"
         return "emergency stop: the printer did not confirm M112: cut the power"
+
+    def _revival(self) -> str:
+        """What a person does about a printer that has halted."""
+        return f"{self.exchange.connection.greeting.firmware.line.revival} before the next print"
 
     def _leave(self, error: PrinterError) -> str:
         """Heaters off before an error goes its way; words on whether the printer proved it."""
+        if isinstance(error, PortError):
+            return Heaters.UNPROVED.value
         timeout_s = HEATERS_OFF_S.get(type(error), SETTLE_S)
-        off = not isinstance(error, PortError) and self._shut_down(timeout_s, alive=not isinstance(error, FirmwareError))
-        return "the printer reports its heaters off" if off else "its heaters may still be on, look at the printer"
+        heaters = self._shut_down(timeout_s, alive=not isinstance(error, FirmwareError))
+        return f"{heaters.value}: {self._revival()}" if heaters is Heaters.HALTED else heaters.value
 
-    def _shut_down(self, timeout_s: float, alive: bool = True) -> bool:
-        """Heaters off, the tip lifted where the printer is alive and knows its place; True when the heaters are proved off."""
+    def _shut_down(self, timeout_s: float, alive: bool = True) -> Heaters:
+        """Heaters off, the tip lifted where the printer is alive and knows its place."""
+        exchange, feed = self.exchange, self.feed
         try:
-            off = heaters_off(self.exchange.wire, self.medium, timeout_s)
-            move = self.feed.lift_move() if off and alive else None
+            heaters = heaters_off(exchange.wire, self.medium, timeout_s, alive and exchange.waits, feed.heed_emergency)
+            move = feed.lift_move() if heaters is Heaters.OFF and alive else None
             if move is not None:
-                self.feed.record_lift(lift_tip(self.exchange.wire, self.medium, *move))
-            return off
+                feed.record_lift(lift_tip(exchange.wire, self.medium, *move))
         except PortError:
-            return False
+            return Heaters.UNPROVED
+        except EmergencyError:
+            raise FirmwareError(self._stop()) from None
+        halted = heaters is Heaters.UNPROVED and exchange.connection.halted
+        return Heaters.HALTED if halted else heaters
 
     def _hint(self) -> str:
         """How to go on with what is half printed."""
@@ -176,7 +189,7 @@ class _Print:
             return ""
         return f"; tiltprint resume {self.journal.path} goes on with it"
 
-    def _outcome(self, start_s: float, off: bool | None) -> Outcome:
+    def _outcome(self, start_s: float, heaters: Heaters | None) -> Outcome:
         feed = self.feed
         return Outcome(
             cancelled=not feed.finished,
@@ -186,5 +199,6 @@ class _Print:
             elapsed_s=self.medium.now_s() - start_s,
             firmware=feed.reports.firmware,
             warnings=tuple(feed.reports.warnings),
-            heaters_off=off,
+            heaters_off=None if heaters is None else heaters is not Heaters.UNPROVED,
+            halted=self._revival() if heaters is Heaters.HALTED else "",
         )

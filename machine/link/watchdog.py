@@ -106,8 +106,9 @@ class PrinterReports:
         if isinstance(report, Temperature):
             self.temperature, self.temperature_s = report, now_s
             self._watchdog.check(report, now_s)
-        elif isinstance(event, Identity):
-            self.firmware = event.text.removeprefix("FIRMWARE_NAME:").strip()
+        identity = event.identity if isinstance(event, Ok) else event
+        if isinstance(identity, Identity):
+            self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
         elif isinstance(event, Echo):
             self._read_echo(event.text)
         elif isinstance(event, Action):

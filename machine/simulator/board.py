@@ -29,7 +29,7 @@ class BuildOptions:
     realtime: Marlin's REALTIME_REPORTING_COMMANDS; geometry: its M115_GEOMETRY_REPORT; waits: its NO_TIMEOUTS, `wait` every
     second when idle; resend_ok: an `ok` follows each Resend (Smoothieware has none); must_home: X Y Z are not moved before they
     are homed (Klipper, RepRapFirmware, Marlin's NO_MOTION_BEFORE_HOMING); home_start: after a restart it believes itself at its
-    home positions as Marlin does, otherwise at 0 0 0.
+    home positions as Marlin does, otherwise at 0 0 0; checksums: it refuses lines without number and checksum.
     """
 
     advanced_ok: bool = True
@@ -43,6 +43,7 @@ class BuildOptions:
     resend_ok: bool = True
     must_home: bool = False
     home_start: bool = True
+    checksums: bool = False
     queue: int | None = None
 
 
@@ -129,7 +130,7 @@ class Board:
     def forget(self) -> None:
         """The board restarts."""
         self.powered = True
-        self.waits_for_heat = self.waits_for_person = self.impatient = self.cold_allowed = False
+        self.waits_for_heat = self.waits_for_person = self.impatient = self.cold_allowed = self.homes = False
         self.report_every_s = self.place_every_s = 0.0
         self.report_s = self.place_s = inf
 

@@ -42,7 +42,7 @@ class SimulatedFirmware:
         self._rules = self.board.rules
         self._commands, self._macros = commands_of(self._rules), dialect_of(machine).macros
         self.board.busy_every_s = self._busy_default_s = busy_s if self._build.busy and self._rules.has_build_options else 0.0
-        self._receiver = Receiver(self._rules, dialect_of(machine).longest_line, self._build.rx_ring)
+        self._receiver = Receiver(self._rules, dialect_of(machine).longest_line, self._build.rx_ring, self._build.checksums)
         self._room = (self._build.queue if self._rules.has_build_options else None) or self._rules.queue_lines
         self._emergency = EmergencyParser(self._build.realtime) if self._reads_bytes() else None
         self._busy_s = self._wait_s = inf
@@ -188,6 +188,8 @@ class SimulatedFirmware:
             board.impatient = True
             if board.waits_for_heat or board.waits_for_person:
                 self._wake_s = board.now_s
+        elif order == "M410" and board.homes:  # Endstops::validate_homing_move: the end stop was not met
+            self._shut_down("Homing Failed", ("echo:Homing Failed",))
         elif order == "M410":
             board.motion.halt(board.now_s)
             board.note("M410")

@@ -82,8 +82,10 @@ def seek_endstops(board: Board, axes: Sequence[int]) -> Iterator[float]:
     """Seek the endstops of axes."""
     yield from wait_for_moves(board)
     until_s = board.now_s + board.motion.home(axes)
+    board.homes = True
     while board.now_s < until_s:
         yield until_s
+    board.homes = False
     board.note("homed " + "".join(board.motion.letters[axis] for axis in axes))
 
 

@@ -7,6 +7,7 @@ from machine.firmware.simulation import SimulationRules
 from machine.link.protocol.framing import checksum
 
 HALF_BYTES = 1024
+MISSING = "Missing checksum"  # as OctoPrint's virtual printer says it with forceChecksum; nothing follows
 CHECKSUM_BYTES = 128  # bytes that the checksum is folded from at once
 DIGITS = re.compile(rb"\s*([-+]?\d+)")
 ORDER_BYTES = 96  # of a line more is not looked at
@@ -15,13 +16,14 @@ SIGNS = (b"M1", b"M4", b"M8", b"000")
 
 
 class Receiver:
-    """rx_ring: bytes of a receive ring that overflows, None: whatever comes is kept. longest: characters kept of a line.
+    """rx_ring: bytes of a receive ring that overflows, None: whatever comes is kept. longest: characters kept of a line;
+    insists: lines without number and checksum are refused.
 
     last: number of the last numbered line that was taken.
     """
 
-    def __init__(self, rules: SimulationRules, longest: int, rx_ring: int | None) -> None:
-        self._rules, self._longest, self._rx_ring = rules, longest, rx_ring
+    def __init__(self, rules: SimulationRules, longest: int, rx_ring: int | None, insists: bool = False) -> None:
+        self._rules, self._longest, self._rx_ring, self._insists = rules, longest, rx_ring, insists
         self.last = self.lost_bytes = 0
         self._lines: deque[bytes] = deque()
         self._half = b""
@@ -69,12 +71,16 @@ class Receiver:
                 return complaint or None
             label = f" N{self.last}"
             line = line[1 : line.rindex(b"*")].lstrip(b"-+0123456789").lstrip(b" ")
+        elif self._insists:
+            return MISSING
         elif b"*" in line:
             line = line[: line.rindex(b"*")]
         return label, line.decode("ascii", "replace").rstrip()
 
     def ask_again(self, complaint: str, ok: bool) -> list[str]:
-        """The answer to a bad line; all that has come behind it is thrown away."""
+        """The answer to a bad line; all that has come behind it is thrown away, unless it merely lacks a checksum."""
+        if complaint == MISSING:
+            return [f"Error: {MISSING}"]
         self.forget()
         return [f"Error:{complaint}, Last Line: {self.last}", f"Resend: {self.last + 1}", *(["ok"] if ok else [])]
 

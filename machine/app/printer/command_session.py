@@ -5,7 +5,7 @@ from machine.link.medium import SERIAL, Wire
 from machine.link.protocol.events import Echo, Event, Ok, Temperature
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
-from machine.link.shutdown import emergency_stop, heaters_off
+from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from profiles.errors import FirmwareError, LocalProtocolError, PortError
 
 FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
@@ -60,7 +60,8 @@ class CommandSession:
     def stop(self) -> FirmwareError:
         """The emergency stop; returns what became of it as an error to raise."""
         if emergency_stop(self.exchange.wire, SERIAL):
-            return FirmwareError("emergency stop: the printer has halted; switch it off and on before the next print")
+            revival = self.exchange.connection.greeting.firmware.line.revival
+            return FirmwareError(f"emergency stop: the printer has halted; {revival} before the next print")
         return FirmwareError("emergency stop: the printer did not confirm M112: cut the power")
 
     def heated(self) -> str:
@@ -77,14 +78,15 @@ class CommandSession:
             for command in ("M104 S0", "M140 S0"):
                 self.command(command)
             return not self.heated()
-        return heaters_off(self.exchange.wire, SERIAL)
+        return heaters_off(self.exchange.wire, SERIAL, homing=self.exchange.waits) is not Heaters.UNPROVED
 
     def give_up(self) -> bool:
         """The same after an error: order it without the protocol, for the printer may not follow it any more."""
         try:
-            return self.exchange.greeted and heaters_off(self.exchange.wire, SERIAL, FAULT_S)
+            heaters = heaters_off(self.exchange.wire, SERIAL, FAULT_S) if self.exchange.greeted else Heaters.UNPROVED
         except PortError:
             return False
+        return heaters is not Heaters.UNPROVED or self.exchange.connection.halted
 
     def _idle(self) -> bool:
         window = self.exchange.connection.window

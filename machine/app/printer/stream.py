@@ -21,6 +21,7 @@ from machine.link.journal import Journal
 from machine.link.pending_commands import Control
 from machine.link.progress import Progress, Schedule
 from machine.link.resume import ResumePoint
+from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
 from machine.link.stream import Outcome, print_lines
 from machine.simulator.board import BuildOptions
@@ -183,7 +184,8 @@ def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal 
     if outcome.warnings and log is not None:
         _point_to(log)
     if outcome.cancelled:
-        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {HEATERS[outcome.heaters_off]}")
+        heaters = f"{Heaters.HALTED.value}: {outcome.halted}" if outcome.halted else HEATERS[outcome.heaters_off]
+        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
         if journal is not None and journal.last.executed:
             say(f"tiltprint resume {journal.path} goes on with it")
         return 130

@@ -22,6 +22,7 @@ from machine.link.protocol.events import (
     Resend,
     Start,
     Wait,
+    is_halt,
 )
 from machine.link.protocol.flow_control import FlowControl
 from machine.link.protocol.framing import LINE_LIMIT, frame
@@ -38,7 +39,8 @@ GREETING_STATES = (State.DRAIN, State.SYNC, State.HELLO)
 
 class Connection:
     """One conversation with a printer. `fault` is the error that ended it, None while it lasts: look at it after receive() and
-    tick(). `greeting` is what the printer answered to M115, `window` counts the lines, `resends` those that were repeated.
+    tick(). `halted`: the firmware says that it has stopped for good. `greeting` is what the printer answered to M115, `window`
+    counts the lines, `resends` those that were repeated.
 
     firmware: taken for one of unknown name; rx_bytes: what the machine's receive buffer holds, None: as its firmware's;
     baud: for messages.
@@ -62,6 +64,7 @@ class Connection:
         self._timeouts = Timeouts(timing or Timing(), now_s)
         self._out = bytearray()
         self._last_number_used = False
+        self.halted = False
 
     @property
     def advanced(self) -> bool:
@@ -131,6 +134,9 @@ class Connection:
     def _handle(self, event: Event, now_s: float) -> None:
         match event:
             case Ok():
+                if (identity := event.identity) is not None:
+                    self.greeting.learn(identity)
+                    self.window.rx_bytes = self.greeting.rx_bytes
                 self._handle_ok(event, now_s)
             case Resend() if self.state is not State.SYNC:
                 self._handle_resend(event, now_s)
@@ -143,6 +149,7 @@ class Connection:
             case Banner() if self.state not in GREETING_STATES:  # there it follows a `start` that was heeded
                 self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))
             case FirmwareFault():
+                self.halted = self.halted or is_halt(event)
                 self._follow(Signal.FAULT, now_s, verdict.firmware_fault(event.text))
             case Wait():
                 if self._questions.hear_idle(bool(self.window.flight)):

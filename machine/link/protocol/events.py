@@ -35,6 +35,11 @@ class Ok:
     text: str = ""
     position: Position | None = None
 
+    @property
+    def identity(self) -> "Identity | None":
+        """The firmware's name, which Klipper puts behind its ok."""
+        return Identity(self.text[self.text.index(NAME) :]) if NAME in self.text else None
+
 
 @dataclass(frozen=True, slots=True)
 class Resend:
@@ -128,6 +133,7 @@ class Unknown:
 Report = Temperature | Position | Capability | Identity | Area | Action | Echo | Unknown
 Event = Ok | Resend | Busy | LineError | FirmwareFault | Start | Banner | Wait | Report
 
+NAME = "FIRMWARE_NAME:"
 OK = re.compile(r"ok(?: N?(\d{1,10}))?(?: P(\d{1,4}))?(?: B(\d{1,4}))?")
 RESEND = re.compile(r"(?:resend:|rs)\s*N?(\d{1,10})", re.IGNORECASE)
 NOZZLE = re.compile(r"(?:^|\s)T0?:\s*(-?\d+\.?\d*)(?:\s*/\s*(-?\d+\.?\d*))?")
@@ -142,7 +148,10 @@ START = re.compile(r"(?:.*[^ -~])?start")
 GREETS = re.compile(r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: .*")
 # Words by which transmission errors are known even when a byte of them is damaged.
 OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
+MISSING = ("missing checksum", "no checksum", "no line number")
 OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
+# Said by a firmware that has stopped for good, its heaters off: Marlin's kill(), Klipper's shutdown, RepRapFirmware's M112.
+KILLED = ("printer halted", "kill() called", "shutdown", "emergency stop")
 # Said by firmwares that stop, whatever became of the `Error:` before them.
 DEADLY = ("printer halted", "kill() called", "thermal runaway", "heating failed", "system stopped", "mintemp", "maxtemp")
 
@@ -160,6 +169,16 @@ def read_event(raw: bytes) -> Event:
     if folded.startswith(("echo:busy:", "busy:")):
         return Busy(text)
     return _read_report(text)
+
+
+def lacks_checksum(event: Event) -> bool:
+    """Whether a line was refused because it had no number or no checksum."""
+    return isinstance(event, LineError) and any(words in event.text.lower() for words in MISSING)
+
+
+def is_halt(event: Event) -> bool:
+    """Whether the firmware says that it has stopped for good and switched its heaters off."""
+    return isinstance(event, FirmwareFault) and any(words in event.text.lower() for words in KILLED)
 
 
 def _error(text: str, folded: str) -> Event:
@@ -182,7 +201,7 @@ def _read_report(text: str) -> Event:
         return Banner(text)
     if text.startswith(("echo:", "//", "Warning:")):  # the last is RepRapFirmware's
         return Echo(text.removeprefix("echo:").removeprefix("//").strip())
-    if text.startswith("FIRMWARE_NAME:"):
+    if text.startswith(NAME):
         return Identity(text)
     if capability := CAPABILITY.fullmatch(text):
         return Capability(capability[1], capability[2] == "1")

@@ -1,10 +1,13 @@
 """Framing: a command becomes `N<number> <command>*<checksum>`; what may not be sent is refused."""
 
+from collections.abc import Sequence
+
 from machine.gcode.words import PAUSE_REMARK
 from profiles.errors import LocalProtocolError
 
 FRAME = 11  # N, five digits (numbers begin anew in time), blank, *, three digits of the checksum
 LINE_LIMIT = 95  # Marlin keeps MAX_CMD_SIZE - 1 characters; a longer line loses its checksum and is asked for again for ever
+FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers refuses it with the one it wants
 REFUSED = {
     "M0": "waits for a person at the printer's own buttons",
     "M1": "waits for a person at the printer's own buttons",
@@ -79,3 +82,8 @@ def name_of(command: str) -> str:
     while end < len(command) and (command[end].isdigit() or command[end] == "."):
         end += 1
     return command[:end].upper()
+
+
+def number_lines(first: int, commands: Sequence[str]) -> bytes:
+    """Commands with numbers from `first` on, and checksums."""
+    return b"".join(frame(number, command) for number, command in enumerate(commands, first))

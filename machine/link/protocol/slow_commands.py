@@ -37,6 +37,15 @@ SLOW_S = {
 }
 
 
+HOMING = {"G28", "G29", "G30", "G32", "G33", "G34", "G38.2", "G38.3", "G38.4", "G38.5", "M48"}
+
+
+def is_waited_for(command: str) -> bool:
+    """Whether a command must be waited for when a print is ended: homing and probing must not be stopped, a dwell cannot be."""
+    name = name_of(command)
+    return name in HOMING or name == "G4" or name.upper().startswith("HOME")
+
+
 def slow_timeout_s(command: str) -> float:
     """How long the answer to a slow command may take, 0 for a quick one."""
     if command[0] == "G" and command[1:2] in ("0", "1"):  # most lines of a program; none of these is slow

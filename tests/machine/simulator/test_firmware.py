@@ -375,3 +375,17 @@ def test_without_power_nothing_heats() -> None:
     assert firmware.record().nozzle_target_c == 0.0
     answer(firmware, "M80\nM104 S200\n")
     assert firmware.record().nozzle_target_c == 200.0
+
+
+def test_m410_during_homing_is_taken_for_a_missed_end_stop() -> None:
+    firmware = SimulatedFirmware(MACHINE, PLAIN)
+    answer(firmware, "G28 Z\n", 0.5)
+    said = answer(firmware, "M410\n", 0.6)
+    assert said == ["echo:Homing Failed", "Error:Printer halted. kill() called!", "//action:poweroff"]
+    assert firmware.dead
+
+
+def test_a_firmware_that_insists_on_checksums_refuses_other_lines_and_says_nothing_more() -> None:
+    firmware = SimulatedFirmware(MACHINE, BuildOptions(checksums=True))
+    assert answer(firmware, "M105\n") == ["Error: Missing checksum"]
+    assert answer(firmware, frame(1, "G21"))[-1].startswith("ok N1")

@@ -1,0 +1,121 @@
+"""Every way out leaves the heaters off: during homing, on a printer that halts, on one that insists on checksums."""
+
+from dataclasses import replace
+from threading import Event as Flag
+
+import pytest
+
+from machine.link.identification import Kind, ask
+from machine.link.medium import Medium
+from machine.link.pending_commands import Command, Control
+from machine.link.port import open_port
+from machine.link.shutdown import Heaters, emergency_stop, heaters_off
+from machine.link.status import query_status
+from machine.link.stream import Outcome, print_lines
+from machine.simulator.board import BuildOptions
+from machine.simulator.faults import Fault, FaultScript
+from machine.simulator.simulator import SimulatedPrinter
+from machine.simulator.virtual import PATH, VirtualPrinter
+from profiles.errors import FirmwareError
+from profiles.profile import load
+
+SLOW = load(settings=["machine.z.speed_mm_s=2"])
+HOMING = ["M104 S200", "M140 S60", "G1 Z60 F600", "G28 X Y Z", "G1 X10 F600", "M104 S0", "M140 S0"]
+INSISTS = BuildOptions(checksums=True)
+
+
+def watching(printer: VirtualPrinter, word: bytes, act: object) -> Medium:
+    """The printer's medium; act() is called when a word is on the wire."""
+
+    def opened(name: str, baud: int) -> object:
+        wire = printer.medium.open(name, baud)
+        write = wire.write
+
+        def heard(data: bytes) -> None:
+            write(data)
+            if word in data:
+                act()  # type: ignore[operator]
+
+        wire.write = heard  # type: ignore[method-assign]
+        return wire
+
+    return replace(printer.medium, open=opened)  # type: ignore[arg-type]
+
+
+def cancelled_in_homing(printer: VirtualPrinter) -> Outcome:
+    stop = Flag()
+    medium = watching(printer, b"G28 X Y Z", stop.set)
+    return print_lines(HOMING, PATH, stop=stop, medium=medium, profile=SLOW)
+
+
+def test_a_cancel_waits_for_the_end_of_homing_and_does_not_kill_the_printer() -> None:
+    printer = VirtualPrinter(SLOW.machine)
+    outcome = cancelled_in_homing(printer)
+    assert (outcome.cancelled, outcome.heaters_off, outcome.halted) == (True, True, "")
+    homed_s = next(seconds for seconds, event in printer.record.events if event == "homed XYZ")
+    off_s = next(seconds for seconds, event in printer.record.events if event == "nozzle 0")
+    assert off_s == pytest.approx(homed_s, abs=0.1)
+    assert homed_s > 150.0
+    assert not printer.firmware.dead
+
+
+def test_an_emergency_stop_is_heeded_while_homing_is_waited_for() -> None:
+    printer, control, stop = VirtualPrinter(SLOW.machine), Control(), Flag()
+
+    def press() -> None:
+        stop.set()
+        control.ask(Command.EMERGENCY_STOP)
+
+    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; switch it off and on, or press its reset"):
+        print_lines(HOMING, PATH, stop=stop, control=control, medium=watching(printer, b"G28 X Y Z", press), profile=SLOW)
+    assert not printer.record.happened("homed XYZ")
+
+
+def test_a_printer_that_halts_while_it_is_cancelled_says_so() -> None:
+    printer = VirtualPrinter(SLOW.machine, faults=FaultScript((Fault("thermal runaway", at=9, unit="line"),)))
+    outcome = cancelled_in_homing(printer)
+    assert (outcome.heaters_off, outcome.halted[:20]) == (True, "switch it off and on")
+
+
+def test_a_printer_that_has_stopped_for_good_is_told_from_one_that_may_still_heat() -> None:
+    printer = VirtualPrinter(SLOW.machine, faults=FaultScript((Fault("thermal runaway", at=5, unit="line"),)))
+    with pytest.raises(FirmwareError, match="has halted and switched its heaters off by itself: switch it off and on"):
+        print_lines(HOMING, PATH, medium=printer.medium, profile=SLOW)
+
+
+def test_a_klipper_that_has_shut_down_wants_a_firmware_restart() -> None:
+    klipper = load(settings=["machine.dialect=klipper"])
+    printer = VirtualPrinter(klipper.machine, faults=FaultScript((Fault("thermal runaway", at=5, unit="line"),)))
+    with pytest.raises(FirmwareError, match="send FIRMWARE_RESTART by tiltprint console before the next print"):
+        print_lines(HOMING, PATH, medium=printer.medium, profile=klipper)
+
+
+def test_a_firmware_that_insists_on_checksums_prints_and_is_switched_off_and_asked() -> None:
+    printer = VirtualPrinter(SLOW.machine, INSISTS)
+    assert print_lines(HOMING, PATH, medium=printer.medium, profile=SLOW).acknowledged == len(HOMING)
+    wire = printer.medium.open(PATH, 0)
+    last = printer.firmware.last_number
+    told = query_status(wire, printer.medium, lambda: None)
+    assert told.last_number == last
+    assert told.position is not None
+    assert dict(told.position.axes)["X"] == 10.0
+    assert heaters_off(wire, printer.medium) is Heaters.OFF
+
+
+def test_a_cancel_switches_the_heaters_of_an_insisting_firmware_off() -> None:
+    printer = VirtualPrinter(SLOW.machine, INSISTS)
+    outcome = cancelled_in_homing(printer)
+    assert outcome.heaters_off
+    assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
+
+
+def test_an_insisting_firmware_without_an_emergency_parser_is_stopped_too() -> None:
+    printer = VirtualPrinter(SLOW.machine, BuildOptions(checksums=True, emergency_parser=False))
+    assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)
+
+
+def test_a_firmware_that_answers_every_question_with_missing_checksum_is_asked_with_one() -> None:
+    with SimulatedPrinter(SLOW.machine, build=INSISTS) as printer, open_port(printer.path, 115200) as port:
+        answer = ask(port)
+    assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZAC")
+    assert answer.firmware.startswith("Marlin")
