@@ -17,6 +17,7 @@ UserError                         message (one sentence: thing, value, what is a
     RemoteProtocolError           the printer asked for something impossible
     FirmwareError                 the printer reported an error; its own text is kept
     SilenceError                silence beyond the bound
+    ServerError                 machine/network: a print server that cannot be reached or that refuses
   JournalError                    machine/link: a journal from which a print cannot be resumed
 
 Anything else is a bug: short message, log file, exit 3. Ctrl-C: stop safely, exit 130.
@@ -89,6 +90,10 @@ class FirmwareError(PrinterError):
 
 class SilenceError(PrinterError):
     """The printer stayed silent beyond the allowed time."""
+
+
+class ServerError(PrinterError):
+    """A print server on the network cannot be reached, or refuses what was asked of it; the message names it."""
 
 
 class JournalError(UserError):

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import ConsoleRequest, Cuts, ModelRequest, PrintRequest, SimulatorRequest
+from machine.app.requests import ConsoleRequest, Cuts, ModelRequest, PrintRequest, SendRequest, SimulatorRequest
 from machine.app.terminal.options import (
     Baud,
     BeamWidth,
@@ -71,7 +71,8 @@ def print_(
 ) -> int:
     """Print a model or a G-code file on a printer or a simulated one.
 
-    PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT. The printer is asked who it is before anything moves.
+    PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT, or a print server: octoprint:HOST, moonraker:HOST,
+    duet:HOST, to which the program is handed over first. The printer is asked who it is before anything moves.
     Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
     """
     from machine.app.commands.print import print_model
@@ -94,6 +95,37 @@ def print_(
         profile_names=names,
     )
     return print_model(request, PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port)))
+
+
+def send(
+    file: Annotated[str, typer.Argument(metavar="FILE.gcode", help="a G-code file")],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to", metavar="SERVER", help="octoprint:HOST, moonraker:HOST or duet:HOST; HOST may be http(s)://HOST:PORT"
+        ),
+    ],
+    start: Annotated[bool, typer.Option("--start", help="print it at once; print --port SERVER follows it, too")] = False,
+    log: LogFile = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")
+    ] = False,
+    machine: MachineGiven = None,
+    material: MaterialGiven = None,
+    process: ProcessGiven = None,
+    settings: Settings = None,
+) -> int:
+    """Hand a G-code file to a print server. It is dry-run and held against machine and server first.
+
+    A key or password stands in servers.toml in the settings folder (see docs/network.md) or in the variable TILTPRINT_SERVER_KEY.
+    """
+    from machine.app.commands.send import send
+
+    profile = profile_of(machine, material, process, settings)
+    names = (machine, material, process)
+    chosen = chosen_sections(settings, machine=machine, material=material, process=process)
+    request = ModelRequest(file, profile, chosen, force=force, profile_names=names)
+    return send(request, SendRequest(to, start, log))
 
 
 def resume(
@@ -170,6 +202,7 @@ def simulator(
 
 COMMANDS: dict[str, Callable[..., int]] = {
     "print": print_,
+    "send": send,
     "resume": resume,
     "ports": ports,
     "console": console,

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from machine.app.commands.send import print_on_server
 from machine.app.file_roles import check_model_files, printing_files, program_beside
 from machine.app.output import check_writable
 from machine.app.pipeline.programs import load_program, refuse_errors
@@ -13,10 +14,13 @@ from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
 from machine.app.terminal.report import print_table, show
 from machine.dryrun.starvation import check_baud, find_starvation
+from machine.network.address import is_server_address
 
 
 def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     """Dry-run, then stream a model or a G-code file to a printer, which is asked who it is before any work is done."""
+    if is_server_address(printing.port):
+        return print_on_server(request, printing)
     for file in (printing.log, printing.journal):
         if file is not None:
             check_writable(file)

@@ -116,22 +116,22 @@ def describe_answer(answer: Answer, baud: int) -> str:
 def check_printer(answer: Answer | None, machine: Machine, force: bool) -> None:
     """Refuse a printer whose firmware cannot print for the machine; force: only say so. None: nothing is known."""
     if answer is not None:
-        _refuse(firmware_mismatch(answer, machine), force)
+        refuse(firmware_mismatch(answer, machine), force)
 
 
 def check_program(answer: Answer | None, program: Program, profile: Profile, file: str, force: bool) -> None:
     """Refuse a program that was made for another machine, or that leaves the limits that the firmware tells; force: say so."""
     own, sections = read_embedded_profile(program.lines, profile, frozenset())
     if "machine" in sections:
-        _refuse(machine_mismatch(own.machine, profile.machine, file), force)
+        refuse(machine_mismatch(own.machine, profile.machine, file), force)
     if answer is not None:
         machine, reached = profile.machine, {letter: reach for letter, reach in summary(program.run)["axes"].items() if reach}
         rotary = (machine.tilt.letter, machine.turn.letter)
         followed = machine.coordinates == "workpiece"  # X Y Z of such a file are no places of the axes
-        _refuse(exceeded_limit(answer, {key: reach for key, reach in reached.items() if key in rotary or not followed}), force)
+        refuse(exceeded_limit(answer, {key: reach for key, reach in reached.items() if key in rotary or not followed}), force)
 
 
-def _refuse(sentence: str, force: bool) -> None:
+def refuse(sentence: str, force: bool) -> None:
     if sentence and not force:
         raise PrinterError(f"{sentence} (--force goes on)")
     if sentence:

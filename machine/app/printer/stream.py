@@ -11,6 +11,7 @@ from machine.app.printer.journal_folder import new_journal
 from machine.app.printer.serial_log import SerialLog, new_log, tap
 from machine.app.requests import SIMULATED, PrintRequest
 from machine.app.terminal.interrupts import stopping
+from machine.app.terminal.keys import Keyboard
 from machine.app.terminal.print_display import Follow, PrintDisplay
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import show
@@ -121,7 +122,7 @@ def stream_program(
         observers.log.note(direction, data)
         words.hear(direction, data)
 
-    with stopping(stop), PrintDisplay(observers.log.title, course, control, words) as display:
+    with stopping(stop), PrintDisplay(observers.log.title, course, Keyboard(control), words) as display:
 
         def begin_then_show(status: PrinterStatus) -> ResumePoint:
             start = ResumePoint(1, ()) if begin is None else begin(status)

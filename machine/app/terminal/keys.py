@@ -60,6 +60,7 @@ class Keyboard:
             act(self)
 
     def _answer(self, key: str) -> None:
+        """What a key means to the question that stands."""
         if key in ("c", "y"):
             self._tell("cancelling")
             self._control.ask(Command.CANCEL)
@@ -96,8 +97,8 @@ _ACTS: dict[str, Callable[[Keyboard], None]] = {
     "p": Keyboard._pause,
     "r": Keyboard._resume,
     " ": Keyboard._toggle,
-    "c": Keyboard._cancel,
-    "q": Keyboard._explain,
+    "c": lambda board: board._cancel(),
+    "q": lambda board: board._explain(),
     "+": lambda board: board._faster(STEP_PERCENT),
     "-": lambda board: board._faster(-STEP_PERCENT),
     "]": lambda board: board._more(STEP_PERCENT),

@@ -6,7 +6,6 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from machine.app.terminal.keys import Keyboard, Typing, can_type
 from machine.app.terminal.progress import PlainLines, is_terminal
 from machine.app.terminal.screen import Course, Screen, Words
-from machine.link.pending_commands import Control
 from machine.link.progress import Progress
 from machine.view.quantities import duration
 
@@ -18,10 +17,10 @@ class PrintDisplay:
     something, the terminal is theirs. Ends with the terminal as before.
     """
 
-    def __init__(self, title: str, course: Course, control: Control, words: Words) -> None:
+    def __init__(self, title: str, course: Course, board: Keyboard, words: Words) -> None:
         self._stack = ExitStack()
         self._follow: Follow | None = None
-        self._shown: AbstractContextManager[Follow] = _shown(title, course, control, words)
+        self._shown: AbstractContextManager[Follow] = _shown(title, course, board, words)
 
     def open(self) -> None:
         """Begin to show what comes."""
@@ -40,11 +39,10 @@ class PrintDisplay:
 
 
 @contextmanager
-def _shown(title: str, course: Course, control: Control, words: Words) -> Iterator[Follow]:
+def _shown(title: str, course: Course, board: Keyboard, words: Words) -> Iterator[Follow]:
     if not is_terminal():
         yield _StatusLines()
         return
-    board = Keyboard(control)
     with ExitStack() as stack:
         keys = can_type()
         if keys:

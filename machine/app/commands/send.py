@@ -1,0 +1,91 @@
+"""The send command, and a print on a server: a program is checked, handed over, started, and followed where that is wanted."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from machine.app.file_roles import check_model_files
+from machine.app.output import check_writable
+from machine.app.pipeline.programs import LoadedProgram, load_program, refuse_errors
+from machine.app.printer.network_print import follow_on_server, hand_over
+from machine.app.printer.serial_log import new_log
+from machine.app.printer.server_checks import check_free, check_server_machine, check_server_program
+from machine.app.printer.stream import PrintJob
+from machine.app.printer.watch_page import serve_watch_page
+from machine.app.requests import ModelRequest, PrintRequest, SendRequest
+from machine.app.terminal.progress import say
+from machine.app.terminal.report import print_table, show
+from machine.network.address import parse_server_address
+from machine.network.gcode_upload import GcodeUpload
+from machine.network.server import PrintServer
+from machine.network.servers import open_server
+from profiles.errors import GcodeError, ServerError
+
+
+def send(request: ModelRequest, sending: SendRequest) -> int:
+    """Hand a G-code file to a print server, and have it printed where that is asked for."""
+    if not request.is_gcode:
+        raise GcodeError(
+            f"{request.name} is no G-code file: export makes one of a model, print --port {sending.server} prints it"
+        )
+    with _session(request, sending.server, sending.log, "send") as server:
+        loaded = _checked(request, server, sending.server, sending.start)
+        upload = GcodeUpload(request.name, loaded.program.lines)
+        file = hand_over(server, upload, request.name)
+        if sending.start:
+            server.start(file)
+        done = "prints" if sending.start else "waits"
+        show(f"{file} {done} on {server.name}\n")
+    return 0
+
+
+def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:
+    """Hand a model's program or a G-code file to a print server, have it printed, and follow it."""
+    if printing.journal is not None:
+        raise ServerError(
+            f"--journal {printing.journal}: {printing.port} prints from a file of its own, which needs no journal here"
+        )
+    with _session(request, printing.port, printing.log, "print") as server:
+        loaded = _checked(request, server, printing.port, True)
+        job = PrintJob(request.name, loaded.program, loaded.profile)
+        upload = GcodeUpload(request.name, loaded.program.lines)
+        with serve_watch_page(job.name, job.program, job.profile, printing.watch_port) as watchers:
+            file = hand_over(server, upload, request.name)
+            check_free(server.name, server.status())  # somebody else may have begun while the program was made
+            server.start(file)
+            code = follow_on_server(server, job, upload, file, watchers.follow)
+            watchers.end("stopped" if code else "done")
+    return code
+
+
+@contextmanager
+def _session(request: ModelRequest, address: str, log: Path | None, kind: str) -> Iterator[PrintServer]:
+    """A session with a server, logged without keys."""
+    parse_server_address(address)
+    if log is not None:
+        check_writable(log)
+    check_model_files(request, (("--log", log),))
+    with new_log(kind, f"{request.name} to {address}", log) as record:
+        if record.trouble:
+            say(f"what is asked and answered is not logged: {record.file}: {record.trouble}")
+        with open_server(address, record.note) as server:
+            yield server
+
+
+def _checked(request: ModelRequest, server: PrintServer, text: str, starts: bool) -> LoadedProgram:
+    """The program, when nothing speaks against printing it there; a server is asked before any work is done."""
+    address = parse_server_address(text)
+    greeting = server.greet()
+    say(f"{greeting.text} answers at {server.name}")
+    if starts:
+        check_free(server.name, server.status())
+    if not request.is_gcode:
+        check_server_machine(address, greeting, request.profile.machine, request.force)
+    loaded = load_program(request)
+    program, profile = loaded.program, loaded.profile
+    if request.is_gcode:
+        check_server_machine(address, greeting, profile.machine, request.force)
+    check_server_program(greeting, program, profile, request.name, request.force)
+    refuse_errors(program, request.force)
+    show(print_table(program, profile))
+    return loaded

@@ -1,0 +1,56 @@
+"""Server checks: whether a print server, its printer, a machine's profile and a program belong together, before a byte goes."""
+
+from machine.app.printer.compatibility import check_printer, check_program, refuse
+from machine.firmware.klipper import stepper_name
+from machine.link.identification import Answer, Kind
+from machine.network.address import ServerAddress
+from machine.network.server import ACTIVE, Greeting, JobStatus, Phase
+from machine.network.servers import dialect_mismatch
+from machine.view.program import Program
+from profiles.errors import PrinterError, ServerError
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+
+def check_server_machine(address: ServerAddress, greeting: Greeting, machine: Machine, force: bool) -> None:
+    """Refuse a machine whose dialect the server's firmware does not read, or whose axes it lacks. Raises PrinterError."""
+    if sentence := dialect_mismatch(address, machine.name, machine.dialect):
+        raise PrinterError(sentence)
+    check_printer(_answer(greeting), machine, force)
+    refuse(lacking_steppers(greeting, machine), force)
+
+
+def check_server_program(greeting: Greeting, program: Program, profile: Profile, file: str, force: bool) -> None:
+    """Refuse a program made for another machine, or that leaves the limits that the server tells. Raises PrinterError."""
+    check_program(_answer(greeting), program, profile, file, force)
+
+
+def check_free(server: str, status: JobStatus) -> None:
+    """Refuse a server that cannot begin a print now. Raises ServerError."""
+    if status.phase in ACTIVE:
+        now = f"{server} is {status.phase.value} {status.file or 'another file'} now"
+        raise ServerError(f"{now}: wait until that is done; send without --start hands a file over meanwhile")
+    if status.phase is Phase.OFFLINE:
+        raise ServerError(f"{server} cannot print now: {status.message or 'its printer is not connected'}")
+
+
+def lacking_steppers(greeting: Greeting, machine: Machine) -> str:
+    """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or does not tell."""
+    if greeting.steppers is None or not machine.tilts:
+        return ""
+    wanted = [stepper_name(axis) for axis in (machine.tilt, machine.turn)]
+    lacking = [name for name in wanted if name not in greeting.steppers]
+    if not lacking:
+        return ""
+    there = ", ".join(sorted(greeting.steppers)) or "none"
+    sections = " and ".join(f"[manual_stepper {name}]" for name in lacking)
+    return (
+        f"{machine.name} turns its table by {sections}, which this Klipper lacks; it has {there}: machine.tilt.stepper names it"
+    )
+
+
+def _answer(greeting: Greeting) -> Answer | None:
+    """What a server tells of its printer, as a printer at a port would have answered."""
+    if not greeting.firmware:
+        return None
+    return Answer(Kind.PRINTER, f"FIRMWARE_NAME:{greeting.firmware}", greeting.letters, greeting.limits)

@@ -1,0 +1,26 @@
+"""Answers: values out of a server's JSON, which may be of any shape."""
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+
+def table(value: Any) -> Mapping[str, Any]:
+    """A JSON object; an empty one where it is none."""
+    return value if isinstance(value, dict) else {}
+
+
+def entry(value: Any, index: Any) -> Any:
+    """An entry of a JSON array; None where there is none."""
+    return value[index] if isinstance(value, list) and isinstance(index, int) and 0 <= index < len(value) else None
+
+
+def number(value: Any) -> float | None:
+    """A JSON number; None where it is none."""
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) else None
+
+
+def whole(value: Any) -> int | None:
+    """The same, without its fraction."""
+    read = number(value)
+    return None if read is None else int(read)

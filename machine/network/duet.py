@@ -1,0 +1,198 @@
+"""A Duet's rr_ requests: RepRapFirmware 3 alone, or behind DuetSoftwareFramework, whose web server answers them, too.
+
+Read in RepRapFirmware (src/Networking/HttpResponder.cpp, GCodes/GCodeInput.cpp, "HTTP requests.md" and the object model of
+PrintMonitor.cpp) and in DuetSoftwareFramework (RepRapFirmwareController.cs); never tried on a board. A session ends after 8 s
+without a request, so a 401 begins a new one. The file is written as NAME.part and renamed when length and CRC are right. M112
+is recognised as its characters come in, whatever waits. A print can only be cancelled while it is paused (M25, then M0).
+"""
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from machine.link.protocol.events import Temperature
+from machine.network.answers import entry, number, table, whole
+from machine.network.credentials import how_to_give_a_key
+from machine.network.gcode_upload import GcodeUpload, Sent
+from machine.network.http import HttpSession, Refusals, Reply, plain
+from machine.network.server import ACTIVE, Greeting, JobStatus, Phase
+from profiles.errors import ServerError
+
+FOLDER = "0:/gcodes/"
+DEFAULT_PASSWORD = "reprap"  # of a board on which none was set; its name must be sent all the same
+WRITTEN_S = 120.0
+PAUSE_S, LOOK_S = 120.0, 0.5
+MOST_PAGES = 16
+STOPPED = frozenset({Phase.PAUSING, Phase.PAUSED, Phase.CANCELLING})
+STATES = {
+    "idle": Phase.READY,
+    "processing": Phase.PRINTING,
+    "simulating": Phase.PRINTING,
+    "pausing": Phase.PAUSING,
+    "paused": Phase.PAUSED,
+    "resuming": Phase.RESUMING,
+    "cancelling": Phase.CANCELLING,
+    "halted": Phase.OFFLINE,
+    "off": Phase.OFFLINE,
+    "updating": Phase.OFFLINE,
+    "starting": Phase.OFFLINE,
+    "disconnected": Phase.OFFLINE,
+}
+
+
+class Duet:
+    """PrintServer of a Duet."""
+
+    def __init__(self, http: HttpSession) -> None:
+        self._http = http
+        self.name = http.name
+        self._nozzle, self._bed = 1, 0  # heaters
+        self._connected = False
+        self._last: Phase | None = None  # of the print, for idle says nothing of how it ended
+
+    def greet(self) -> Greeting:
+        """Log in, and learn firmware, axes with their limits and which heaters are nozzle and bed."""
+        self._connect()
+        board = table(self._model("boards[0]"))
+        name, version = str(board.get("firmwareName") or "RepRapFirmware"), str(board.get("firmwareVersion") or "")
+        axes = [table(axis) for axis in self._array("move.axes")]
+        limits = {str(axis.get("letter")): (number(axis.get("min")), number(axis.get("max"))) for axis in axes}
+        known = {letter: (low, high) for letter, (low, high) in limits.items() if low is not None and high is not None}
+        nozzle = whole(entry(table(entry(self._array("tools"), 0)).get("heaters"), 0))
+        bed = whole(entry(table(self._model("heat")).get("bedHeaters"), 0))
+        self._nozzle, self._bed = self._nozzle if nozzle is None else nozzle, -1 if bed is None else bed
+        return Greeting(f"{name} {version}".strip(), f"{name} {version}".strip(), "".join(limits), known)
+
+    def _connect(self) -> None:
+        password = self._http.credentials.key or DEFAULT_PASSWORD
+        now = time.strftime("%Y-%m-%dT%H:%M:%S")
+        reply = self._http.get("/rr_connect", {"password": password, "time": now, "sessionKey": "yes"}, secret=True)
+        value = table(self._http.check(reply, "a session"))
+        if value.get("err") == 1:
+            wrong = "refuses the password" if self._http.credentials.key else "wants a password"
+            raise ServerError(f"{self.name} {wrong}: {how_to_give_a_key(self._http.address)}")
+        if value.get("err") == 2:
+            raise ServerError(f"{self.name} serves as many others as it can: close a web page or program that is connected to it")
+        if value.get("err") != 0:
+            raise ServerError(f"{self.name} is no Duet: it does not answer rr_connect as one")
+        self._connected = True
+        key = whole(value.get("sessionKey"))
+        if key:  # firmware from 3.5 on; before that, and from DuetSoftwareFramework, a session is this computer's address
+            self._http.set_header("X-Session-Key", str(key))
+
+    def status(self) -> JobStatus:
+        """From what the object model calls frequently changing, and what the firmware has said since."""
+        model = table(table(self._value("/rr_model", {"flags": "d99fn"})).get("result"))
+        job, state = table(model.get("job")), str(table(model.get("state")).get("status") or "")
+        elapsed_s = number(job.get("duration"))
+        under_way = Phase.READY if elapsed_s is None else Phase.PRINTING  # busy, changingTool: within a print or without one
+        phase = STATES.get(state, under_way)
+        said = self._get("/rr_reply")
+        words = plain(said.body.decode("utf-8", "replace")) if said.status == 200 else ""
+        return JobStatus(
+            self._since_start(phase),
+            bytes_read=whole(job.get("filePosition")),
+            elapsed_s=elapsed_s,
+            temperature=self._temperature(table(model.get("heat")).get("heaters")),
+            message=words or (f"it is {state}" if phase is Phase.OFFLINE else ""),
+        )
+
+    def _since_start(self, phase: Phase) -> Phase:
+        """The phase, with idle after a print as its end: a cancelled one was paused before."""
+        if phase in ACTIVE:
+            self._last = phase
+        if phase is not Phase.READY or self._last is None:
+            return phase
+        return Phase.CANCELLED if self._last in STOPPED else Phase.DONE
+
+    def _temperature(self, heaters: Any) -> Temperature:
+        found = (table(entry(heaters, index)) for index in (self._nozzle, self._bed))
+        return Temperature(*(number(each.get(key)) for each in found for key in ("current", "active")))
+
+    def has(self, file: str) -> bool:
+        """Whether it holds a file of this name."""
+        return table(self._value("/rr_fileinfo", {"name": FOLDER + file})).get("err") == 0
+
+    def upload(self, upload: GcodeUpload, sent: Sent) -> str:
+        """Hand over a file with its CRC."""
+        self._connect()  # the one before may have ended while the program was made
+        params = {"name": FOLDER + upload.name, "crc32": upload.crc32}
+        headers = {"Content-Type": "application/octet-stream"}
+        pieces = upload.pieces(sent)
+        reply = self._http.upload("/rr_upload", pieces, len(upload.content), headers, params, answer_s=WRITTEN_S)
+        if table(self._http.check(reply, "the file")).get("err") != 0:
+            said = plain(self._get("/rr_reply").body.decode("utf-8", "replace"))
+            raise ServerError(f"{self.name} has not kept the file ({said or 'no reason given'}): is the card full or damaged?")
+        return upload.name
+
+    def start(self, file: str) -> None:
+        """Begin to print a file that it holds."""
+        self._last = None
+        self.command(f'M32 "{FOLDER}{file}"')
+
+    def pause(self) -> None:
+        """Pause the print: the firmware runs pause.g."""
+        self.command("M25")
+
+    def resume(self) -> None:
+        """Go on with it."""
+        self.command("M24")
+
+    def cancel(self) -> None:
+        """Pause, which the firmware insists on, then end: it runs cancel.g, or switches heaters off where there is none."""
+        self.command("M25")
+        deadline_s = time.monotonic() + PAUSE_S
+        while (phase := self.status().phase) in (Phase.PRINTING, Phase.PAUSING, Phase.RESUMING):
+            if time.monotonic() > deadline_s:
+                raise ServerError(f"{self.name} has not paused within {PAUSE_S:g} s, and cancels only then: look at it")
+            time.sleep(LOOK_S)
+        if phase is Phase.PAUSED:
+            self.command("M0")
+
+    def command(self, line: str) -> None:
+        """Have a line of G-code executed."""
+        value = table(self._value("/rr_gcode", {"gcode": line}))
+        if value.get("err", 0) != 0:
+            raise ServerError(f"{self.name} has not taken {line}: it is busy")
+
+    def emergency_stop(self) -> None:
+        """M112: the board halts until it is reset."""
+        self.command("M112")
+
+    def close(self) -> None:
+        """End the session, so that others find room, and leave."""
+        try:
+            if self._connected:
+                self._http.get("/rr_disconnect")
+        except ServerError:
+            pass
+        finally:
+            self._http.close()
+
+    def _model(self, key: str) -> Any:
+        return table(self._value("/rr_model", {"key": key, "flags": "d99vn"})).get("result")
+
+    def _array(self, key: str) -> list[Any]:
+        """An array of the object model, which comes in pages."""
+        entries: list[Any] = []
+        flags = "d99vn"
+        for _ in range(MOST_PAGES):
+            page = table(self._value("/rr_model", {"key": key, "flags": flags}))
+            entries += page["result"] if isinstance(page.get("result"), list) else []
+            following = whole(page.get("next"))
+            if not following:
+                break
+            flags = f"d99vna{following}"
+        return entries
+
+    def _value(self, path: str, params: Mapping[str, str]) -> Any:
+        sentence = {503: f"{self.name} is short of memory just now: try again"}
+        return self._http.check(self._get(path, params), "to answer", Refusals(sentence))
+
+    def _get(self, path: str, params: Mapping[str, str] | None = None) -> Reply:
+        """The reply; a session that has ended is begun again."""
+        reply = self._http.get(path, params)
+        if reply.status == 401:
+            self._connect()
+            reply = self._http.get(path, params)
+        return reply

@@ -1,0 +1,156 @@
+"""Follow: a print on a server watched to its end, while a person asks for a pause, the end, or the emergency stop.
+
+The server prints without this program. What it is asked may be answered late: polls and orders have threads of their own, so
+that the emergency stop never waits for them.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
+from machine.network.server import ACTIVE, JobStatus, Phase, PrintServer
+from profiles.errors import ServerError
+
+POLL_S, TURN_S = 1.0, 0.05
+SHOW_S = 0.25  # what is shown is drawn again: a question to the person stands beside it
+BEGIN_S = 15.0  # a server that has taken the order to start shows it by then
+LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
+OnStatus = Callable[[JobStatus, str], None]  # with a message to the person, "" when there is none
+
+
+class End(Enum):
+    """How following a print ended."""
+
+    DONE = "done"
+    CANCELLED = "cancelled"
+    LEFT = "left"  # the print goes on
+    STOPPED = "stopped"  # by the emergency stop
+
+
+@dataclass
+class _Heard:
+    """What the polling thread has heard last, and how long it has heard nothing."""
+
+    status: JobStatus | None = None
+    error: ServerError | None = None
+    answered_s: float = field(default_factory=time.monotonic)
+
+
+def follow_print(server: PrintServer, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]) -> End:
+    """Follow a print that has been ordered to start; size: of its file, bytes; left(): whether the person has gone away.
+
+    Raises ServerError when the print fails or the server is lost.
+    """
+    return _Follower(server, size, on_status, control, left).run()
+
+
+class _Follower:
+    def __init__(self, server: PrintServer, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]) -> None:
+        self._server, self._size, self._on_status, self._control, self._left = server, size, on_status, control, left
+        self._heard, self._over = _Heard(), threading.Event()
+        self._orders: deque[Callable[[], None]] = deque()
+        self._message = ""
+        self._last_active: Phase | None = None
+        self._read = 0
+        self._began_s = time.monotonic()
+        self._shown: tuple[JobStatus | None, str] = (None, "")
+        self._shown_s = 0.0
+
+    def run(self) -> End:
+        for work in (self._poll, self._carry_out):
+            threading.Thread(target=work, name="print server", daemon=True).start()
+        try:
+            while True:
+                if self._left():
+                    return End.LEFT
+                if self._take_requests():
+                    return End.STOPPED
+                end = self._look()
+                if end is not None:
+                    return end
+                time.sleep(TURN_S)
+        finally:
+            self._over.set()
+
+    def _look(self) -> End | None:
+        """Tell the newest status; how the print has ended, None while it goes on."""
+        heard, silent_s = self._heard, time.monotonic() - self._heard.answered_s
+        if heard.error is not None and silent_s > LOST_S:
+            raise ServerError(f"{heard.error}; no answer for {silent_s:.0f} s: the print may go on, look at the printer")
+        if heard.status is None:
+            return None
+        message = self._message or (f"no answer for {silent_s:.0f} s, the print goes on there" if heard.error is not None else "")
+        if heard.status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
+            self._shown, self._shown_s = (heard.status, message), time.monotonic()
+            self._on_status(heard.status, message)
+        return self._end_of(heard.status)
+
+    def _end_of(self, status: JobStatus) -> End | None:
+        if status.phase in ACTIVE:
+            self._last_active, self._read = status.phase, max(self._read, status.bytes_read or 0)
+            return None
+        if status.phase is Phase.OFFLINE or (status.phase is Phase.FAILED and self._last_active is not None):
+            where = f" at {100 * self._read / self._size:.0f} %" if self._read else ""
+            raise ServerError(f"{self._server.name}: the print has failed{where}: {status.message or status.phase.value}")
+        if self._last_active is None:
+            return self._end_unseen(status)
+        return End.DONE if status.phase is Phase.DONE else End.CANCELLED
+
+    def _end_unseen(self, status: JobStatus) -> End | None:
+        """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
+        if time.monotonic() - self._began_s < BEGIN_S:
+            return None
+        if status.phase is Phase.DONE:
+            return End.DONE
+        raise ServerError(
+            f"{self._server.name} has not begun to print within {BEGIN_S:g} s: {status.message or 'no reason given'}"
+        )
+
+    def _poll(self) -> None:
+        while not self._over.is_set():
+            before = self._heard
+            try:
+                self._heard = _Heard(self._server.status())
+            except ServerError as error:
+                self._heard = _Heard(before.status, error, before.answered_s)
+            self._over.wait(POLL_S)
+
+    def _take_requests(self) -> bool:
+        """Hand on what a person has asked for; True after an emergency stop."""
+        while (request := self._control.take()) is not None:
+            if request.command is Command.EMERGENCY_STOP:
+                self._stop()
+                return True
+            if order := self._order(request):
+                self._orders.append(order)
+        return False
+
+    def _stop(self) -> None:
+        try:
+            self._server.emergency_stop()
+        except ServerError as error:
+            raise ServerError(f"emergency stop: {self._server.name} did not confirm it: cut the power ({error})") from None
+
+    def _order(self, request: PendingCommand) -> Callable[[], None] | None:
+        server, value = self._server, request.value
+        if request.command in (Command.FEED, Command.FLOW):
+            feed = request.command is Command.FEED
+            self._message = percent_refusal(value, FEED_PERCENT if feed else FLOW_PERCENT) or ""
+            return None if self._message else (lambda: server.command(f"{'M220' if feed else 'M221'} S{value:g}"))
+        orders = {Command.PAUSE: server.pause, Command.RESUME: server.resume, Command.CANCEL: server.cancel}
+        return orders.get(request.command)
+
+    def _carry_out(self) -> None:
+        """Orders one after the other; what a server refuses is told, and following goes on."""
+        while not self._over.wait(TURN_S):
+            while self._orders:
+                order = self._orders.popleft()
+                try:
+                    order()
+                    self._message = ""
+                except ServerError as error:
+                    self._message = str(error)

@@ -1,0 +1,232 @@
+"""HTTP: requests to one print server, and every way in which they fail as one sentence.
+
+Redirects are not followed and no proxy of the environment is used: either would carry the key to somebody else. Certificates
+are verified; nothing turns that off.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import socket
+import ssl
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from machine.network.address import NAMES, ServerAddress
+from machine.network.credentials import Credentials, how_to_give_a_key, servers_file
+from profiles.errors import ServerError
+
+if TYPE_CHECKING:
+    import httpx
+
+CONNECT_S, ANSWER_S = 5.0, 10.0
+ERRNO = re.compile(r"^\[errno -?\d+\] ")
+WORDS = 160  # characters of a server's own words in a message
+Tell = Callable[[str, bytes], None]  # direction and what went over the line, as a log takes it
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What a server has answered. path: what was asked for, for messages."""
+
+    status: int
+    body: bytes
+    path: str
+    location: str = ""
+
+    def json(self) -> Any:
+        """The body's value; None when it is none."""
+        try:
+            return json.loads(self.body)
+        except (ValueError, RecursionError):
+            return None
+
+
+@dataclass(frozen=True)
+class Refusals:
+    """What a status means to a request, where that is not what it usually means. key: it is about the key."""
+
+    sentences: Mapping[int, str] = field(default_factory=dict)
+    key: tuple[int, ...] = (401, 403)
+
+
+class HttpSession:
+    """get() and post() below a server's address; from any thread. Raises ServerError with a sentence for a person."""
+
+    def __init__(self, address: ServerAddress, credentials: Credentials, tell: Tell | None = None) -> None:
+        import httpx
+
+        for name in ("httpx", "httpcore"):  # they would log addresses, and a Duet's password is part of one
+            logging.getLogger(name).setLevel(logging.WARNING)
+        self.address, self.credentials = address, credentials
+        self._tell = tell or (lambda direction, data: None)
+        self._log_lock = threading.Lock()
+        self._httpx = httpx
+        self._client = httpx.Client(
+            base_url=address.url,
+            verify=_certificates(address, credentials),
+            trust_env=False,
+            follow_redirects=False,
+            headers={"User-Agent": "tiltprint", "Accept": "application/json"},
+            timeout=httpx.Timeout(ANSWER_S, connect=CONNECT_S),
+        )
+
+    @property
+    def name(self) -> str:
+        """The server as the user names it."""
+        return self.address.text
+
+    def close(self) -> None:
+        """End all connections."""
+        self._client.close()
+
+    def set_header(self, name: str, value: str) -> None:
+        """Send a header with every further request."""
+        self._client.headers[name] = value
+
+    def get(self, path: str, params: Mapping[str, str] | None = None, secret: bool = False) -> Reply:
+        """GET. secret: the parameters are not logged."""
+        return self._request("GET", path, params=params, note=path if secret else _shown(path, params))
+
+    def post(self, path: str, value: Any = None, answer_s: float = ANSWER_S) -> Reply:
+        """POST a value as JSON, or nothing."""
+        note = path + ("" if value is None else f" {json.dumps(value)}")
+        timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S)
+        return self._request("POST", path, json=value, timeout=timeout, note=note)
+
+    def upload(
+        self,
+        path: str,
+        pieces: Iterable[bytes],
+        length: int,
+        headers: Mapping[str, str],
+        params: Mapping[str, str] | None = None,
+        answer_s: float = ANSWER_S,
+    ) -> Reply:
+        """POST a body of so many bytes; the answer may take so many seconds after its last one."""
+        timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S, write=30.0)
+        sent = {**headers, "Content-Length": str(length)}
+        note = f"{_shown(path, params)} ({length} bytes)"
+        return self._request("POST", path, params=params, content=pieces, headers=sent, timeout=timeout, note=note)
+
+    def _request(self, method: str, path: str, note: str, **request: Any) -> Reply:
+        self._log(">", f"{method} {note}")
+        try:
+            answer = self._client.request(method, path, **{k: v for k, v in request.items() if v is not None})
+        except self._httpx.TransportError as error:
+            sentence = _transport_sentence(error, self.address, self._httpx)
+            self._log("#", sentence)
+            raise ServerError(sentence) from None
+        except (self._httpx.InvalidURL, self._httpx.DecodingError) as error:
+            raise ServerError(f"what answers at {self.address.url} speaks no proper HTTP: {plain(str(error))}") from None
+        reply = Reply(answer.status_code, answer.content, path, answer.headers.get("location", ""))
+        self._log("<", f"{reply.status} {self.words(reply)}")
+        return reply
+
+    def _log(self, direction: str, text: str) -> None:
+        with self._log_lock:
+            self._tell(direction, f"{self._without_key(text)}\n".encode())
+
+    def _without_key(self, text: str) -> str:
+        key = self.credentials.key
+        return text.replace(key, "***") if key else text
+
+    def check(self, reply: Reply, purpose: str, refusals: Refusals | None = None) -> Any:
+        """The value of a good reply. Raises ServerError; purpose: what was wanted, as `starting the print`."""
+        refusals = refusals or Refusals()
+        status, address = reply.status, self.address
+        if 200 <= status < 300:
+            return reply.json()
+        words = self.words(reply)
+        if status in refusals.sentences:
+            raise ServerError(refusals.sentences[status].format(words=words or f"status {status}"))
+        if 300 <= status < 400:
+            where = plain(reply.location) or "nowhere"
+            raise ServerError(f"{self.name} redirects to {where}: give that server's address, no key is carried there")
+        if status in refusals.key:
+            raise ServerError(self._key_sentence(status, words))
+        if status == 404:
+            raise ServerError(f"{address.url} is no {NAMES[address.kind].removeprefix('a ')}: it knows no {reply.path}")
+        if status in (413, 507):
+            raise ServerError(f"{self.name} has no room for it ({words or status}): delete files there")
+        raise ServerError(f"{self.name} refuses {purpose}: {words or f'status {status}'}")
+
+    def _key_sentence(self, status: int, words: str) -> str:
+        if not self.credentials.key:
+            return f"{self.name} wants a key: {how_to_give_a_key(self.address)}"
+        return f"{self.name} refuses the key or what its user may do ({words or status}): {how_to_give_a_key(self.address)}"
+
+    def words(self, reply: Reply) -> str:
+        """A server's own words on what it refuses, short and without the key; "" when it has none."""
+        value = reply.json()
+        error = value.get("error", value.get("message")) if isinstance(value, dict) else None
+        if isinstance(error, dict):
+            error = error.get("message")
+        if isinstance(value, str):
+            error = value
+        if error is None and not reply.body.lstrip().startswith(b"<"):  # a page says nothing in a line
+            error = reply.body[: 4 * WORDS].decode("utf-8", "replace")
+        return self._without_key(plain(str(error or "")))
+
+
+def plain(text: str) -> str:
+    """Words of a server as part of one line: nothing in them can act on a terminal."""
+    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return line if len(line) <= WORDS else line[: WORDS - 3] + "..."
+
+
+def _shown(path: str, params: Mapping[str, str] | None) -> str:
+    return path + ("?" + "&".join(f"{key}={value}" for key, value in params.items()) if params else "")
+
+
+def _certificates(address: ServerAddress, credentials: Credentials) -> ssl.SSLContext:
+    if address.scheme == "http":
+        return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # trusts nobody, and need not: there is no TLS on this way
+    try:
+        return ssl.create_default_context(cafile=credentials.ca_file)
+    except OSError as error:  # ssl.SSLError is one
+        raise ServerError(
+            f"ca_file {credentials.ca_file} for {address.text} holds no certificates: {error.strerror or error}"
+        ) from None
+
+
+def _transport_sentence(error: httpx.TransportError, address: ServerAddress, httpx_: Any) -> str:
+    """What went wrong below HTTP, and what to look at."""
+    where, chain = f"{address.host} at port {address.port}", _causes(error)
+    if any(isinstance(each, socket.gaierror) for each in chain):
+        return f"{address.text}: no computer of the name {address.host} is known here: an IP address will do, too"
+    if trust := next((each for each in chain if isinstance(each, ssl.SSLCertVerificationError)), None):
+        return (
+            f"{address.text}: its certificate cannot be trusted ({plain(trust.verify_message)}): for one of your own name "
+            f'its authority as ca_file below [servers."{address.host}"] in {servers_file()}'
+        )
+    if any(isinstance(each, ssl.SSLError) for each in chain):
+        return f"{address.text}: {where} speaks no TLS: is it http:// instead of https://?"
+    if any(isinstance(each, ConnectionRefusedError) for each in chain):
+        return f"{address.text}: nothing listens on {where}: is {NAMES[address.kind]} switched on and the port right?"
+    if isinstance(error, httpx_.ConnectTimeout):
+        other = ", and does it speak TLS" if address.scheme == "https" else ""
+        return f"{address.text}: {where} does not answer within {CONNECT_S:g} s: is it switched on, in this network{other}?"
+    if isinstance(error, httpx_.ConnectError):
+        return f"{address.text}: {where} cannot be reached: {_reason(error)}"
+    if isinstance(error, httpx_.TimeoutException):
+        return f"{address.text}: {where} has stopped answering"
+    if isinstance(error, httpx_.RemoteProtocolError):
+        return f"{address.text}: what answers on {where} breaks off or speaks no HTTP ({_reason(error)})"
+    return f"{address.text}: the connection to {where} broke off ({_reason(error)})"
+
+
+def _reason(error: Exception) -> str:
+    return ERRNO.sub("", plain(str(error)).lower()) or type(error).__name__
+
+
+def _causes(error: BaseException | None) -> list[BaseException]:
+    causes: list[BaseException] = []
+    while error is not None and error not in causes:
+        causes.append(error)
+        error = error.__cause__ or error.__context__
+    return causes

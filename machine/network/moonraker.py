@@ -1,0 +1,158 @@
+"""Moonraker's HTTP API (moonraker.readthedocs.io/en/latest/external_api, read in the sources of 0.11), which drives Klipper.
+
+A wrong key is 401; 403 of an upload is a file that is being printed. Klipper works on orders one after the other: a pause or a
+cancellation waits for the command under way, a heating included, and is answered when it is done (docs/API_Server.md); the
+emergency stop is not.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from machine.link.protocol.events import Temperature
+from machine.network.answers import entry, number, table, whole
+from machine.network.gcode_upload import GcodeUpload, Sent
+from machine.network.http import HttpSession, Refusals
+from machine.network.server import Greeting, JobStatus, Phase
+from profiles.errors import ServerError
+
+READ_S = 300.0  # the server reads a whole file for its metadata before it answers
+ORDERED_S = 120.0
+KEY = (401,)
+STEPPER = "manual_stepper "
+STATES = {
+    "standby": Phase.READY,
+    "printing": Phase.PRINTING,
+    "paused": Phase.PAUSED,
+    "complete": Phase.DONE,
+    "cancelled": Phase.CANCELLED,
+    "error": Phase.FAILED,
+}
+REPORTED = ("webhooks", "print_stats", "virtual_sdcard", "extruder", "heater_bed", "gcode_move")
+
+
+class Moonraker:
+    """PrintServer of a Moonraker."""
+
+    def __init__(self, http: HttpSession) -> None:
+        self._http = http
+        self.name = http.name
+        if http.credentials.key:
+            http.set_header("X-Api-Key", http.credentials.key)
+
+    def greet(self) -> Greeting:
+        """Its version; axes, limits and steppers of its Klipper where that is ready."""
+        server = table(self._get("/server/info"))
+        if "klippy_state" not in server:
+            raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
+        text = f"Moonraker {server.get('moonraker_version') or ''}".strip()
+        if server["klippy_state"] != "ready":
+            return Greeting(text, "Klipper")
+        version = str(table(self._get("/printer/info")).get("software_version") or "")
+        objects = table(self._get("/printer/objects/list")).get("objects")
+        names = frozenset(name for name in objects if isinstance(name, str)) if isinstance(objects, list) else frozenset()
+        steppers = frozenset(name.removeprefix(STEPPER) for name in names if name.startswith(STEPPER))
+        limits = self._limits() if "toolhead" in names else {}
+        return Greeting(f"{text}, Klipper {version}".strip(), f"Klipper {version}".strip(), "XYZ", limits, steppers)
+
+    def _limits(self) -> dict[str, tuple[float, float]]:
+        toolhead = table(self._query(("toolhead",)).get("toolhead"))
+        pairs = ((number(entry(toolhead.get(f"axis_{end}"), k)) for end in ("minimum", "maximum")) for k in range(3))
+        found = zip("XYZ", (tuple(pair) for pair in pairs), strict=True)
+        return {letter: (low, high) for letter, (low, high) in found if low is not None and high is not None}
+
+    def status(self) -> JobStatus:
+        """From the objects that Klipper reports; where it does not run, from what Moonraker says of it."""
+        server = table(self._get("/server/info"))
+        if server.get("klippy_state") != "ready":
+            return JobStatus(Phase.OFFLINE, message=self._trouble(server))
+        found = self._query(REPORTED)
+        job, card, moves = table(found.get("print_stats")), table(found.get("virtual_sdcard")), table(found.get("gcode_move"))
+        feed, flow = number(moves.get("speed_factor")), number(moves.get("extrude_factor"))
+        return JobStatus(
+            STATES.get(str(job.get("state")), Phase.READY),
+            str(job.get("filename") or ""),
+            whole(card.get("file_position")),
+            number(job.get("total_duration")),
+            _temperature(found),
+            None if feed is None else 100.0 * feed,
+            None if flow is None else 100.0 * flow,
+            str(job.get("message") or ""),
+        )
+
+    def _trouble(self, server: Mapping[str, Any]) -> str:
+        """Why Klipper cannot print."""
+        if not server.get("klippy_connected"):
+            return "Klipper does not run there"
+        words = table(self._http.get("/printer/info").json()).get("result")
+        return f"Klipper is in the state {server.get('klippy_state')}: {table(words).get('state_message') or 'no reason given'}"
+
+    def has(self, file: str) -> bool:
+        """Whether it holds a file of this name."""
+        reply = self._http.get("/server/files/metadata", {"filename": file})
+        return reply.status != 404 and self._value(reply, "to tell of its files") is not None
+
+    def upload(self, upload: GcodeUpload, sent: Sent) -> str:
+        """Hand over a file with its checksum, without which half a file would be taken for a whole one."""
+        pieces, length, headers = upload.form({"root": "gcodes", "checksum": upload.sha256}, sent)
+        reply = self._http.upload("/server/files/upload", pieces, length, headers, answer_s=READ_S)
+        sentences = {
+            400: f"{self.name} does not take the file: {{words}}; it takes files up to max_upload_size of its [server]",
+            403: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})",
+            422: f"{self.name} has received another file than was sent ({{words}}): send it again",
+        }
+        value = table(self._http.check(reply, "the file", Refusals(sentences, KEY)))
+        path = table(value.get("item")).get("path")
+        if not isinstance(path, str):
+            raise ServerError(f"{self.name} has not said that it holds the file: send it again")
+        return path
+
+    def start(self, file: str) -> None:
+        """Begin to print a file that it holds."""
+        sentence = {400: f"{self.name} cannot start it now: {{words}}"}
+        self._order("/printer/print/start", {"filename": file}, sentence)
+
+    def pause(self) -> None:
+        """Pause the print."""
+        self._order("/printer/print/pause")
+
+    def resume(self) -> None:
+        """Go on with it."""
+        self._order("/printer/print/resume")
+
+    def cancel(self) -> None:
+        """End it: Klipper's CANCEL_PRINT macro says what that means."""
+        self._order("/printer/print/cancel")
+
+    def command(self, line: str) -> None:
+        """Have a line of G-code executed, after the one under way."""
+        self._order("/printer/gcode/script", {"script": line})
+
+    def emergency_stop(self) -> None:
+        """Klipper shuts down at once."""
+        self._value(self._http.post("/printer/emergency_stop"), "the emergency stop")
+
+    def close(self) -> None:
+        """Leave."""
+        self._http.close()
+
+    def _query(self, names: tuple[str, ...]) -> Mapping[str, Any]:
+        value = self._value(
+            self._http.post("/printer/objects/query", {"objects": dict.fromkeys(names)}), "to tell of its printer"
+        )
+        return table(table(table(value).get("result")).get("status"))
+
+    def _get(self, path: str) -> Any:
+        return table(self._value(self._http.get(path), "to say who it is")).get("result")
+
+    def _order(self, path: str, value: Mapping[str, Any] | None = None, sentences: Mapping[int, str] | None = None) -> None:
+        reply = self._http.post(path, value, answer_s=ORDERED_S)
+        self._http.check(reply, f"{path.rpartition('/')[2]}", Refusals(sentences or {}, KEY))
+
+    def _value(self, reply: Any, purpose: str) -> Any:
+        sentence = {503: f"{self.name} has lost its Klipper: {{words}}"}
+        return self._http.check(reply, purpose, Refusals(sentence, KEY))
+
+
+def _temperature(found: Mapping[str, Any]) -> Temperature:
+    nozzle, bed = table(found.get("extruder")), table(found.get("heater_bed"))
+    return Temperature(*(number(each.get(key)) for each in (nozzle, bed) for key in ("temperature", "target")))

@@ -1,0 +1,100 @@
+"""Server: what every kind of print server can be asked for, and where a print on one stands."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+from machine.link.protocol.events import Temperature
+from machine.network.gcode_upload import GcodeUpload, Sent
+
+
+class Phase(Enum):
+    """Where a server and its print stand; the words are those of a print over a serial port where it knows the phase, too."""
+
+    READY = "ready"
+    PRINTING = "printing"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    RESUMING = "resuming"
+    CANCELLING = "cancelling"
+    FINISHING = "finishing"
+    DONE = "done"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+    OFFLINE = "offline"  # the server is there, its printer is not
+
+
+ACTIVE = frozenset({Phase.PRINTING, Phase.PAUSING, Phase.PAUSED, Phase.RESUMING, Phase.CANCELLING, Phase.FINISHING})
+
+
+@dataclass(frozen=True)
+class JobStatus:
+    """A moment of a server. file: what it prints or has printed last; bytes_read: how far into the file; message: its own words.
+
+    None: not told. feed_percent and flow_percent: its overrides.
+    """
+
+    phase: Phase
+    file: str = ""
+    bytes_read: int | None = None
+    elapsed_s: float | None = None
+    temperature: Temperature = field(default_factory=Temperature)
+    feed_percent: float | None = None
+    flow_percent: float | None = None
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Greeting:
+    """Who answers. text: server, version and what it drives; firmware: as M115 names it, "" when it does not tell.
+
+    letters: axes of the printer; limits: letter -> least and greatest place, mm or deg; steppers: names of the [manual_stepper]
+    sections, None where there is no such thing.
+    """
+
+    text: str
+    firmware: str = ""
+    letters: str = ""
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    steppers: frozenset[str] | None = None
+
+
+class PrintServer(Protocol):
+    """One print server. All raise ServerError; status() and orders may come from different threads."""
+
+    @property
+    def name(self) -> str:
+        """As the user names it."""
+
+    def greet(self) -> Greeting:
+        """Make sure that it is such a server, that the key is good, and learn what it drives."""
+
+    def status(self) -> JobStatus:
+        """Where it stands."""
+
+    def has(self, file: str) -> bool:
+        """Whether it holds a file of this name."""
+
+    def upload(self, upload: GcodeUpload, sent: Sent) -> str:
+        """Hand over a file and return the name by which it is printed; half a file is never kept."""
+
+    def start(self, file: str) -> None:
+        """Begin to print a file that it holds."""
+
+    def pause(self) -> None:
+        """Pause the print."""
+
+    def resume(self) -> None:
+        """Go on with it."""
+
+    def cancel(self) -> None:
+        """End it."""
+
+    def command(self, line: str) -> None:
+        """Have a line of G-code executed."""
+
+    def emergency_stop(self) -> None:
+        """Halt at once."""
+
+    def close(self) -> None:
+        """Leave."""

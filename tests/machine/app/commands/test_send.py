@@ -1,0 +1,122 @@
+"""`tiltprint send` and `print --port SERVER`: what is checked before a byte goes, what is said, what is left behind."""
+
+from pathlib import Path
+
+import pytest
+
+from machine.app.cli import main
+from machine.network import follow
+from machine.network.credentials import VARIABLE
+from tests.machine.network.stand_ins import KEY, stand_in
+
+PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
+MARLIN, KLIPPER = PROGRAMS / "post_and_arm_generic_ac.gcode", PROGRAMS / "post_and_arm_fractal5pro.gcode"
+
+
+@pytest.fixture(autouse=True)
+def _own_folders(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(follow, "POLL_S", 0.02)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setenv(VARIABLE, KEY)
+
+
+def sent(*words: object) -> int:
+    return main(["send", *map(str, words)])
+
+
+def test_a_file_is_sent_and_started_where_that_is_asked_for(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    with stand_in("octoprint") as (job, address):
+        assert sent(MARLIN, "--to", address, "--force") == 0
+        assert job.files["post_and_arm_generic_ac.gcode"].decode().splitlines() == MARLIN.read_text().splitlines()
+        assert job.state == "idle"
+        first = capsys.readouterr()
+        assert sent(MARLIN, "--to", address, "--start", "--force") == 0
+        assert job.state == "printing"
+    second = capsys.readouterr()
+    assert f"post_and_arm_generic_ac.gcode waits on {address}" in first.out
+    assert f"post_and_arm_generic_ac.gcode prints on {address}" in second.out
+    assert "replaces the post_and_arm_generic_ac.gcode that is there" in second.err
+    left_behind = b"".join(file.read_bytes() for file in (tmp_path / "state").rglob("*") if file.is_file())
+    assert b"GET /api/version" in left_behind
+    assert KEY.encode() not in left_behind
+    assert KEY not in first.out + first.err + second.out + second.err
+
+
+@pytest.mark.parametrize(("kind", "file"), [("octoprint", MARLIN), ("moonraker", KLIPPER)])
+def test_a_print_on_a_server_is_followed_to_its_end(kind: str, file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with stand_in(kind, steppers=("stepper_a", "stepper_c")) as (job, address):
+        assert main(["print", str(file), "--port", address, "--force"]) == 0
+    said = capsys.readouterr()
+    assert "there is no journal to resume from after a power cut" in said.err
+    assert f"printed {file.name} on {address}" in said.out
+    assert job.state == "complete"
+
+
+@pytest.mark.parametrize(
+    ("kind", "file", "sentence"),
+    [
+        ("moonraker", MARLIN, "generic A/C table writes for marlin, but Moonraker prints klipper or klipper_steppers: "),
+        (
+            "duet",
+            KLIPPER,
+            "Fractal 5 Pro writes for klipper, but a Duet prints reprapfirmware: --machine must be one of those, as gen5x",
+        ),
+    ],
+)
+def test_a_program_for_another_firmware_is_refused_before_a_byte_is_sent(
+    kind: str, file: Path, sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with stand_in(kind) as (job, address):
+        assert sent(file, "--to", address, "--force") == 1
+    assert sentence in capsys.readouterr().err
+    assert not any(asked.startswith("POST") and "query" not in asked for asked in job.asked)
+
+
+def test_a_klipper_without_the_table_s_steppers_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with stand_in("moonraker", steppers=("stepper_b",)) as (job, address):
+        assert sent(KLIPPER, "--to", address) == 1
+    said = capsys.readouterr().err
+    assert "[manual_stepper" in said
+    assert "which this Klipper lacks; it has stepper_b" in said
+    assert job.files == {}
+
+
+def test_a_file_in_which_the_dry_run_finds_errors_is_not_sent(capsys: pytest.CaptureFixture[str]) -> None:
+    with stand_in("octoprint") as (job, address):
+        assert sent(MARLIN, "--to", address) == 1
+    assert "the dry run found 1 errors, the first: the part begins in air" in capsys.readouterr().err
+    assert job.files == {}
+
+
+def test_a_file_made_for_another_machine_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with stand_in("octoprint") as (job, address):
+        assert sent(MARLIN, "--to", address, "--set", "machine.tilt.point_mm=[0, 0, -33]") == 1
+    assert "was made when machine.tilt.point_mm of generic A/C table was" in capsys.readouterr().err
+    assert job.files == {}
+
+
+def test_a_server_that_prints_is_told_of_before_any_work(capsys: pytest.CaptureFixture[str]) -> None:
+    with stand_in("octoprint") as (job, address):
+        job.files["other.gcode"] = b"G28\n" * 100_000
+        job.start("other.gcode")
+        assert sent(MARLIN, "--to", address, "--start") == 1
+    assert f"{address} is printing other.gcode now: wait until that is done" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["send", "box.stl", "--to", "octoprint:octopi"], "box.stl is no G-code file: export makes one"),
+        (["send", str(MARLIN), "--to", "prusalink:host"], "octoprint:HOST, moonraker:HOST or duet:HOST"),
+        (
+            ["print", str(MARLIN), "--port", "octoprint:octopi", "--journal", "j"],
+            "--journal j: octoprint:octopi prints from a file",
+        ),
+        (["send", str(MARLIN), "--to", "octoprint:octopi", "--log", str(MARLIN)], "is the same file as the model, which is read"),
+    ],
+)
+def test_what_cannot_be_sent_is_one_sentence(words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words) == 1
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count("\n") == 1

@@ -1,0 +1,298 @@
+"""Each kind of server: a file handed over, printed, paused, cancelled, halted; refusals and broken lines as sentences."""
+
+import shutil
+import socket
+import subprocess
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from machine.link.pending_commands import Command, Control
+from machine.network import duet, follow, http
+from machine.network.credentials import VARIABLE, servers_file
+from machine.network.follow import End, follow_print
+from machine.network.gcode_upload import GcodeUpload
+from machine.network.server import JobStatus, Phase, PrintServer
+from machine.network.servers import KINDS, open_server
+from profiles.errors import ServerError
+from tests.machine.network.stand_ins import KEY, stand_in
+
+LINES = tuple(f"G1 X{k}" for k in range(20_000))
+UPLOAD = GcodeUpload("box.gcode", LINES)
+every_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(follow, "POLL_S", 0.02)
+    monkeypatch.setattr(follow, "TURN_S", 0.002)
+    monkeypatch.setattr(duet, "LOOK_S", 0.01)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    monkeypatch.setenv(VARIABLE, KEY)
+
+
+def unheard(count: int) -> None:
+    del count
+
+
+def hand_over(server: PrintServer) -> str:
+    server.greet()
+    return server.upload(UPLOAD, unheard)
+
+
+def run(server: PrintServer, control: Control, on_status: Callable[[JobStatus, str], None] = lambda status, message: None) -> End:
+    return follow_print(server, len(UPLOAD.content), on_status, control, lambda: False)
+
+
+@every_kind
+def test_a_file_is_handed_over_whole_with_its_progress(kind: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.greet()
+        assert not server.has("box.gcode")
+        counts: list[int] = []
+        assert server.upload(UPLOAD, counts.append) == "box.gcode"
+        assert server.has("box.gcode")
+    assert job.files == {"box.gcode": UPLOAD.content}
+    assert counts == [*range(0, len(UPLOAD.content), 65536), len(UPLOAD.content)]
+
+
+@every_kind
+def test_a_print_is_started_and_followed_to_its_end(kind: str) -> None:
+    seen: list[JobStatus] = []
+    with stand_in(kind) as (_, address), open_server(address) as server:
+        server.start(hand_over(server))
+        assert run(server, Control(), lambda status, message: seen.append(status)) is End.DONE
+    printing = [status for status in seen if status.phase is Phase.PRINTING]
+    assert printing
+    assert 0 < printing[0].bytes_read < len(UPLOAD.content)
+    heat = printing[0].temperature
+    assert (heat.nozzle_c, heat.nozzle_target_c, heat.bed_c, heat.bed_target_c) == (209.6, 210.0, 59.9, 60.0)
+
+
+@every_kind
+def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> None:
+    control, phases = Control(), list[Phase]()
+    asks = {Phase.PRINTING: Command.PAUSE, Phase.PAUSED: Command.RESUME}
+
+    def ask(status: JobStatus, message: str) -> None:
+        if phases[-1:] == [status.phase]:
+            return
+        phases.append(status.phase)
+        done = len(phases) > 2  # printing, paused, printing
+        if status.phase in asks:
+            control.ask(Command.CANCEL if done else asks[status.phase])
+
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        file = hand_over(server)
+        job.files[file] *= 1000  # long enough
+        server.start(file)
+        end = follow_print(server, 1000 * len(UPLOAD.content), ask, control, lambda: False)
+    assert end is End.CANCELLED
+    assert job.state == "cancelled"
+    assert phases[:3] == [Phase.PRINTING, Phase.PAUSED, Phase.PRINTING]
+
+
+@every_kind
+def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
+    control = Control()
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.start(hand_over(server))
+        job.state = "paused"
+        control.ask(Command.FEED, 120.0)
+        control.ask(Command.FLOW, 900.0)  # not possible: told, not sent
+
+        def stop(status: JobStatus, message: str) -> None:
+            if job.commands:
+                control.ask(Command.EMERGENCY_STOP)
+
+        assert run(server, control, stop) is End.STOPPED
+        assert server.status().phase is Phase.OFFLINE
+    assert job.commands[0] == "M220 S120"
+    assert job.halted
+
+
+@every_kind
+def test_a_person_leaves_a_print_that_goes_on(kind: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.start(hand_over(server))
+        assert follow_print(server, 1, lambda status, message: None, Control(), lambda: True) is End.LEFT
+        assert job.state == "printing"
+
+
+@every_kind
+@pytest.mark.parametrize(("key", "sentence"), [("another-key", "refuses the"), ("", "wants a")])
+def test_a_wrong_or_missing_key_is_one_sentence_without_it(
+    kind: str, key: str, sentence: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, key)
+    logged: list[bytes] = []
+    with (
+        stand_in(kind) as (_, address),
+        open_server(address, lambda direction, data: logged.append(data)) as server,
+        pytest.raises(ServerError, match=sentence) as refused,
+    ):
+        server.greet()
+    assert str(servers_file()) in str(refused.value)
+    assert not key or key not in str(refused.value) + str(logged)
+
+
+@every_kind
+def test_no_key_stands_in_the_log(kind: str) -> None:
+    logged: list[bytes] = []
+    with stand_in(kind) as (_, address), open_server(address, lambda direction, data: logged.append(data)) as server:
+        server.start(hand_over(server))
+        assert run(server, Control()) is End.DONE
+    assert b"GET" in b"".join(logged)
+    assert KEY.encode() not in b"".join(logged)
+
+
+UPLOADS = {"octoprint": "/api/files/local", "moonraker": "/server/files/upload", "duet": "/rr_upload"}
+
+
+@every_kind
+@pytest.mark.parametrize(
+    ("status", "words", "sentence"),
+    [
+        (413, "Payload Too Large", "has no room for it .Payload Too Large."),
+        (507, "Insufficient Storage", "has no room for it"),
+        (302, "http://elsewhere/", "redirects to .*http://elsewhere/.*no key is carried there"),
+        (500, "a \x1b[31mred\x07 page " + "x" * 5000, "refuses the file: .*x\\.\\.\\.$"),
+    ],
+)
+def test_what_a_server_refuses_is_one_sentence(kind: str, status: int, words: str, sentence: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.greet()
+        job.refuse[UPLOADS[kind]] = (status, words.encode() if status == 500 else words)
+        with pytest.raises(ServerError, match=sentence) as refused:
+            server.upload(UPLOAD, unheard)
+    assert str(refused.value).isprintable()
+    assert len(str(refused.value)) < 300
+
+
+@every_kind
+def test_half_an_upload_is_no_file(kind: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.greet()
+        job.break_off = UPLOADS[kind]
+        with pytest.raises(ServerError, match=r"broke off|breaks off"):
+            server.upload(GcodeUpload("box.gcode", LINES * 20), unheard)
+    assert job.files == {}
+
+
+@pytest.mark.parametrize(
+    ("kind", "sentence"), [("octoprint", "printing a file of this name now"), ("moonraker", "printing a file of this name now")]
+)
+def test_a_file_that_is_being_printed_is_not_replaced(kind: str, sentence: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.start(hand_over(server))
+        with pytest.raises(ServerError, match=sentence):
+            server.upload(UPLOAD, unheard)
+        with pytest.raises(ServerError, match="cannot start it now"):
+            server.start("box.gcode")
+    assert job.file == "box.gcode"
+
+
+def test_a_moonraker_that_speaks_as_octoprint_is_told_apart() -> None:
+    with stand_in("octoprint") as (job, address), open_server(address) as server:
+        job.refuse["/api/version"] = (200, b'{"text": "OctoPrint (Moonraker v0.3.1)"}')
+        with pytest.raises(ServerError, match="use moonraker:HOST"):
+            server.greet()
+
+
+@pytest.mark.parametrize(("kind", "other"), [("octoprint", "moonraker"), ("moonraker", "duet"), ("duet", "octoprint")])
+def test_another_kind_of_server_is_none(kind: str, other: str) -> None:
+    with stand_in(other) as (_, address), open_server(address.replace(other, kind, 1)) as server, pytest.raises(ServerError):
+        server.greet()
+
+
+def test_a_session_of_a_duet_that_has_ended_is_begun_again() -> None:
+    sessions: set[str] = set()
+    with stand_in("duet", sessions=sessions) as (_, address), open_server(address) as server:
+        server.greet()
+        sessions.clear()
+        assert server.status().phase is Phase.READY
+
+
+@every_kind
+def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(follow, "LOST_S", 0.2)
+    told: list[str] = []
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.start(hand_over(server))
+        paths = ("/api/job", "/server/info", "/rr_model")
+
+        def away(status: JobStatus, message: str) -> None:
+            told.append(message)
+            job.refuse = dict.fromkeys(paths, (502, "Bad Gateway"))
+
+        with pytest.raises(ServerError, match="the print may go on, look at the printer"):
+            run(server, Control(), away)
+    assert any("the print goes on there" in message for message in told)
+
+
+def greet(address: str) -> None:
+    with open_server(address) as server:
+        server.greet()
+
+
+def test_an_unknown_name_and_a_closed_port_are_sentences() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as held:
+        port = held.getsockname()[1]
+    with pytest.raises(ServerError, match=f"nothing listens on 127.0.0.1 at port {port}: is Moonraker switched on"):
+        greet(f"moonraker:127.0.0.1:{port}")
+    with pytest.raises(ServerError, match=r"no computer of the name printer\.invalid is known here"):
+        greet("octoprint:printer.invalid")
+
+
+def test_a_server_that_says_nothing_or_nonsense_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http, "ANSWER_S", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"duet:127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(ServerError, match="has stopped answering"):
+            greet(address)
+        monkeypatch.setattr(http, "ANSWER_S", 10.0)
+
+        def answer() -> None:
+            for _ in range(2):
+                connection = silent.accept()[0]
+            connection.recv(4096)
+            connection.sendall(b"220 ftp ready\r\n")
+
+        threading.Thread(target=answer, daemon=True).start()
+        with pytest.raises(ServerError, match="speaks no HTTP"):
+            greet(address)
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A key and a certificate for 127.0.0.1 that it has signed itself."""
+    if shutil.which("openssl") is None:
+        pytest.skip("openssl makes the certificate")
+    file = tmp_path_factory.mktemp("tls") / "server.pem"
+    words = "req -x509 -newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 2 -subj /CN=printer"
+    made = ["openssl", *words.split(), "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(file), "-out", f"{file}.crt"]
+    subprocess.run(made, check=True, capture_output=True)
+    file.write_text(file.read_text() + Path(f"{file}.crt").read_text())
+    return file
+
+
+def test_a_certificate_of_nobody_is_refused_until_its_authority_is_named(certificate: Path) -> None:
+    with stand_in("moonraker", certificate=certificate) as (job, address):
+        with pytest.raises(ServerError, match=r"certificate cannot be trusted .self-signed certificate.*ca_file"):
+            greet(address)
+        assert job.asked == []
+        servers_file().parent.mkdir(parents=True)
+        servers_file().write_text(f'[servers."127.0.0.1"]\nca_file = "{certificate}.crt"\n')
+        servers_file().chmod(0o600)
+        greet(address)
+        servers_file().write_text('[servers."127.0.0.1"]\nca_file = "/nowhere.pem"\n')
+        with pytest.raises(ServerError, match=r"ca_file /nowhere.pem .* holds no certificates: No such file"):
+            greet(address)
+
+
+def test_tls_to_a_server_without_it_is_a_sentence() -> None:
+    no_tls = pytest.raises(ServerError, match="speaks no TLS: is it http:// instead of https://")
+    with stand_in("moonraker") as (_, address), no_tls:
+        greet(address.replace("http:", "https:"))
