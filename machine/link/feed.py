@@ -92,7 +92,10 @@ class Feed:
                 self._approach(resume_point)
                 resume_point = None
             self._before(command)
-            self._send(line, command)
+            if self.reports.leaves_out(command):
+                self._skip(command)
+            else:
+                self._send(line, command)
         self._finish()
 
     def _approach(self, resume_point: ResumePoint) -> None:
@@ -107,7 +110,7 @@ class Feed:
         self.set_state("printing")
 
     def _skip(self, command: str) -> None:
-        """A command that was done by an earlier run."""
+        """A command that was done by an earlier run, or that the firmware does not know."""
         self._track(command)
         self._skipped += 1
         self._program_pause = ""
@@ -262,8 +265,10 @@ class Feed:
     def poll(self) -> None:
         """See what a person wants, and show where the print stands now and then. Raises CancelledError, EmergencyError."""
         now_s, message = self.exchange.medium.now_s(), self._pending.message
+        wanted = self._pending.pause_s is not None
         self._pending.poll(self.state, now_s)
-        if now_s - self._shown_s >= PROGRESS_S or self._pending.message != message:
+        changed = self._pending.message != message or (self._pending.pause_s is not None) != wanted
+        if now_s - self._shown_s >= PROGRESS_S or changed:
             self.show(now_s)
 
     def heed_emergency(self) -> None:
@@ -324,11 +329,13 @@ class Feed:
         if self._on_progress is None:
             return
         elapsed_s, at, done = now_s - self._start_s, self._position, self._skipped + self.history.commands
+        pausing = self.state == "printing" and self._pending.pause_s is not None  # begins at the end of the stroke under way
         self._on_progress(
             Progress(
                 sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
                 left_s=self._left_s(elapsed_s), share=at.share(done, self._job.total),
-                temperature=self.reports.temperature, part=at.part, parts=at.parts, layer=at.layer, state=self.state,
+                temperature=self.reports.temperature, part=at.part, parts=at.parts, layer=at.layer,
+                state="pausing" if pausing else self.state,
                 file_line=self.history.acknowledged,
                 feed_percent=self._pending.feed_percent, flow_percent=self._pending.flow_percent,
                 message=self._pending.message or self._trouble or self._silence(),

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.link.pending_commands import Command, PendingCommand
-from machine.link.protocol.events import Action, Echo, Event, Identity, Ok, Temperature
+from machine.link.protocol.events import Action, Echo, Event, Identity, Ok, Temperature, unknown_command
+from machine.link.protocol.framing import name_of
 from profiles.errors import PrinterError
 
 
@@ -30,6 +31,9 @@ OVER_LIMIT_C = 15.0
 OVER_REPORTS = 2  # in a row: a byte lost on the line makes 200 of 20.0 once
 WARNINGS = 20  # remembered of the printer's own words that show a program it does not understand
 WARNS = ("nknown command", "too long extrusion")
+# What displays, names parts or tunes: a firmware that does not know it is asked once.
+ADVICE = {"M73", "M117", "M118", "M201", "M203", "M204", "M205", "M300", "M413", "M486", "M572", "M593", "M900"}
+MACROS = ("EXCLUDE_OBJECT", "SET_PRINT_STATS_INFO", "SET_DISPLAY_TEXT", "SET_PRESSURE_ADVANCE", "SET_VELOCITY_LIMIT")
 COLD = ("cold extrusion prevented", "not driven because its heater")  # Marlin, RepRapFirmware; Klipper's is an error
 ASKS = {"pause": Command.PAUSE, "resume": Command.RESUME, "cancel": Command.CANCEL}
 SILENT = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prompt_button", "prompt_show", "prompt_end"}
@@ -93,11 +97,12 @@ class Watchdog:
 
 
 class PrinterReports:
-    """read() every event; temperature_s: when the newest temperature came."""
+    """read() every event; temperature_s: when the newest temperature came; unknown: commands that the firmware does not know."""
 
     def __init__(self, watchdog: Watchdog, now_s: float) -> None:
         self.temperature, self.firmware, self.temperature_s = Temperature(), "unknown", now_s
-        self.warnings: list[str] = []
+        self.unknown: set[str] = set()
+        self._warned: dict[str, int] = {}
         self._watchdog = watchdog
 
     def read(self, event: Event, now_s: float) -> PendingCommand | None:
@@ -109,11 +114,24 @@ class PrinterReports:
         identity = event.identity if isinstance(event, Ok) else event
         if isinstance(identity, Identity):
             self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
+        elif unknown := unknown_command(event):
+            self.unknown.add(unknown)
+            self._warn(f"Unknown command: {unknown}")
         elif isinstance(event, Echo):
             self._read_echo(event.text)
         elif isinstance(event, Action):
             return self._read_action(event)
         return None
+
+    def leaves_out(self, command: str) -> bool:
+        """Whether the firmware has said that it does not know a command, and can do without: no heat, move, mode or waiting."""
+        name = name_of(command)
+        return name in self.unknown and (name in ADVICE or name.startswith(MACROS))
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the printer said about a program that it does not understand; what it said again is counted."""
+        return [text if count == 1 else f"{text} (x {count})" for text, count in self._warned.items()]
 
     def check_silence(self, now_s: float, mute: bool) -> None:
         """Judge a silence; raises PrinterError. mute: nothing can be reported now."""
@@ -135,5 +153,5 @@ class PrinterReports:
         return PendingCommand(ASKS[action.name]) if action.name in ASKS else None
 
     def _warn(self, text: str) -> None:
-        if len(self.warnings) < WARNINGS:
-            self.warnings.append(text)
+        if text in self._warned or len(self._warned) < WARNINGS:
+            self._warned[text] = self._warned.get(text, 0) + 1

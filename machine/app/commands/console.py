@@ -283,6 +283,7 @@ class Shown:
         self.reports = reports
         self.quiet = True
         self._half = b""
+        self._busy = 0  # in a row
         self._colours = sys.stdout.isatty() and "NO_COLOR" not in os.environ
 
     def hear(self, data: bytes) -> None:
@@ -297,6 +298,14 @@ class Shown:
         event = read_event(line)
         if isinstance(event, Temperature) and not self.reports:
             return
+        if isinstance(event, Busy):
+            self._busy += 1
+            if self._busy > 1:
+                return
+        elif self._busy:
+            if self._busy > 1:
+                self.write(f"(busy {self._busy - 1} more times)")
+            self._busy = 0
         text = "".join(c if c.isprintable() else "?" for c in line.decode("ascii", "replace"))
         colour = COLOURS.get(type(event))
         self.write(f"\x1b[{colour}m{text}\x1b[0m" if colour and self._colours else text)

@@ -2,14 +2,13 @@
 
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.medium import SERIAL, Wire
-from machine.link.protocol.events import Echo, Event, Ok, Temperature
+from machine.link.protocol.events import Event, Ok, Temperature, unknown_command
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from profiles.errors import FirmwareError, LocalProtocolError, PortError
 
 FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
-UNKNOWN = "nknown command"
 
 
 class LeftError(Exception):
@@ -97,7 +96,7 @@ class CommandSession:
             self._heat = event.temperature or self._heat
         elif isinstance(event, Temperature):
             self._heat = event
-        elif isinstance(event, Echo) and UNKNOWN in event.text and self.exchange.greeted:
+        elif unknown_command(event) and self.exchange.greeted:
             self.unknown.append(self._command)
 
     def _turned(self, now_s: float) -> None:

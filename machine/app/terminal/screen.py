@@ -17,7 +17,7 @@ from rich.text import Text
 from machine.app.terminal.plain import plain_line
 from machine.dryrun.dryrun import DryRun
 from machine.link.progress import Progress
-from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event
+from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event, unknown_command
 from machine.reader.parsed import MoveKind
 from machine.view.quantities import duration
 
@@ -77,6 +77,7 @@ class Words:
     def __init__(self) -> None:
         self.last: deque[str] = deque(maxlen=WORDS_KEPT)
         self._half, self._message = b"", ""
+        self._newest, self._times = "", 0
 
     def hear(self, direction: str, data: bytes) -> None:
         """Take what was received ("<")."""
@@ -86,12 +87,21 @@ class Words:
         self._half = self._half[-HALF_BYTES:]
         for line in lines:
             if line[:2] != b"ok" and (text := printer_message(line)):
-                self.last.append(text)
+                self._append(text)
+
+    def _append(self, text: str) -> None:
+        """What is said again takes no line of its own but a count."""
+        again = text == self._newest and bool(self.last)
+        self._newest, self._times = text, self._times + 1 if again else 1
+        if again:
+            self.last[-1] = f"{text} (x {self._times})"
+        else:
+            self.last.append(text)
 
     def add(self, text: str) -> None:
         """Take the stream's message of this moment; one that stays is added once."""
         if text and text != self._message:
-            self.last.append(text)
+            self._append(text)
         self._message = text
 
 
@@ -102,6 +112,8 @@ def printer_message(line: bytes) -> str:
         return "the printer has started"
     if isinstance(event, Action):
         return f"the printer asks: {event.name} {event.words}".rstrip()
+    if unknown := unknown_command(event):
+        return f"Unknown command: {unknown}"
     return event.text if isinstance(event, Echo | FirmwareFault | LineError | Unknown) else ""
 
 

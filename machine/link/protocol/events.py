@@ -148,6 +148,7 @@ START = re.compile(r"(?:.*[^ -~])?start")
 GREETS = re.compile(r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: .*")
 # Words by which transmission errors are known even when a byte of them is damaged.
 OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
+UNKNOWN = re.compile(r'Unknown command: ?"?([A-Z][A-Z0-9_.]*)|\b([GM]\d+): Command is not supported')
 MISSING = ("missing checksum", "no checksum", "no line number")
 OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
 # Said by a firmware that has stopped for good, its heaters off: Marlin's kill(), Klipper's shutdown, RepRapFirmware's M112.
@@ -169,6 +170,14 @@ def read_event(raw: bytes) -> Event:
     if folded.startswith(("echo:busy:", "busy:")):
         return Busy(text)
     return _read_report(text)
+
+
+def unknown_command(event: Event) -> str:
+    """The name of a command that the firmware says it does not know, "" of other words. Marlin and Klipper quote the whole line,
+    RepRapFirmware names the code.
+    """
+    match = UNKNOWN.search(event.text) if isinstance(event, Echo) else None
+    return "" if match is None else match[1] or match[2]
 
 
 def lacks_checksum(event: Event) -> bool:

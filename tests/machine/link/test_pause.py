@@ -112,6 +112,14 @@ def test_the_states_of_a_pause_are_told_in_order() -> None:
     assert told == ["printing", "pausing", "paused", "resuming", "finishing"]
 
 
+def test_a_pause_is_shown_at_once_though_it_begins_after_the_stroke_under_way() -> None:
+    watcher = watched()
+    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
+    watcher.run(PROGRAM)
+    asked = next(place for place, progress in enumerate(watcher.shown) if progress.acknowledged >= 150)
+    assert [progress.state for progress in watcher.shown[asked : asked + 2]] == ["printing", "pausing"]
+
+
 def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside() -> None:
     watcher = watched()
     watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}

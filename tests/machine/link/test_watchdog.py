@@ -5,9 +5,10 @@ from contextlib import nullcontext
 
 import pytest
 
-from machine.link.protocol.events import Temperature
+from machine.app.printer.serial_log import tap
+from machine.link.protocol.events import Echo, Temperature, read_event
 from machine.link.stream import print_lines
-from machine.link.watchdog import Watchdog
+from machine.link.watchdog import PrinterReports, Watchdog
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.virtual import PATH, VirtualPrinter
@@ -103,3 +104,35 @@ def test_a_bed_that_cannot_be_heated_may_be_as_warm_as_its_room() -> None:
     lines = ["M104 S200", "M109 S200", *(f"G1 X{k % 50} F600" for k in range(100))]
     printer = VirtualPrinter(profile.machine)
     assert not print_lines(lines, PATH, medium=printer.medium, profile=profile).cancelled
+
+
+STRANGER = load(settings=["machine.dialect=klipper"])  # its printer does not know M486
+PARTS = [line for part in range(9) for line in (f"M486 S{part}", f"G1 X{part + 1} F6000", "M73 P5 R1", "M486 S-1")]
+
+
+def test_what_the_firmware_does_not_know_is_asked_once_and_left_out_then() -> None:
+    printer, sent = VirtualPrinter(STRANGER.machine), list[bytes]()
+    medium = tap(lambda way, data: sent.append(data) if way == ">" else None, printer.medium)
+    outcome = print_lines(["G28", *PARTS], PATH, medium=medium, profile=STRANGER)
+    assert outcome.warnings == ("Unknown command: M486",)
+    assert b"".join(sent).count(b"M486") == 1
+    assert b"".join(sent).count(b"M73") == 9
+    assert len(printer.record.end) == 9
+
+
+def test_what_matters_is_sent_although_the_firmware_does_not_know_it() -> None:
+    reports = PrinterReports(Watchdog(), 0.0)
+    for said in ('Unknown command: "M104 S200"', 'Unknown command: "M900 K0.1"'):
+        reports.read(Echo(said), 0.0)
+    assert not reports.leaves_out("M104 S210")
+    assert reports.leaves_out("M900 K0.2")
+
+
+@pytest.mark.parametrize("said", [
+    b'echo:Unknown command: "M486 S1"', b'// Unknown command:"M486"', b"Warning: M486: Command is not supported",
+])  # fmt: skip
+def test_every_firmware_s_words_for_an_unknown_command_are_counted_as_one(said: bytes) -> None:
+    reports = PrinterReports(Watchdog(), 0.0)
+    for _ in range(19):
+        reports.read(read_event(said), 0.0)
+    assert reports.warnings == ["Unknown command: M486 (x 19)"]

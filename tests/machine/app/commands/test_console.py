@@ -16,7 +16,7 @@ from prompt_toolkit.output import DummyOutput
 from prompt_toolkit.renderer import Renderer
 
 from machine.app.cli import main
-from machine.app.commands.console import _Console
+from machine.app.commands.console import Shown, _Console
 from machine.app.printer import compatibility
 from machine.app.terminal.interrupts import interrupting
 from machine.simulator.record import Record
@@ -253,3 +253,16 @@ def test_a_closed_terminal_leaves_with_the_heaters_off(after_s: float) -> None:
             sleep(after_s)
             assert person.hang_up() == 130
         assert (printer.record.happened("nozzle 200"), printer.record.nozzle_target_c) == (True, 0.0)
+
+
+def test_busy_lines_in_a_row_are_folded(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = Shown(reports=False)
+    shown.quiet = False
+    shown.hear(b"echo:busy: processing\n" * 15 + b"ok\necho:busy: processing\nok\n")
+    assert capsys.readouterr().out.splitlines() == [
+        "echo:busy: processing",
+        "(busy 14 more times)",
+        "ok",
+        "echo:busy: processing",
+        "ok",
+    ]

@@ -147,3 +147,9 @@ def test_a_printer_that_never_ends_its_line_takes_no_memory() -> None:
     for _ in range(100):
         words.hear("<", b"x" * 1000)
     assert len(words._half) == 4096
+
+
+def test_words_said_again_are_one_line_with_a_count() -> None:
+    words = Words()
+    words.hear("<", b'echo:Unknown command: "M486 S1"\nok\n' + b'echo:Unknown command: "M486 S-1"\nok\n' * 18 + b"echo:done\n")
+    assert list(words.last) == ["Unknown command: M486 (x 19)", "done"]
