@@ -6,6 +6,7 @@ right.
 """
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from math import pi
 
@@ -77,13 +78,16 @@ def directions(normal: Floats) -> Floats:
     return units
 
 
+@cache
 def spread(count: int) -> Floats:
-    """(count, 3) unit directions spread evenly over the sphere (Fibonacci lattice)."""
+    """(count, 3) unit directions spread evenly over the sphere (Fibonacci lattice); read only."""
     k = np.arange(count) + 0.5
     z = 1.0 - 2.0 * k / count
     angle = pi * (1.0 + 5.0**0.5) * k
     around = np.sqrt(1.0 - z * z)
-    return np.column_stack([around * np.cos(angle), around * np.sin(angle), z])
+    points: Floats = np.column_stack([around * np.cos(angle), around * np.sin(angle), z])
+    points.flags.writeable = False
+    return points
 
 
 def corners(least_mm: Vector, most_mm: Vector) -> Floats:

@@ -17,7 +17,7 @@ from time import process_time
 
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import ModelRequest
-from machine.dryrun.agreement import agreement
+from machine.dryrun.conformity.agreement import agreement
 from machine.link.stream import print_lines
 from machine.simulator.simulator import SimulatedPrinter
 from machine.view.program import Program

@@ -176,13 +176,14 @@ def _room(machine: Machine, printed: Printed, pose: Pose, tip: Floats, most: flo
     """By how much all gaps in one pose exceed what is needed (at most `most`), and those that do not: (body, solid) -> mm."""
     normal = rotation(machine, pose) @ UP
     met: dict[tuple[str, str], float] = {}
-    left = most
+    left, head, around = most, bodies(machine), directions(normal)
     for name, reach_of in solids(machine, pose, printed):
-        for body in bodies(machine):
+        reaches = [(tried, reach_of(tried)) for tried in (UP[None], around)]
+        for body in head:
             need, gap = body.need_mm - ROUNDING_MM, -np.inf
-            for tried in (UP[None], directions(normal)):
+            for tried, reach in reaches:
                 if gap - need < most:
-                    gap = max(gap, float(sweep_gaps(body, tip[None], tip[None], tried, reach_of(tried))[0]))
+                    gap = max(gap, float(sweep_gaps(body, tip[None], tip[None], tried, reach)[0]))
             if gap < need:
                 gap = max(gap, refined_gap(body, tip, tip, normal, reach_of))
             if gap < need:

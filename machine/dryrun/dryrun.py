@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, heat, motion, placement, provenance, sequence
+from machine.dryrun import clearance, contents, extrusion, heat, layering, motion, placement, provenance, sequence
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, beads_of, replay
 from machine.kinematics.table import workpiece_path
@@ -74,10 +74,14 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
         *motion.findings(program, machine),
         *clearance.findings(program, segments, rows, machine),
         *placement.findings(program, deposited, contacts),
+        *layering.findings(program, deposited, contacts),
+        *extrusion.findings(program, deposited, profile),
+        *contents.findings(program),
         *sequence.findings(program, profile),
         *provenance.findings(text, program, profile),
         *placement.off_plate(program, segments, rows, profile),
-        *heat.findings(program, profile),
+        *placement.purged_into(program, deposited),
+        *heat.findings(program, profile, provenance.has_material(text, profile)),
     ]
     findings = sorted(dict.fromkeys(findings), key=lambda finding: (finding.severity, finding.line))
     return DryRun(

@@ -55,6 +55,11 @@ def unless_own(program: ParsedProgram, first: int, last: int) -> tuple[Severity,
     return ("warning", f", unless {names[0]} does that") if names else ("error", "")
 
 
+def at_row(program: ParsedProgram, row: int, severity: Severity, code: str, message: str) -> Finding:
+    """A finding about row `row`."""
+    return Finding(severity, code, int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
+
+
 def at_line(program: ParsedProgram, row: int, line: int, severity: Severity, code: str, message: str) -> Finding:
     """A finding about an event before row `row`."""
     last = min(max(row - 1, 0), len(program.line) - 1)

@@ -1,23 +1,31 @@
-"""Heat: findings about temperatures and flow, and about numbers nobody has measured."""
+"""Heat: findings about temperatures, fans and flow, and about numbers nobody has measured."""
 
 from math import pi
 
 import numpy as np
 
-from machine.dryrun.findings import Finding, at_line, per_part, unless_own
+from machine.dryrun.findings import Finding, at_line, at_row, per_part, unless_own
 from machine.reader.parsed import MoveKind, ParsedProgram
+from mdp.mesh import Floats
 from profiles.profile import Profile
+from slicer.paths import Kind
 
 MELTING_C = 150.0
 SLACK = 1.005
+FAR_C = 35.0  # from a file's usual temperature: towers of test temperatures stay within
+SETTLED, FEWEST_STILL = 5, 2  # layers of a part without fan at first, and those that are told of
+QUICKER = 0.7
 ROUNDING_MM = 3e-3  # both ends are written to a thousandth, and a point dropped for that gives its filament to the next
 
 
-def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
-    """All findings about heat, flow and the profile."""
+def findings(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
+    """All findings about heat, fans, flow and the profile; own: the file itself tells that it was made with this material."""
     return [
         *_cold(program),
         *_left_on(program),
+        *_temperature(program, profile, own),
+        *_bed_off(program),
+        *_fan(program, profile, own),
         *_flow(program, profile),
         *_profile(program, profile),
         *_unknown_commands(program),
@@ -52,6 +60,80 @@ def _left_on(program: ParsedProgram) -> list[Finding]:
             severity, unless = unless_own(program, max(events[-1].row, last + 1), len(program.line))
             message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing{unless}"
             problems.append(at_line(program, events[-1].row, events[-1].line, severity, "heater-on", message))
+    return problems
+
+
+def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
+    """In every part the first bead at another temperature than the material's, or far from the rest of the file's."""
+    material, process, machine = profile.material, profile.process, profile.machine
+    wanted = _levels(program, ("M104", "M109"))
+    beads = (program.kind == MoveKind.EXTRUDE) & (wanted >= MELTING_C)
+    if not beads.any():
+        return []
+    usual = float(np.median(wanted[beads]))
+    least, most = usual - FAR_C, min(usual + FAR_C, machine.nozzle_limit_c)
+    if own:
+        told = (material.first_layer_nozzle_c, material.nozzle_c)
+        least, most = min(told) - 0.5, min(max(told) + process.interface_temperature_add_c, machine.nozzle_limit_c) + 0.5
+    message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
+    cool, hot = beads & (wanted < least), beads & (wanted > most)
+    return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted, "error", "temperature", message)]
+
+
+def _bed_off(program: ParsedProgram) -> list[Finding]:
+    """The bed switched off while beads are still to come: what is printed lets go of the plate."""
+    bed = _levels(program, ("M140", "M190"))
+    beads = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0))
+    if not len(beads) or bed[beads[0]] <= 0.0:
+        return []
+    off = beads[bed[beads] <= 0.0]
+    message = f"the bed is switched off while {len(off)} moves of the print are still to come"
+    return [at_row(program, int(off[0]), "warning", "bed-off", message)] if len(off) else []
+
+
+def _levels(program: ParsedProgram, codes: tuple[str, ...]) -> Floats:
+    """(n,) what events of these codes have set before each row, 0 before the first."""
+    events = [event for event in program.events if event.code in codes]
+    values = np.array([0.0, *(1.0 if event.code == "M106" and not event.letters else event.value for event in events)])
+    order = np.searchsorted([event.row for event in events], np.arange(len(program.line)), side="right")
+    return np.asarray(values[order])
+
+
+def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
+    """In every part layers without any fan where the file has one in layers like them.
+
+    A slicer's fan blows the harder the less time a layer takes: a layer without fan that is quicker than most with one is no
+    slicer's. In a file of ours no layer is without, but for the first ones.
+    """
+    beads = (program.kind == MoveKind.EXTRUDE) & ~program.rows_of_types(Kind.PURGE.value)
+    if not beads.any():
+        return []
+    fan = _levels(program, ("M106", "M107"))
+    layer = program.part * (int(program.layer.max()) + 1) + program.layer
+    length = np.linalg.norm((program.end - program.start)[:, :3], axis=1)
+    seconds = np.bincount(layer[beads], weights=(length / np.maximum(program.feed, 1e-9))[beads] * 60.0)
+    blown = np.bincount(layer[beads], weights=(length * (fan > 0.0))[beads])
+    at, first = np.unique(layer[beads], return_index=True)
+    rows = np.flatnonzero(beads)[first]
+    part = program.part[rows]
+    begun = np.array([np.searchsorted(at, at[part == each][0]) for each in part])
+    settled = np.arange(len(at)) - begun >= SETTLED
+    still = (blown[at] == 0.0) & settled
+    if own:
+        expected = min(profile.material.fan_least, profile.material.fan) > 0.0
+        still &= expected & ((part != 1) | (np.arange(len(at)) - begun >= profile.material.fan_off_layers))
+    elif (blown[at] > 0.0).any():
+        still &= seconds[at] < QUICKER * float(np.median(seconds[at][blown[at] > 0.0]))
+    else:
+        return []
+    problems = []
+    for each in np.unique(part[still]):
+        mine = np.flatnonzero(still & (part == each))
+        if len(mine) < FEWEST_STILL:
+            continue
+        row = int(rows[mine[0]])
+        message = f"no fan blows in layer {program.layer[row]}, where the file's other layers have one (layers: {len(mine)})"
+        problems.append(at_row(program, row, "error", "fan", message))
     return problems
 
 

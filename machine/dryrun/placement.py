@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.findings import Finding, Severity, per_part
-from machine.dryrun.replay import Beads, Contacts
+from machine.dryrun.findings import Finding, Severity, at_row, per_part
+from machine.dryrun.replay import CROSSING_MM, Beads, Contacts
 from machine.reader.parsed import ParsedProgram
 from mdp.mesh import Floats
 from profiles.machine import Table
@@ -19,21 +19,41 @@ ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # of a part's length in air
 LOST_SHARE = 0.5  # of a part's first layer without anything under it
 OVERLAPPING_SHARE = 0.4  # of a layer's length
 LEAST_MM = 10.0
+STRETCH_MM = 30.0  # of beads in air that follow each other
+HANGING_SHARE = 0.8  # of a move's length
 ROUNDING_MM = 0.02
+ON_PLATE = 1.5  # heights of a bead: so low its top is where it lies on the plate
+PURGE_STEP_MM = 0.3
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
-    """Errors and warnings of code air, filled and contact, one a part; not-tested where the table turns too often."""
+    """Errors and warnings of code air, filled, contact and low-travel, one a part; not-tested where the table turns too often."""
     length = np.zeros(len(program.line))
     length[deposited.rows] = np.linalg.norm(deposited.segments_mm[:, 1] - deposited.segments_mm[:, 0], axis=1)
     deep = "the head runs {value} mm deep into earlier plastic (moves: {count})"
     problems = per_part(program, contacts.depth_mm > 0.0, contacts.depth_mm, "error", "contact", deep)
+    problems += _too_low(program, contacts)
     problems += [*_in_air(program, length, contacts), *_in_plastic(program, length, contacts)]
     if contacts.untested_row >= 0:
         row = contacts.untested_row
         message = "the table turns too often: from here on no move was tried against earlier plastic"
         place = (int(program.line[row]), int(program.part[row]), int(program.layer[row]))
         problems.append(Finding("warning", "not-tested", *place, message))
+    return problems
+
+
+def _too_low(program: ParsedProgram, contacts: Contacts) -> list[Finding]:
+    """In every part the first way to or from a turn of the table that does not lead above the print."""
+    close = contacts.close_mm > 0.0
+    problems = []
+    for part in np.unique(program.part[close]):
+        rows = np.flatnonzero(close & (program.part == part))
+        left = max(CROSSING_MM - float(contacts.close_mm[rows].max()), 0.0)
+        message = (
+            f"the tip crosses the print {left:.2f} mm above it on the way to or from a turn of the table, {CROSSING_MM:g} mm are "
+            f"needed (moves: {len(rows)})"
+        )
+        problems.append(at_row(program, int(rows[0]), "error", "low-travel", message))
     return problems
 
 
@@ -49,16 +69,27 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[
         begins = mine & (program.layer == program.layer[mine & (length > 0)].min())
         first = float((contacts.air_mm + contacts.beside_mm)[begins].sum())
         lost = first > max(LEAST_MM, LOST_SHARE * float(length[begins].sum()))
-        if not (lost or loose > max(LEAST_MM, WARNING_SHARE * whole)):
+        stretch = _longest_mm(hanging, length, mine)
+        if not (lost or stretch > STRETCH_MM or loose > max(LEAST_MM, WARNING_SHARE * whole)):
             continue
-        severity: Severity = "error" if lost or loose > ERROR_SHARE * whole else "warning"
+        grave = lost or loose > ERROR_SHARE * whole or stretch > STRETCH_MM
+        severity: Severity = "error" if grave else "warning"
         of_support = float(hanging[mine & support].sum())
-        message = f"{loose:.1f} mm of {whole:.0f} mm are extruded into air, nothing lies under or beside them: "
+        at_once = f", {stretch:.1f} mm of it in one stretch ({STRETCH_MM:g} mm are allowed)" if stretch > STRETCH_MM else ""
+        message = f"{loose:.1f} mm of {whole:.0f} mm are extruded into air{at_once}, nothing lies under or beside them: "
         message += f"{loose - of_support:.1f} mm of the part, {of_support:.1f} mm of its support"
         if lost:
             message = f"the part begins in air: {first:.1f} mm of its first layer have nothing under them"
-        problems.append(_at(program, begins & (contacts.air_mm > 0) if lost else mine & (hanging > 0), severity, "air", message))
+        rows = begins & (contacts.air_mm > 0) if lost else mine & (hanging > 0)
+        problems.append(at_row(program, int(np.flatnonzero(rows)[0]), severity, "air", message))
     return problems
+
+
+def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> float:
+    """The longest stretch of moves that follow each other and hang in air."""
+    loose = mine & (hanging > HANGING_SHARE * length) & (length > 0)
+    stretches = np.bincount(np.cumsum(~loose), weights=np.where(loose, hanging, 0.0))
+    return float(stretches.max(initial=0.0))
 
 
 def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[Finding]:
@@ -74,13 +105,8 @@ def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> l
         amount = float(overlapping[groups].sum())
         message = f"{amount:.1f} mm are extruded where plastic already is (layers: {len(groups)})"
         rows = counted & np.isin(group, groups) & (contacts.overlapping_mm > 0)
-        problems.append(_at(program, rows, "error", "filled", message))
+        problems.append(at_row(program, int(np.flatnonzero(rows)[0]), "error", "filled", message))
     return problems
-
-
-def _at(program: ParsedProgram, rows: NDArray[np.bool_], severity: Severity, code: str, message: str) -> Finding:
-    row = int(np.flatnonzero(rows)[0])
-    return Finding(severity, code, int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
 
 
 def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> tuple[float, float, float]:
@@ -105,6 +131,38 @@ def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64],
     badness[rows] = over
     message = f"the first layer reaches {{value}} mm over the plate's edge, {edge} (moves: {{count}})"
     return per_part(program, marked, badness, "error", "off-plate", message)
+
+
+def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
+    """A purge on the plate where beads of the first layer come to lie: they would stand on it, the tip would run through it."""
+    height = deposited.segments_mm[:, :, 2].max(axis=1, initial=0.0)
+    low = height <= ON_PLATE * np.maximum(deposited.height_mm, ROUNDING_MM)
+    purge = program.rows_of_types(PURGE)[deposited.rows]
+    lines, beads = np.flatnonzero(low & purge), np.flatnonzero(low & ~purge)
+    if not len(lines) or not len(beads):
+        return []
+    places = [
+        np.linspace(a, b, max(int(np.linalg.norm(b - a) / PURGE_STEP_MM), 1) + 1) for a, b in deposited.segments_mm[lines, :, :2]
+    ]
+    points, which = np.concatenate(places), np.repeat(lines, [len(each) for each in places])
+    ends = deposited.segments_mm[beads, :, :2].reshape(-1, 2)
+    own = (ends.min(axis=0) - 1.0, ends.max(axis=0) + 1.0)
+    near = np.all((points > own[0]) & (points < own[1]), axis=1)
+    for point, line in zip(points[near], which[near], strict=True):
+        distance = _distances(point, deposited.segments_mm[beads, :, :2]) - 0.5 * deposited.width_mm[beads]
+        if distance.min() < 0.5 * deposited.width_mm[line] - ROUNDING_MM:
+            row, met = int(deposited.rows[line]), int(deposited.rows[beads[distance.argmin()]])
+            message = f"the purge at X{point[0]:.1f} Y{point[1]:.1f} lies where line {program.line[met]} lays the first layer"
+            return [at_row(program, row, "error", "purge", message)]
+    return []
+
+
+def _distances(point: Floats, segments: Floats) -> Floats:
+    """(m,) distances of a point (2,) from segments (m, 2, 2)."""
+    a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
+    share = np.clip(((point - a) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-12), 0.0, 1.0)
+    away: Floats = np.linalg.norm(a + share[:, None] * d - point, axis=1)
+    return away
 
 
 def _over_mm(points: Floats, table: Table) -> tuple[Floats, str]:

@@ -22,6 +22,13 @@ def findings(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> 
     return [*_geometry(lines, profile), *_poses(lines, program, profile)]
 
 
+def has_material(lines: Sequence[str], profile: Profile) -> bool:
+    """Whether the file's own configuration has the profile's material."""
+    recorded = _configuration(lines)
+    material = [(f"material.{key}", value) for key, value in flat(profile.material.model_dump(), "")]
+    return bool(recorded) and all(recorded[key][1] == comment(f"{key} = {value}") for key, value in material if key in recorded)
+
+
 def _geometry(lines: Sequence[str], profile: Profile) -> list[Finding]:
     """Keys of the chain of axes that the file's configuration has otherwise than the profile."""
     recorded = _configuration(lines)

@@ -25,6 +25,9 @@ from slicer.paths import Kind
 STEP_MM = 0.5
 ROUGH = 0.5  # of half a bead: by how much earlier plastic, seen from another side, may seem to stand higher than it does
 SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded
+LEVEL_SLACK_MM = 0.05  # a travel below the bead that was just laid; what lies there was laid at the same pose
+CROSSING_MM = 0.2  # on the way to a turn of the table, or from it to the next bead, the tip keeps so far above the print
+ACROSS_MM, WAY_MM = 0.5, 3.0  # a shorter way next to a bead is a wipe
 INNER = 0.35  # of the bead's width: where what lies under it is looked for
 OWN = 3.0  # so many widths back along its path the plastic is the bead's own beginning
 MOST_TURNED = 100_000_000  # segments turned into the frames of all runs together
@@ -47,6 +50,8 @@ class Contacts:
 
     beside_mm: lengths that only what lies beside them carries.
 
+    close_mm: by how much less than CROSSING_MM the tip stays above the plastic on a way to or from a turn of the table.
+
     untested_row: the first row that was not tried, where the table turns too often; -1: all were.
     """
 
@@ -54,12 +59,13 @@ class Contacts:
     air_mm: Floats
     overlapping_mm: Floats
     beside_mm: Floats
+    close_mm: Floats
     untested_row: int
 
 
 class Strokes(NamedTuple):
     """(n,) of each row: half its bead's width and its height (0: no bead), the path it belongs to, how far along all moves it
-    ends, and whether it is support, which stands off by a gap.
+    ends, whether it is support, which stands off by a gap, how deep the head may dip, and how much lower it is tried too.
     """
 
     half: Floats
@@ -67,6 +73,8 @@ class Strokes(NamedTuple):
     path: NDArray[np.int32]
     way: Floats
     stands_off: NDArray[np.bool_]
+    slack: Floats
+    lower: Floats
 
 
 class Surroundings(NamedTuple):
@@ -85,6 +93,7 @@ class Measured(NamedTuple):
     air: Floats
     overlapping: Floats
     beside: Floats
+    close: Floats
 
 
 def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Beads:
@@ -131,7 +140,32 @@ def _strokes(program: ParsedProgram, deposited: Beads, extruded: NDArray[np.bool
     path = np.cumsum(np.concatenate([[True], ~goes_on])).astype(np.int32)
     way = np.cumsum(np.linalg.norm((program.end - program.start)[:, :3], axis=1))
     stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.type]
-    return Strokes(half, height, path, way, stands_off)
+    return Strokes(half, height, path, way, stands_off, _slacks(program, extruded, half), _ways_to_turns(program, extruded))
+
+
+def _slacks(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats) -> Floats:
+    """(n,) how deep the head may dip: a stroke by its bead's width, a travel below the last bead of its pose next to nothing."""
+    rows = np.arange(len(extruded))
+    last = np.maximum.accumulate(np.where(extruded, rows, -1))
+    across = np.linalg.norm((program.end - program.start)[:, :2], axis=1)
+    height = np.maximum(program.start[:, 2], program.end[:, 2])[last]
+    same_pose = (last >= 0) & np.all(program.end[:, 3:] == program.end[last, 3:], axis=1)
+    low = np.minimum(program.start[:, 2], program.end[:, 2]) < height - LEVEL_SLACK_MM
+    level = same_pose & low & (across > ACROSS_MM) & ~extruded
+    return np.where(extruded, 2.0 * half, np.where(level, LEVEL_SLACK_MM, SLACK_MM))
+
+
+def _ways_to_turns(program: ParsedProgram, extruded: NDArray[np.bool_]) -> Floats:
+    """(n,) CROSSING_MM for travels between the last bead before a turn of the table and the first one after it, else 0."""
+    turns = np.cumsum(program.kind == MoveKind.ROTATE)
+    strokes = np.flatnonzero(extruded)
+    after = np.searchsorted(strokes, np.arange(len(extruded)))
+    before_turn = turns[strokes[np.clip(after - 1, 0, len(strokes) - 1)]]
+    after_turn = turns[strokes[np.clip(after, 0, len(strokes) - 1)]]
+    across = np.linalg.norm((program.end - program.start)[:, :2], axis=1)
+    travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0.0) & (across > WAY_MM)
+    ways = travels & (after > 0) & (after < len(strokes)) & (after_turn > before_turn)
+    return np.where(ways, CROSSING_MM, 0.0)
 
 
 def head_of(machine: Machine) -> Head:
@@ -247,8 +281,10 @@ def _replay_run(
     for row in rows:
         a, b = ends[0][row], ends[1][row]
         extruded = strokes.height[row] > 0.0
-        slack = 2.0 * strokes.half[row] if extruded else SLACK_MM
-        measured.depth[row] = depth_of(a, b, slack, about.field, head)
+        measured.depth[row] = depth_of(a, b, strokes.slack[row], about.field, head)
+        if strokes.lower[row] > 0.0:
+            down = np.array([0.0, 0.0, strokes.lower[row]])
+            measured.close[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, head)
         if not extruded:
             continue
         dx, dy = b[0] - a[0], b[1] - a[1]

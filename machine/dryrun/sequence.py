@@ -8,11 +8,18 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 SLACK_MM = 0.02
+MOST_PULLED_MM = 15.0  # twice what the longest Bowden tubes need
 
 
 def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
     """Errors of code order and retraction."""
-    return [*_parts(program), *_layers(program), *_unbalanced_retractions(program, profile), *_oozing(program)]
+    return [
+        *_parts(program),
+        *_layers(program),
+        *_unbalanced_retractions(program, profile),
+        *_far_pulled(program),
+        *_oozing(program),
+    ]
 
 
 def _place(program: ParsedProgram, row: int) -> tuple[int, int, int]:
@@ -50,7 +57,11 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> list[Fi
     Nothing is said of a program that never pulls back; what the start block does is its own affair.
     """
     e, material = program.e_mm, profile.material
-    rows = np.flatnonzero((np.abs(e) > 1e-9) & (program.part > 0))
+    counted = program.part + program.layer > 0
+    purge = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & ~counted)
+    if program.parts and len(purge):  # what the purge of a program of ours pulls back its first part pushes
+        counted[purge[-1] + 1 :] = True
+    rows = np.flatnonzero((np.abs(e) > 1e-9) & counted)
     if not (e[rows] < 0.0).any():
         return []
     pushing = program.kind[rows] == MoveKind.EXTRUDE
@@ -65,17 +76,35 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> list[Fi
     over = stood & (balance < -extra - SLACK_MM) & (inner > 0)
     under = stood & (balance > SLACK_MM) & (inner < run[-1])
     problems = []
-    for wrong, sentence in (
-        (over, "{:.3f} mm more filament is pushed than was pulled back"),
-        (under, "{:.3f} mm of filament stay pulled back"),
+    for wrong, sentence, next_bead in (
+        (over, "{:.3f} mm more filament is pushed than was pulled back", 0),
+        (under, "{:.3f} mm of filament stay pulled back", 1),
     ):
         runs = np.flatnonzero(wrong)
-        for part in np.unique(program.part[rows[np.searchsorted(run, runs)]]):
-            mine = [r for r in runs if program.part[rows[np.searchsorted(run, r)]] == part]
-            worst = max(abs(balance[r]) for r in mine)
-            row = int(rows[np.searchsorted(run, mine[0], side="right") - 1])
-            message = f"{sentence.format(worst)} before the next bead (places: {len(mine)})"
-            problems.append(Finding("error", "retraction", *_place(program, row), message))
+        places = rows[np.searchsorted(run, runs, side="right") - 1 + next_bead]
+        for part in np.unique(program.part[places]):
+            mine = program.part[places] == part
+            worst = float(np.abs(balance[runs[mine]]).max())
+            message = f"{sentence.format(worst)} before the next bead (places: {mine.sum()})"
+            problems.append(Finding("error", "retraction", *_place(program, int(places[mine][0])), message))
+    return problems
+
+
+def _far_pulled(program: ParsedProgram) -> list[Finding]:
+    """In every part the first place between two beads where more filament is pulled back than a hot end holds."""
+    beads = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0))
+    if len(beads) < 2:
+        return []
+    rows = np.arange(beads[0], beads[-1])
+    last = beads[np.searchsorted(beads, rows, side="right") - 1]
+    pulled = program.filament_mm[last] - program.filament_mm[rows]
+    far = rows[pulled > MOST_PULLED_MM]
+    problems = []
+    for part in np.unique(program.part[far]):
+        row = int(far[program.part[far] == part][0])
+        amount = float(pulled[row - rows[0]])
+        message = f"{amount:.1f} mm of filament are pulled back, {MOST_PULLED_MM:g} mm are allowed: more leaves the hot end"
+        problems.append(Finding("error", "retraction", *_place(program, row), message))
     return problems
 
 

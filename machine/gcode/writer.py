@@ -9,6 +9,7 @@ import numpy as np
 from machine.firmware import dialect_of
 from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
+from machine.gcode.contents import contents_comment
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_path
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
@@ -83,6 +84,7 @@ def _lines(
         elif isinstance(move, BeginPart):
             following = next(coming, None)
             yield from _begin_part(move, len(parts), pen)
+            yield from _contents(program, place)
         else:
             yield from _begin_layer(move, profile, pen)
             yield from _progress(float(elapsed[place]), total, pen)
@@ -156,6 +158,24 @@ def _begin_part(move: BeginPart, parts: int, pen: Pen) -> Iterator[str]:
     pen.values |= {"part": move.index, "tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "part_layers": move.layers}
     pen.kind, pen.width_mm = None, 0.0
     pen.part += 1
+
+
+def _contents(program: MachineProgram, place: int) -> Iterator[str]:
+    """What the strokes of the part that begins with the move at `place` come to."""
+    strokes: list[Stroke] = []
+    layers: set[int] = set()
+    layer = 0
+    for move in program.moves[place + 1 :]:
+        if isinstance(move, BeginPart):
+            break
+        if isinstance(move, BeginLayer):
+            layer = move.index
+        elif isinstance(move, Stroke):
+            strokes.append(move)
+            layers.add(layer)
+    comment = contents_comment(strokes, len(layers))
+    if comment:
+        yield comment
 
 
 def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:

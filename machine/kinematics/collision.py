@@ -16,7 +16,7 @@ from machine.kinematics.table import machine_points
 from mdp.head import Body, corners, directions, spread
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
-from profiles.machine import CradleBox, Machine
+from profiles.machine import CradleBox, Machine, Table
 
 FAR_MM = 1e9
 REFINEMENTS = 40
@@ -24,22 +24,29 @@ REFINEMENTS = 40
 
 def table_reach(machine: Machine, pose: Pose, tried: Floats) -> Floats:
     """(k,) greatest d . x over the table's plate at a pose, in the frame of X Y Z, for (k, 3) directions."""
+    return _reach_of_table(machine, pose)(tried)
+
+
+def _reach_of_table(machine: Machine, pose: Pose) -> "Reach":
     table = machine.table
     if table.size_mm is not None:
         x, y = (0.5 * size for size in table.size_mm)
-        return _corner_reach(machine_points(machine, pose, corners((-x, -y, -table.thickness_mm), (x, y, 0.0))), tried)
-    normal = rotation(machine, pose) @ UP
-    centre = machine_points(machine, pose, np.zeros((1, 3)))[0]
+        return partial(_corner_reach, machine_points(machine, pose, corners((-x, -y, -table.thickness_mm), (x, y, 0.0))))
+    return partial(_plate_reach, table, rotation(machine, pose) @ UP, machine_points(machine, pose, np.zeros((1, 3)))[0])
+
+
+def _plate_reach(table: Table, normal: Floats, centre: Floats, tried: Floats) -> Floats:
+    """The same of a round plate."""
     along = tried @ normal
     across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
     reach: Floats = tried @ centre + table.radius_mm * across + np.maximum(0.0, -along) * table.thickness_mm
     return reach
 
 
-def cradle_reach(machine: Machine, box: CradleBox, pose: Pose, tried: Floats) -> Floats:
-    """(k,) greatest d . x over a body of the cradle, which tilts with the table and does not turn with it."""
+def _reach_of_cradle(machine: Machine, box: CradleBox, pose: Pose) -> "Reach":
+    """Of a body of the cradle, which tilts with the table and does not turn with it."""
     tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
-    return _corner_reach(machine_points(machine, tilted, corners(box.min_mm, box.max_mm)), tried)
+    return partial(_corner_reach, machine_points(machine, tilted, corners(box.min_mm, box.max_mm)))
 
 
 def _corner_reach(points: Floats, tried: Floats) -> Floats:
@@ -81,8 +88,8 @@ Reach = Callable[[Floats], Floats]  # (k, 3) directions -> (k,) how far a solid 
 
 def solids(machine: Machine, pose: Pose, printed: Printed | None = None) -> list[tuple[str, Reach]]:
     """What the head can meet at a pose: the table, the cradle's bodies, what is printed; names for messages."""
-    bodies: list[tuple[str, Reach]] = [("the table", partial(table_reach, machine, pose))]
-    bodies += [(f"the cradle's {box.name}", partial(cradle_reach, machine, box, pose)) for box in machine.cradle]
+    bodies: list[tuple[str, Reach]] = [("the table", _reach_of_table(machine, pose))]
+    bodies += [(f"the cradle's {box.name}", _reach_of_cradle(machine, box, pose)) for box in machine.cradle]
     if printed is not None and len(printed.points_mm):
         bodies.append(("the print", partial(printed.reach, machine, pose)))
     return bodies

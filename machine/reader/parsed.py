@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.gcode.contents import Contents
 from mdp.mesh import Floats
 from mdp.pose import Pose
 
@@ -52,7 +53,8 @@ class ParsedProgram:
     F in units per minute. kind: MoveKind. part, layer: from ;PART: and ;LAYER_CHANGE comments, 0 before the first.
     type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
     acceleration: mm/s2 told by M204, inf where the axes decide. layers: number of layer changes. parts: numbers of the parts
-    in order. unsupported: the places that no support could be given.
+    in order. unsupported: the places that no support could be given. announced: how many parts `;PART:1 of 3` tells, 0 where none
+    does; contents: what comments tell of the parts' beads.
     """
 
     line: NDArray[np.int64]
@@ -74,6 +76,8 @@ class ParsedProgram:
     layers: int
     parts: tuple[int, ...]
     unsupported: tuple[Unheld, ...]
+    announced: int
+    contents: tuple[Contents, ...]
 
     def rows_of_types(self, *names: str) -> NDArray[np.bool_]:
         """(n,) which rows belong to these ;TYPE: names."""

@@ -2,12 +2,13 @@
 
 import re
 
+from machine.gcode.contents import KEY, read_contents
 from machine.reader.parsed import Unheld
 from machine.reader.state import Reader
 
 
 def remark(reader: Reader, text: str) -> None:
-    """What a comment says, the sign taken off: PrusaSlicer's words, Cura's LAYER and our own PART and UNSUPPORTED."""
+    """What a comment says, the sign taken off: PrusaSlicer's words, Cura's LAYER and our own PART, CONTENTS and UNSUPPORTED."""
     text = text.strip()
     if text == "LAYER_CHANGE":
         _layer(reader)
@@ -22,10 +23,15 @@ def remark(reader: Reader, text: str) -> None:
     elif key == "HEIGHT":
         reader.height = _positive(value)
     elif key == "PART":
-        number = value.split()[0] if value.split() else ""
-        if re.fullmatch("[0-9]{1,6}", number):
-            reader.part, reader.layer = int(number), 0
+        numbers = re.fullmatch("([0-9]{1,6})(?: of ([0-9]{1,6}))?.*", value.strip())
+        if numbers:
+            reader.part, reader.layer = int(numbers[1]), 0
             reader.parts.append(reader.part)
+            reader.announced = max(reader.announced, int(numbers[2] or 0))
+    elif key == KEY:
+        contents = read_contents(value, reader.number, reader.part)
+        if contents is not None:
+            reader.contents.append(contents)
     elif key == "UNSUPPORTED":
         area, _, place = value.partition("@")
         layer, _, reason = place.partition(" ")

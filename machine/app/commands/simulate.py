@@ -8,7 +8,7 @@ from machine.app.output import check_outputs, write_bytes, write_json
 from machine.app.pipeline.programs import load_program
 from machine.app.requests import ModelRequest
 from machine.app.terminal.report import agreement_line, print_table, show
-from machine.dryrun.agreement import agreement
+from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import check_baud, find_starvation
 from machine.view.page import print_page

@@ -14,7 +14,7 @@ import numpy as np
 
 from machine.app.pictures.raster import draw
 from machine.app.terminal.progress import say
-from machine.dryrun.agreement import agreement
+from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.planning.plan import plan

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from textwrap import wrap
 
 from machine.app.terminal.plain import plain_lines
-from machine.dryrun.agreement import Agreement
+from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.view.parts import risky_before_mm2
 from machine.view.program import Program

@@ -7,7 +7,7 @@ import pytest
 
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import ModelRequest
-from machine.dryrun.deposit import inside_share
+from machine.dryrun.conformity.deposit import inside_share
 from machine.link.stream import print_lines
 from machine.simulator.simulator import SimulatedPrinter
 from machine.view.program import Program

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.deposit import AROUND, inside
+from machine.dryrun.conformity.deposit import AROUND, inside
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.replay import beads_of
 from machine.reader.parsed import pose_runs

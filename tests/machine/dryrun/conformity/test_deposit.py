@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
-from machine.dryrun.deposit import inside_share, outside_mm
+from machine.dryrun.conformity.deposit import inside_share, outside_mm
 from profiles.profile import load
 from tests import shapes
 from tests.machine.hand import printed, text

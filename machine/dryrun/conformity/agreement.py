@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machine.dryrun.deposit import Share, inside_share
+from machine.dryrun.conformity.deposit import Share, inside_share
+from machine.dryrun.conformity.filling import filled_share
 from machine.dryrun.dryrun import DryRun
-from machine.dryrun.filling import filled_share
 from machine.dryrun.findings import Finding
 from machine.dryrun.placement import unsupported_mm
 from machine.dryrun.replay import beads_of

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from machine.dryrun import dry_run
-from machine.dryrun.agreement import agreement
+from machine.dryrun.conformity.agreement import agreement
 from profiles.profile import Profile, load
 from tests import shapes
 from tests.machine.hand import printed, text

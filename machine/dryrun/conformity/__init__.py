@@ -1,0 +1,1 @@
+"""Conformity: the deposited plastic held against the model it was made from."""

@@ -1,0 +1,162 @@
+"""Extrusion: findings about beads that get more or less plastic than their width and height need, and about travels that extrude.
+
+A bead's cross-section is that of its width and height as the file tells them (PrusaSlicer's ;WIDTH and ;HEIGHT, which give
+its own files' filament within 0.3 %); where a file tells none, that of other beads of its kind.
+"""
+
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun.findings import Finding, Severity, at_row
+from machine.dryrun.replay import Beads
+from machine.reader.parsed import MoveKind, ParsedProgram
+from mdp.mesh import Floats
+from profiles.profile import Profile
+from slicer.paths import Kind
+
+UNEVEN = (Kind.GAP.value, Kind.IRONING.value, Kind.PURGE.value, Kind.BRIDGE.value)  # wider or thinner than told on purpose
+LAYER_MOST, UNTOLD_MOST = 1.15, 1.5  # a layer's plastic over that of other layers, or the other way round
+FILE_LEAST, FILE_MOST = 0.7, 1.4  # the file's plastic over what its own widths and heights need
+ROW_LEAST, ROW_MOST, ROW_MM = 0.4, 2.0, 1.0
+ODD_MM = 8.0  # so much length of odd beads in a part is told
+LAYER_MM = 20.0
+CLIMBING = 0.3  # of a layer's height
+SPARE_MM3 = 0.5
+FAST = 0.95  # of the travels' usual speed
+FASTER = 1.3  # than all but a few strokes
+FEW = 0.03
+
+
+def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> list[Finding]:
+    """Errors of code extrusion and extruding-travel; a warning of code extrusion where the file tells no widths."""
+    if not len(deposited.rows):
+        return []
+    told = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
+    counted = ~program.rows_of_types(*UNEVEN)[deposited.rows] & ~_climbs(program, deposited)
+    length = np.linalg.norm(deposited.segments_mm[:, 1] - deposited.segments_mm[:, 0], axis=1)
+    problems = _fast(program, deposited.rows, length)
+    spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
+    for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
+        mine = np.flatnonzero(counted & (told == known) & (length > 0))
+        rows = deposited.rows[mine]
+        if not len(rows):
+            continue
+        pushed = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0
+        needed = length[mine] * (_area(program, rows, profile) if known else 1.0)
+        if known:
+            problems += [*_whole_file(program, rows, pushed, needed), *_odd(program, rows, length[mine], pushed / needed)]
+        problems += _layers(program, rows, (pushed, needed, length[mine]), spare, most)
+    return problems
+
+
+def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
+    """(m,) which beads are of a layer that climbs, as a vase does: its first and last turns get less and less plastic."""
+    rows = deposited.rows
+    _, group = np.unique(program.part[rows] * (int(program.layer.max(initial=0)) + 1) + program.layer[rows], return_inverse=True)
+    low, high = np.full(len(rows), np.inf), np.full(len(rows), -np.inf)
+    np.minimum.at(low, group, program.end[rows, 2])
+    np.maximum.at(high, group, program.end[rows, 2])
+    climbs: NDArray[np.bool_] = (high - low)[group] > CLIMBING * deposited.height_mm
+    return climbs
+
+
+def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Floats:
+    """(m,) cross-section that the told width and height need, with the profile's own factors."""
+    width, height = program.width_mm[rows], program.height_mm[rows]
+    area = pi * np.minimum(width, height) * height / 4.0 + np.maximum(width - height, 0.0) * height
+    first = program.layer[rows] == program.layer[rows].min()
+    on_plate = first & (program.part[rows] <= 1)
+    on_part = (program.part[rows] > 1) & (program.layer[rows] == 1)
+    process = profile.process
+    factor = np.where(on_plate, process.first_layer_flow, np.where(on_part, process.interface_flow, 1.0))
+    return np.asarray(area * factor * profile.material.flow)
+
+
+def _whole_file(program: ParsedProgram, rows: NDArray[np.int64], pushed: Floats, needed: Floats) -> list[Finding]:
+    """A file that pushes far more or less everywhere."""
+    share = float(pushed.sum() / max(needed.sum(), 1e-9))
+    if FILE_LEAST <= share <= FILE_MOST:
+        return []
+    message = (
+        f"the file pushes {share:.2f} of the plastic that its own widths and heights need, {FILE_LEAST:g} to {FILE_MOST:g} "
+        "are allowed"
+    )
+    return [at_row(program, int(rows[0]), "error", "extrusion", message)]
+
+
+def _odd(program: ParsedProgram, rows: NDArray[np.int64], length: Floats, share: Floats) -> list[Finding]:
+    """Single moves far from the cross-section told, in every part that has a good length of them."""
+    odd = (length > ROW_MM) & ((share < ROW_LEAST) | (share > ROW_MOST))
+    problems = []
+    for part in np.unique(program.part[rows[odd]]):
+        mine = np.flatnonzero(odd & (program.part[rows] == part))
+        if length[mine].sum() < ODD_MM:
+            continue
+        worst = float(share[mine][np.abs(np.log(np.maximum(share[mine], 1e-6))).argmax()])
+        message = (
+            f"a move pushes {worst:.2f} of the plastic that its width and height need, {ROW_LEAST:g} to {ROW_MOST:g} are allowed "
+            f"(moves: {len(mine)})"
+        )
+        problems.append(at_row(program, int(rows[mine[0]]), "error", "extrusion", message))
+    return problems
+
+
+def _layers(
+    program: ParsedProgram, rows: NDArray[np.int64], plastic: tuple[Floats, Floats, Floats], spare: float, most: float
+) -> list[Finding]:
+    """In every part the first layer that gets more or less than the file's layers do, kind by kind.
+
+    plastic: (m,) pushed by each bead, needed, and how long it is. spare: mm3 that a layer may get beyond its own, which come
+    out anyway after the table has turned. A warning where the file tells no widths.
+    """
+    pushed, needed, length = plastic
+    severity: Severity = "error" if most == LAYER_MOST else "warning"
+    usual = np.ones(len(rows))
+    for kind in np.unique(program.type[rows]):
+        mine = program.type[rows] == kind
+        usual[mine] = _weighted_median(pushed[mine] / needed[mine], needed[mine])
+    group = program.part[rows] * (int(program.layer.max(initial=0)) + 1) + program.layer[rows]
+    got, due, long = (np.bincount(group, weights=values) for values in (pushed, needed * usual, length))
+    share = got / np.maximum(due, 1e-12)
+    bad = np.flatnonzero((long > LAYER_MM) & (np.abs(got - due) > spare) & ((share > most) | (share < 1.0 / most)))
+    problems = []
+    parts = np.array([program.part[rows[np.argmax(group == each)]] for each in bad])
+    for part in np.unique(parts):
+        layers = bad[parts == part]
+        row = int(rows[np.argmax(group == layers[0])])
+        message = (
+            f"layer {program.layer[row]} gets {share[layers[0]]:.2f} of the plastic that such beads get in the rest of the file, "
+            f"{1 / most:.2f} to {most:.2f} are allowed (layers: {len(layers)})"
+        )
+        problems.append(at_row(program, row, severity, "extrusion", message))
+    return problems
+
+
+def _weighted_median(values: Floats, weights: Floats) -> float:
+    order = np.argsort(values)
+    sums = np.cumsum(weights[order])
+    return float(values[order[np.searchsorted(sums, 0.5 * sums[-1])]])
+
+
+def _fast(program: ParsedProgram, rows: NDArray[np.int64], length: Floats) -> list[Finding]:
+    """Strokes as fast as travels, in a file whose other strokes are slower."""
+    across = np.linalg.norm((program.end - program.start)[:, :2], axis=1)
+    travels = (program.kind == MoveKind.TRAVEL) & (across > ROW_MM) & (program.e_mm == 0.0)
+    if not travels.any():
+        return []
+    usual = _weighted_median(program.feed[travels], across[travels])
+    feed = program.feed[rows]
+    fast = (feed > FAST * usual) & (length > ROW_MM)
+    if not fast.any() or fast.mean() > FEW or usual * FAST < FASTER * np.quantile(feed[~fast], 1.0 - FEW):
+        return []
+    problems = []
+    for part in np.unique(program.part[rows[fast]]):
+        mine = rows[fast & (program.part[rows] == part)]
+        message = (
+            f"a move pushes filament at {program.feed[mine[0]] / 60:.0f} mm/s, the speed of the travels (moves: {len(mine)}): "
+            "filament flows during a travel"
+        )
+        problems.append(at_row(program, int(mine[0]), "error", "extruding-travel", message))
+    return problems

@@ -1,0 +1,107 @@
+"""Layering: findings about layers that do not lie on each other: one is missing, or part of one is printed too high.
+
+Two signs: a bead that begins above all that its part has laid before, by the heights that the file tells; and a layer most of
+whose beads have nothing under them, by the plastic that lies there.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun.findings import Finding, at_row
+from machine.dryrun.replay import Beads, Contacts
+from machine.reader.parsed import ParsedProgram
+from mdp.mesh import Floats
+from slicer.paths import Kind
+
+SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
+LOOSE = (Kind.OVERHANG.value, Kind.BRIDGE.value, Kind.IRONING.value, Kind.PURGE.value, Kind.SKIRT.value, *SUPPORT)
+SLACK_MM, SLACK_SHARE = 0.02, 0.1  # of a layer's height
+STAND_OFF_MM = 0.5  # at most between a part and the support below it
+ON_PLATE_MM = 0.35  # so low a bead sags onto the plate
+NEW_OBJECT_MM = 1.0  # a fall of more begins another object beside the first one
+FLOATING_SHARE = 0.5  # of a layer's length
+LEAST_MM = 10.0
+
+
+def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
+    """Errors of code gap."""
+    return [*_too_high(program, deposited), *_floating(program, deposited, contacts)]
+
+
+def _too_high(program: ParsedProgram, deposited: Beads) -> list[Finding]:
+    """In every part the first bead whose underside lies above all that was laid before it, by the heights told."""
+    told = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
+    rows = deposited.rows[told]
+    turned = np.any(program.end[rows[1:], 3:] != program.end[rows[:-1], 3:], axis=1)
+    groups = np.split(np.arange(len(rows)), np.flatnonzero((np.diff(program.part[rows]) != 0) | turned) + 1)
+    problems, seen = [], set()
+    for group in groups:
+        part = int(program.part[rows[group[0]]]) if len(group) else 0
+        if not len(group) or part in seen:
+            continue
+        mine = rows[group]
+        gap = _gaps(program, mine)
+        high = np.flatnonzero(gap > np.maximum(SLACK_MM, SLACK_SHARE * program.height_mm[mine]))
+        if len(high):
+            seen.add(part)
+            row, layers = int(mine[high[0]]), len(np.unique(program.layer[mine[high]]))
+            message = (
+                f"layer {program.layer[row]} begins {gap[high[0]]:.2f} mm above all that lies below it: it should lie on it "
+                f"(layers: {layers})"
+            )
+            problems.append(at_row(program, row, "error", "gap", message))
+    return problems
+
+
+def _gaps(program: ParsedProgram, rows: NDArray[np.int64]) -> Floats:
+    """(m,) by how much the underside of each bead of a part lies above the highest one before it; support keeps its distance."""
+    ends = np.stack([program.start[rows, 2], program.end[rows, 2]])
+    underside, top = ends.min(axis=0) - program.height_mm[rows], ends.max(axis=0)
+    objects = np.cumsum(np.diff(top, prepend=top[0]) < -NEW_OBJECT_MM)
+    support = program.rows_of_types(*SUPPORT)[rows]
+    gaps = np.zeros(len(rows))
+    for each in np.unique(objects):
+        own = np.flatnonzero(objects == each)
+        highest = np.maximum.accumulate(top[own])
+        of_part = np.maximum.accumulate(np.where(support[own], -np.inf, top[own]))
+        before, part_before = (np.concatenate([[np.inf], values[:-1]]) for values in (highest, of_part))
+        gap = underside[own] - before
+        stands_off = (support[own] | (part_before < before - SLACK_MM)) & (gap < STAND_OFF_MM)
+        gaps[own] = np.where(stands_off, 0.0, gap)
+    return gaps
+
+
+def _begins(program: ParsedProgram, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) which beads are of their part's first layer, of which another finding tells."""
+    parts, part = np.unique(program.part[rows], return_inverse=True)
+    first = np.full(len(parts), np.iinfo(np.int64).max)
+    np.minimum.at(first, part, program.layer[rows])
+    begins: NDArray[np.bool_] = program.layer[rows] == first[part]
+    return begins
+
+
+def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
+    """In every part the first layer of which more than half has nothing under it, though it is no bridge and no overhang."""
+    rows = deposited.rows
+    low = deposited.segments_mm[:, :, 2].min(axis=1) - deposited.height_mm < ON_PLATE_MM
+    counted = ~program.rows_of_types(*LOOSE)[rows] & ~low & ~_begins(program, rows)
+    rows = rows[counted]
+    ends = deposited.segments_mm[counted]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    group = program.part[rows] * (int(program.layer.max(initial=0)) + 1) + program.layer[rows]
+    loose = np.bincount(group, weights=(contacts.air_mm + contacts.beside_mm)[rows])
+    air = np.bincount(group, weights=contacts.air_mm[rows])
+    whole = np.bincount(group, weights=length)
+    bad = np.flatnonzero((loose > FLOATING_SHARE * whole) & (whole > LEAST_MM) & (air > 0.0))
+    problems, seen = [], set()
+    for each in bad:
+        row = int(rows[np.argmax(group == each)])
+        part = int(program.part[row])
+        if part not in seen:
+            seen.add(part)
+            message = (
+                f"{loose[each]:.1f} mm of the {whole[each]:.1f} mm of layer {program.layer[row]} have nothing under them, "
+                f"at most {100 * FLOATING_SHARE:g} % are allowed: a layer below it is missing"
+            )
+            problems.append(at_row(program, row, "error", "gap", message))
+    return problems

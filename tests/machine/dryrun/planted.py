@@ -1,0 +1,272 @@
+"""Faults planted into a good program by editing its text: what a person, a script or a damaged disk may do to a file."""
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+Lines = list[str]
+Edit = Callable[[Lines], Lines]
+STROKE = re.compile(r"G1 (?=.*[XY]).*[EU]\d")
+TRAVEL = re.compile(r"G0 (?=.*X)(?!.*[ACUV])")
+HEAT_OFF = re.compile(r"M104 [SP]0$")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """code: of a finding that tells it, in this part and (unless 0) this layer; refused: the file cannot be read at all."""
+
+    name: str
+    code: str
+    part: int
+    layer: int
+    edit: Edit
+    severity: str = "error"
+
+
+def part_of(lines: Lines, index: int) -> range:
+    """Places of a part's lines, from its ;PART: comment to before the way to the next turn."""
+    first = next(k for k, line in enumerate(lines) if line.startswith(f";PART:{index} "))
+    after = next(k for k in range(first + 1, len(lines)) if lines[k].startswith(";TYPE:Custom"))
+    return range(first, after)
+
+
+def layers_of(lines: Lines, index: int) -> list[range]:
+    """Places of the lines of a part's layers."""
+    part = part_of(lines, index)
+    firsts = [k for k in part if lines[k] == ";LAYER_CHANGE"]
+    return [range(a, b) for a, b in zip(firsts, [*firsts[1:], part.stop], strict=True)]
+
+
+def on(places: Callable[[Lines], Iterable[int]], change: Callable[[str], str | None]) -> Edit:
+    """Change the lines at some places; None takes a line out."""
+
+    def edit(lines: Lines) -> Lines:
+        changed = {k: change(lines[k]) for k in places(lines)}
+        edited = [changed.get(k, line) for k, line in enumerate(lines)]
+        return [line for line in edited if line is not None]
+
+    return edit
+
+
+def part(index: int) -> Callable[[Lines], Iterable[int]]:
+    return lambda lines: part_of(lines, index)
+
+
+def layers(index: int, first: int, count: int = 1) -> Callable[[Lines], Iterable[int]]:
+    """Layers of a part, counted from 1."""
+    return lambda lines: [k for layer in layers_of(lines, index)[first - 1 : first - 1 + count] for k in layer]
+
+
+def nth(pattern: str, which: int = 0, within: int = 0) -> Callable[[Lines], Iterable[int]]:
+    """The place of the n-th line that fits; within: a part."""
+
+    def places(lines: Lines) -> Iterable[int]:
+        among = part_of(lines, within) if within else range(len(lines))
+        return [[k for k in among if re.match(pattern, lines[k])][which]]
+
+    return places
+
+
+def word(letter: str, change: Callable[[float], float], only: str = "G[01] ") -> Callable[[str], str]:
+    """Change the number of one word of moves."""
+
+    def changed(line: str) -> str:
+        if not re.match(only, line):
+            return line
+        return re.sub(rf" {letter}(-?[0-9.]+)", lambda told: f" {letter}{change(float(told[1])):.5f}", line)
+
+    return changed
+
+
+def drop(pattern: str) -> Callable[[str], str | None]:
+    return lambda line: None if re.match(pattern, line) else line
+
+
+def insert(places: Callable[[Lines], Iterable[int]], *added: str) -> Edit:
+    """Put lines before a place."""
+
+    def edit(lines: Lines) -> Lines:
+        at = next(iter(places(lines)))
+        return [*lines[:at], *added, *lines[at:]]
+
+    return edit
+
+
+def before_turn(lines: Lines, index: int) -> int:
+    """The place of the line that lifts the tip after a part's last bead."""
+    stop = part_of(lines, index).stop
+    return max(k for k in range(stop) if lines[k] == ";WIPE_END") + 1
+
+
+def everywhere(lines: Lines) -> Iterable[int]:
+    return range(len(lines))
+
+
+def amid(index: int, layer: int) -> Callable[[Lines], Iterable[int]]:
+    """A place behind the first lines of a layer."""
+    return lambda lines: [layers_of(lines, index)[layer - 1][8]]
+
+
+def end_of(index: int, layer: int) -> Callable[[Lines], Iterable[int]]:
+    return lambda lines: [layers_of(lines, index)[layer - 1].stop]
+
+
+def not_pulled(lines: Lines) -> Lines:
+    """The last wipe of part 2 without its filament."""
+    at = before_turn(lines, 2)
+    return on(lambda _: range(at - 8, at), word("E", lambda _: 0.0, "G1 .*E-"))(lines)
+
+
+def purged_at_middle(lines: Lines) -> Lines:
+    return on(lambda _: range(part_of(lines, 1).start), word("Y", lambda _: 0.0))(lines)
+
+
+def turned_on(line: str) -> str:
+    return re.sub(r"([CV])([0-9.]+)", lambda told: f"{told[1]}{float(told[2]) + 10:.4f}", line)
+
+
+def still(line: str) -> str | None:
+    """The fan off at the beginning of a layer, and never on."""
+    return "M107" if line.startswith(";HEIGHT") else drop("M106")(line)
+
+
+def fan_off(line: str) -> str:
+    return "M107" if line.startswith("M106") else line
+
+
+def extruding_travels(push: Callable[[float], float]) -> Edit:
+    """Forty travels within parts that push filament; push: of the length, mm."""
+
+    def edit(lines: Lines) -> Lines:
+        edited, left, at = list(lines), 40, (0.0, 0.0)
+        inside = {k for layer in layers_of(lines, 1) for k in layer}
+        for k, line in enumerate(lines):
+            words = dict(re.findall(r"([XY])(-?[0-9.]+)", line)) if line.startswith("G") else {}
+            to = (float(words.get("X", at[0])), float(words.get("Y", at[1])))
+            length = abs(to[0] - at[0]) + abs(to[1] - at[1])
+            at = to
+            if left and k in inside and TRAVEL.match(line) and length > 2.0:
+                left -= 1
+                edited[k] = f"{line.replace('G0', 'G1')} E{push(length):.5f}"
+        return edited
+
+    return edit
+
+
+def moved_part(lines: Lines, index: int, behind: int) -> Lines:
+    """A part with its turn put behind another one."""
+    blocks = {k: turn_and_part(lines, k) for k in (index, behind)}
+    text = [line for k, line in enumerate(lines) if k not in blocks[index]]
+    at = len([k for k in range(blocks[behind].stop) if k not in blocks[index]])
+    return [*text[:at], *(lines[k] for k in blocks[index]), *text[at:]]
+
+
+def turn_and_part(lines: Lines, index: int) -> range:
+    """From the turn before a part to the turn behind it."""
+    body = part_of(lines, index)
+    return range(body.start - 2, body.stop)
+
+
+def without_part(index: int) -> Edit:
+    return lambda lines: [line for k, line in enumerate(lines) if k not in turn_and_part(lines, index)]
+
+
+def repeated(places: Callable[[Lines], Iterable[int]]) -> Edit:
+    """Lines that come twice."""
+
+    def edit(lines: Lines) -> Lines:
+        block = list(places(lines))
+        return [*lines[: block[-1] + 1], *(lines[k] for k in block), *lines[block[-1] + 1 :]]
+
+    return edit
+
+
+def swapped_layers(index: int, first: int) -> Edit:
+    def edit(lines: Lines) -> Lines:
+        a, b = layers_of(lines, index)[first - 1 : first + 1]
+        return [*lines[: a.start], *lines[b.start : b.stop], *lines[a.start : a.stop], *lines[b.stop :]]
+
+    return edit
+
+
+def crossed_low(lines: Lines) -> Lines:
+    """After the turn down first, then across."""
+    begin = part_of(lines, 3).start
+    ways = [k for k in range(begin, begin + 8) if lines[k].startswith("G0")]
+    edited = list(lines)
+    edited[ways[0]], edited[ways[1]] = lines[ways[1]], lines[ways[0]]
+    return edited
+
+
+IN_1_20, IN_2_1 = amid(1, 20), amid(2, 1)
+
+FAULTS = (
+    Fault("a part shifted by 0.5 mm", "contents", 2, 1, on(part(2), word("X", lambda x: x + 0.5))),
+    Fault("a part shifted by 0.2 mm", "contents", 2, 1, on(part(2), word("X", lambda x: x + 0.2))),
+    Fault("the first part shifted by 0.2 mm", "contents", 1, 1, on(part(1), word("Y", lambda y: y - 0.2))),
+    Fault("a part raised 0.3 mm off its interface", "contents", 2, 1, on(part(2), word("Z", lambda z: z + 0.3))),
+    Fault("a part pressed 0.1 mm into its interface", "contents", 3, 1, on(part(3), word("Z", lambda z: z - 0.1))),
+    Fault("the first part 0.15 mm above the plate", "contents", 1, 1, on(part(1), word("Z", lambda z: z + 0.15))),
+    Fault("a part scaled by 1.02", "contents", 2, 0, on(part(2), word("X", lambda x: 1.02 * x))),
+    Fault("a mirrored part", "contents", 2, 0, on(part(2), word("Y", lambda y: -y))),
+    Fault("a layer missing", "gap", 1, 20, on(layers(1, 20), lambda _: None)),
+    Fault("four layers missing", "gap", 2, 12, on(layers(2, 12, 4), lambda _: None)),
+    Fault("a layer whose moves are gone", "gap", 1, 31, on(layers(1, 30), drop("G1 .*E"))),
+    Fault("a layer whose beads are not extruded", "gap", 2, 11, on(layers(2, 10), word("E", lambda e: 0.0, "G1 .*E[0-9]"))),
+    Fault("a layer 0.1 mm too high", "gap", 1, 25, on(layers(1, 25), word("Z", lambda z: z + 0.1))),
+    Fault("a layer 0.1 mm too low", "gap", 1, 26, on(layers(1, 25), word("Z", lambda z: z - 0.1))),
+    Fault("a lift that is not lowered again", "gap", 1, 15, insert(amid(1, 15), "G91", "G0 Z0.4", "G90", "M83")),
+    Fault("a layer printed twice", "filled", 1, 11, repeated(layers(1, 10))),
+    Fault("two layers in the wrong order", "order", 1, 11, swapped_layers(1, 10)),
+    Fault("a part at 60 % flow", "extrusion", 2, 1, on(part(2), word("E", lambda e: 0.6 * e, "G1 .*[XY].*E[0-9]"))),
+    Fault("a part at 150 % flow", "extrusion", 3, 1, on(part(3), word("E", lambda e: 1.5 * e, "G1 .*[XY].*E[0-9]"))),
+    Fault("a layer at 80 % flow", "extrusion", 1, 18, on(layers(1, 18), word("E", lambda e: 0.8 * e, "G1 .*[XY].*E[0-9]"))),
+    Fault("M221 S60 for a part", "extrusion", 2, 1, insert(nth(";PART:2"), "M221 S60")),
+    Fault("40 travels that ooze", "extrusion", 1, 0, extruding_travels(lambda mm: 0.05)),
+    Fault("40 travels that extrude", "extruding-travel", 1, 0, extruding_travels(lambda mm: 0.035 * mm)),
+    Fault("no lift before a turn", "low-travel", 1, 47, on(lambda t: [before_turn(t, 1)], lambda _: None)),
+    Fault("across after the turn at the height of the first bead", "low-travel", 3, 0, crossed_low),
+    Fault("no fans", "fan", 1, 6, on(everywhere, drop("M106"))),
+    Fault("no fan for a part", "fan", 2, 6, on(part(2), fan_off)),
+    Fault("the fan off amid a part", "fan", 1, 20, on(layers(1, 20, 6), still)),
+    Fault("45 mm laid in the air", "air", 1, 20, insert(end_of(1, 20), "G0 X40 Y0", "G1 X85 Y0 E1.5 F600", "G0 X0 Y0")),
+    Fault("a nozzle of 170 deg C", "temperature", 2, 1, insert(IN_2_1, "M104 S170")),
+    Fault("a nozzle of 255 deg C", "temperature", 2, 1, insert(IN_2_1, "M104 S255")),
+    Fault("the nozzle off amid the print", "cold-extrusion", 1, 20, insert(IN_1_20, "M104 S0")),
+    Fault("no waiting for heat", "cold-extrusion", 1, 1, on(everywhere, drop("M109"))),
+    Fault("the heater left on", "heater-on", 3, 0, on(everywhere, lambda line: None if HEAT_OFF.match(line) else line)),
+    Fault("the bed off amid the print", "bed-off", 1, 20, insert(IN_1_20, "M140 S0"), "warning"),
+    Fault("parts in the wrong order", "order", 2, 1, lambda t: moved_part(t, 2, 3)),
+    Fault("a part missing", "missing", 2, 0, without_part(2)),
+    Fault("a part printed twice", "filled", 2, 1, repeated(part(2))),
+    Fault("cut off amid the last part", "contents", 3, 10, lambda t: t[: layers_of(t, 3)[10].start]),
+    Fault("cut off before the last part", "missing", 3, 0, lambda t: t[: part_of(t, 3).start]),
+    Fault("a prime missing", "retraction", 1, 0, on(nth("G1 E0", 0, 1), lambda _: None)),
+    Fault("no pulling back before a turn", "retraction", 2, 34, not_pulled),
+    Fault("a blob of 5 mm of filament", "retraction", 1, 20, insert(IN_1_20, "G1 E5 F300")),
+    Fault("30 mm pulled back", "retraction", 1, 20, insert(IN_1_20, "G1 E-30 F300", "G1 E30 F300")),
+    Fault("another turn", "pose", 2, 1, on(nth("G0 [AU]15"), turned_on)),
+    Fault("a tilt to the other side", "pose", 2, 1, on(nth("G0 [AU]15"), lambda line: line.replace("15.0000", "-15.0000"))),
+    Fault("filament while the table turns", "turning-stroke", 1, 47, on(nth("G0 [AU]15"), lambda line: line + " E1")),
+    Fault("speeds ten times as high", "flow", 2, 1, on(part(2), word("F", lambda f: 10 * f, "G1 .*[XY].*E[0-9]")), "warning"),
+    Fault("M220 S1000", "axis-speed", 1, 0, insert(IN_1_20, "M220 S1000"), "warning"),
+    Fault("relative moves from a layer on", "axis-limit", 1, 0, insert(IN_1_20, "G91")),
+    Fault("inches from a layer on", "gap", 1, 20, insert(IN_1_20, "G20")),
+    Fault("filament told absolutely", "contents", 1, 0, on(everywhere, lambda line: "M82" if line == "M83" else line)),
+    Fault("a plunge below the plate", "collision", 1, 20, insert(IN_1_20, "G0 Z-1", "G0 Z4")),
+    Fault("a travel 0.15 mm too low", "contact", 1, 0, insert(end_of(1, 20), "G0 X0 Y0", "G0 Z3.85", "G0 X2 Y3", "G0 Z4")),
+    Fault("a plunge into an earlier part", "contact", 3, 5, insert(amid(3, 5), "G91", "G0 Z-3", "G0 Z3", "G90", "M83")),
+    Fault("homing amid the print", "homing-over-print", 1, 20, insert(IN_1_20, "G28"), "warning"),
+    Fault("no homing", "not-homed", 0, 0, on(everywhere, drop("G28|G92 [A-Z]0 "))),
+    Fault("a place beyond the axis", "axis-limit", 1, 20, insert(IN_1_20, "G0 X900")),
+    Fault("a purge line through the part", "purge", 0, 0, purged_at_middle),
+    Fault("the first part beside the plate", "off-plate", 1, 0, on(part(1), word("X", lambda x: x + 95.0))),
+)
+
+REFUSED = {
+    "a speed of 0": (insert(IN_1_20, "G1 X1 Y1 E0.1 F0"), "a feed must be above 0"),
+    "a number that is none": (insert(IN_1_20, "G1 Xnan Y1 E0.1"), "Xnan"),
+    "a word without its number": (insert(IN_1_20, "G1 X Y1 E0.1"), "without a number"),
+    "an arc without its centre": (insert(IN_1_20, "G2 X1 Y1 E0.1"), "is no arc"),
+    "half a line": (insert(IN_1_20, "G1 X12.3 Y-"), "cannot be read"),
+}
