@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_all_start_methods, get_context
+from multiprocessing import active_children, get_all_start_methods, get_context
 from multiprocessing.sharedctypes import RawArray
 from threading import Thread
 from typing import Any
@@ -118,5 +118,9 @@ def _slice_side_by_side(
             if on_progress is not None:
                 on_progress(sum(count > 0 for count in counts), len(planned), sum(counts), sum(expected))
         return tuple(futures[k].result() for k in range(len(planned)))
+    except BaseException:
+        for process in active_children():  # nobody waits for what they slice
+            process.kill()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)

@@ -8,7 +8,12 @@ def main() -> int:
     try:
         from machine.app.cli import main as run
 
-        return run()
+        code = run()
     except KeyboardInterrupt:
         sys.stderr.write("tiltprint: interrupted\n")
-        return 130
+        code = 130
+    if code == 130:
+        from machine.app.terminal.interrupts import leave
+
+        leave(code)
+    return code

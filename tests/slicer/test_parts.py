@@ -55,7 +55,7 @@ slicer.parts.slice_parts(cut(box(10, 10, 24), ((0.0, 0.0, 1.0), 12.0)), profile(
 """
 
 
-@pytest.mark.parametrize("ended_by", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("ended_by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -> None:
     with subprocess.Popen([sys.executable, "-c", SLICING], stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None

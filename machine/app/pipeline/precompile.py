@@ -5,8 +5,10 @@ compiles the latter, while this one compiles the former and searches. Where only
 """
 
 import atexit
+import os
 import subprocess
 import sys
+from threading import Thread
 from time import perf_counter
 
 import manifold3d as m3
@@ -105,8 +107,9 @@ def _keep(what: str) -> None:
 
 
 def _start(what: str) -> None:
-    """Compile in another process, which ends with this one."""
-    _others.append(subprocess.Popen([sys.executable, "-m", "machine.app.pipeline.precompile", what], stderr=subprocess.DEVNULL))
+    """Compile in another process, which ends with this one: whatever ends it, the pipe between them is closed then."""
+    command = [sys.executable, "-m", "machine.app.pipeline.precompile", what]
+    _others.append(subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL))
     atexit.register(_others[-1].kill)
 
 
@@ -172,7 +175,13 @@ def _program(profile: Profile) -> None:
     agreement(run, decomposition.mesh, profile)
 
 
+def _end_with_parent() -> None:
+    sys.stdin.buffer.read()
+    os._exit(1)
+
+
 if __name__ == "__main__":
+    Thread(target=_end_with_parent, daemon=True).start()
     if sys.argv[1] == SEARCH:
         _beside_sweep()
     else:

@@ -1,9 +1,12 @@
 """Interrupts: Ctrl-C, a termination request and a closed terminal, turned into a safe end."""
 
+import atexit
 import os
 import select
 import signal
+import socket
 import stat
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -12,6 +15,8 @@ from types import FrameType
 HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
 ALL: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM, *HANGUP)
 AGAIN_S = 0.1
+PATIENCE_S = 1.2  # how long work may go on after Ctrl-C: native code hears of it only when it is done
+SHOW_CURSOR = "\r\x1b[K\x1b[?25h"
 COMPILER = f"{os.sep}llvmlite{os.sep}"
 
 
@@ -63,7 +68,10 @@ def calling(act: Callable[[], None]) -> Iterator[None]:
 
 @contextmanager
 def outside_compiler() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, but never beneath the compiler, which would lose it or take it for an error of its own."""
+    """Ctrl-C raises KeyboardInterrupt, but never beneath the compiler, which would lose it or take it for an error of its own.
+
+    Work that goes on all the same, in native code or waiting for threads, is ended with the process.
+    """
     main, here = threading.main_thread(), threading.current_thread()
     if (
         here is not main
@@ -85,9 +93,60 @@ def outside_compiler() -> Iterator[None]:
 
     before = signal.signal(signal.SIGINT, handle)
     try:
-        yield
+        with _hurried(lambda: signal.getsignal(signal.SIGINT) is handle):
+            yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _hurried(wanted: Callable[[], bool]) -> Iterator[None]:
+    """End the process when what is inside still runs PATIENCE_S after an interrupt that is wanted to end it.
+
+    A thread hears of the signal by what Python writes at once, whatever the main thread does.
+    """
+    heard, noted = socket.socketpair()
+    heard.settimeout(None)
+    noted.setblocking(False)
+    over = threading.Event()
+
+    def serve() -> None:
+        while not over.is_set():
+            if signal.SIGINT in heard.recv(64) and wanted() and not over.wait(PATIENCE_S) and wanted():
+                end_at_once()
+
+    wakeup = signal.set_wakeup_fd(noted.fileno(), warn_on_full_buffer=False)
+    thread = threading.Thread(target=serve, name="hurry", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        signal.set_wakeup_fd(wakeup)
+        noted.send(b"\0")
+        thread.join()
+        heard.close()
+        noted.close()
+
+
+def end_at_once() -> None:
+    """End this process as interrupted, whatever its threads do; its helpers end with it."""
+    if sys.stderr.isatty():
+        sys.stderr.write(SHOW_CURSOR)
+    sys.stderr.write("tiltprint: interrupted\n")
+    sys.stderr.flush()
+    leave(130)
+
+
+def leave(code: int) -> None:
+    """End this process without waiting for its threads and the processes that help it, which have nothing to do any more."""
+    processes = sys.modules.get("multiprocessing.process")
+    for helper in processes.active_children() if processes is not None else ():
+        helper.kill()
+    atexit._run_exitfuncs()
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+    os._exit(code)
 
 
 @contextmanager

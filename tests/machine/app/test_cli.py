@@ -145,8 +145,11 @@ def test_ctrl_c_before_the_command_line_is_loaded_is_an_interrupt(monkeypatch: p
     def interrupted() -> int:
         raise KeyboardInterrupt
 
+    left: list[int] = []
     monkeypatch.setattr("machine.app.cli.main", interrupted)
-    assert start.main() == 130
+    monkeypatch.setattr("machine.app.terminal.interrupts.leave", left.append)
+    start.main()
+    assert left == [130]
 
 
 def test_ctrl_c_beneath_compiled_code_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -64,9 +64,7 @@ def test_nothing_else_is_served(watched: Watched, path: str) -> None:
     assert asked(watched, path)[0].status == 404
 
 
-@pytest.mark.parametrize(
-    "path", ["/", "/state", "/AAAAAAAAAAAAAAAAAAAAAA/", "/AAAAAAAAAAAAAAAAAAAAAA/state", "//state", "/\u00e9"]
-)
+@pytest.mark.parametrize("path", ["/", "/state", "/AAAAAAAAAAAAAAAAAAAAAA/", "/AAAAAAAAAAAAAAAAAAAAAA/state", "//state"])
 def test_who_does_not_know_the_token_of_the_address_is_shown_nothing(watched: Watched, path: str) -> None:
     answer, content = asked_without_token(watched, path)
     assert (answer.status, content) == (404, b"this page is at the address that the print has told\n")

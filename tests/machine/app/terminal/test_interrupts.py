@@ -3,12 +3,17 @@
 import os
 import select
 import signal
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Callable
 
 import pytest
 
 from machine.app.terminal.interrupts import COMPILER, calling, interrupting, outside_compiler, stopping
+
+SLACK_S = 1.0  # on a busy machine
 
 
 def wait_for_nothing() -> None:
@@ -95,3 +100,32 @@ def test_an_interrupt_beneath_the_compiler_waits_until_it_is_back() -> None:
         work()
     signal.signal(signal.SIGINT, before)
     assert finished == ["compiled"]
+
+
+NATIVE = """
+import hashlib
+from machine.app.terminal.interrupts import outside_compiler
+with outside_compiler():
+    print("ready", flush=True)
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)  # native code for minutes
+"""
+
+
+def test_work_in_native_code_is_ended_with_the_process() -> None:
+    with subprocess.Popen([sys.executable, "-c", NATIVE], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        began_s = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        assert process.communicate() == ("", "tiltprint: interrupted\n")
+    assert process.returncode == 130
+    assert time.monotonic() - began_s < 2.0 + SLACK_S
+
+
+def test_work_that_ends_by_itself_is_not_ended_again(capfd: pytest.CaptureFixture[str]) -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    threads = threading.active_count()
+    with pytest.raises(KeyboardInterrupt), outside_compiler():
+        signal.raise_signal(signal.SIGINT)
+    signal.signal(signal.SIGINT, before)
+    assert (threading.active_count(), capfd.readouterr().err) == (threads, "")
