@@ -65,7 +65,9 @@ def _check(parts: SplitResult, text: str, has_scheme: bool) -> None:
     if has_scheme and parts.scheme not in SCHEMES:
         raise ServerError(f"server address {_plain(text)!r} begins with {parts.scheme}://: http:// or https:// is expected")
     host = parts.hostname or ""
-    if not host or not all(c.isalnum() or c in ".-_:%" for c in host):
+    if not all(c.isalnum() or c in ".-_:%" for c in host) or not all(
+        0 < len(label) < 64 for label in host.rstrip(".").split(".")
+    ):
         raise ServerError(f"server address {_plain(text)!r} names no host: {EXPECTED}")
     if parts.query or parts.fragment:
         raise ServerError(f"server address {_plain(text)!r}: nothing may follow the path: {EXPECTED}")

@@ -21,7 +21,7 @@ from profiles.errors import ServerError
 FOLDER = "0:/gcodes/"
 DEFAULT_PASSWORD = "reprap"  # of a board on which none was set; its name must be sent all the same
 WRITTEN_S = 120.0
-PAUSE_S, LOOK_S = 120.0, 0.5
+START_S, PAUSE_S, LOOK_S = 3.0, 120.0, 0.25
 MOST_PAGES = 16
 STOPPED = frozenset({Phase.PAUSING, Phase.PAUSED, Phase.CANCELLING})
 STATES = {
@@ -129,6 +129,11 @@ class Duet:
         """Begin to print a file that it holds."""
         self._last = None
         self.command(f'M32 "{FOLDER}{file}"')
+        deadline_s = time.monotonic() + START_S
+        while (status := self.status()).phase not in ACTIVE and time.monotonic() < deadline_s:
+            if "Error" in status.message:
+                raise ServerError(f"{self.name} cannot start it now: {status.message}")
+            time.sleep(LOOK_S)
 
     def pause(self) -> None:
         """Pause the print: the firmware runs pause.g."""

@@ -17,6 +17,7 @@ from profiles.errors import ServerError
 
 POLL_S, TURN_S = 1.0, 0.05
 SHOW_S = 0.25  # what is shown is drawn again: a question to the person stands beside it
+JOIN_S = 0.5  # an order that still waits for its answer is left to the server
 BEGIN_S = 15.0  # a server that has taken the order to start shows it by then
 LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
 OnStatus = Callable[[JobStatus, str], None]  # with a message to the person, "" when there is none
@@ -61,8 +62,9 @@ class _Follower:
         self._shown_s = 0.0
 
     def run(self) -> End:
-        for work in (self._poll, self._carry_out):
-            threading.Thread(target=work, name="print server", daemon=True).start()
+        threads = [threading.Thread(target=work, name="print server", daemon=True) for work in (self._poll, self._carry_out)]
+        for thread in threads:
+            thread.start()
         try:
             while True:
                 if self._left():
@@ -75,6 +77,8 @@ class _Follower:
                 time.sleep(TURN_S)
         finally:
             self._over.set()
+            for thread in threads:
+                thread.join(JOIN_S)
 
     def _look(self) -> End | None:
         """Tell the newest status; how the print has ended, None while it goes on."""

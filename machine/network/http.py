@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 CONNECT_S, ANSWER_S = 5.0, 10.0
 ERRNO = re.compile(r"^\[errno -?\d+\] ")
+MOST_BYTES = 16_000_000  # of an answer
 WORDS = 160  # characters of a server's own words in a message
 Tell = Callable[[str, bytes], None]  # direction and what went over the line, as a log takes it
 
@@ -115,17 +116,32 @@ class HttpSession:
 
     def _request(self, method: str, path: str, note: str, **request: Any) -> Reply:
         self._log(">", f"{method} {note}")
+        given = {key: value for key, value in request.items() if value is not None}
         try:
-            answer = self._client.request(method, path, **{k: v for k, v in request.items() if v is not None})
+            with self._client.stream(method, path, **given) as answer:
+                body = self._body(answer)
         except self._httpx.TransportError as error:
             sentence = _transport_sentence(error, self.address, self._httpx)
             self._log("#", sentence)
             raise ServerError(sentence) from None
         except (self._httpx.InvalidURL, self._httpx.DecodingError) as error:
             raise ServerError(f"what answers at {self.address.url} speaks no proper HTTP: {plain(str(error))}") from None
-        reply = Reply(answer.status_code, answer.content, path, answer.headers.get("location", ""))
+        except RuntimeError:
+            if not self._client.is_closed:
+                raise
+            raise ServerError(f"{self.name}: the session is over") from None
+        reply = Reply(answer.status_code, body, path, answer.headers.get("location", ""))
         self._log("<", f"{reply.status} {self.words(reply)}")
         return reply
+
+    def _body(self, answer: httpx.Response) -> bytes:
+        """All of an answer, which is small from every such server. Raises ServerError."""
+        body = b""
+        for piece in answer.iter_bytes():
+            body += piece
+            if len(body) > MOST_BYTES:
+                raise ServerError(f"{self.name} answers with more than {MOST_BYTES // 1_000_000} MB: it is no print server")
+        return body
 
     def _log(self, direction: str, text: str) -> None:
         with self._log_lock:

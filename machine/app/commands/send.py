@@ -33,6 +33,7 @@ def send(request: ModelRequest, sending: SendRequest) -> int:
         upload = GcodeUpload(request.name, loaded.program.lines)
         file = hand_over(server, upload, request.name)
         if sending.start:
+            check_free(server.name, server.status())
             server.start(file)
         done = "prints" if sending.start else "waits"
         show(f"{file} {done} on {server.name}\n")

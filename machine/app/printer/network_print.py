@@ -75,7 +75,7 @@ def follow_on_server(server: PrintServer, job: PrintJob, upload: GcodeUpload, fi
 
 def _report_end(end: End, file: str, server: str, progress: "ServerProgress") -> int:
     if end is End.STOPPED:
-        raise FirmwareError(f"emergency stop: {server} has taken it; switch the printer off and on before the next print")
+        raise FirmwareError(f"emergency stop: {server} has taken it; restart the printer before the next print")
     if end is End.DONE:
         show(f"printed {file} on {server} in {duration(progress.elapsed_s)}\n")
         return 0

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import ssl
+import sys
 import threading
 import zlib
 from collections.abc import Iterator
@@ -310,13 +311,23 @@ class DuetStandIn(Handler):
 STAND_INS: dict[str, type[Handler]] = {"octoprint": OctoPrintStandIn, "moonraker": MoonrakerStandIn, "duet": DuetStandIn}
 
 
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """A client that hangs up is no fault of the test."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
+
+
 @contextmanager
-def stand_in(kind: str, key: str = KEY, certificate: Path | None = None, **more: Any) -> Iterator[tuple[Job, str]]:
+def stand_in(
+    kind: str, key: str = KEY, certificate: Path | None = None, handler: type[Handler] | None = None, **more: Any
+) -> Iterator[tuple[Job, str]]:
     """A print server of a kind: its job and the address of it. certificate: a PEM file with its key, for TLS."""
     job = Job()
-    handler = type(kind, (STAND_INS[kind],), {"job": job, "key": key, "sessions": set(), **more})
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    server.daemon_threads = True
+    made = type(kind, (handler or STAND_INS[kind],), {"job": job, "key": key, "sessions": set(), **more})
+    server = _Server(("127.0.0.1", 0), made)
     if certificate is not None:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         context.load_cert_chain(certificate)

@@ -41,6 +41,8 @@ def test_a_port_is_no_server(text: str) -> None:
         ("octoprint:host?apikey=1", "nothing may follow the path"),
         ("octoprint:a b", "names no host"),
         ("octoprint:ho\x1bst", "names no host"),
+        ("octoprint:a..b", "names no host"),
+        ("octoprint:" + "a" * 64, "names no host"),
     ],
 )
 def test_an_address_that_names_no_server_is_refused(text: str, sentence: str) -> None:

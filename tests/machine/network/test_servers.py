@@ -1,5 +1,7 @@
 """Each kind of server: a file handed over, printed, paused, cancelled, halted; refusals and broken lines as sentences."""
 
+import contextlib
+import random
 import shutil
 import socket
 import subprocess
@@ -17,7 +19,7 @@ from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import JobStatus, Phase, PrintServer
 from machine.network.servers import KINDS, open_server
 from profiles.errors import ServerError
-from tests.machine.network.stand_ins import KEY, stand_in
+from tests.machine.network.stand_ins import KEY, STAND_INS, stand_in
 
 LINES = tuple(f"G1 X{k}" for k in range(20_000))
 UPLOAD = GcodeUpload("box.gcode", LINES)
@@ -296,3 +298,49 @@ def test_tls_to_a_server_without_it_is_a_sentence() -> None:
     no_tls = pytest.raises(ServerError, match="speaks no TLS: is it http:// instead of https://")
     with stand_in("moonraker") as (_, address), no_tls:
         greet(address.replace("http:", "https:"))
+
+
+def any_value(draw: random.Random, depth: int = 0) -> object:
+    """A JSON value of any shape, with the names that the servers use."""
+    names = ("result", "state", "error", "status", "job", "files", "local", "path", "err", "flags", "message", "heat", "heaters")
+    kind = draw.randrange(8 if depth < 4 else 6)
+    if kind == 6:
+        return [any_value(draw, depth + 1) for _ in range(draw.randrange(3))]
+    if kind == 7:
+        return {draw.choice(names): any_value(draw, depth + 1) for _ in range(draw.randrange(5))}
+    return (None, True, -1, 1e308, "\x1b]0;x\x07", "ready")[kind]
+
+
+@every_kind
+def test_whatever_a_server_answers_there_is_a_sentence_or_a_value(kind: str) -> None:
+    draw = random.Random(kind)
+
+    class AnyAnswer(STAND_INS[kind]):  # type: ignore[misc]
+        def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> tuple[int, object]:
+            usual = super().answer(method, path, query, body)
+            return usual if draw.random() < 0.3 else (draw.choice((200, 201, 200, 404, 409, 500)), any_value(draw))
+
+    with stand_in(kind, handler=AnyAnswer) as (_, address):
+        for _ in range(60):
+            with open_server(address) as server:
+                calls: list[Callable[[], object]] = [server.greet, server.status, lambda: server.has("box.gcode"), server.pause]
+                for call in [*calls, lambda: server.upload(UPLOAD, unheard), lambda: server.command("M220 S90")]:
+                    with contextlib.suppress(ServerError):
+                        call()
+
+
+def test_an_answer_without_end_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http, "MOST_BYTES", 1_000_000)
+    with stand_in("octoprint") as (job, address), open_server(address) as server:
+        job.refuse["/api/version"] = (200, b"x" * 2_000_000)
+        with pytest.raises(ServerError, match="answers with more than 1 MB: it is no print server"):
+            server.greet()
+
+
+def test_a_duet_that_does_not_start_says_why() -> None:
+    with stand_in("duet") as (job, address), open_server(address) as server:
+        file = hand_over(server)
+        job.refuse["/rr_gcode"] = (200, {"buff": 240})
+        job.refuse["/rr_reply"] = (200, b"Error: M32: Cannot set file to print, because a file is already being printed\n")
+        with pytest.raises(ServerError, match="cannot start it now: Error: M32: Cannot set file to print"):
+            server.start(file)
