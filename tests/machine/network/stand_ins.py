@@ -17,7 +17,6 @@ from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 KEY = "workshop-key-0815"
-STEPS = 4  # looks that a print takes
 
 
 class Job:
@@ -27,6 +26,7 @@ class Job:
         self.files: dict[str, bytes] = {}
         self.asked: list[str] = []
         self.state, self.file, self.position = "idle", "", 0
+        self.steps = 4  # looks that a print takes
         self.commands: list[str] = []
         self.halted = False
         self.refuse: dict[str, tuple[int, str]] = {}  # path -> status and words that are answered instead
@@ -38,7 +38,7 @@ class Job:
     def look(self) -> None:
         if self.state == "printing":
             size = len(self.files[self.file])
-            self.position = min(self.position + size // STEPS + 1, size)
+            self.position = min(self.position + size // self.steps + 1, size)
             if self.position == size:
                 self.state = "complete"
 

@@ -1,13 +1,18 @@
 """`tiltprint send` and `print --port SERVER`: what is checked before a byte goes, what is said, what is left behind."""
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from machine.app.cli import main
+from machine.app.terminal.server_keys import LEAVING
 from machine.network import follow
 from machine.network.credentials import VARIABLE
 from tests.machine.network.stand_ins import KEY, stand_in
+from tests.machine.person import ROOT, Person
 
 PROGRAMS = Path(__file__).resolve().parents[2] / "programs"
 MARLIN, KLIPPER = PROGRAMS / "post_and_arm_generic_ac.gcode", PROGRAMS / "post_and_arm_fractal5pro.gcode"
@@ -120,3 +125,56 @@ def test_what_cannot_be_sent_is_one_sentence(words: list[str], sentence: str, ca
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1
+
+
+def print_of(address: str) -> list[str]:
+    return ["print", str(MARLIN), "--port", address, "--force"]
+
+
+@pytest.mark.slow
+def test_a_print_on_a_server_is_paused_by_a_key_and_cancelled_by_the_second_ctrl_c() -> None:
+    with stand_in("octoprint") as (job, address):
+        job.steps = 10_000
+        with Person(*print_of(address)) as person:
+            before = person.settings()
+            person.see("so far")
+            person.press("p")
+            person.see("paused")
+            assert job.state == "paused"
+            person.press("r")
+            person.see("printing")
+            person.press("\x03")
+            person.see(LEAVING[:40])
+            assert job.state == "printing"
+            person.press("\x03")
+            person.see(f"tiltprint: interrupted; the print was cancelled on {address}")
+            assert person.settings() == before
+            assert person.end() == 130
+    assert job.state == "cancelled"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("interrupts", "state"), [(1, "printing"), (2, "cancelled")])
+def test_without_a_terminal_one_interrupt_leaves_and_two_cancel(interrupts: int, state: str) -> None:
+    with stand_in("octoprint") as (job, address):
+        job.steps = 10_000
+        command = [sys.executable, "-m", "machine.app.cli", *print_of(address)]
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT)
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith(b"printing: ") or (b"interrupt again within 2 s" in line and interrupts == 2):
+                process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 130
+        assert job.state == state
+
+
+@pytest.mark.slow
+def test_the_emergency_key_halts_the_printer_behind_a_server() -> None:
+    with stand_in("octoprint") as (job, address):
+        job.steps = 10_000
+        with Person(*print_of(address)) as person:
+            person.see("so far")
+            person.press("e")
+            person.see(f"tiltprint: emergency stop: {address} has taken it; restart the printer before the next print")
+            assert person.end() == 1
+    assert job.commands == ["M112"]
