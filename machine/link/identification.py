@@ -35,7 +35,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Answer:
-    """What answers. words: the firmware's own line, its error, or the last words of a stranger.
+    """What answers. words: the firmware's own line, its error, what it is busy with, or the last words of a stranger.
 
     letters: axes that M114 reports, the filament's left out; "" when none. limits: letter -> least and greatest
     value, of a firmware that reports them.
@@ -89,7 +89,8 @@ class _Inquiry:
         self._decoder = LineDecoder()
         self._words = self._fault = self._letters = ""
         self._area: Area | None = None
-        self._ok = self._busy = self.named = self.placed = self._refused = False
+        self._ok = self.named = self.placed = self._refused = False
+        self._busy = ""  # what it says of that
         self._next_number = 0  # that a firmware which insists on numbers and checksums wants
 
     def listen(self, question: str, timeout_s: float, until: Callable[[], bool]) -> None:
@@ -123,7 +124,7 @@ class _Inquiry:
         if self._words or self._ok or self._refused:
             return Answer(Kind.PRINTER, self._words, self._letters, self._limits())
         if self._busy:
-            return Answer(Kind.BUSY)
+            return Answer(Kind.BUSY, self._busy)
         if self._decoder.rubbish:
             return Answer(Kind.RUBBISH)
         words = self._decoder.foreign
@@ -133,7 +134,7 @@ class _Inquiry:
         if isinstance(event, FirmwareFault):
             self._fault = event.text
         elif isinstance(event, Busy):
-            self._busy = True
+            self._busy = event.text.rpartition("busy:")[2].strip() or "busy"
         elif lacks_checksum(event):
             self._refused = True
         elif isinstance(event, Resend) and self._refused:

@@ -2,11 +2,14 @@
 
 import os
 import socket
+from collections import deque
+from contextlib import suppress
 from pathlib import Path
 
 from profiles.errors import PortError
 
 READ_BYTES = 4096
+TAKEN, MOST_OTHERS = b"echo:busy: another program talks to this simulated printer\n", 8
 TERMINALS = ("/dev/pts/", "/dev/tty")
 
 
@@ -88,7 +91,7 @@ def _leads_to_a_terminal(link: Path) -> bool:
 
 
 class Server:
-    """A TCP port of this computer for one host at a time; number 0 takes a free one."""
+    """A TCP port of this computer for one host at a time, others are told so; number 0 takes a free one."""
 
     def __init__(self, number: int) -> None:
         try:
@@ -97,6 +100,7 @@ class Server:
             raise PortError(f"TCP port {number} cannot be listened on: {(error.strerror or str(error)).lower()}") from None
         self._server.setblocking(False)
         self._host: socket.socket | None = None
+        self._others: deque[socket.socket] = deque()  # that are turned away
         self._open = False
         self.path = f"socket://localhost:{self._server.getsockname()[1]}"
 
@@ -118,7 +122,8 @@ class Server:
         """Descriptors that become readable when a host comes or says something."""
         if not self._open:
             return []
-        return [self._server.fileno()] if self._host is None else [self._host.fileno()]
+        hosts = [*self._others, *([] if self._host is None else [self._host])]
+        return [self._server.fileno(), *(host.fileno() for host in hosts)]
 
     def writable_ends(self) -> list[int]:
         """Descriptors that become writable when the host has read."""
@@ -132,6 +137,7 @@ class Server:
                 self._host.setblocking(False)
                 self._host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 return b""
+            self._turn_away()
             data = self._host.recv(READ_BYTES)
         except BlockingIOError:
             return b""
@@ -140,6 +146,22 @@ class Server:
         if not data:
             self._hang_up()
         return data
+
+    def _turn_away(self) -> None:
+        """Tell other hosts, as soon as they ask something, that the printer is taken."""
+        with suppress(OSError):
+            other, _ = self._server.accept()
+            other.setblocking(False)
+            self._others.append(other)
+        for other in [*self._others]:
+            with suppress(OSError):
+                if other.recv(READ_BYTES):
+                    other.sendall(TAKEN)
+                    continue
+                self._others.remove(other)
+                other.close()
+        while len(self._others) > MOST_OTHERS:
+            self._others.popleft().close()
 
     def write(self, data: bytes) -> int:
         """How many bytes the connection took; without a host they are lost."""
@@ -152,6 +174,7 @@ class Server:
             return len(data)
 
     def _hang_up(self) -> None:
-        if self._host is not None:
-            self._host.close()
-            self._host = None
+        for gone in [*([] if self._host is None else [self._host]), *self._others]:
+            gone.close()
+        self._host = None
+        self._others.clear()  # the next one to come has the printer for itself

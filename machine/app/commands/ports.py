@@ -8,6 +8,7 @@ from threading import Event
 from typing import Any
 
 from machine.app.printer.compatibility import describe_answer
+from machine.app.printer.running_simulators import running_simulators
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import show
 from machine.link.identification import QUICK_S, RATES, Answer, Kind, ask_at_any_rate
@@ -29,9 +30,12 @@ class PortReport:
 
 
 def ports(baud: int, as_json: bool, ask: bool) -> int:
-    """List ports on stdout; those found in /dev/serial/by-id first. ask=False: none is opened. 0 also when there is none."""
+    """List ports on stdout: those in /dev/serial/by-id first, running simulators of this user last. ask=False: none is opened.
+
+    0 also when there is none.
+    """
     check_baud(baud)
-    devices = serial_devices()
+    devices = (*serial_devices(), *running_simulators())
     if not devices:
         say("no serial port was found: plug the printer in and switch it on")
     elif ask:

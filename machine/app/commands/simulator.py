@@ -4,6 +4,7 @@ import threading
 from dataclasses import fields, replace
 from math import inf, isfinite
 
+from machine.app.printer.running_simulators import announced
 from machine.app.requests import SimulatorRequest
 from machine.app.terminal.interrupts import stopping
 from machine.app.terminal.progress import say
@@ -32,6 +33,7 @@ def simulate_printer(request: SimulatorRequest) -> int:
     with (
         stopping(stop),
         SimulatedPrinter(machine, request.speed or inf, build, script, request.link, request.tcp, baud, KEPT) as printer,
+        announced(f"simulated printer ({machine.name}, {dialect_of(machine).firmware})", printer.path) as announce,
     ):
         show(f"{printer.path}\n")
         say(f"simulated printer ({machine.name}, {dialect_of(machine).firmware}) listens there; Ctrl-C ends it")
@@ -39,6 +41,7 @@ def simulate_printer(request: SimulatorRequest) -> int:
         while not stop.wait(LOOK_S):
             if printer.path != path:
                 path = printer.path
+                announce(path)
                 show(f"{path}\n")
         record = printer.record
     show(summary(record))

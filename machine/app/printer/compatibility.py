@@ -52,7 +52,7 @@ _REFUSALS: Mapping[Kind, type[PrinterError]] = {
 def _why(answer: Answer, port: str, baud: int) -> str:
     words = answer.words[:60]
     if answer.kind is Kind.BUSY:
-        return f"the printer at {port} is busy (it heats, moves or waits for a person): wait until it is done, or restart it"
+        return f"the printer at {port} is busy ({_work(answer)}): wait until it is done, or restart it"
     if answer.kind is Kind.HALTED:
         return f"the printer at {port} has stopped with an error of its own ({words}): switch it off and on again"
     if answer.kind is Kind.STRANGER:
@@ -94,6 +94,12 @@ def check_dialect(machine: Machine) -> None:
         )
 
 
+def _work(answer: Answer) -> str:
+    """What a busy printer does: Marlin says only that it does something, or waits."""
+    usual = answer.words.startswith(("processing", "paused for", "busy")) or not answer.words
+    return "it heats, moves or waits for a person" if usual else answer.words[:60]
+
+
 def _stranger(answer: Answer) -> str:
     return "it sends back what it is told" if answer.words in ECHO else f"it says {answer.words[:60]!r}"
 
@@ -106,7 +112,7 @@ def describe_answer(answer: Answer, baud: int) -> str:
     if answer.kind is Kind.STRANGER:
         return f"something answers but is no printer: {_stranger(answer)}"
     return {
-        Kind.BUSY: f"a printer that is busy (it heats, moves or waits for a person), at {baud} baud",
+        Kind.BUSY: f"a printer that is busy ({_work(answer)}), at {baud} baud",
         Kind.HALTED: f"a printer that has stopped with an error ({answer.words[:60]}), at {baud} baud",
         Kind.RUBBISH: f"rubbish at {baud} baud, and nothing at the usual other rates: --baud N tries another",
         Kind.SILENT: "nothing answers",

@@ -1,6 +1,7 @@
 """`tiltprint ports`: every port once, with what answers there, for people and for programs."""
 
 import json
+from pathlib import Path
 from threading import Event
 
 import pytest
@@ -8,9 +9,11 @@ import pytest
 from machine.app.cli import main
 from machine.app.commands import ports as ports_command
 from machine.app.commands.ports import PortReport, ask_port, describe, port_json
+from machine.app.printer.running_simulators import announced
 from machine.link.identification import Answer, Kind
-from machine.link.port import SerialDevice
+from machine.link.port import SerialDevice, open_port
 from machine.simulator.simulator import SimulatedPrinter
+from profiles.folders import state_folder
 from profiles.profile import load
 from tests.machine.peers import hear_out, on_terminal, scripted
 
@@ -112,3 +115,33 @@ def test_the_list_for_programs_always_has_the_same_keys() -> None:
     assert whole["limits"] == {"X": [0.0, 9.0]}
     assert whole["serial_number"] == "7533"
     assert set(whole) == set(port_json(PortReport(MEGA))) == set(port_json(PortReport(MEGA, Answer(Kind.SILENT), 115200)))
+
+
+def test_a_running_simulator_is_a_port_as_long_as_it_runs(
+    here: list[SerialDevice], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with SimulatedPrinter(MACHINE, link=tmp_path / "tty") as printer, announced("simulated printer (mine)", printer.path):
+        assert main(["ports"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        f"{tmp_path}/tty",
+        "    simulated printer (mine)",
+        "    Marlin bugfix-2.1.x (simulated), axes X Y Z A C, at 115200 baud",
+    ]
+    assert main(["ports", "--json"]) == 0
+    assert capsys.readouterr().out == "[]\n"
+
+
+def test_a_simulator_that_was_killed_is_no_port(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
+    folder = state_folder() / "simulators"
+    folder.mkdir(exist_ok=True)
+    (folder / "12345").write_text("/dev/pts/0\nsimulated printer (gone)\n", encoding="utf-8")
+    assert main(["ports", "--json"]) == 0
+    assert capsys.readouterr().out == "[]\n"
+    assert not list(folder.iterdir())
+
+
+def test_a_simulator_that_another_program_talks_to_says_that_it_is_busy(capsys: pytest.CaptureFixture[str]) -> None:
+    with SimulatedPrinter(MACHINE, tcp=0) as printer, open_port(printer.path, 115200) as first:
+        first.write(b"M115\n")
+        assert main(["print", "demo:overhang", "--port", printer.path]) == 1
+    assert "is busy (another program talks to this simulated printer)" in capsys.readouterr().err

@@ -1,0 +1,73 @@
+"""Running simulators: the simulated printers of this user that run now, for the list of ports.
+
+Each keeps a file in the state folder with its path and a word on what it is, locked as long as it runs: another terminal may
+get the path of one that was killed, and must not be written to.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TextIO
+
+from machine.link.port import SerialDevice
+from profiles.folders import state_folder
+
+try:
+    import fcntl
+except ImportError:  # no pseudo-terminals there either
+    fcntl = None  # type: ignore[assignment]
+
+
+@contextmanager
+def announced(description: str, path: str) -> Iterator[Callable[[str], None]]:
+    """List a simulated printer while it runs; call what is given with a new path of it."""
+    file = _folder() / str(os.getpid())
+    with suppress(OSError), file.open("w", encoding="utf-8") as text:  # a full disk: it is not listed
+        _lock(text)
+
+        def tell(now: str) -> None:
+            with suppress(OSError):
+                text.seek(0)
+                text.truncate()
+                text.write(f"{now}\n{description}\n")
+                text.flush()
+
+        tell(path)
+        try:
+            yield tell
+        finally:
+            file.unlink(missing_ok=True)
+        return
+    yield lambda now: None
+
+
+def running_simulators() -> tuple[SerialDevice, ...]:
+    """Those that run now, by path; what is left of others is removed."""
+    devices = []
+    for file in sorted(_folder().iterdir()):
+        with suppress(OSError), file.open("r+", encoding="utf-8") as text:
+            if _lock(text):
+                file.unlink(missing_ok=True)
+                continue
+            path, _, description = text.read().partition("\n")
+            if path:
+                devices.append(SerialDevice(path, path, description.strip(), ""))
+    return tuple(sorted(devices, key=lambda device: device.path))
+
+
+def _folder() -> Path:
+    folder = state_folder() / "simulators"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
+
+
+def _lock(text: TextIO) -> bool:
+    """Lock a file for this process; False when another one holds it."""
+    if fcntl is None:
+        return True
+    try:
+        fcntl.flock(text, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
