@@ -5,26 +5,34 @@ import os
 import select
 import socket
 import stat
+from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic
 from types import TracebackType
 from typing import Any, Self
 from urllib.parse import urlsplit
 
-import serial
-from serial.tools import list_ports
-
 from profiles.errors import PortError
+
+try:
+    import serial
+    from serial.tools import list_ports
+except ImportError:  # pyserial does not know the serial ports of every system: then socket:// is left
+    serial = list_ports = None
 
 READ_S = 0.02  # read() gives up after this: an emergency stop is to be on the wire within 50 ms
 READ_BYTES = 4096
 WRITE_S = 10.0  # a printer whose buffers stay full for longer has stopped reading
+CONNECT_S = 5.0
 BAUDS = (1200, 4_000_000)  # slowest and fastest rate that an adapter is known to take
 
 # termios.error is no OSError; pyserial lets it through when a setting is refused. An rfc2217:// port that is closed or
 # refuses a setting may show it as AttributeError or NotImplementedError.
-_TROUBLE: tuple[type[Exception], ...] = (serial.SerialException, OSError, ValueError, AttributeError, NotImplementedError)
-if os.name == "posix":
+_TROUBLE: tuple[type[Exception], ...] = (OSError, ValueError, AttributeError, NotImplementedError)
+_TIMEOUTS: tuple[type[Exception], ...] = (TimeoutError,)
+if serial is not None:
+    _TROUBLE, _TIMEOUTS = (*_TROUBLE, serial.SerialException), (*_TIMEOUTS, serial.SerialTimeoutException)
+with suppress(ImportError):
     import termios
 
     _TROUBLE += (termios.error,)
@@ -89,7 +97,7 @@ class Port:
                 data = data[os.write(descriptor, data) :]
             except BlockingIOError:
                 if not select.select([], [descriptor], [], max(0.0, until_s - monotonic()))[1]:
-                    raise serial.SerialTimeoutException from None
+                    raise TimeoutError from None
 
     def _read_descriptor(self, descriptor: int) -> bytes:
         if not select.select([descriptor], [], [], READ_S)[0]:
@@ -138,13 +146,57 @@ def open_port(name: str, baud: int) -> Port:
         _check_address(name)
     else:
         _check_path(name)
-    # pyserial's rfc2217:// knows no time limit for writing, its socket has one of its own.
-    write_s = None if name.startswith("rfc2217://") else WRITE_S
     try:
-        device = serial.serial_for_url(name, baudrate=baud, timeout=READ_S, write_timeout=write_s, exclusive=True)
+        return Port(_open_device(name, baud), name)
     except _TROUBLE as error:
         raise PortError(refusal(name, baud, error)) from None
-    return Port(device, name)
+
+
+def _open_device(name: str, baud: int) -> Any:
+    if name.startswith("socket://"):
+        return _Socket(name)
+    if serial is None:
+        raise PortError(f"port {name}: this system's serial ports are not known to pyserial, socket://HOST:PORT is left")
+    # pyserial's rfc2217:// knows no time limit for writing.
+    write_s = None if name.startswith("rfc2217://") else WRITE_S
+    return serial.serial_for_url(name, baudrate=baud, timeout=READ_S, write_timeout=write_s, exclusive=True)
+
+
+class _Socket:
+    """A socket:// address with the calls of pyserial's devices that a port makes, on every system: pyserial's own reads a socket
+    byte by byte where it has no descriptor, and is not there where pyserial knows no serial ports.
+    """
+
+    baudrate = 0  # a socket has none, but may be told one
+    in_waiting = 0  # read() gives all there is
+
+    def __init__(self, address: str) -> None:
+        parts = urlsplit(address)
+        self._socket = socket.create_connection((parts.hostname or "", parts.port or 0), CONNECT_S)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # a small line must not wait for the last answer
+        self._socket.settimeout(0.0 if os.name == "posix" else WRITE_S)  # there a port reads and writes the descriptor itself
+        self.fileno = self._socket.fileno
+
+    def write(self, data: bytes) -> None:
+        """Send all bytes. OSError; TimeoutError when they are not taken in WRITE_S."""
+        self._socket.sendall(data)
+
+    def read(self, size: int) -> bytes:
+        """The bytes that have come, all of them whatever the size; waits up to READ_S. OSError."""
+        del size
+        if not select.select([self._socket], [], [], READ_S)[0]:
+            return b""
+        data = self._socket.recv(READ_BYTES)
+        if not data:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return data
+
+    def reset_output_buffer(self) -> None:
+        """What was handed over is the system's."""
+
+    def close(self) -> None:
+        """Hang up."""
+        self._socket.close()
 
 
 def check_baud(baud: int) -> None:
@@ -161,9 +213,6 @@ def _descriptor(device: Any) -> int | None:
         descriptor: int = device.fileno()
     except OSError:  # io.UnsupportedOperation, as rfc2217:// and loop:// have none
         return None
-    if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
-        with socket.socket(fileno=os.dup(descriptor)) as same:  # a small line must not wait for the answer to the last one
-            same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return descriptor
 
 
@@ -177,7 +226,7 @@ def serial_devices() -> tuple[SerialDevice, ...]:
             description=_description(port),
             serial_number=port.serial_number or "",
         )
-        for port in list_ports.comports()
+        for port in (() if list_ports is None else list_ports.comports())
     ]
     return tuple(sorted(devices, key=lambda device: (device.name == device.path, device.name)))
 
@@ -270,7 +319,7 @@ def _number(error: BaseException) -> int | None:
 
 def _timed_out(error: BaseException | None) -> bool:
     """Whether a write gave up, by pyserial's own clock or by its socket's."""
-    while error is not None and not isinstance(error, serial.SerialTimeoutException | TimeoutError):
+    while error is not None and not isinstance(error, _TIMEOUTS):
         error = error.__context__
     return error is not None
 

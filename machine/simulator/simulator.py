@@ -1,21 +1,24 @@
-"""A simulated printer on a real pseudo-terminal: the firmware in a thread, reached through a device path like any printer."""
+"""A simulated printer on a real pseudo-terminal: the firmware in a thread, reached through a device path like any printer.
 
-import os
+Where there are no pseudo-terminals it listens on a TCP port of this computer.
+"""
+
 import select
+import socket
 import threading
 from collections.abc import Iterable
 from math import inf
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.cable import Cable
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.firmware import BUSY_S, SimulatedFirmware
 from machine.simulator.record import Record
-from machine.simulator.terminal import Server, Terminal
+from machine.simulator.terminal import Server, Terminal, terminals_exist
 from machine.simulator.uart import Uart
 from profiles.machine import Machine
 
@@ -31,7 +34,8 @@ class SimulatedPrinter:
     baud: every byte takes the time of 10 bits, both ways, and what a ring of machine.receive_bytes cannot hold is lost (build
     of your own say it themselves); None: USB, as fast as the system, and the host waits. The rate a host opens the path
     with means nothing. kept: how many moves the record holds at least, None: all (120 bytes a move).
-    Raises PortError on a system without pseudo-terminals, or for a link or port that is taken.
+    Without pseudo-terminals path is a socket:// address, too. Raises PortError for a link or port that is taken, and for a link
+    where there are no terminals.
     """
 
     def __init__(
@@ -57,23 +61,24 @@ class SimulatedPrinter:
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Self:
-        self._terminal: Terminal | Server = Terminal(self._link) if self._tcp is None else Server(self._tcp)
+        by_terminal = self._tcp is None and (self._link is not None or terminals_exist())
+        self._terminal: Terminal | Server = Terminal(self._link) if by_terminal else Server(self._tcp or 0)
         self._terminal.open()
-        self._end, self._wake = os.pipe()
+        self._end, self._wake = socket.socketpair()  # Windows cannot wait for pipes
         self._began_s = monotonic()
         self._thread = threading.Thread(target=self._serve, name="simulated printer", daemon=True)
         self._thread.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        os.write(self._wake, b"x")
+        self._wake.send(b"x")
         if self._thread is not None:
             self._thread.join()
         self._terminal.close()
         if isinstance(self._terminal, Server):
             self._terminal.end()
-        for descriptor in (self._end, self._wake):
-            os.close(descriptor)
+        for end in (self._end, self._wake):
+            end.close()
 
     @property
     def path(self) -> str:
@@ -100,7 +105,8 @@ class SimulatedPrinter:
                 self._answer(answer)
             reading = [] if self._reads_nothing(now_s) else self._terminal.readable_ends()
             writing = self._terminal.writable_ends() if self._out else []
-            readable, _, _ = select.select([*reading, self._end], writing, [], self._pause_s(now_s))
+            waited_for: list[Any] = [*reading, self._end]
+            readable, _, _ = select.select(waited_for, writing, [], self._pause_s(now_s))
             if self._end in readable:
                 return
             data = self._terminal.read() if readable else b""

@@ -29,7 +29,7 @@ class Terminal:
             import tty
 
             self._master, self._slave = os.openpty()
-        except (ImportError, OSError) as error:
+        except (ImportError, AttributeError, OSError) as error:
             raise PortError(f"the simulated printer needs a pseudo-terminal, which this system does not give ({error})") from None
         # Raw: no echo, no change of newlines. The own slave end stays open, so that the terminal outlives each host.
         tty.setraw(self._slave)
@@ -83,6 +83,15 @@ class Terminal:
         """Remove the link, unless another simulated printer has taken it over."""
         if self._link is not None and self._link.is_symlink() and os.readlink(self._link) == self._device:
             self._link.unlink()
+
+
+def terminals_exist() -> bool:
+    """Whether this system has pseudo-terminals; Windows has none."""
+    try:
+        import tty  # noqa: F401 - not there without termios
+    except ImportError:
+        return False
+    return hasattr(os, "openpty")
 
 
 def _leads_to_a_terminal(link: Path) -> bool:

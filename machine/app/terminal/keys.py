@@ -8,12 +8,13 @@ import threading
 from collections.abc import Callable
 from time import monotonic
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
 from machine.link.progress import Progress
 
 STEP_PERCENT = 10.0
+LOOK_S = 0.05
 HINT_S = 10.0  # a question that was not answered by then is void
 STANDING = ("pausing", "paused")
 SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
@@ -163,9 +164,55 @@ class Typing:
                 self._press(key)
 
 
+class ConsoleTyping:
+    """The same on Windows, whose console gives keys one by one and is never changed. keys: its module msvcrt."""
+
+    def __init__(self, press: Callable[[str], None], keys: Any) -> None:
+        self._press, self._keys = press, keys
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="keys", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def _serve(self) -> None:
+        while not self._over.wait(LOOK_S):
+            while self._keys.kbhit():
+                key = self._keys.getwch()
+                if key in ("\x00", "\xe0"):  # an arrow or a function key: the next character says which
+                    self._keys.getwch()
+                else:
+                    self._press(key)
+
+
+def typing(press: Callable[[str], None]) -> "Typing | ConsoleTyping":
+    """What hands keys to press() on this system."""
+    console = _windows_console()
+    return Typing(press) if console is None else ConsoleTyping(press, console)
+
+
 def can_type() -> bool:
     """Whether keys can be read: stdin is a terminal, and this program stands in its foreground."""
     try:
-        return os.name == "posix" and sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
-    except (OSError, ValueError):
+        if not sys.stdin.isatty():
+            return False
+        if _windows_console() is not None:
+            return True
+        import termios  # noqa: F401 - some systems have neither
+
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except (ImportError, OSError, ValueError):
         return False
+
+
+def _windows_console() -> Any:
+    try:
+        import msvcrt
+    except ImportError:
+        return None
+    return msvcrt

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 
-from machine.app.terminal.keys import Keyboard, Typing, can_type
+from machine.app.terminal.keys import Keyboard, can_type, typing
 from machine.app.terminal.progress import PlainLines, is_terminal
 from machine.app.terminal.screen import Course, Screen, Words
 from machine.link.progress import Progress
@@ -46,7 +46,7 @@ def _shown(title: str, course: Course, board: Keyboard, words: Words) -> Iterato
     with ExitStack() as stack:
         keys = can_type()
         if keys:
-            stack.enter_context(Typing(board.press))
+            stack.enter_context(typing(board.press))
         screen = stack.enter_context(Screen(title, course, words, lambda: board.hint, keys))
 
         def follow(progress: Progress) -> None:

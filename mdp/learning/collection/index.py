@@ -1,7 +1,6 @@
 """Index: one line a search of a collection of records, what came of it and why it has no record."""
 
 import csv
-import fcntl
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
@@ -68,12 +67,24 @@ def writing_alone(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         with (folder / LOCK).open("w") as lock:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
+                _lock(lock.fileno())
+            except (BlockingIOError, PermissionError):
                 raise LearningError(f"folder {folder}: another collection writes into it; wait for it or take another") from None
             yield
     except OSError as error:
         raise LearningError(f"folder {folder}: cannot be written ({error})") from None
+
+
+def _lock(descriptor: int) -> None:
+    """Raises OSError where another process holds the file; given back when it is closed."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        import msvcrt
+
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+    else:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def read_index(folder: Path) -> list[Row]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from machine.app.terminal.keys import HINT_S, MORE, SURE, Keyboard, Typing, can_type
+from machine.app.terminal.keys import HINT_S, MORE, SURE, Keyboard, Typing, can_type, typing
 from machine.link.pending_commands import Command, Control, PendingCommand
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
@@ -189,6 +189,33 @@ def test_a_terminal_that_goes_away_ends_the_reading_of_keys_and_is_no_error(monk
             os.close(fingers)
             reader.join(PATIENCE_S)
             assert not reader.is_alive()
+
+
+class Console:
+    """Windows' module msvcrt, with what a person has typed."""
+
+    def __init__(self, typed: str) -> None:
+        self._typed = list(typed)
+
+    def kbhit(self) -> bool:
+        return bool(self._typed)
+
+    def getwch(self) -> str:
+        return self._typed.pop(0)
+
+
+def test_where_there_is_no_termios_keys_come_from_the_windows_console(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
+    monkeypatch.setitem(sys.modules, "msvcrt", Console("p\xe0Kr\x00;+"))
+    monkeypatch.setitem(sys.modules, "termios", None)
+    pressed = Pressed()
+    assert can_type()
+    with typing(pressed):
+        assert pressed.wait_for(3) == "pr+"
+
+
+def test_where_keys_cannot_be_read_none_are_offered(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
+    monkeypatch.setitem(sys.modules, "termios", None)
+    assert not can_type()
 
 
 def test_keys_are_read_from_a_terminal_in_the_foreground_only(keyboard: int) -> None:
