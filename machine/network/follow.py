@@ -41,17 +41,28 @@ class _Heard:
     answered_s: float = field(default_factory=time.monotonic)
 
 
-def follow_print(server: PrintServer, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]) -> End:
-    """Follow a print that has been ordered to start; size: of its file, bytes; left(): whether the person has gone away.
+def follow_print(
+    server: PrintServer, file: str, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]
+) -> End:
+    """Follow the print of a file that has been ordered to start.
 
-    Raises ServerError when the print fails or the server is lost.
+    size: of the file, bytes; left(): whether the person has gone away. Raises ServerError when it fails or is lost.
     """
-    return _Follower(server, size, on_status, control, left).run()
+    return _Follower(server, file, size, on_status, control, left).run()
 
 
 class _Follower:
-    def __init__(self, server: PrintServer, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]) -> None:
-        self._server, self._size, self._on_status, self._control, self._left = server, size, on_status, control, left
+    def __init__(
+        self, server: PrintServer, file: str, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]
+    ) -> None:
+        self._server, self._file, self._size, self._on_status, self._control, self._left = (
+            server,
+            file,
+            size,
+            on_status,
+            control,
+            left,
+        )
         self._heard, self._over = _Heard(), threading.Event()
         self._orders: deque[Callable[[], None]] = deque()
         self._message = ""
@@ -95,6 +106,8 @@ class _Follower:
 
     def _end_of(self, status: JobStatus) -> End | None:
         if status.phase in ACTIVE:
+            if self._last_active is not None and status.file not in ("", self._file):
+                raise ServerError(f"{self._server.name} prints {status.file} now: what became of {self._file} is not known")
             self._last_active, self._read = status.phase, max(self._read, status.bytes_read or 0)
             return None
         if status.phase is Phase.OFFLINE or (status.phase is Phase.FAILED and self._last_active is not None):

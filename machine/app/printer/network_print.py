@@ -66,7 +66,7 @@ def follow_on_server(server: PrintServer, job: PrintJob, upload: GcodeUpload, fi
                 follow(now)
 
         try:
-            end = follow_print(server, len(upload.content), on_status, control, board.gone)
+            end = follow_print(server, file, len(upload.content), on_status, control, board.gone)
         except KeyboardInterrupt:
             say("ended at once: whether the print has been cancelled is not known, look at the printer")
             raise

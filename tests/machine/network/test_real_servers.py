@@ -142,7 +142,7 @@ def print_on(address: str, steps: Steps) -> tuple[End, list[Phase]]:
 
     with open_server(address) as server:
         server.start(server.upload(UPLOAD, lambda count: None))
-        return follow_print(server, len(UPLOAD.content), on_status, control, lambda: False), phases
+        return follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status, control, lambda: False), phases
 
 
 def pause_resume_cancel() -> Steps:
@@ -162,6 +162,21 @@ def only_watch(status: JobStatus, control: Control) -> None:
 def stop_at_once(status: JobStatus, control: Control) -> None:
     if status.phase is Phase.PRINTING:
         control.ask(Command.EMERGENCY_STOP)
+
+
+def check_broken_off(address: str) -> None:
+    """A person who interrupts an upload leaves nothing of it."""
+    large = GcodeUpload("broken.gcode", PASSES * 200)
+
+    def interrupt(count: int) -> None:
+        if count > 1_000_000:
+            raise KeyboardInterrupt
+
+    with open_server(address) as server:
+        with pytest.raises(KeyboardInterrupt):
+            server.upload(large, interrupt)
+        time.sleep(1.0)
+        assert not server.has("broken.gcode")
 
 
 def check_refusals(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,6 +204,7 @@ def test_octoprint_prints_pauses_cancels_and_halts(octoprint: str, monkeypatch: 
         Phase.PAUSED,
         Phase.PRINTING,
     ]
+    check_broken_off(octoprint)
     assert print_on(octoprint, stop_at_once)[0] is End.STOPPED
     check_refusals(octoprint, monkeypatch)
 
@@ -216,6 +232,7 @@ def test_moonraker_prints_pauses_cancels_and_halts(moonraker: tuple[str, KlippyS
         Phase.PRINTING,
     ]
     check_while_printing(address)
+    check_broken_off(address)
     assert print_on(address, stop_at_once)[0] is End.STOPPED
     with open_server(address) as server:
         assert server.status().phase is Phase.OFFLINE

@@ -45,7 +45,7 @@ def hand_over(server: PrintServer) -> str:
 
 
 def run(server: PrintServer, control: Control, on_status: Callable[[JobStatus, str], None] = lambda status, message: None) -> End:
-    return follow_print(server, len(UPLOAD.content), on_status, control, lambda: False)
+    return follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status, control, lambda: False)
 
 
 @every_kind
@@ -119,7 +119,7 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
 def test_a_person_leaves_a_print_that_goes_on(kind: str) -> None:
     with stand_in(kind) as (job, address), open_server(address) as server:
         server.start(hand_over(server))
-        assert follow_print(server, 1, lambda status, message: None, Control(), lambda: True) is End.LEFT
+        assert follow_print(server, UPLOAD.name, 1, lambda status, message: None, Control(), lambda: True) is End.LEFT
         assert job.state == "printing"
 
 
@@ -344,3 +344,17 @@ def test_a_duet_that_does_not_start_says_why() -> None:
         job.refuse["/rr_reply"] = (200, b"Error: M32: Cannot set file to print, because a file is already being printed\n")
         with pytest.raises(ServerError, match="cannot start it now: Error: M32: Cannot set file to print"):
             server.start(file)
+
+
+@pytest.mark.parametrize("kind", ["octoprint", "moonraker"])
+def test_another_print_that_somebody_has_started_is_not_taken_for_ours(kind: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        server.start(hand_over(server))
+        job.steps = 10_000
+        job.files["other.gcode"] = UPLOAD.content
+
+        def start_another(status: JobStatus, message: str) -> None:
+            job.file = "other.gcode"
+
+        with pytest.raises(ServerError, match=r"prints other\.gcode now: what became of box\.gcode is not known"):
+            run(server, Control(), start_another)

@@ -11,6 +11,7 @@ from machine.app.cli import main
 from machine.app.terminal.server_keys import LEAVING
 from machine.network import follow
 from machine.network.credentials import VARIABLE
+from machine.network.octoprint import OctoPrint
 from tests.machine.network.stand_ins import KEY, stand_in
 from tests.machine.person import ROOT, Person
 
@@ -50,10 +51,11 @@ def test_a_file_is_sent_and_started_where_that_is_asked_for(capsys: pytest.Captu
 @pytest.mark.parametrize(("kind", "file"), [("octoprint", MARLIN), ("moonraker", KLIPPER)])
 def test_a_print_on_a_server_is_followed_to_its_end(kind: str, file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with stand_in(kind, steppers=("stepper_a", "stepper_c")) as (job, address):
-        assert main(["print", str(file), "--port", address, "--force"]) == 0
+        assert main(["print", str(file), "--port", address, "--force", "--watch"]) == 0
     said = capsys.readouterr()
     assert "there is no journal to resume from after a power cut" in said.err
     assert f"printed {file.name} on {address}" in said.out
+    assert "watch the print at http" in said.err
     assert job.state == "complete"
 
 
@@ -125,6 +127,16 @@ def test_what_cannot_be_sent_is_one_sentence(words: list[str], sentence: str, ca
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1
+
+
+def test_an_interrupted_upload_is_told_of(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(*_: object) -> str:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(OctoPrint, "upload", interrupted)
+    with stand_in("octoprint") as (_, address):
+        assert sent(MARLIN, "--to", address, "--force") == 130
+    assert f"upload broken off: {address} keeps nothing of post_and_arm_generic_ac.gcode" in capsys.readouterr().err
 
 
 def print_of(address: str) -> list[str]:
