@@ -73,12 +73,12 @@ def outside_compiler() -> Iterator[None]:
     Work that goes on all the same, in native code or waiting for threads, is ended with the process.
     """
     main, here = threading.main_thread(), threading.current_thread()
-    if (
-        here is not main
-        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-        or not hasattr(signal, "pthread_kill")
-    ):
+    if here is not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
+        return
+    if not hasattr(signal, "pthread_kill"):  # Windows
+        with _hurried(lambda: signal.getsignal(signal.SIGINT) is signal.default_int_handler):
+            yield
         return
 
     def handle(number: int, frame: FrameType | None) -> None:

@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 import pytest
 
-from machine.app.terminal.interrupts import COMPILER, calling, interrupting, outside_compiler, stopping
+from machine.app.terminal.interrupts import COMPILER, PATIENCE_S, calling, interrupting, outside_compiler, stopping
 
-SLACK_S = 1.0  # on a busy machine
+BUSY_S = 30.0
 
 
 def wait_for_nothing() -> None:
@@ -119,7 +119,8 @@ def test_work_in_native_code_is_ended_with_the_process() -> None:
         process.send_signal(signal.SIGINT)
         assert process.communicate() == ("", "tiltprint: interrupted\n")
     assert process.returncode == 130
-    assert time.monotonic() - began_s < 2.0 + SLACK_S
+    assert PATIENCE_S < 2.0  # so long a person waits
+    assert time.monotonic() - began_s < BUSY_S  # where the machine has other work too; by itself it would take minutes
 
 
 def test_work_that_ends_by_itself_is_not_ended_again(capfd: pytest.CaptureFixture[str]) -> None:
