@@ -338,7 +338,7 @@ class Feed:
                 state="pausing" if pausing else self.state,
                 file_line=self.history.acknowledged,
                 feed_percent=self._pending.feed_percent, flow_percent=self._pending.flow_percent,
-                message=self._pending.message or self._trouble or self._silence(),
+                message=self._pending.message or self._trouble or self.reports.waiting or self._silence(),
             )
         )  # fmt: skip
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.link.pending_commands import Command, PendingCommand
-from machine.link.protocol.events import Action, Echo, Event, Identity, Ok, Temperature, unknown_command
+from machine.link.protocol.events import Action, Busy, Echo, Event, Identity, Ok, Temperature, unknown_command
 from machine.link.protocol.framing import name_of
 from profiles.errors import PrinterError
 
@@ -97,16 +97,24 @@ class Watchdog:
 
 
 class PrinterReports:
-    """read() every event; temperature_s: when the newest temperature came; unknown: commands that the firmware does not know."""
+    """read() every event; temperature_s: when the newest temperature came; unknown: commands that the firmware does not know;
+    waiting: what a person at the printer is waited for, "" when for nothing.
+    """
 
     def __init__(self, watchdog: Watchdog, now_s: float) -> None:
         self.temperature, self.firmware, self.temperature_s = Temperature(), "unknown", now_s
         self.unknown: set[str] = set()
+        self.waiting = ""
         self._warned: dict[str, int] = {}
         self._watchdog = watchdog
 
     def read(self, event: Event, now_s: float) -> PendingCommand | None:
         """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
+        if isinstance(
+            event, Ok | Busy
+        ):  # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display
+            paused = isinstance(event, Busy) and "paused for" in event.text
+            self.waiting = "the printer waits for a person: look at its display" if paused else ""
         report = event.temperature if isinstance(event, Ok) else event
         if isinstance(report, Temperature):
             self.temperature, self.temperature_s = report, now_s

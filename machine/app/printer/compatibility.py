@@ -62,7 +62,10 @@ def _why(answer: Answer, port: str, baud: int) -> str:
             f"only rubbish comes from {port} at {baud} baud, and no printer answers at the usual other rates: "
             f"the firmware's settings tell its rate for --baud"
         )
-    return f"nothing answers at {port}: is the printer switched on, and is {baud} baud the firmware's rate?"
+    return (
+        f"nothing answers at {port}: is the printer switched on, and is {baud} baud the firmware's rate? "
+        "One that has halted says nothing until it is switched off and on"
+    )
 
 
 def check_port(port: str, baud: int, sim_speed: float) -> Answer | None:

@@ -136,3 +136,15 @@ def test_every_firmware_s_words_for_an_unknown_command_are_counted_as_one(said: 
     for _ in range(19):
         reports.read(read_event(said), 0.0)
     assert reports.warnings == ["Unknown command: M486 (x 19)"]
+
+
+def test_a_printer_that_waits_for_a_person_says_so_until_it_goes_on() -> None:
+    shown: list[str] = []
+    printer = VirtualPrinter(
+        PROFILE.machine, faults=FaultScript((Fault("error", at=9, unit="line", text="echo:busy: paused for user"),))
+    )
+    print_lines(
+        ["G28", "G1 X5 F600", *["G4 S1"] * 8], PATH, medium=printer.medium, on_progress=lambda told: shown.append(told.message)
+    )
+    assert list(dict.fromkeys(shown)) == ["", "the printer waits for a person: look at its display"]
+    assert shown[-1] == ""

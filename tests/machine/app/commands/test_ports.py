@@ -143,5 +143,5 @@ def test_a_simulator_that_was_killed_is_no_port(here: list[SerialDevice], capsys
 def test_a_simulator_that_another_program_talks_to_says_that_it_is_busy(capsys: pytest.CaptureFixture[str]) -> None:
     with SimulatedPrinter(MACHINE, tcp=0) as printer, open_port(printer.path, 115200) as first:
         first.write(b"M115\n")
-        assert main(["print", "demo:overhang", "--port", printer.path]) == 1
+        assert main(["print", "demo:bracket", "--port", printer.path]) == 1
     assert "is busy (another program talks to this simulated printer)" in capsys.readouterr().err
