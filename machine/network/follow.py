@@ -44,9 +44,9 @@ class _Heard:
 def follow_print(
     server: PrintServer, file: str, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]
 ) -> End:
-    """Follow the print of a file that has been ordered to start.
+    """Have a file printed that a server holds, and follow that to its end.
 
-    size: of the file, bytes; left(): whether the person has gone away. Raises ServerError when it fails or is lost.
+    size: of the file, bytes; left(): whether the person has gone away. Raises ServerError when it is refused, fails or is lost.
     """
     return _Follower(server, file, size, on_status, control, left).run()
 
@@ -68,7 +68,8 @@ class _Follower:
         self._message = ""
         self._last_active: Phase | None = None
         self._read = 0
-        self._began_s = time.monotonic()
+        self._began_s: float | None = None  # since when the server has been told to start
+        self._refused: ServerError | None = None
         self._shown: tuple[JobStatus | None, str] = (None, "")
         self._shown_s = 0.0
 
@@ -93,6 +94,8 @@ class _Follower:
 
     def _look(self) -> End | None:
         """Tell the newest status; how the print has ended, None while it goes on."""
+        if self._refused is not None:
+            raise self._refused
         heard, silent_s = self._heard, time.monotonic() - self._heard.answered_s
         if heard.error is not None and silent_s > LOST_S:
             raise ServerError(f"{heard.error}; no answer for {silent_s:.0f} s: the print may go on, look at the printer")
@@ -105,6 +108,8 @@ class _Follower:
         return self._end_of(heard.status)
 
     def _end_of(self, status: JobStatus) -> End | None:
+        if self._began_s is None:
+            return None
         if status.phase in ACTIVE:
             if self._last_active is not None and status.file not in ("", self._file):
                 raise ServerError(f"{self._server.name} prints {status.file} now: what became of {self._file} is not known")
@@ -114,12 +119,12 @@ class _Follower:
             where = f" at {100 * self._read / self._size:.0f} %" if self._read else ""
             raise ServerError(f"{self._server.name}: the print has failed{where}: {status.message or status.phase.value}")
         if self._last_active is None:
-            return self._end_unseen(status)
+            return self._end_unseen(status, time.monotonic() - self._began_s)
         return End.DONE if status.phase is Phase.DONE else End.CANCELLED
 
-    def _end_unseen(self, status: JobStatus) -> End | None:
+    def _end_unseen(self, status: JobStatus, waited_s: float) -> End | None:
         """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
-        if time.monotonic() - self._began_s < BEGIN_S:
+        if waited_s < BEGIN_S:
             return None
         if status.phase is Phase.DONE:
             return End.DONE
@@ -162,7 +167,13 @@ class _Follower:
         return orders.get(request.command)
 
     def _carry_out(self) -> None:
-        """Orders one after the other; what a server refuses is told, and following goes on."""
+        """The start, then orders one after the other; what a server refuses of these is told, and following goes on."""
+        try:
+            self._server.start(self._file)
+        except ServerError as error:
+            self._refused = error
+            return
+        self._began_s = time.monotonic()
         while not self._over.wait(TURN_S):
             while self._orders:
                 order = self._orders.popleft()

@@ -7,7 +7,7 @@ from pathlib import Path
 from machine.app.file_roles import check_model_files
 from machine.app.output import check_writable
 from machine.app.pipeline.programs import LoadedProgram, load_program, refuse_errors
-from machine.app.printer.network_print import follow_on_server, hand_over
+from machine.app.printer.network_print import hand_over, print_there
 from machine.app.printer.serial_log import new_log
 from machine.app.printer.server_checks import check_free, check_server_machine, check_server_program
 from machine.app.printer.stream import PrintJob
@@ -34,10 +34,18 @@ def send(request: ModelRequest, sending: SendRequest) -> int:
         file = hand_over(server, upload, request.name)
         if sending.start:
             check_free(server.name, server.status())
-            server.start(file)
+            _start(server, file)
         done = "prints" if sending.start else "waits"
         show(f"{file} {done} on {server.name}\n")
     return 0
+
+
+def _start(server: PrintServer, file: str) -> None:
+    try:
+        server.start(file)
+    except KeyboardInterrupt:
+        say(f"interrupted while {file} was being started: look whether {server.name} prints it")
+        raise
 
 
 def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:
@@ -53,8 +61,7 @@ def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:
         with serve_watch_page(job.name, job.program, job.profile, printing.watch_port) as watchers:
             file = hand_over(server, upload, request.name)
             check_free(server.name, server.status())  # somebody else may have begun while the program was made
-            server.start(file)
-            code = follow_on_server(server, job, upload, file, watchers.follow)
+            code = print_there(server, job, upload, file, watchers.follow)
             watchers.end("stopped" if code else "done")
     return code
 

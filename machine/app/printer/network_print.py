@@ -47,8 +47,8 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str) -> str:
     return file
 
 
-def follow_on_server(server: PrintServer, job: PrintJob, upload: GcodeUpload, file: str, follow: Follow | None) -> int:
-    """Show a print that has been started until it ends or the person leaves; 130 when a person stopped or left it.
+def print_there(server: PrintServer, job: PrintJob, upload: GcodeUpload, file: str, follow: Follow | None) -> int:
+    """Have a file printed and show it until it ends or the person leaves; 130 when a person stopped or left it.
 
     Raises ServerError, FirmwareError.
     """

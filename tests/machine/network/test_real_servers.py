@@ -141,8 +141,8 @@ def print_on(address: str, steps: Steps) -> tuple[End, list[Phase]]:
             steps(status, control)
 
     with open_server(address) as server:
-        server.start(server.upload(UPLOAD, lambda count: None))
-        return follow_print(server, UPLOAD.name, len(UPLOAD.content), on_status, control, lambda: False), phases
+        file = server.upload(UPLOAD, lambda count: None)
+        return follow_print(server, file, len(UPLOAD.content), on_status, control, lambda: False), phases
 
 
 def pause_resume_cancel() -> Steps:

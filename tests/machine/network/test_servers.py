@@ -64,7 +64,7 @@ def test_a_file_is_handed_over_whole_with_its_progress(kind: str) -> None:
 def test_a_print_is_started_and_followed_to_its_end(kind: str) -> None:
     seen: list[JobStatus] = []
     with stand_in(kind) as (_, address), open_server(address) as server:
-        server.start(hand_over(server))
+        hand_over(server)
         assert run(server, Control(), lambda status, message: seen.append(status)) is End.DONE
     printing = [status for status in seen if status.phase is Phase.PRINTING]
     assert printing
@@ -79,7 +79,7 @@ def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> Non
     asks = {Phase.PRINTING: Command.PAUSE, Phase.PAUSED: Command.RESUME}
 
     def ask(status: JobStatus, message: str) -> None:
-        if phases[-1:] == [status.phase]:
+        if status.phase is Phase.READY or phases[-1:] == [status.phase]:
             return
         phases.append(status.phase)
         done = len(phases) > 2  # printing, paused, printing
@@ -87,9 +87,8 @@ def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> Non
             control.ask(Command.CANCEL if done else asks[status.phase])
 
     with stand_in(kind) as (job, address), open_server(address) as server:
-        file = hand_over(server)
+        hand_over(server)
         job.steps = 10_000
-        server.start(file)
         end = run(server, control, ask)
     assert end is End.CANCELLED
     assert job.state == "cancelled"
@@ -100,8 +99,8 @@ def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> Non
 def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
     control = Control()
     with stand_in(kind) as (job, address), open_server(address) as server:
-        server.start(hand_over(server))
-        job.state = "paused"
+        hand_over(server)
+        job.steps = 10_000
         control.ask(Command.FEED, 120.0)
         control.ask(Command.FLOW, 900.0)  # not possible: told, not sent
 
@@ -118,8 +117,10 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
 @every_kind
 def test_a_person_leaves_a_print_that_goes_on(kind: str) -> None:
     with stand_in(kind) as (job, address), open_server(address) as server:
-        server.start(hand_over(server))
-        assert follow_print(server, UPLOAD.name, 1, lambda status, message: None, Control(), lambda: True) is End.LEFT
+        hand_over(server)
+        job.steps = 10_000
+        left = lambda: job.state == "printing"  # noqa: E731
+        assert follow_print(server, UPLOAD.name, 1, lambda status, message: None, Control(), left) is End.LEFT
         assert job.state == "printing"
 
 
@@ -144,7 +145,7 @@ def test_a_wrong_or_missing_key_is_one_sentence_without_it(
 def test_no_key_stands_in_the_log(kind: str) -> None:
     logged: list[bytes] = []
     with stand_in(kind) as (_, address), open_server(address, lambda direction, data: logged.append(data)) as server:
-        server.start(hand_over(server))
+        hand_over(server)
         assert run(server, Control()) is End.DONE
     assert b"GET" in b"".join(logged)
     assert KEY.encode() not in b"".join(logged)
@@ -222,7 +223,8 @@ def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch:
     monkeypatch.setattr(follow, "LOST_S", 0.2)
     told: list[str] = []
     with stand_in(kind) as (job, address), open_server(address) as server:
-        server.start(hand_over(server))
+        hand_over(server)
+        job.steps = 10_000
         paths = ("/api/job", "/server/info", "/rr_model")
 
         def away(status: JobStatus, message: str) -> None:
@@ -349,12 +351,24 @@ def test_a_duet_that_does_not_start_says_why() -> None:
 @pytest.mark.parametrize("kind", ["octoprint", "moonraker"])
 def test_another_print_that_somebody_has_started_is_not_taken_for_ours(kind: str) -> None:
     with stand_in(kind) as (job, address), open_server(address) as server:
-        server.start(hand_over(server))
+        hand_over(server)
         job.steps = 10_000
         job.files["other.gcode"] = UPLOAD.content
 
         def start_another(status: JobStatus, message: str) -> None:
-            job.file = "other.gcode"
+            if status.phase is Phase.PRINTING:
+                job.file = "other.gcode"
 
         with pytest.raises(ServerError, match=r"prints other\.gcode now: what became of box\.gcode is not known"):
             run(server, Control(), start_another)
+
+
+@pytest.mark.parametrize("kind", ["octoprint", "moonraker"])
+def test_a_start_that_is_refused_ends_with_the_server_s_words(kind: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        hand_over(server)
+        job.files["other.gcode"] = UPLOAD.content
+        job.steps = 10_000
+        job.start("other.gcode")
+        with pytest.raises(ServerError, match=r"cannot start it now: (SD busy|Printer is already printing)"):
+            run(server, Control())
