@@ -257,10 +257,12 @@ class Feed:
             self.exchange.connection.send("M105", now_s)
 
     def _cannot_report(self) -> bool:
-        """Whether the printer cannot report temperatures now: it is at a slow command, and does not report by itself."""
+        """Whether the printer cannot report temperatures now: it is at a slow command, or waits for a person, and does not report
+        by itself.
+        """
         connection = self.exchange.connection
         reports = connection.greeting.capabilities.get("AUTOREPORT_TEMP")
-        return not reports and any(line.slow_timeout_s for line in connection.window.flight)
+        return not reports and (bool(self.reports.waiting) or any(line.slow_timeout_s for line in connection.window.flight))
 
     def poll(self) -> None:
         """See what a person wants, and show where the print stands now and then. Raises CancelledError, EmergencyError."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Banner, Event, Ok, Position, Start, Temperature, read_event
+from machine.link.protocol.events import Banner, Event, Ok, Position, Resend, Start, Temperature, read_event
 from machine.link.protocol.framing import FAR_NUMBER, frame
 from machine.link.shutdown import Orders
 
@@ -52,7 +52,9 @@ class _StatusAnswers:
         self.hear_greeting(event)
         if last_line := LAST_LINE.search(line):
             self.number = int(last_line[1])
-        return last_line is not None or (isinstance(event, Ok) and event.temperature is not None)
+        elif isinstance(event, Resend):  # Repetier and OctoPrint's virtual printer do not name the last line
+            self.number = event.line - 1
+        return self.number is not None or (isinstance(event, Ok) and event.temperature is not None)
 
     def read_position(self, line: bytes) -> bool:
         """Take a position; whether the temperature that is asked for after it has come."""

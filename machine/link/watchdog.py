@@ -110,9 +110,8 @@ class PrinterReports:
 
     def read(self, event: Event, now_s: float) -> PendingCommand | None:
         """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
-        if isinstance(
-            event, Ok | Busy
-        ):  # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display
+        if isinstance(event, Ok | Busy):
+            # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
             paused = isinstance(event, Busy) and "paused for" in event.text
             self.waiting = "the printer waits for a person: look at its display" if paused else ""
         report = event.temperature if isinstance(event, Ok) else event

@@ -16,7 +16,8 @@ from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
 from machine.link import status
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
-from machine.link.medium import Medium, Wire
+from machine.link.medium import SERIAL, Medium, Wire
+from machine.link.port import open_port
 from machine.link.progress import Progress
 from machine.link.protocol.events import Position, Temperature
 from machine.link.protocol.framing import frame
@@ -553,3 +554,16 @@ class _Deaf:
 
     def write(self, data: bytes) -> None:
         pass
+
+
+@pytest.mark.parametrize("said", [
+    b"Error:Line Number is not Last Line Number+1, Last Line: 41\n",
+    b"Error: expected line 42 got 999999\nResend: 42\n",
+])  # fmt: skip
+def test_the_last_line_is_known_by_a_refusal_or_by_what_is_wanted_next(said: bytes) -> None:
+    def answer(data: bytes, baud: int) -> bytes:
+        return said + b"ok\n" if b"N999999" in data else b"ok T:20.0 /0.0\n" if b"M105" in data else b""
+
+    with on_terminal(answer) as path, open_port(path, 115200) as port:
+        told = status.query_status(port, SERIAL, lambda: None)
+    assert told.last_number == 41
