@@ -130,9 +130,15 @@ class Duet:
         self._last = None
         self.command(f'M32 "{FOLDER}{file}"')
         deadline_s = time.monotonic() + START_S
-        while (status := self.status()).phase not in ACTIVE and time.monotonic() < deadline_s:
+        while time.monotonic() < deadline_s:
+            try:
+                status = self.status()
+            except ServerError:  # it has the order: whether it prints is seen when it answers again
+                return
             if "Error" in status.message:
                 raise ServerError(f"{self.name} cannot start it now: {status.message}")
+            if status.phase in ACTIVE:
+                return
             time.sleep(LOOK_S)
 
     def pause(self) -> None:
