@@ -35,7 +35,7 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> list
         return []
     told = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
     counted = ~program.rows_of_types(*UNEVEN)[deposited.rows] & ~_climbs(program, deposited)
-    length = np.linalg.norm(deposited.segments_mm[:, 1] - deposited.segments_mm[:, 0], axis=1)
+    length = deposited.length_mm
     problems = _fast(program, deposited.rows, length)
     spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
     for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
@@ -142,11 +142,11 @@ def _weighted_median(values: Floats, weights: Floats) -> float:
 
 def _fast(program: ParsedProgram, rows: NDArray[np.int64], length: Floats) -> list[Finding]:
     """Strokes as fast as travels, in a file whose other strokes are slower."""
-    across = np.linalg.norm((program.end - program.start)[:, :2], axis=1)
-    travels = (program.kind == MoveKind.TRAVEL) & (across > ROW_MM) & (program.e_mm == 0.0)
-    if not travels.any():
+    travels = np.flatnonzero((program.kind == MoveKind.TRAVEL) & (program.e_mm == 0.0))
+    across = np.hypot(*(program.end[travels] - program.start[travels])[:, :2].T)
+    if not (across > ROW_MM).any():
         return []
-    usual = _weighted_median(program.feed[travels], across[travels])
+    usual = _weighted_median(program.feed[travels], np.where(across > ROW_MM, across, 0.0))
     feed = program.feed[rows]
     fast = (feed > FAST * usual) & (length > ROW_MM)
     if not fast.any() or fast.mean() > FEW or usual * FAST < FASTER * np.quantile(feed[~fast], 1.0 - FEW):

@@ -83,11 +83,10 @@ def _begins(program: ParsedProgram, rows: NDArray[np.int64]) -> NDArray[np.bool_
 def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
     """In every part the first layer of which more than half has nothing under it, though it is no bridge and no overhang."""
     rows = deposited.rows
-    low = deposited.segments_mm[:, :, 2].min(axis=1) - deposited.height_mm < ON_PLATE_MM
+    low = np.minimum(deposited.segments_mm[:, 0, 2], deposited.segments_mm[:, 1, 2]) - deposited.height_mm < ON_PLATE_MM
     counted = ~program.rows_of_types(*LOOSE)[rows] & ~low & ~_begins(program, rows)
     rows = rows[counted]
-    ends = deposited.segments_mm[counted]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    length = deposited.length_mm[counted]
     group = program.part[rows] * (int(program.layer.max(initial=0)) + 1) + program.layer[rows]
     loose = np.bincount(group, weights=(contacts.air_mm + contacts.beside_mm)[rows])
     air = np.bincount(group, weights=contacts.air_mm[rows])

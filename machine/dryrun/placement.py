@@ -29,7 +29,7 @@ PURGE_STEP_MM = 0.3
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
     """Errors and warnings of code air, filled, contact and low-travel, one a part; not-tested where the table turns too often."""
     length = np.zeros(len(program.line))
-    length[deposited.rows] = np.linalg.norm(deposited.segments_mm[:, 1] - deposited.segments_mm[:, 0], axis=1)
+    length[deposited.rows] = deposited.length_mm
     deep = "the head runs {value} mm deep into earlier plastic (moves: {count})"
     problems = per_part(program, contacts.depth_mm > 0.0, contacts.depth_mm, "error", "contact", deep)
     problems += _too_low(program, contacts)
@@ -113,7 +113,7 @@ def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts)
     """Lengths, mm: extruded, in air where the slicer has not said so, in air where it has."""
     own = ~program.rows_of_types(PURGE)
     reported = program.rows_of_types(*HANGING)
-    length = np.linalg.norm(deposited.segments_mm[:, 1] - deposited.segments_mm[:, 0], axis=1)[own[deposited.rows]]
+    length = deposited.length_mm[own[deposited.rows]]
     return float(length.sum()), float(contacts.air_mm[own & ~reported].sum()), float(contacts.air_mm[own & reported].sum())
 
 
@@ -123,7 +123,7 @@ def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64],
     segments: (m, 2, 3) deposited, workpiece frame; rows: (m,) their rows in the program.
     """
     heights = np.where(program.height_mm[rows] > 0, program.height_mm[rows], profile.process.first_layer_height_mm)
-    lowest = segments[:, :, 2].max(axis=1) <= heights + ROUNDING_MM
+    lowest = np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= heights + ROUNDING_MM
     over, edge = _over_mm(segments[:, :, :2], profile.machine.table)
     beyond = lowest & ~program.rows_of_types(PURGE)[rows] & (over > ROUNDING_MM)
     marked, badness = np.zeros(len(program.line), dtype=np.bool_), np.zeros(len(program.line))
@@ -135,7 +135,7 @@ def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64],
 
 def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
     """A purge on the plate where beads of the first layer come to lie: they would stand on it, the tip would run through it."""
-    height = deposited.segments_mm[:, :, 2].max(axis=1, initial=0.0)
+    height = np.maximum(deposited.segments_mm[:, 0, 2], deposited.segments_mm[:, 1, 2])
     low = height <= ON_PLATE * np.maximum(deposited.height_mm, ROUNDING_MM)
     purge = program.rows_of_types(PURGE)[deposited.rows]
     lines, beads = np.flatnonzero(low & purge), np.flatnonzero(low & ~purge)

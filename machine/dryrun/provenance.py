@@ -64,8 +64,8 @@ def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> li
     letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
     rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
     problems = []
-    for number, line in enumerate(lines, start=1):
-        comment_pose = POSE.match(line) if line.startswith(";POSE:") else None
+    for number in [k for k, line in enumerate(lines, start=1) if line[:6] == ";POSE:"]:
+        comment_pose = POSE.match(lines[number - 1])
         if comment_pose is None or (comment_pose[1], comment_pose[3]) != letters:
             continue
         after = int(np.searchsorted(program.line[rows], number))

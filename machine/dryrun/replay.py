@@ -36,12 +36,13 @@ STANDS_OFF = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.SKIRT.value
 
 @dataclass(frozen=True, eq=False)
 class Beads:
-    """What was deposited: (m, 2, 3) segments in the workpiece frame, (m,) their rows, widths and heights."""
+    """What was deposited: (m, 2, 3) segments in the workpiece frame, (m,) their rows, widths, heights and lengths."""
 
     segments_mm: Floats
     rows: NDArray[np.int64]
     width_mm: Floats
     height_mm: Floats
+    length_mm: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +100,14 @@ class Measured(NamedTuple):
 def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Beads:
     """Widths and heights as the program's comments tell, else by the profile's layer and the filament pushed."""
     process = profile.process
-    first = segments[:, :, 2].max(axis=1, initial=0.0) <= process.first_layer_height_mm + 1e-3
+    first = np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= process.first_layer_height_mm + 1e-3
     usual = np.where(first, process.first_layer_height_mm, process.layer_height_mm)
     height = np.where(program.height_mm[rows] > 0, program.height_mm[rows], usual)
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     area = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
     by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
     width = np.where(program.width_mm[rows] > 0, program.width_mm[rows], by_flow)
-    return Beads(segments, rows, width, height)
+    return Beads(segments, rows, width, height, length)
 
 
 def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contacts:
@@ -140,32 +141,35 @@ def _strokes(program: ParsedProgram, deposited: Beads, extruded: NDArray[np.bool
     path = np.cumsum(np.concatenate([[True], ~goes_on])).astype(np.int32)
     way = np.cumsum(np.linalg.norm((program.end - program.start)[:, :3], axis=1))
     stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.type]
-    return Strokes(half, height, path, way, stands_off, _slacks(program, extruded, half), _ways_to_turns(program, extruded))
+    across = np.hypot(*(program.end - program.start)[:, :2].T)
+    slack, lower = _slacks(program, extruded, half, across), _ways_to_turns(program, extruded, across)
+    return Strokes(half, height, path, way, stands_off, slack, lower)
 
 
-def _slacks(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats) -> Floats:
+def _slacks(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats, across: Floats) -> Floats:
     """(n,) how deep the head may dip: a stroke by its bead's width, a travel below the last bead of its pose next to nothing."""
-    rows = np.arange(len(extruded))
-    last = np.maximum.accumulate(np.where(extruded, rows, -1))
-    across = np.linalg.norm((program.end - program.start)[:, :2], axis=1)
-    height = np.maximum(program.start[:, 2], program.end[:, 2])[last]
-    same_pose = (last >= 0) & np.all(program.end[:, 3:] == program.end[last, 3:], axis=1)
-    low = np.minimum(program.start[:, 2], program.end[:, 2]) < height - LEVEL_SLACK_MM
-    level = same_pose & low & (across > ACROSS_MM) & ~extruded
-    return np.where(extruded, 2.0 * half, np.where(level, LEVEL_SLACK_MM, SLACK_MM))
+    rows = np.flatnonzero(~extruded & (across > ACROSS_MM))
+    last = np.maximum.accumulate(np.where(extruded, np.arange(len(extruded)), -1))[rows]
+    height = np.maximum(program.start[last, 2], program.end[last, 2])
+    same_pose = (last >= 0) & (program.end[rows, 3] == program.end[last, 3]) & (program.end[rows, 4] == program.end[last, 4])
+    low = same_pose & (np.minimum(program.start[rows, 2], program.end[rows, 2]) < height - LEVEL_SLACK_MM)
+    slack = np.where(extruded, 2.0 * half, SLACK_MM)
+    slack[rows[low]] = LEVEL_SLACK_MM
+    return slack
 
 
-def _ways_to_turns(program: ParsedProgram, extruded: NDArray[np.bool_]) -> Floats:
+def _ways_to_turns(program: ParsedProgram, extruded: NDArray[np.bool_], across: Floats) -> Floats:
     """(n,) CROSSING_MM for travels between the last bead before a turn of the table and the first one after it, else 0."""
+    lower, strokes = np.zeros(len(extruded)), np.flatnonzero(extruded)
+    if not (program.kind == MoveKind.ROTATE).any():
+        return lower
     turns = np.cumsum(program.kind == MoveKind.ROTATE)
-    strokes = np.flatnonzero(extruded)
-    after = np.searchsorted(strokes, np.arange(len(extruded)))
-    before_turn = turns[strokes[np.clip(after - 1, 0, len(strokes) - 1)]]
-    after_turn = turns[strokes[np.clip(after, 0, len(strokes) - 1)]]
-    across = np.linalg.norm((program.end - program.start)[:, :2], axis=1)
-    travels = (program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0.0) & (across > WAY_MM)
-    ways = travels & (after > 0) & (after < len(strokes)) & (after_turn > before_turn)
-    return np.where(ways, CROSSING_MM, 0.0)
+    rows = np.flatnonzero((program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0.0) & (across > WAY_MM))
+    after = np.searchsorted(strokes, rows)
+    within = (after > 0) & (after < len(strokes))
+    rows, after = rows[within], after[within]
+    lower[rows[turns[strokes[after]] > turns[strokes[after - 1]]]] = CROSSING_MM
+    return lower
 
 
 def head_of(machine: Machine) -> Head:
