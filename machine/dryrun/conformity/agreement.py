@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from machine.dryrun.conformity import registration
 from machine.dryrun.conformity.deposit import Share, inside_share
 from machine.dryrun.conformity.filling import filled_share
 from machine.dryrun.dryrun import DryRun
@@ -22,7 +23,8 @@ LEAST_FILLED = 0.98  # of the model at 100 % infill
 class Agreement:
     """Shares 0..1. filled: of the model's inside that lies in a bead; outside: of the extruded length (skirt and support
     aside) that lies more than half a line outside the model, farthest_mm the worst of it; unsupported: of the extruded
-    length that hangs in air where the slicer has not said so, reported: where it has.
+    length that hangs in air where the slicer has not said so, reported: where it has. shift_mm: by which the part that lies
+    farthest from its place does so.
     """
 
     filled: float
@@ -30,20 +32,24 @@ class Agreement:
     farthest_mm: float
     unsupported: float
     reported: float
+    shift_mm: float
 
 
 def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, DryRun]:
     """How the plastic of a dry run agrees with the closed model (workpiece frame); the run with what that found added.
 
-    Findings: outside (error), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
+    Findings: outside and shift (errors), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
     """
     share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm + reach_mm(profile.process))
     filled = filled_share(run, mesh, profile).share
     deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
     length, loose, reported = unsupported_mm(run.program, deposited, run.contacts)
     whole = max(length, 1e-9)
-    result = Agreement(filled, 1.0 - share.share, share.farthest_mm, loose / whole, reported / whole)
-    return result, replace(run, findings=(*run.findings, *_findings(run, share, result, profile)))
+    moved = registration.shifts(run, mesh, profile)
+    farthest = max((shift.size_mm for shift in moved), default=0.0)
+    result = Agreement(filled, 1.0 - share.share, share.farthest_mm, loose / whole, reported / whole, farthest)
+    problems = [*_findings(run, share, result, profile), *registration.findings(run, moved)]
+    return result, replace(run, findings=(*run.findings, *problems))
 
 
 def _findings(run: DryRun, share: Share, result: Agreement, profile: Profile) -> list[Finding]:

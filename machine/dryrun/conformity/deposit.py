@@ -64,8 +64,19 @@ def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:
     distances = np.zeros(len(points))
     out = np.flatnonzero(~inside(points, mesh))
     near = _columns(corners, max(most_mm, _column_mm(mesh)), most_mm)
-    distances[out] = _nearest(points[out], corners, near, most_mm)
+    distances[out], _ = _nearest(points[out], corners, near, most_mm)
     return distances
+
+
+def nearest_faces(points: Floats, mesh: Mesh, most_mm: float) -> tuple[Floats, NDArray[np.int64]]:
+    """(n,) distances of (n, 3) points from a mesh's surface, at most most_mm, and (n,) its nearest faces (0: none is near)."""
+    corners = mesh.vertices[mesh.faces]
+    return _nearest(points, corners, _columns(corners, max(most_mm, _column_mm(mesh)), most_mm), most_mm)
+
+
+def signed(points: Floats, distances: Floats, mesh: Mesh) -> Floats:
+    """(n,) distances of (n, 3) points from the surface, below 0 inside."""
+    return np.where(inside(points, mesh), -distances, distances)
 
 
 def inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
@@ -137,9 +148,9 @@ def _winding(points: Floats, corners: Floats, columns: Columns, aside: Floats) -
 
 
 @kernel
-def _nearest(points: Floats, corners: Floats, columns: Columns, most: float) -> Floats:
-    """(n,) distance of each point to the nearest face, at most `most`."""
-    distances = np.full(len(points), most)
+def _nearest(points: Floats, corners: Floats, columns: Columns, most: float) -> tuple[Floats, NDArray[np.int64]]:
+    """(n,) distance of each point to the nearest face, at most `most`, and that face."""
+    distances, nearest = np.full(len(points), most), np.zeros(len(points), np.int64)
     origin, size, shape, first, faces = columns
     for i in range(len(points)):
         p = points[i]
@@ -148,8 +159,9 @@ def _nearest(points: Floats, corners: Floats, columns: Columns, most: float) -> 
         cell = cx * shape[1] + cy
         for k in range(first[cell], first[cell + 1]):
             d = _to_triangle(p, corners[faces[k], 0], corners[faces[k], 1], corners[faces[k], 2])
-            distances[i] = min(distances[i], d)
-    return distances
+            if d < distances[i]:
+                distances[i], nearest[i] = d, faces[k]
+    return distances, nearest
 
 
 @part

@@ -43,7 +43,7 @@ def filled_share(run: DryRun, mesh: Mesh, profile: Profile, points: int = POINTS
     places = lattice(mesh, points)
     own = np.array([name not in AROUND for name in run.segment_type], dtype=np.bool_)
     deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
-    ups = _ups(run, profile)
+    ups = printing_directions(run, profile)
     hit = in_beads(places, run.segments_mm[own], ups[own], deposited.width_mm[own], deposited.height_mm[own])
     return Fill(int(hit.sum()), len(places))
 
@@ -58,7 +58,7 @@ def lattice(mesh: Mesh, points: int) -> Floats:
     return within
 
 
-def _ups(run: DryRun, profile: Profile) -> Floats:
+def printing_directions(run: DryRun, profile: Profile) -> Floats:
     """(m, 3) printing direction of each segment, workpiece frame."""
     ups = np.zeros((len(run.segment_row), 3))
     for pose_run in pose_runs(run.program):

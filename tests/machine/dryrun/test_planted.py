@@ -15,6 +15,18 @@ def test_a_planted_fault_is_found_where_it_is(fault: Fault) -> None:
     assert (fault.severity, fault.part, True) in {(f.severity, f.part, fault.layer in (0, f.layer) and f.line > 0) for f in found}
 
 
+@pytest.mark.parametrize("machine", ["gen5x", "linuxcnc_xyzac"])
+@pytest.mark.parametrize("name", [
+    "a part shifted by 0.2 mm", "a layer missing", "four layers missing", "a mirrored part", "a layer printed twice",
+    "two layers in the wrong order", "no lift before a turn", "no fans", "no waiting for heat", "a part missing",
+    "cut off amid the last part", "no homing"])  # fmt: skip
+def test_other_firmwares_and_other_axes_hide_no_fault(name: str, machine: str) -> None:
+    profile, _, lines = bent(machine)
+    fault = next(fault for fault in FAULTS if fault.name == name)
+    found = {f.code for f in dry_run(fault.edit(list(lines)), profile).errors}
+    assert fault.code in found or (name == "no homing" and machine == "linuxcnc_xyzac")  # which homes before any program
+
+
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_no_gcode_is_refused_with_its_line(name: str) -> None:
     profile, _, lines = bent("generic_ac")

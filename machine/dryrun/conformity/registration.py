@@ -1,0 +1,109 @@
+"""Registration: by how much each part lies beside the model it was made from.
+
+An outer wall runs half its width inside the surface. What it lies farther in or out, seen along the surface's normal, is a
+constant (a compensation, the resolution) and the share of a shift along that normal: a least-squares fit over walls of all
+directions tells them apart (the point-to-plane step of Chen and Medioni 1992). Walls along cuts are on no surface and are left
+out by their distance; a direction in which no wall faces is not told.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun.conformity.deposit import nearest_faces, signed
+from machine.dryrun.conformity.filling import printing_directions
+from machine.dryrun.dryrun import DryRun
+from machine.dryrun.findings import Finding, at_row
+from machine.dryrun.replay import beads_of
+from mdp.mesh import Floats, Mesh
+from profiles.profile import Profile
+from slicer.paths import Kind
+
+WALLS = (Kind.OUTER_WALL.value, "WALL-OUTER", "Outer wall")
+MOST_SHIFT_MM = 0.1
+NEAR_MM = 1.5  # walls farther from where they should be are not of this surface
+LEAST_MM = 0.2  # of a wall's piece
+PER_PART = 3000  # pieces
+FEWEST = 40
+INFORMATION = 0.04  # of the pieces: a direction in which fewer face is not told
+TRIMMED = 3.0  # times the usual deviation
+ROUNDS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """(3,) mm, workpiece frame, by which a part lies beside the model; row: of its first wall."""
+
+    part: int
+    row: int
+    by_mm: Floats
+
+    @property
+    def size_mm(self) -> float:
+        """How far."""
+        return float(np.linalg.norm(self.by_mm))
+
+
+def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> list[Shift]:
+    """The shift of every part with enough outer walls against the closed model in the workpiece frame."""
+    outer = run.program.rows_of_types(*WALLS)[run.segment_row]
+    deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
+    walls = np.flatnonzero(outer & (deposited.length_mm > LEAST_MM))
+    part = run.program.part[run.segment_row]
+    chosen = [_evenly(walls[part[walls] == each]) for each in np.unique(part[walls])]
+    if not chosen:
+        return []
+    pieces = np.concatenate(chosen)
+    ups = printing_directions(run, profile)[pieces]
+    width, height = deposited.width_mm[pieces], deposited.height_mm[pieces]
+    points = run.segments_mm[pieces].mean(axis=1) - 0.5 * height[:, None] * ups
+    distance, face = nearest_faces(points, mesh, NEAR_MM)
+    normals = mesh.normals[face]
+    lateral = np.sqrt(np.maximum(0.0, 1.0 - (normals * ups).sum(axis=1) ** 2))
+    beside = signed(points, distance, mesh) + 0.5 * width * lateral
+    use = (distance < NEAR_MM) & (np.abs(beside) < NEAR_MM) & (lateral > 0.5)
+    return [
+        Shift(int(part[own[0]]), int(run.segment_row[own[0]]), by)
+        for own, mine in zip(chosen, np.split(np.arange(len(pieces)), np.cumsum([len(c) for c in chosen])[:-1]), strict=True)
+        if (by := _fit(normals[mine][use[mine]], beside[mine][use[mine]])) is not None
+    ]
+
+
+def findings(run: DryRun, found: list[Shift]) -> list[Finding]:
+    """An error for every part that lies beside the model."""
+    return [
+        at_row(
+            run.program,
+            shift.row,
+            "error",
+            "shift",
+            f"part {shift.part} lies {shift.size_mm:.2f} mm beside the model, by X{shift.by_mm[0]:+.2f} Y{shift.by_mm[1]:+.2f} "
+            f"Z{shift.by_mm[2]:+.2f}, {MOST_SHIFT_MM:g} mm are allowed",
+        )
+        for shift in found
+        if shift.size_mm > MOST_SHIFT_MM
+    ]
+
+
+def _evenly(own: NDArray[np.int64]) -> NDArray[np.int64]:
+    return own if len(own) <= PER_PART else own[np.linspace(0, len(own) - 1, PER_PART).astype(np.int64)]
+
+
+def _fit(normals: Floats, beside: Floats) -> Floats | None:
+    """(3,) shift that explains best how far (n,) walls lie outward along (n, 3) normals, beside a constant; None: too few."""
+    keep = np.ones(len(beside), dtype=np.bool_)
+    shift = np.zeros(3)
+    for _ in range(ROUNDS):
+        if keep.sum() < FEWEST:
+            return None
+        facing = normals[keep] - normals[keep].mean(axis=0)
+        value, axis = np.linalg.eigh(facing.T @ facing / keep.sum())
+        told = axis[:, value > INFORMATION]
+        along, *_ = np.linalg.lstsq(facing @ told, beside[keep] - beside[keep].mean(), rcond=None)
+        shift = told @ along
+        left = beside - normals @ shift
+        left -= np.median(left[keep])
+        usual = 1.4826 * float(np.median(np.abs(left[keep]))) + 1e-3
+        keep = np.abs(left) < TRIMMED * usual + 0.02
+    return shift
