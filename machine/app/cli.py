@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         kernels = sys.modules.get("mdp.kernels.cache")  # loading it for nothing would cost what it saves
         if kernels is not None and kernels.trouble():
-            sys.stderr.write(f"tiltprint: the next run compiles the kernels again: {kernels.trouble()}\n")
+            _complain(f"the next run compiles the kernels again: {kernels.trouble()}")
 
 
 def _run(arguments: Sequence[str] | None) -> int:
