@@ -51,6 +51,7 @@ def main() -> None:
     parser.add_argument("--signals", nargs="+", default=["GROUP"], choices=list(SIGNALS))
     parser.add_argument("--commands", nargs="+", default=list(COMMANDS), choices=list(COMMANDS))
     asked = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(1))
     bad = 0
     for model in asked.models:
         for command in asked.commands:
@@ -90,6 +91,8 @@ def run(command: str, model: str, name: str | None, moment_s: float) -> End:
             else:
                 process.send_signal(SIGNALS[name])
             process.wait()
+        finally:
+            process.kill()  # where the campaign itself is interrupted
         after_s = monotonic() - began if name is None or process.returncode else 0.0
         sleep(0.1)
         left = session(process.pid)
