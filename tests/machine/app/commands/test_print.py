@@ -142,7 +142,7 @@ def test_what_the_printer_did_not_understand_is_told_with_the_log(tmp_path: Path
     with SimulatedPrinter(MACHINE) as printer:
         assert main(["print", str(file), "--port", printer.path, "--log", str(log), "--force"]) == 0
     assert capsys.readouterr().err.splitlines()[-2:] == [
-        'the printer said: Unknown command: "M9876"',
+        "the printer said: Unknown command: M9876",
         f"all that was sent and received is in {log}",
     ]
 
