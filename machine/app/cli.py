@@ -20,10 +20,10 @@ from machine.app.terminal.plain import plain_line
 from machine.app.terminal.usage import sentence
 from profiles.errors import UserError
 
+ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by what --install-completion writes: words are wanted, no command
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
 app = typer.Typer(
-    add_completion=False,
     context_settings={"max_content_width": 120},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -67,6 +67,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     # numpy's library for products waits for its threads by spinning: on a busy machine that costs more than the products.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     command = typer.main.get_command(app)
+    if ASKED_BY_SHELL in os.environ:
+        command.main(given, "tiltprint")
     try:
         with outside_compiler(), command.make_context("tiltprint", given or ["--help"]) as context:
             code = command.invoke(context)

@@ -1,10 +1,14 @@
 """Start: what the command `tiltprint` runs; it knows Ctrl-C before the command line is loaded."""
 
+import gc
 import sys
+
+SELDOM = (100_000, 20, 50)  # what is allocated between two looks for garbage in circles, of which there is little
 
 
 def main() -> int:
     """Load the command line and run it; returns the exit code."""
+    gc.set_threshold(*SELDOM)
     try:
         from machine.app.cli import main as run
 

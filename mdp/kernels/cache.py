@@ -103,6 +103,18 @@ def mark(purpose: str) -> Path:
     return home() / f"{purpose}-{sha256(' '.join(sorted(_loaded)).encode()).hexdigest()[:16]}"
 
 
+def keep(purpose: str) -> None:
+    """Note for later runs that the kernels for a purpose are all cached, where they are."""
+    cached = mark(purpose)
+    if trouble():
+        return
+    try:
+        cached.parent.mkdir(parents=True, exist_ok=True)
+        cached.touch()
+    except OSError as error:
+        note_unwritten(cached.parent, error)
+
+
 def _clear(parent: Path, names: str) -> None:
     """Remove what has not been changed for long."""
     for old in parent.glob(names):

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar
 
 from numba import config, njit
+from numba.core import event
 
 from mdp.kernels.cache import folder, note_unwritten
 
@@ -58,3 +59,23 @@ def _forgive(compiled: Any, place: Path) -> None:
             note_unwritten(place, error)
 
     compiled._cache.save_overload = save_if_possible
+
+
+def on_compiled(call: Callable[[], None]) -> None:
+    """Have a function called whenever a kernel has been compiled, with its parts; those that are cached do not count."""
+    event.register("numba:compile", _Compilations(call))
+
+
+class _Compilations(event.Listener):
+    """Compilations as numba tells them, those of parts inside that of their kernel."""
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        self._call, self._depth = call, 0
+
+    def on_start(self, event: Any) -> None:
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self._depth -= 1
+        if self._depth == 0:
+            self._call()

@@ -76,8 +76,12 @@ class Problem:
         self.bearable_mpa = profile.material.interlayer_strength_mpa / settings.strength_safety
         self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
         self._evaluated: list[int] = []  # appended to by several threads
-        self._began = perf_counter()
         self._stopped = False
+        self.begin()
+
+    def begin(self) -> None:
+        """Have the time limit count from now on."""
+        self._began = perf_counter()
 
     def stop(self) -> None:
         """Have everything that asks whether it is late leave off."""

@@ -39,7 +39,7 @@ MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the search stands."""
+    """Where the search stands: after which stage, 0 when it begins."""
 
     stage: int
     beam: int
@@ -82,6 +82,7 @@ def decompose(
     if parts == 1 and price is None and trace is None:  # nobody looks at the front
         best, front, rounds = problem.root, Front(problem.root), 0
     elif profile.search.method == "published":
+        _begin(problem, report)
         continues = partial(_continues, problem)
         best, rounds = search_as_published(problem, ranker_named(ranker), continues, trace, partial(_report, problem, report))
         front = Front(problem.start)
@@ -251,6 +252,7 @@ def _search_beam(
     beam = Beam(problem, ranker, trace)
     stage = 0
     try:
+        _begin(problem, report)
         while any(beam.nodes) and _continues(problem, stage):
             stage += 1
             beam.advance()
@@ -286,6 +288,13 @@ def _prefer_symmetry(problem: Problem, front: Front) -> None:
     mirrors = find_mirrors(problem.mesh) if cut else []
     for node in cut if mirrors else []:
         front.replace(node, make_symmetric(problem, node, mirrors))
+
+
+def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:
+    """Tell that a search begins, where there is anything to search; its time limit counts from then on."""
+    if _continues(problem, 0):
+        report(Progress(0, 1, 1.0))
+        problem.begin()
 
 
 def _report(problem: Problem, report: Callable[[Progress], None], stage: int, held: int, best: Node) -> None:

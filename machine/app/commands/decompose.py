@@ -7,8 +7,8 @@ from machine.app.output import check_outputs, delete, make_folder, write_bytes, 
 from machine.app.pictures.front_picture import front_picture
 from machine.app.pictures.picture import contact_sheet, parts_picture
 from machine.app.pictures.png import write_png
+from machine.app.pipeline import compilers
 from machine.app.pipeline.pipeline import decompose_model
-from machine.app.pipeline.precompile import compile_pictures
 from machine.app.requests import ModelRequest, Outputs
 from machine.app.terminal.advice import advice
 from machine.app.terminal.report import part_settings_lines, parts_table, show
@@ -66,7 +66,7 @@ def _is_same(file: Path, plan: Path | None) -> bool:
 def _draw(outputs: Outputs, decomposition: Decomposition, profile: Profile) -> None:
     png, sheet, front = outputs.png, outputs.sheet, outputs.front
     if png is not None or sheet is not None or front is not None:
-        compile_pictures()
+        compilers.wait_for(compilers.PICTURES)
     if png is not None:
         write_png(png, parts_picture(decomposition, profile))
     if sheet is not None:

@@ -8,9 +8,9 @@ import numpy as np
 
 from machine.app.output import write_bytes
 from machine.app.pictures.thumbnail import with_thumbnails
+from machine.app.pipeline import compilers
 from machine.app.pipeline.copies import check_copies, in_copies
 from machine.app.pipeline.given_plan import check_parts_named, read_given_plan, with_plan_settings
-from machine.app.pipeline.precompile import compile_pictures, compile_program, compile_search
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import Report, reporting, say
@@ -68,7 +68,8 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     read_s = perf_counter() - began
     for repair in repairs:
         say(f"{request.name}: {repair}")
-    compile_search(to_build)
+    compilers.begin((*compilers.JUDGE, *(compilers.PROGRAM if to_build else ()), *compilers.SEARCH))
+    compilers.wait_for(compilers.JUDGE)
     orientation = None if given is None or given.orientation is None else np.array(given.orientation)
     if orientation is not None:
         mesh = standing_still(mesh, orientation)
@@ -130,6 +131,9 @@ class _Search:
         return next(record[0] for found, record in self._records if found is decomposition)
 
     def _show(self, progress: Progress) -> None:
+        if progress.stage == 0:
+            compilers.wait_for(compilers.SEARCH, self._report)
+            return
         left = f"{100 * progress.best_share:.1f} % of the risky area left"
         self._report(f"searching parts: stage {progress.stage}, {progress.beam} in the beam, {left}")
 
@@ -155,7 +159,7 @@ def build(decomposition: Decomposition, profile: Profile, pictures: bool = False
     """
     parts = decomposition.parts
     check_parts(parts, profile)
-    compile_program(profile)
+    compilers.wait_for(compilers.PROGRAM)
     with reporting() as report:
 
         def show(begun: int, of: int, layers: int, all_layers: int) -> None:
@@ -169,7 +173,7 @@ def build(decomposition: Decomposition, profile: Profile, pictures: bool = False
             say(f"{decomposition.name}: {note}")
         lines = tuple(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
-            compile_pictures()
+            compilers.wait_for(compilers.PICTURES, report)
             lines = with_thumbnails(lines, decomposition, profile)
         report("dry run")
         run = dry_run(lines, profile)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from machine.app.embedded_profile import in_words, read_embedded_profile
+from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import refuse_cuts
 from machine.app.pipeline.pipeline import build, decompose_model
-from machine.app.pipeline.precompile import announce_dry_run_compilation
 from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
@@ -37,7 +37,7 @@ def load_program(request: ModelRequest) -> LoadedProgram:
     profile, sections = read_embedded_profile(lines, request.profile, request.chosen_sections)
     if sections:
         say(f"{request.name}: {in_words(sections, profile)}, as the file itself tells")
-    announce_dry_run_compilation()
+    compilers.wait_for(compilers.DRY_RUN)
     known = "machine" in request.chosen_sections or profile.machine is not request.profile.machine
     return LoadedProgram(Program(lines, dry_run(lines, profile), None), profile, known)
 

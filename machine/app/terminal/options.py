@@ -2,23 +2,28 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from machine.app.terminal.completion import names_of
 
 if TYPE_CHECKING:
     from profiles.profile import Profile
 
+
+def _profile_option(kind: str, otherwise: str = "") -> Any:
+    return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=names_of(kind), help=f"{kind} profile{otherwise}")
+
+
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF or GLB file, or demo:NAME")]
 ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model file, demo:NAME, or a G-code file")]
-MachineName = Annotated[str, typer.Option("--machine", metavar="NAME|FILE", help="machine profile")]
-MaterialName = Annotated[str, typer.Option("--material", metavar="NAME|FILE", help="material profile")]
-ProcessName = Annotated[str, typer.Option("--process", metavar="NAME|FILE", help="process profile")]
-MachineGiven = Annotated[
-    str | None, typer.Option("--machine", metavar="NAME|FILE", help="machine profile; else the G-code file's own")
-]
-MaterialGiven = Annotated[str | None, typer.Option("--material", metavar="NAME|FILE", help="material profile; else the file's")]
-ProcessGiven = Annotated[str | None, typer.Option("--process", metavar="NAME|FILE", help="process profile; else the file's")]
+MachineName = Annotated[str, _profile_option("machine")]
+MaterialName = Annotated[str, _profile_option("material")]
+ProcessName = Annotated[str, _profile_option("process")]
+MachineGiven = Annotated[str | None, _profile_option("machine", "; else the G-code file's own")]
+MaterialGiven = Annotated[str | None, _profile_option("material", "; else the file's")]
+ProcessGiven = Annotated[str | None, _profile_option("process", "; else the file's")]
 Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
 HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
+from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Mesh
 from slicer.geometry.segments import squared_distance_in_space
@@ -128,7 +129,7 @@ def _faces_of_columns(
 @kernel
 def _winding(points: Floats, corners: Floats, columns: Columns, aside: Floats) -> NDArray[np.int64]:
     """(n,) how often the surface winds about each point: signed crossings of the ray straight up."""
-    winding = np.zeros(len(points), np.int64)
+    winding = longs(len(points), 0)
     origin, size, shape, first, faces = columns
     for i in range(len(points)):
         x, y, z = points[i, 0] + aside[0], points[i, 1] + aside[1], points[i, 2]
@@ -150,7 +151,7 @@ def _winding(points: Floats, corners: Floats, columns: Columns, aside: Floats) -
 @kernel
 def _nearest(points: Floats, corners: Floats, columns: Columns, most: float) -> tuple[Floats, NDArray[np.int64]]:
     """(n,) distance of each point to the nearest face, at most `most`, and that face."""
-    distances, nearest = np.full(len(points), most), np.zeros(len(points), np.int64)
+    distances, nearest = floats(len(points), most), longs(len(points), 0)
     origin, size, shape, first, faces = columns
     for i in range(len(points)):
         p = points[i]

@@ -14,6 +14,7 @@ from machine.dryrun.conformity.deposit import AROUND, inside
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.replay import beads_of
 from machine.reader.parsed import pose_runs
+from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Mesh
 from mdp.pose import rotation
@@ -124,15 +125,17 @@ def _in_bar(p: Floats, bar: Bar) -> bool:
 @kernel
 def _mark_places(places: Places, segments: Floats, ups: Floats, width: Floats, height: Floats, hit: NDArray[np.bool_]) -> None:
     """Mark the places in every bar: those of the cubes that its box touches, piece by piece."""
-    d, low, high = np.zeros(3), np.zeros(3, np.int64), np.zeros(3, np.int64)
+    d, low, high = floats(3, 0.0), longs(3, 0), longs(3, 0)
     origin, cell, shape = places.origin, places.cell, places.shape
     for i in range(len(segments)):
         a, b = segments[i, 0], segments[i, 1]
-        d[:] = b - a
+        for axis in range(3):
+            d[axis] = b[axis] - a[axis]
         length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
         if length <= 0.0:
             continue
-        d /= length
+        for axis in range(3):
+            d[axis] /= length
         bar = Bar(a, d, length, ups[i], 0.5 * width[i], height[i])
         reach = 0.5 * width[i] + height[i]
         pieces = int(length / cell) + 1

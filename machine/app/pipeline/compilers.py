@@ -1,0 +1,113 @@
+"""Compilers: processes that compile the kernels which the first run needs, one a core, while the command goes on.
+
+The command says early what it will need, in the order of need, and waits for a bundle where it needs it. Where a process
+cannot be had or fails, the work compiles by itself what is missing.
+"""
+
+import atexit
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Iterable
+from contextlib import nullcontext
+from threading import Condition, Thread
+
+from machine.app.pipeline.precompile import DONE, KERNEL
+from machine.app.terminal.progress import Report, reporting, say
+from mdp.kernels.cache import keep, mark, trouble
+from mdp.kernels.threads import THREADS
+
+JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = ("judge",), ("sweep", "search"), ("slice", "dry-run"), ("dry-run",), ("draw",)
+LOOK_S = 0.2
+
+
+class Compilers:
+    """The processes of this command. Threads: one a process reads what it answers; `changed` guards what they share."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[str] = deque()
+        self._done: set[str] = set()
+        self._asked: set[str] = set()
+        self._kernels = 0
+        self._working = 0
+        self._told = False
+        self._changed = Condition()
+
+    def begin(self, bundles: Iterable[str]) -> None:
+        """Have the bundles compiled that are not cached yet, the first ones first."""
+        new = [bundle for bundle in bundles if bundle not in self._asked and not trouble() and not mark(bundle).exists()]
+        with self._changed:
+            self._asked.update(new)
+            self._waiting.extend(new)
+            start = min(len(self._waiting), THREADS - self._working)
+            self._working += start
+        for _ in range(start):
+            Thread(target=self._work, daemon=True).start()
+
+    def wait_for(self, bundles: Iterable[str], report: Report | None = None) -> None:
+        """Return when the bundles are compiled, or cannot be in a process of their own; report: where progress is shown."""
+        self.begin(bundles)
+        if self._ready(bundles):
+            return
+        if not self._told:
+            self._told = True
+            say("compiling the kernels (only the first run does)")
+        with nullcontext(report) if report is not None else reporting() as show:
+            while not self._ready(bundles):
+                show(f"compiling the kernels: {self._kernels} done")
+                with self._changed:
+                    self._changed.wait(LOOK_S)
+
+    def _ready(self, bundles: Iterable[str]) -> bool:
+        return not self._working or all(bundle not in self._asked or bundle in self._done for bundle in bundles)
+
+    def _work(self) -> None:
+        """In a thread: hand bundles to a process of our own until there are none."""
+        try:
+            self._hand_over()
+        except OSError:  # no process can be had, or it has ended
+            pass
+        finally:
+            with self._changed:
+                self._working -= 1
+                self._changed.notify_all()
+
+    def _hand_over(self) -> None:
+        command = [sys.executable, "-m", "machine.app.pipeline.precompile"]
+        pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
+        process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nowhere, text=True)
+        atexit.register(process.kill)
+        try:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            going_on = True
+            while going_on and (bundle := self._next()) is not None:
+                process.stdin.write(f"{bundle}\n")
+                process.stdin.flush()
+                going_on = self._follow(bundle, process.stdout)
+        finally:
+            process.kill()
+            process.wait()
+            atexit.unregister(process.kill)
+
+    def _next(self) -> str | None:
+        with self._changed:
+            return self._waiting.popleft() if self._waiting else None
+
+    def _follow(self, bundle: str, answers: Iterable[str]) -> bool:
+        """Follow what a process says of a bundle; False where it ends before it is done."""
+        for answer in answers:
+            with self._changed:
+                if answer.strip() == KERNEL:
+                    self._kernels += 1
+                elif answer.strip() == f"{DONE} {bundle}":
+                    keep(bundle)
+                    self._done.add(bundle)
+                self._changed.notify_all()
+            if bundle in self._done:
+                return True
+        return False
+
+
+COMPILERS = Compilers()
+begin, wait_for = COMPILERS.begin, COMPILERS.wait_for
