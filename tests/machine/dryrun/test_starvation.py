@@ -27,7 +27,7 @@ def circles(segment_mm: float, feed: int, count: int) -> tuple[str, ...]:
 
 
 def printed(lines: tuple[str, ...], baud: int) -> Record:
-    printer = VirtualPrinter(MACHINE, BuildOptions(rx_ring=128), baud=baud)
+    printer = VirtualPrinter(MACHINE, BuildOptions(rx_ring=128, home_start=False), baud=baud)
     print_lines(lines, PATH, baud, medium=printer.medium)
     return printer.record
 

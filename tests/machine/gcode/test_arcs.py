@@ -14,6 +14,7 @@ from machine.gcode.writer import write_gcode
 from machine.planning.moves import MachineProgram, Stroke, Travel
 from machine.reader.motion import CHORD_MM
 from machine.reader.parse import parse_gcode
+from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from mdp.mesh import Floats
 from profiles.profile import Profile, load
@@ -127,7 +128,7 @@ def test_the_centre_by_radius_is_as_far_from_both_ends_and_gives_the_shorter_way
 def test_the_simulated_printer_runs_an_arc_as_the_reader_reads_it() -> None:
     machine = load().machine
     lines = f"{HEAD}G1 X10 Y10 F3000\nG2 X30 Y10 I10 J0 F1800\nM400\n"
-    firmware = SimulatedFirmware(machine)
+    firmware = SimulatedFirmware(machine, BuildOptions(home_start=False))
     firmware.receive(lines.encode())
     firmware.advance()
     record = firmware.record()
