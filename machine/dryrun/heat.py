@@ -102,8 +102,8 @@ def _levels(program: ParsedProgram, codes: tuple[str, ...]) -> Floats:
 def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     """In every part layers without any fan where the file has one in layers like them.
 
-    A slicer's fan blows the harder the less time a layer takes: a layer without fan that is quicker than most with one is no
-    slicer's. In a file of ours no layer is without, but for the first ones.
+    In a file of ours no layer is without, but for the first ones. Other slicers switch the fan with the time that a layer takes,
+    and the quicker a layer the harder it blows: only where it is off once, in layers quicker than most, it is missed.
     """
     beads = (program.kind == MoveKind.EXTRUDE) & ~program.rows_of_types(Kind.PURGE.value)
     if not beads.any():
@@ -122,10 +122,11 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     if own:
         expected = min(profile.material.fan_least, profile.material.fan) > 0.0
         still &= expected & ((part != 1) | (np.arange(len(at)) - begun >= profile.material.fan_off_layers))
-    elif (blown[at] > 0.0).any():
-        still &= seconds[at] < QUICKER * float(np.median(seconds[at][blown[at] > 0.0]))
     else:
-        return []
+        quick = seconds[at] < QUICKER * float(np.median(seconds[at][blown[at] > 0.0])) if (blown > 0.0).any() else ~still
+        once = np.count_nonzero(np.diff(still.astype(np.int8), prepend=0) > 0) == 1
+        if not once or not quick[still].all():
+            return []
     problems = []
     for each in np.unique(part[still]):
         mine = np.flatnonzero(still & (part == each))

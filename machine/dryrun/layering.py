@@ -24,8 +24,9 @@ LEAST_MM = 10.0
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
-    """Errors of code gap."""
-    return [*_too_high(program, deposited), *_floating(program, deposited, contacts)]
+    """Errors of code gap, in every part the first sign."""
+    found = sorted([*_too_high(program, deposited), *_floating(program, deposited, contacts)], key=lambda each: each.line)
+    return list({each.part: each for each in reversed(found)}.values())
 
 
 def _too_high(program: ParsedProgram, deposited: Beads) -> list[Finding]:

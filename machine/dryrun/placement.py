@@ -69,7 +69,7 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[
         begins = mine & (program.layer == program.layer[mine & (length > 0)].min())
         first = float((contacts.air_mm + contacts.beside_mm)[begins].sum())
         lost = first > max(LEAST_MM, LOST_SHARE * float(length[begins].sum()))
-        stretch = _longest_mm(hanging, length, mine)
+        stretch, at = _longest_mm(hanging, length, mine)
         if not (lost or stretch > STRETCH_MM or loose > max(LEAST_MM, WARNING_SHARE * whole)):
             continue
         grave = lost or loose > ERROR_SHARE * whole or stretch > STRETCH_MM
@@ -81,15 +81,18 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[
         if lost:
             message = f"the part begins in air: {first:.1f} mm of its first layer have nothing under them"
         rows = begins & (contacts.air_mm > 0) if lost else mine & (hanging > 0)
-        problems.append(at_row(program, int(np.flatnonzero(rows)[0]), severity, "air", message))
+        row = at if stretch > STRETCH_MM and not lost else int(np.flatnonzero(rows)[0])
+        problems.append(at_row(program, row, severity, "air", message))
     return problems
 
 
-def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> float:
-    """The longest stretch of moves that follow each other and hang in air."""
+def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> tuple[float, int]:
+    """The longest stretch of moves that follow each other and hang in air, and its first row."""
     loose = mine & (hanging > HANGING_SHARE * length) & (length > 0)
-    stretches = np.bincount(np.cumsum(~loose), weights=np.where(loose, hanging, 0.0))
-    return float(stretches.max(initial=0.0))
+    group = np.cumsum(~loose)
+    stretches = np.bincount(group, weights=np.where(loose, hanging, 0.0))
+    longest = int(stretches.argmax())
+    return float(stretches[longest]), int(np.argmax(loose & (group == longest)))
 
 
 def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[Finding]:
