@@ -66,7 +66,7 @@ class Contacts:
 
 class Strokes(NamedTuple):
     """(n,) of each row: half its bead's width and its height (0: no bead), the path it belongs to, how far along all moves it
-    ends, whether it is support, which stands off by a gap, how deep the head may dip, and how much lower it is tried too.
+    ends, and whether it is support, which stands off by a gap.
     """
 
     half: Floats
@@ -74,6 +74,16 @@ class Strokes(NamedTuple):
     path: NDArray[np.int32]
     way: Floats
     stands_off: NDArray[np.bool_]
+
+
+class Moves(NamedTuple):
+    """(n, 5) start and end of each row; (n,) how deep the head may dip during it, and by how much lower it is tried too.
+
+    Apart from Strokes, which the innermost functions take: each array more there slows all of it down.
+    """
+
+    start: Floats
+    end: Floats
     slack: Floats
     lower: Floats
 
@@ -118,6 +128,7 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
         return Contacts(*measured, untested_row=-1)
     extruded = program.kind == MoveKind.EXTRUDE
     strokes, head = _strokes(program, deposited, extruded), head_of(machine)
+    moves = _moves(program, extruded, strokes.half)
     ups, turned = np.zeros((len(deposited.rows), 3)), 0
     process = profile.process
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
@@ -130,7 +141,7 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
         field = _field(deposited, int(before), int(after), run, ups, machine)
         if field is not None:
             about = Surroundings(field, int(run.rows[0]), gap, _plate(machine, run.pose))
-            _replay_run(run.rows, (program.start, program.end), strokes, about, head, measured)
+            _replay_run(run.rows, moves, strokes, about, head, measured)
     return Contacts(*measured, untested_row=-1)
 
 
@@ -141,9 +152,13 @@ def _strokes(program: ParsedProgram, deposited: Beads, extruded: NDArray[np.bool
     path = np.cumsum(np.concatenate([[True], ~goes_on])).astype(np.int32)
     way = np.cumsum(np.linalg.norm((program.end - program.start)[:, :3], axis=1))
     stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.type]
+    return Strokes(half, height, path, way, stands_off)
+
+
+def _moves(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats) -> Moves:
     across = np.hypot(*(program.end - program.start)[:, :2].T)
     slack, lower = _slacks(program, extruded, half, across), _ways_to_turns(program, extruded, across)
-    return Strokes(half, height, path, way, stands_off, slack, lower)
+    return Moves(program.start, program.end, slack, lower)
 
 
 def _slacks(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats, across: Floats) -> Floats:
@@ -275,19 +290,19 @@ def _classify_support(
 @kernel
 def _replay_run(
     rows: NDArray[np.int64],
-    ends: tuple[Floats, Floats],
+    moves: Moves,
     strokes: Strokes,
     about: Surroundings,
     head: Head,
     measured: Measured,
 ) -> None:
-    """Try each row of a run against the field, then lay it. ends: (n, 5) starts and ends of all rows."""
+    """Try each row of a run against the field, then lay it."""
     for row in rows:
-        a, b = ends[0][row], ends[1][row]
+        a, b = moves.start[row], moves.end[row]
         extruded = strokes.height[row] > 0.0
-        measured.depth[row] = depth_of(a, b, strokes.slack[row], about.field, head)
-        if strokes.lower[row] > 0.0:
-            down = np.array([0.0, 0.0, strokes.lower[row]])
+        measured.depth[row] = depth_of(a, b, moves.slack[row], about.field, head)
+        if moves.lower[row] > 0.0:
+            down = np.array([0.0, 0.0, moves.lower[row]])
             measured.close[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, head)
         if not extruded:
             continue
