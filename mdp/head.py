@@ -14,7 +14,8 @@ import numpy as np
 
 from mdp.mesh import Floats
 from mdp.pose import UP
-from profiles.machine import Machine, Vector
+from profiles.frozen import Vector
+from profiles.machine import Machine
 
 FIELD = 120
 

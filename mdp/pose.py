@@ -10,7 +10,8 @@ from math import atan2, ceil, cos, degrees, floor, hypot, radians, sin
 import numpy as np
 
 from mdp.mesh import Floats
-from profiles.machine import Machine, RotaryAxis
+from profiles.axes import RotaryAxis
+from profiles.machine import Machine
 
 UP = np.array([0.0, 0.0, 1.0])
 SINGULAR = 1e-7  # sine of an angle that no table can show; nearer to the singular pose the turn is not defined

@@ -14,7 +14,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.repair.edges import connected_components
-from profiles.machine import Vector
+from profiles.frozen import Vector
 
 ROUNDING_MM = 1e-6  # a plane may touch what it must not pass through
 MOST_PRODUCTS = 4_000_000  # of directions and points at a time

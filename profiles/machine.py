@@ -1,13 +1,14 @@
-"""The machine: linear axes, the tilt and turn axes of the table, the head's bodies, the table, its G-code blocks."""
+"""The machine: its axes, the head's bodies, the table, its G-code blocks."""
 
 from collections.abc import Iterable
 from math import acos, cos, degrees, hypot, radians
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, model_validator
 
+from profiles.axes import STANDING, LinearAxis, RotaryAxis
 from profiles.dialects import FOLLOWS_TABLE
+from profiles.frozen import Frozen, Vector, refuse
 from profiles.wording import keys, nearest
 
 if TYPE_CHECKING:
@@ -15,125 +16,9 @@ if TYPE_CHECKING:
 else:
     DialectName = Literal[tuple(FOLLOWS_TABLE)]
 
-Vector = tuple[float, float, float]
-Limits = tuple[float, float]
 LEAST_LEAN_DEG = 1.0  # a table that leans less can print nothing but upright parts
 UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
-Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
 Pixels = Annotated[int, Field(ge=16, le=1024)]
-
-
-class Frozen(BaseModel):
-    """A validated value: unknown keys are refused, nothing changes after loading."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _no_truth_as_number(cls, value: Any, info: ValidationInfo) -> Any:
-        """Refuses true and false where pydantic would read 1 and 0."""
-        if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
-            raise PydanticCustomError("truth_as_number", "true and false are no numbers")
-        return value
-
-
-def _refuse(problems: Iterable[str]) -> None:
-    """Raise all problems of a table at once, one a line: profiles.wording makes a sentence of each."""
-    sentences = list(problems)
-    if sentences:
-        raise ValueError("\n".join(sentences))
-
-
-def _reversed(limits: Limits, name: str) -> list[str]:
-    return [f"{name} is {list(limits)}: the first number must be below the second"] if limits[0] >= limits[1] else []
-
-
-class LinearAxis(Frozen):
-    """One of X, Y, Z as the firmware means it."""
-
-    limits_mm: Limits = Field(description="least and greatest position the firmware accepts, mm")
-    speed_mm_s: float = Field(gt=0, le=5000, description="greatest speed, mm/s")
-    acceleration_mm_s2: float = Field(gt=0, le=100000, description="acceleration, mm/s2")
-    home_mm: float | None = Field(
-        None,
-        description="what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, "
-        "mm; left out: the least of limits_mm for X and Y, the greatest for Z",
-    )
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        _refuse(_reversed(self.limits_mm, "limits_mm"))
-        return self
-
-
-class RotaryAxis(Frozen):
-    """The tilt or the turn axis of the table.
-
-    A point w of the table moves by the right-handed rotation about `axis` through `point_mm` by
-    -sign * (value - zero_deg): the rule of LinuxCNC's xyzac-trt-kins, whose default sign is -1.
-    """
-
-    letter: Letter = Field(description="the G-code word of this axis")
-    stepper: str = Field(
-        "",
-        pattern=r"^[A-Za-z0-9_]*$",
-        description="name of the axis's [manual_stepper] in Klipper; empty: stepper_ and the letter",
-    )
-    axis: Vector = Field(description="direction of the axis in the machine frame (any length)")
-    point_mm: Vector = Field(
-        description="a point of the axis in the machine frame at tilt 0, turn 0; for the turn axis the point where it "
-        "meets the table's surface, which is the workpiece origin"
-    )
-    sign: Literal[-1, 1] = Field(description="-1: positive values turn the table right-handed about axis; 1: the other way")
-    zero_deg: float = Field(0.0, ge=-360, le=360, description="axis value at which the table is level (tilt) or unturned")
-    limits_deg: Limits = Field(description="least and greatest value the firmware accepts, deg")
-    budget_deg: float | None = Field(
-        None,
-        ge=180,
-        le=100000,
-        description="how far cables let the axis wind to either side of zero_deg, deg: it is unwound before; left out: no cable",
-    )
-    speed_deg_s: float = Field(gt=0, le=3600, description="greatest speed, deg/s")
-    acceleration_deg_s2: float = Field(gt=0, le=100000, description="acceleration, deg/s2")
-    home_deg: float | None = Field(
-        None,
-        description="what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, "
-        "deg; left out: it is homed to zero_deg, and believed at the least of limits_deg after a restart",
-    )
-
-    @property
-    def reach_deg(self) -> Limits:
-        """Least and greatest value a print may use: the firmware's limits, and what the cables let the axis wind."""
-        if self.budget_deg is None:
-            return self.limits_deg
-        least, most = self.limits_deg
-        return max(least, self.zero_deg - self.budget_deg), min(most, self.zero_deg + self.budget_deg)
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        problems = _reversed(self.limits_deg, "limits_deg") if not isinstance(self, StillAxis) else []
-        if sum(x * x for x in self.axis) < 1e-12:
-            problems.append(f"axis is {list(self.axis)}: a direction must not be zero")
-        if not problems and not self.limits_deg[0] <= self.zero_deg <= self.limits_deg[1]:
-            problems.append(f"zero_deg is {self.zero_deg:g}: it must lie inside limits_deg {list(self.limits_deg)}")
-        _refuse(problems)
-        return self
-
-
-class StillAxis(RotaryAxis):
-    """The rotary axis of a machine that has none: it stands at 0."""
-
-    point_mm: Vector = (0.0, 0.0, 0.0)
-    sign: Literal[-1, 1] = -1
-    limits_deg: Limits = (0.0, 0.0)
-    speed_deg_s: float = 1.0
-    acceleration_deg_s2: float = 1.0
-
-
-STANDING = {
-    "tilt": StillAxis.model_validate({"letter": "A", "axis": (1.0, 0.0, 0.0)}),
-    "turn": StillAxis.model_validate({"letter": "C", "axis": (0.0, 0.0, 1.0)}),
-}
 
 
 class Box(Frozen):
@@ -148,7 +33,7 @@ class Box(Frozen):
         problems = _inverted(self.name, self.min_mm, self.max_mm)
         if self.min_mm[2] < 0:
             problems.append(f"box {self.name}: min_mm z is {self.min_mm[2]:g}: no body may hang below the tip")
-        _refuse(problems)
+        refuse(problems)
         return self
 
 
@@ -166,7 +51,7 @@ class CradleBox(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _refuse(_inverted(self.name, self.min_mm, self.max_mm))
+        refuse(_inverted(self.name, self.min_mm, self.max_mm))
         return self
 
     @property
@@ -194,7 +79,7 @@ class Head(Frozen):
         ]
         if self.silhouette_mm[0][0] < 0 or self.silhouette_mm[0][1] < 0:
             problems.append("silhouette_mm: radius and height must not be negative")
-        _refuse(problems)
+        refuse(problems)
         return self
 
 
@@ -218,7 +103,7 @@ class Table(Frozen):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.size_mm is not None and min(self.size_mm) <= 0:
-            _refuse([f"size_mm is {list(self.size_mm)}: both numbers must be above 0"])
+            refuse([f"size_mm is {list(self.size_mm)}: both numbers must be above 0"])
         return self
 
 
@@ -322,7 +207,7 @@ class Machine(Frozen):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _refuse([*self._words(), *(self._axes() if self.tilts else []), *self._named(), *self._in_the_plate()])
+        refuse([*self._words(), *(self._axes() if self.tilts else []), *self._named(), *self._in_the_plate()])
         return self
 
     def _words(self) -> Iterable[str]:

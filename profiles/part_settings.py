@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from profiles.errors import ProfileError
-from profiles.machine import Frozen
+from profiles.frozen import Frozen
 from profiles.process import Process
 from profiles.settings.plate import Plate
 from profiles.settings.support import Support

@@ -6,7 +6,8 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from profiles.errors import ProfileError
-from profiles.machine import Frozen, Machine
+from profiles.frozen import Frozen
+from profiles.machine import Machine
 from profiles.material import Material
 from profiles.part_settings import PartSettings, merge_part_settings, process_of_part
 from profiles.places import KINDS, OF_KIND, kind_of, known, shipped, tables

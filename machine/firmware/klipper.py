@@ -14,7 +14,7 @@ from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
 from machine.firmware.simulation import SimulationRules
-from profiles.machine import RotaryAxis
+from profiles.axes import RotaryAxis
 
 _STANDS = (
     "SET_KINEMATIC_POSITION X={x_mm} Y={y_mm} Z={z_mm}",

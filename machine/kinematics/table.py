@@ -7,7 +7,8 @@ import numpy as np
 
 from mdp.mesh import Floats
 from mdp.pose import Pose, rotation, shift, unit
-from profiles.machine import Machine, RotaryAxis
+from profiles.axes import RotaryAxis
+from profiles.machine import Machine
 
 
 def machine_points(machine: Machine, pose: Pose, workpiece_mm: Floats) -> Floats:

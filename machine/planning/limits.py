@@ -10,7 +10,8 @@ from mdp.decomposition import Part
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.errors import MoveError
-from profiles.machine import Limits, Machine
+from profiles.frozen import Limits
+from profiles.machine import Machine
 from profiles.profile import Profile
 
 ROUNDING = 5e-4

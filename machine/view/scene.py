@@ -10,7 +10,8 @@ from machine.view.parts import residual_faces, risky_before, risky_before_mm2
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import unit
-from profiles.machine import Machine, RotaryAxis
+from profiles.axes import RotaryAxis
+from profiles.machine import Machine
 from profiles.profile import Profile
 
 RESIDUAL, UPRIGHT = 1, 2  # bits of face_marks

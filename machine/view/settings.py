@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 from profiles.errors import ProfileError
-from profiles.machine import Frozen
+from profiles.frozen import Frozen
 from profiles.places import OF_KIND, shipped
 from profiles.profile import DEFAULTS, SECTIONS, Profile, load_one, rows
 

@@ -34,7 +34,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.zone import NO_ZONES, Zones
 from profiles.errors import PlanError
-from profiles.machine import Vector
+from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
 
 VERSION = 1

@@ -12,7 +12,7 @@ from mdp.colour import parse_colour
 from mdp.plans.plan_file import KEYS, PART_KEYS, ROW_KEYS, VERSION, ZONE_KEYS, PlanFile, PlannedPart, PlannedRow
 from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
-from profiles.machine import Vector
+from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
 from profiles.toml_text import read_toml
 

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from profiles.machine import Frozen
+from profiles.frozen import Frozen
 
 
 class Finish(Frozen):

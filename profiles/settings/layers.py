@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from profiles.machine import Frozen, Vector
+from profiles.frozen import Frozen, Vector
 
 
 class Layers(Frozen):

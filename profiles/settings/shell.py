@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from profiles.machine import Frozen
+from profiles.frozen import Frozen
 
 
 class Shell(Frozen):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from profiles.check import check_file
 from profiles.errors import ProfileError
-from profiles.machine import Frozen
+from profiles.frozen import Frozen
 from profiles.profile import DEFAULTS, KINDS, OF_KIND, SECTIONS, kind_of, load, load_one, rows, shipped
 from profiles.wording import allowed, keys
 

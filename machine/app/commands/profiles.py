@@ -9,7 +9,8 @@ from machine.app.terminal.plain import plain_line, plain_lines
 from machine.app.terminal.progress import say
 from profiles.check import check_file
 from profiles.errors import ProfileError
-from profiles.machine import Frozen, Machine
+from profiles.frozen import Frozen
+from profiles.machine import Machine
 from profiles.places import own, own_folder
 from profiles.profile import KINDS, kind_of, load, load_one, rows, shipped
 

@@ -12,7 +12,7 @@ from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
-from profiles.machine import Vector
+from profiles.frozen import Vector
 from profiles.part_settings import PartSettings
 from tests import shapes
 

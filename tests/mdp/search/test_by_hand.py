@@ -19,7 +19,7 @@ from mdp.save import stl
 from mdp.search.search import cut_by_plan, decompose
 from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
-from profiles.machine import Vector
+from profiles.frozen import Vector
 from profiles.profile import Profile, load
 from tests import shapes
 

@@ -1,0 +1,101 @@
+"""Axes: the linear axes of a machine, and the rotary ones that tilt and turn its table."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from profiles.frozen import Frozen, Limits, Vector, refuse
+
+Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
+
+
+def _reversed(limits: Limits, name: str) -> list[str]:
+    return [f"{name} is {list(limits)}: the first number must be below the second"] if limits[0] >= limits[1] else []
+
+
+class LinearAxis(Frozen):
+    """One of X, Y, Z as the firmware means it."""
+
+    limits_mm: Limits = Field(description="least and greatest position the firmware accepts, mm")
+    speed_mm_s: float = Field(gt=0, le=5000, description="greatest speed, mm/s")
+    acceleration_mm_s2: float = Field(gt=0, le=100000, description="acceleration, mm/s2")
+    home_mm: float | None = Field(
+        None,
+        description="what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, "
+        "mm; left out: the least of limits_mm for X and Y, the greatest for Z",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        refuse(_reversed(self.limits_mm, "limits_mm"))
+        return self
+
+
+class RotaryAxis(Frozen):
+    """The tilt or the turn axis of the table.
+
+    A point w of the table moves by the right-handed rotation about `axis` through `point_mm` by
+    -sign * (value - zero_deg): the rule of LinuxCNC's xyzac-trt-kins, whose default sign is -1.
+    """
+
+    letter: Letter = Field(description="the G-code word of this axis")
+    stepper: str = Field(
+        "",
+        pattern=r"^[A-Za-z0-9_]*$",
+        description="name of the axis's [manual_stepper] in Klipper; empty: stepper_ and the letter",
+    )
+    axis: Vector = Field(description="direction of the axis in the machine frame (any length)")
+    point_mm: Vector = Field(
+        description="a point of the axis in the machine frame at tilt 0, turn 0; for the turn axis the point where it "
+        "meets the table's surface, which is the workpiece origin"
+    )
+    sign: Literal[-1, 1] = Field(description="-1: positive values turn the table right-handed about axis; 1: the other way")
+    zero_deg: float = Field(0.0, ge=-360, le=360, description="axis value at which the table is level (tilt) or unturned")
+    limits_deg: Limits = Field(description="least and greatest value the firmware accepts, deg")
+    budget_deg: float | None = Field(
+        None,
+        ge=180,
+        le=100000,
+        description="how far cables let the axis wind to either side of zero_deg, deg: it is unwound before; left out: no cable",
+    )
+    speed_deg_s: float = Field(gt=0, le=3600, description="greatest speed, deg/s")
+    acceleration_deg_s2: float = Field(gt=0, le=100000, description="acceleration, deg/s2")
+    home_deg: float | None = Field(
+        None,
+        description="what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, "
+        "deg; left out: it is homed to zero_deg, and believed at the least of limits_deg after a restart",
+    )
+
+    @property
+    def reach_deg(self) -> Limits:
+        """Least and greatest value a print may use: the firmware's limits, and what the cables let the axis wind."""
+        if self.budget_deg is None:
+            return self.limits_deg
+        least, most = self.limits_deg
+        return max(least, self.zero_deg - self.budget_deg), min(most, self.zero_deg + self.budget_deg)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        problems = _reversed(self.limits_deg, "limits_deg") if not isinstance(self, StillAxis) else []
+        if sum(x * x for x in self.axis) < 1e-12:
+            problems.append(f"axis is {list(self.axis)}: a direction must not be zero")
+        if not problems and not self.limits_deg[0] <= self.zero_deg <= self.limits_deg[1]:
+            problems.append(f"zero_deg is {self.zero_deg:g}: it must lie inside limits_deg {list(self.limits_deg)}")
+        refuse(problems)
+        return self
+
+
+class StillAxis(RotaryAxis):
+    """The rotary axis of a machine that has none: it stands at 0."""
+
+    point_mm: Vector = (0.0, 0.0, 0.0)
+    sign: Literal[-1, 1] = -1
+    limits_deg: Limits = (0.0, 0.0)
+    speed_deg_s: float = 1.0
+    acceleration_deg_s2: float = 1.0
+
+
+STANDING = {
+    "tilt": StillAxis.model_validate({"letter": "A", "axis": (1.0, 0.0, 0.0)}),
+    "turn": StillAxis.model_validate({"letter": "C", "axis": (0.0, 0.0, 1.0)}),
+}
