@@ -96,5 +96,9 @@ class ServerError(PrinterError):
     """A print server on the network cannot be reached, or refuses what was asked of it; the message names it."""
 
 
+class NoAnswerError(ServerError):
+    """A print server was reached but did not answer: whether it has done what was asked is not known."""
+
+
 class JournalError(UserError):
     """A journal from which a print cannot be resumed; the message says why."""

@@ -45,6 +45,8 @@ def parse_server_address(text: str) -> ServerAddress:
     """The server that is meant. Raises ServerError."""
     kind, colon, rest = text.partition(":")
     kind = kind.lower()
+    if "@" in rest:  # never repeated: what stands before it may be a password
+        raise ServerError("server address: names and passwords do not belong into it: keys have a file of their own")
     if not colon or kind not in PORTS:
         raise ServerError(f"server address {_plain(text)!r}: {EXPECTED}")
     has_scheme = "://" in rest
@@ -53,8 +55,8 @@ def parse_server_address(text: str) -> ServerAddress:
         port = parts.port
     except ValueError as error:
         raise ServerError(f"server address {_plain(text)!r}: {str(error).lower()}: {EXPECTED}") from None
-    if "@" in rest:  # never repeated: what stands before it may be a password
-        raise ServerError(f"server address {kind}:...: names and passwords do not belong into it: keys have a file of their own")
+    if port == 0:
+        raise ServerError(f"server address {_plain(text)!r}: port 0 is none: {EXPECTED}")
     _check(parts, text, has_scheme)
     scheme = parts.scheme or "http"
     usual = TLS_PORT if scheme == "https" else PORTS[kind]

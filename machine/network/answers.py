@@ -17,7 +17,13 @@ def entry(value: Any, index: Any) -> Any:
 
 def number(value: Any) -> float | None:
     """A JSON number; None where it is none."""
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) else None
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    try:
+        read = float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return None
+    return read if isfinite(read) else None
 
 
 def whole(value: Any) -> int | None:

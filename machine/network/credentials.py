@@ -49,7 +49,10 @@ def read_credentials(address: ServerAddress) -> Credentials:
     if not (key.isascii() and key.isprintable()):
         raise ServerError(f"the key for {address.text} has characters that no key has: letters, digits and signs are allowed")
     ca_file = table.get("ca_file")
-    return Credentials(key.strip(), None if ca_file is None else file.parent / Path(ca_file).expanduser())
+    try:
+        return Credentials(key.strip(), None if ca_file is None else file.parent / Path(ca_file).expanduser())
+    except RuntimeError:
+        raise ServerError(f"ca_file {ca_file} for {address.text}: no home folder of that user is known") from None
 
 
 def _table(file: Path, address: ServerAddress) -> dict[str, str]:
@@ -62,7 +65,8 @@ def _table(file: Path, address: ServerAddress) -> dict[str, str]:
         raise ServerError(f'{file}: servers must be tables of their own: [servers."HOST"] is expected')
     for name, table in servers.items():
         _check_table(file, name, table)
-    return next((servers[name] for name in address.names if name in servers), {})
+    known = {name.lower(): table for name, table in servers.items()}  # as the address has its host
+    return next((known[name] for name in address.names if name in known), {})
 
 
 def _check_table(file: Path, name: str, table: dict[str, Any]) -> None:

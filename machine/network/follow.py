@@ -8,17 +8,19 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
 from machine.network.server import ACTIVE, JobStatus, Phase, PrintServer
-from profiles.errors import ServerError
+from profiles.errors import NoAnswerError, ServerError
 
 POLL_S, TURN_S = 1.0, 0.05
 SHOW_S = 0.25  # what is shown is drawn again: a question to the person stands beside it
 JOIN_S = 0.5  # an order that still waits for its answer is left to the server
 BEGIN_S = 15.0  # a server that has taken the order to start shows it by then
+QUIET_S = 15.0  # without an answer or an error for so long, it is said
 LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
 OnStatus = Callable[[JobStatus, str], None]  # with a message to the person, "" when there is none
 
@@ -69,12 +71,13 @@ class _Follower:
         self._last_active: Phase | None = None
         self._read = 0
         self._began_s: float | None = None  # since when the server has been told to start
-        self._refused: ServerError | None = None
+        self._failed: Exception | None = None  # of the start, or of a thread
         self._shown: tuple[JobStatus | None, str] = (None, "")
         self._shown_s = 0.0
 
     def run(self) -> End:
-        threads = [threading.Thread(target=work, name="print server", daemon=True) for work in (self._poll, self._carry_out)]
+        works = (self._poll, self._carry_out)
+        threads = [threading.Thread(target=self._guard, args=(work,), name="print server", daemon=True) for work in works]
         for thread in threads:
             thread.start()
         try:
@@ -92,20 +95,30 @@ class _Follower:
             for thread in threads:
                 thread.join(JOIN_S)
 
+    def _guard(self, work: Callable[[], None]) -> None:
+        """Have a thread's error raised where the print is followed: nobody would miss the thread."""
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 - raised again by _look()
+            self._failed = error
+
     def _look(self) -> End | None:
         """Tell the newest status; how the print has ended, None while it goes on."""
-        if self._refused is not None:
-            raise self._refused
-        heard, silent_s = self._heard, time.monotonic() - self._heard.answered_s
-        if heard.error is not None and silent_s > LOST_S:
-            raise ServerError(f"{heard.error}; no answer for {silent_s:.0f} s: the print may go on, look at the printer")
+        if self._failed is not None:
+            raise self._failed
+        heard = self._heard
+        silent_s = time.monotonic() - heard.answered_s
+        if silent_s > LOST_S:
+            where = heard.error or self._server.name
+            raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer")
         if heard.status is None:
             return None
-        message = self._message or (f"no answer for {silent_s:.0f} s, the print goes on there" if heard.error is not None else "")
+        quiet = heard.error is not None or silent_s > QUIET_S
+        message = self._message or (f"no answer for {silent_s:.0f} s, the print goes on there" if quiet else "")
         if heard.status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
             self._shown, self._shown_s = (heard.status, message), time.monotonic()
             self._on_status(heard.status, message)
-        return self._end_of(heard.status)
+        return None if quiet else self._end_of(heard.status)  # what was told last may be true no more
 
     def _end_of(self, status: JobStatus) -> End | None:
         if self._began_s is None:
@@ -126,7 +139,7 @@ class _Follower:
         """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
         if waited_s < BEGIN_S:
             return None
-        if status.phase is Phase.DONE:
+        if status.phase is Phase.DONE and status.file in ("", self._file):
             return End.DONE
         raise ServerError(
             f"{self._server.name} has not begun to print within {BEGIN_S:g} s: {status.message or 'no reason given'}"
@@ -167,12 +180,12 @@ class _Follower:
         return orders.get(request.command)
 
     def _carry_out(self) -> None:
-        """The start, then orders one after the other; what a server refuses of these is told, and following goes on."""
-        try:
+        """The start, then orders one after the other; what a server refuses of these is told, and following goes on.
+
+        A start without an answer may have been taken: whether it was is seen by the status.
+        """
+        with suppress(NoAnswerError):
             self._server.start(self._file)
-        except ServerError as error:
-            self._refused = error
-            return
         self._began_s = time.monotonic()
         while not self._over.wait(TURN_S):
             while self._orders:

@@ -12,18 +12,20 @@ import re
 import socket
 import ssl
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from machine.network.address import NAMES, ServerAddress
 from machine.network.credentials import Credentials, how_to_give_a_key, servers_file
-from profiles.errors import ServerError
+from profiles.errors import NoAnswerError, ServerError
 
 if TYPE_CHECKING:
     import httpx
 
 CONNECT_S, ANSWER_S = 5.0, 10.0
+WHOLE_S = 30.0  # from the first byte of an answer to its last: ANSWER_S is between any two of them
 ERRNO = re.compile(r"^\[errno -?\d+\] ")
 MOST_BYTES = 16_000_000  # of an answer
 WORDS = 160  # characters of a server's own words in a message
@@ -56,7 +58,9 @@ class Refusals:
 
 
 class HttpSession:
-    """get() and post() below a server's address; from any thread. Raises ServerError with a sentence for a person."""
+    """get() and post() below a server's address; from any thread. Raises ServerError with a sentence for a person, NoAnswerError
+    where the request may have been taken.
+    """
 
     def __init__(self, address: ServerAddress, credentials: Credentials, tell: Tell | None = None) -> None:
         import httpx
@@ -67,14 +71,17 @@ class HttpSession:
         self._tell = tell or (lambda direction, data: None)
         self._log_lock = threading.Lock()
         self._httpx = httpx
-        self._client = httpx.Client(
-            base_url=address.url,
-            verify=_certificates(address, credentials),
-            trust_env=False,
-            follow_redirects=False,
-            headers={"User-Agent": "tiltprint", "Accept": "application/json"},
-            timeout=httpx.Timeout(ANSWER_S, connect=CONNECT_S),
-        )
+        try:
+            self._client = httpx.Client(
+                base_url=address.url,
+                verify=_certificates(address, credentials),
+                trust_env=False,
+                follow_redirects=False,
+                headers={"User-Agent": "tiltprint", "Accept": "application/json"},
+                timeout=httpx.Timeout(ANSWER_S, connect=CONNECT_S),
+            )
+        except (httpx.InvalidURL, UnicodeError) as error:
+            raise ServerError(f"server address {address.text!r} names no host: {plain(str(error)).lower()}") from None
 
     @property
     def name(self) -> str:
@@ -123,7 +130,10 @@ class HttpSession:
         except self._httpx.TransportError as error:
             sentence = _transport_sentence(error, self.address, self._httpx)
             self._log("#", sentence)
-            raise ServerError(sentence) from None
+            reached = not isinstance(error, self._httpx.ConnectError | self._httpx.ConnectTimeout)
+            raise (NoAnswerError if reached else ServerError)(sentence) from None
+        except UnicodeError as error:  # idna's errors are of this kind, here and above
+            raise ServerError(f"server address {self.name!r} names no host: {plain(str(error)).lower()}") from None
         except (self._httpx.InvalidURL, self._httpx.DecodingError) as error:
             raise ServerError(f"what answers at {self.address.url} speaks no proper HTTP: {plain(str(error))}") from None
         except RuntimeError:
@@ -136,9 +146,11 @@ class HttpSession:
 
     def _body(self, answer: httpx.Response) -> bytes:
         """All of an answer, which is small from every such server. Raises ServerError."""
-        body = b""
+        body, until_s = b"", time.monotonic() + WHOLE_S
         for piece in answer.iter_bytes():
             body += piece
+            if time.monotonic() > until_s:
+                raise NoAnswerError(f"{self.name} does not come to the end of its answer: it is no print server")
             if len(body) > MOST_BYTES:
                 raise ServerError(f"{self.name} answers with more than {MOST_BYTES // 1_000_000} MB: it is no print server")
         return body
@@ -161,7 +173,9 @@ class HttpSession:
         if status in refusals.sentences:
             raise ServerError(refusals.sentences[status].format(words=words or f"status {status}"))
         if 300 <= status < 400:
-            where = plain(reply.location) or "nowhere"
+            where = (
+                plain(self._without_key(reply.location.partition("?")[0])) or "nowhere"
+            )  # behind it a Duet's password may be repeated
             raise ServerError(f"{self.name} redirects to {where}: give that server's address, no key is carried there")
         if status in refusals.key:
             raise ServerError(self._key_sentence(status, words))
@@ -186,7 +200,7 @@ class HttpSession:
             error = value
         if error is None and not reply.body.lstrip().startswith(b"<"):  # a page says nothing in a line
             error = reply.body[: 4 * WORDS].decode("utf-8", "replace")
-        return self._without_key(plain(str(error or "")))
+        return plain(self._without_key(str(error or "")))
 
 
 def plain(text: str) -> str:

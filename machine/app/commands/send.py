@@ -19,7 +19,7 @@ from machine.network.address import parse_server_address
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import PrintServer
 from machine.network.servers import open_server
-from profiles.errors import GcodeError, ServerError
+from profiles.errors import GcodeError, NoAnswerError, ServerError
 
 
 def send(request: ModelRequest, sending: SendRequest) -> int:
@@ -46,6 +46,8 @@ def _start(server: PrintServer, file: str) -> None:
     except KeyboardInterrupt:
         say(f"interrupted while {file} was being started: look whether {server.name} prints it")
         raise
+    except NoAnswerError as error:
+        raise ServerError(f"{error}; whether it prints {file} is not known: look at the printer") from None
 
 
 def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:

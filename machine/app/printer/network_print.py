@@ -31,17 +31,20 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str) -> str:
         say(f"{named} becomes {upload.name} there")
     if server.has(upload.name):
         say(f"replaces the {upload.name} that is there")
-    total = len(upload.content)
+    total, gone = len(upload.content), 0
     with reporting() as report:
 
         def sent(count: int) -> None:
+            nonlocal gone
+            gone = count
             state = f"{_megabytes(count)} of {_megabytes(total)}" if count < total else "the server reads it"
             report(f"uploading {upload.name}: {state}", count / total if total else None)
 
         try:
             file = server.upload(upload, sent)
         except KeyboardInterrupt:
-            say(f"upload broken off: {server.name} keeps nothing of {upload.name}")
+            kept = "keeps nothing of" if gone < total else "may hold all of"
+            say(f"upload broken off: {server.name} {kept} {upload.name}")
             raise
     say(f"{file} is on {server.name}, {_megabytes(total)}, complete")
     return file

@@ -22,30 +22,38 @@ except ImportError:  # no pseudo-terminals there either
 @contextmanager
 def announced(description: str, path: str) -> Iterator[Callable[[str], None]]:
     """List a simulated printer while it runs; call what is given with a new path of it."""
-    file = _folder() / str(os.getpid())
-    with suppress(OSError), file.open("w", encoding="utf-8") as text:  # a full disk: it is not listed
-        _lock(text)
-
-        def tell(now: str) -> None:
-            with suppress(OSError):
-                text.seek(0)
-                text.truncate()
-                text.write(f"{now}\n{description}\n")
-                text.flush()
-
-        tell(path)
-        try:
-            yield tell
-        finally:
-            file.unlink(missing_ok=True)
+    try:
+        text = (_folder() / str(os.getpid())).open("w", encoding="utf-8")
+    except OSError:  # a full disk: it is not listed
+        yield lambda now: None
         return
-    yield lambda now: None
+    _lock(text)
+
+    def tell(now: str) -> None:
+        with suppress(OSError):
+            text.seek(0)
+            text.truncate()
+            text.write(f"{now}\n{description}\n")
+            text.flush()
+
+    tell(path)
+    try:
+        yield tell
+    finally:
+        with suppress(OSError):
+            Path(text.name).unlink(missing_ok=True)
+        with suppress(OSError):
+            text.close()
 
 
 def running_simulators() -> tuple[SerialDevice, ...]:
     """Those that run now, by path; what is left of others is removed."""
     devices = []
-    for file in sorted(_folder().iterdir()):
+    try:
+        files = sorted(_folder().iterdir())
+    except OSError:
+        return ()
+    for file in files:
         with suppress(OSError), file.open("r+", encoding="utf-8") as text:
             if _lock(text):
                 file.unlink(missing_ok=True)

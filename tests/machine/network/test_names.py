@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from machine.network.address import is_server_address, parse_server_address
-from machine.network.credentials import VARIABLE, read_credentials, servers_file
+from machine.network.credentials import VARIABLE, Credentials, read_credentials, servers_file
 from machine.network.gcode_upload import GcodeUpload, server_name
+from machine.network.http import HttpSession
 from profiles.errors import ServerError
 
 
@@ -38,6 +39,7 @@ def test_a_port_is_no_server(text: str) -> None:
         ("octoprint:", "names no host"),
         ("octoprint:ftp://host", "http:// or https:// is expected"),
         ("octoprint:host:99999", "port out of range"),
+        ("octoprint:host:0", "port 0 is none"),
         ("octoprint:host?apikey=1", "nothing may follow the path"),
         ("octoprint:a b", "names no host"),
         ("octoprint:ho\x1bst", "names no host"),
@@ -51,10 +53,17 @@ def test_an_address_that_names_no_server_is_refused(text: str, sentence: str) ->
     assert str(refused.value).isprintable()
 
 
-def test_a_password_in_an_address_is_refused_and_not_repeated() -> None:
-    with pytest.raises(ServerError) as refused:
-        parse_server_address("octoprint:me:secret@host")
+@pytest.mark.parametrize("text", ["octoprint:me:secret@host", "octoprint:me:secret@host:80x", "octopi:me:secret@host"])
+def test_a_password_in_an_address_is_refused_and_not_repeated(text: str) -> None:
+    with pytest.raises(ServerError, match="names and passwords do not belong into it") as refused:
+        parse_server_address(text)
     assert "secret" not in str(refused.value)
+
+
+@pytest.mark.parametrize("host", ["999.999.999.999", "\ufb01x", "xn--zz"])
+def test_a_host_that_cannot_be_is_refused_in_a_sentence(host: str) -> None:
+    with pytest.raises(ServerError, match="names no host"):
+        HttpSession(parse_server_address(f"octoprint:{host}"), Credentials()).get("/")
 
 
 @pytest.mark.parametrize(
@@ -103,6 +112,11 @@ def test_a_key_is_found_by_host_and_port_before_the_host_alone() -> None:
     assert read_credentials(parse_server_address("octoprint:other")).key == ""
 
 
+def test_a_host_is_the_same_in_capitals() -> None:
+    write_servers('[servers."OctoPi.local"]\nkey = "one"\n')
+    assert read_credentials(parse_server_address("octoprint:octopi.LOCAL")).key == "one"
+
+
 def test_the_variable_goes_before_the_file_and_no_key_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     write_servers('[servers."octopi"]\nkey = "one"\n')
     monkeypatch.setenv(VARIABLE, "other")
@@ -126,6 +140,7 @@ def test_a_file_of_keys_that_others_can_read_is_refused(mode: int) -> None:
         ('[servers."octopi"]\nkye = "x"', "'kye': key and ca_file are known"),
         ('[servers."octopi"]\nkey = 1234', "must be a text in quotes"),
         ("[servers]\nkey = 'x'", "must be tables of their own"),
+        ('[servers."octopi"]\nca_file = "~nobody-of-that-name/ca.pem"', "no home folder of that user is known"),
         ('[servers."octopi"]\nkey = "a\\nb"', "has characters that no key has"),
     ],
 )

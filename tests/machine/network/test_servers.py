@@ -18,7 +18,7 @@ from machine.network.follow import End, follow_print
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import JobStatus, Phase, PrintServer
 from machine.network.servers import KINDS, open_server
-from profiles.errors import ServerError
+from profiles.errors import NoAnswerError, ServerError
 from tests.machine.network.stand_ins import KEY, STAND_INS, stand_in
 
 LINES = tuple(f"G1 X{k}" for k in range(20_000))
@@ -159,7 +159,7 @@ UPLOADS = {"octoprint": "/api/files/local", "moonraker": "/server/files/upload",
     [
         (413, "Payload Too Large", "has no room for it .Payload Too Large."),
         (507, "Insufficient Storage", "has no room for it"),
-        (302, "http://elsewhere/", "redirects to .*http://elsewhere/.*no key is carried there"),
+        (302, "http://elsewhere/?password=secret", "redirects to .*http://elsewhere/.*no key is carried there"),
         (500, "a \x1b[31mred\x07 page " + "x" * 5000, "refuses the file: .*x\\.\\.\\.$"),
     ],
 )
@@ -170,6 +170,7 @@ def test_what_a_server_refuses_is_one_sentence(kind: str, status: int, words: st
         with pytest.raises(ServerError, match=sentence) as refused:
             server.upload(UPLOAD, unheard)
     assert str(refused.value).isprintable()
+    assert "secret" not in str(refused.value)
     assert len(str(refused.value)) < 300
 
 
@@ -310,7 +311,7 @@ def any_value(draw: random.Random, depth: int = 0) -> object:
         return [any_value(draw, depth + 1) for _ in range(draw.randrange(3))]
     if kind == 7:
         return {draw.choice(names): any_value(draw, depth + 1) for _ in range(draw.randrange(5))}
-    return (None, True, -1, 1e308, "\x1b]0;x\x07", "ready")[kind]
+    return (None, True, -(10**400), 1e308, "\x1b]0;x\x07", "ready")[kind]
 
 
 @every_kind
@@ -337,6 +338,60 @@ def test_an_answer_without_end_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> N
         job.refuse["/api/version"] = (200, b"x" * 2_000_000)
         with pytest.raises(ServerError, match="answers with more than 1 MB: it is no print server"):
             server.greet()
+
+
+def test_an_answer_that_drips_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http, "WHOLE_S", -1.0)
+    no_end = pytest.raises(NoAnswerError, match="does not come to the end of its answer")
+    with stand_in("octoprint") as (_, address), open_server(address) as server, no_end:
+        server.greet()
+
+
+class Unanswered:
+    """A server that takes the order to start without an answer; status() calls what it is given."""
+
+    name = "octoprint:host"
+
+    def __init__(self, status: Callable[[], JobStatus]) -> None:
+        self.status = status
+
+    def start(self, file: str) -> None:
+        raise NoAnswerError("it has stopped answering")
+
+
+def follow_unanswered(status: Callable[[], JobStatus]) -> End:
+    server: object = Unanswered(status)
+    return follow_print(server, "box.gcode", 9, lambda status, message: None, Control(), lambda: False)  # type: ignore[arg-type]
+
+
+def test_a_print_whose_start_was_not_answered_is_followed_all_the_same() -> None:
+    told = iter([Phase.PRINTING] * 20)
+    assert follow_unanswered(lambda: JobStatus(next(told, Phase.DONE), "box.gcode")) is End.DONE
+
+
+def test_the_end_of_an_earlier_print_is_not_taken_for_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(follow, "BEGIN_S", 0.1)
+    with pytest.raises(ServerError, match="has not begun to print within"):
+        follow_unanswered(lambda: JobStatus(Phase.DONE, "other.gcode"))
+
+
+def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(follow, "LOST_S", 0.1)
+    over = threading.Event()
+    monkeypatch.setattr(follow, "JOIN_S", 0.01)
+    try:
+        with pytest.raises(ServerError, match="octoprint:host; no answer for 0 s: the print may go on, look at the printer"):
+            follow_unanswered(lambda: JobStatus(Phase.READY if over.wait(60.0) else Phase.FAILED))
+    finally:
+        over.set()
+
+
+def test_an_error_of_a_thread_is_not_lost() -> None:
+    def broken() -> JobStatus:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        follow_unanswered(broken)
 
 
 def test_a_duet_that_does_not_start_says_why() -> None:

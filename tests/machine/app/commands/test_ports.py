@@ -131,6 +131,11 @@ def test_a_running_simulator_is_a_port_as_long_as_it_runs(
     assert capsys.readouterr().out == "[]\n"
 
 
+def test_what_ends_a_simulator_is_not_lost_by_its_announcement(here: list[SerialDevice]) -> None:
+    with pytest.raises(BrokenPipeError), announced("simulated printer (mine)", "/dev/pts/9"):
+        raise BrokenPipeError
+
+
 def test_a_simulator_that_was_killed_is_no_port(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
     folder = state_folder() / "simulators"
     folder.mkdir(exist_ok=True)
