@@ -19,6 +19,7 @@ from mdp.kernels.threads import THREADS
 
 JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = ("judge",), ("sweep", "search"), ("slice", "dry-run"), ("dry-run",), ("draw",)
 LOOK_S = 0.2
+COMPILE = "import sys; sys.path[:] = {path!r}; from machine.app.pipeline.precompile import main; main()"
 
 
 class Compilers:
@@ -73,9 +74,8 @@ class Compilers:
                 self._changed.notify_all()
 
     def _hand_over(self) -> None:
-        command = [sys.executable, "-m", "machine.app.pipeline.precompile"]
         pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
-        process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nowhere, text=True)
+        process = subprocess.Popen(command(), stdin=pipe, stdout=pipe, stderr=nowhere, text=True)
         atexit.register(process.kill)
         try:
             assert process.stdin is not None
@@ -107,6 +107,11 @@ class Compilers:
             if bundle in self._done:
                 return True
         return False
+
+
+def command() -> list[str]:
+    """The command of such a process. It imports from where we do: by `-m` it would run what lies in the working folder."""
+    return [sys.executable, "-c", COMPILE.format(path=sys.path)]
 
 
 COMPILERS = Compilers()

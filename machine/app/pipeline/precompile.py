@@ -1,8 +1,8 @@
 """Precompile: what the kernels are compiled with that a first run needs: tiny models, in bundles that processes share.
 
 A bundle does what the command does later, so that it compiles exactly the kernels that will be called; later runs find them
-cached. `python -m machine.app.pipeline.precompile` is one of those processes: it is told the bundles to compile, line by line,
-and answers with a line for every kernel and one for every bundle done.
+cached. `main` is what one of those processes does (`machine.app.pipeline.compilers`): it is told the bundles to compile, line by
+line, and answers with a line for every kernel and one for every bundle done.
 """
 
 import gc
@@ -177,7 +177,3 @@ def main() -> None:
         if trouble():  # what is not cached is of no use to the one who asks
             return
         _answer(f"{DONE} {bundle}")
-
-
-if __name__ == "__main__":
-    main()
