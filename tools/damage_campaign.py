@@ -29,6 +29,7 @@ import trimesh
 from machine.app.cli import main as tiltprint
 from machine.app.embedded_profile import read_embedded_profile
 from machine.app.pipeline.programs import read_gcode_lines
+from machine.app.terminal.plain import plain_lines
 from machine.dryrun import dry_run
 from mdp.formats.readers import READERS
 from mdp.read import locate, read_mesh
@@ -203,8 +204,8 @@ def _try(read: Callable[[Path], None], file: Path) -> int:
         try:
             read(file)
         except UserError as error:
-            said.write(str(error))
-            return 1 if str(error).count("\n") < 5 and len(str(error)) < 2000 else 3
+            said.write(plain_lines(str(error)))
+            return 1
         except BaseException:  # noqa: BLE001 - whatever it is, it is what is looked for
             traceback.print_exc(file=said)
             return 3

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 
 SECTIONS = 23
 EXCESS = 1e-3  # of the area of all sections; folds of less are left alone, since mending them would re-triangulate the model
-DEEPEST = 5  # halvings
+DEEPEST, TOGETHER = 5, 8  # halvings, and pieces that are united at once
+LEAST_MOST, MOST_GROWTH = 1000, 2  # faces that a union may have, and for each face of its pieces
 
 
 def overlaps_itself(solid: "m3.Manifold") -> bool:
@@ -44,12 +45,16 @@ def section_area(vertices: Floats, faces: np.ndarray[tuple[int, int], np.dtype[n
     return abs(0.5 * float((start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]).sum()))
 
 
-def resolve_overlap(solid: "m3.Manifold", depth: int = 0) -> "m3.Manifold":
-    """The solid with every point counted once.
+def resolve_overlap(solid: "m3.Manifold") -> "m3.Manifold | None":
+    """The solid with every point counted once; None for one so tangled that its union would have many times its faces.
 
     Halved across its longest side until no piece overlaps itself: pieces that were one body far along the surface
     are bodies of their own then, and their union counts nothing twice.
     """
+    return _united(solid, 0)
+
+
+def _united(solid: "m3.Manifold", depth: int) -> "m3.Manifold | None":
     import manifold3d as m3
 
     whole: list[m3.Manifold] = []
@@ -59,6 +64,14 @@ def resolve_overlap(solid: "m3.Manifold", depth: int = 0) -> "m3.Manifold":
             continue
         box = np.array(piece.bounding_box()).reshape(2, 3)
         normal = np.eye(3)[np.argmax(box[1] - box[0])]
-        halves = piece.split_by_plane(tuple(normal), float(normal @ box.mean(axis=0)))
-        whole += [resolve_overlap(half, depth + 1) for half in halves]
-    return m3.Manifold.batch_boolean(whole, m3.OpType.Add)
+        for half in piece.split_by_plane(tuple(normal), float(normal @ box.mean(axis=0))):
+            resolved = _united(half, depth + 1)
+            if resolved is None:
+                return None
+            whole.append(resolved)
+    most = LEAST_MOST + MOST_GROWTH * sum(piece.num_tri() for piece in whole)
+    while len(whole) > 1:  # few at a time: the union of what crosses everywhere is noticed before it fills the memory
+        whole = [m3.Manifold.batch_boolean(whole[k : k + TOGETHER], m3.OpType.Add) for k in range(0, len(whole), TOGETHER)]
+        if sum(piece.num_tri() for piece in whole) > most:
+            return None
+    return whole[0] if whole else m3.Manifold()

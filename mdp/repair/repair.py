@@ -98,9 +98,9 @@ def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) 
 def _count_once(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> Surface:
     """The solid without what it counts twice; as it is when that cannot be told apart."""
     mended = resolve_overlap(whole)
-    left = any(overlaps_itself(piece) for piece in mended.decompose())
-    shared_mm3 = whole.volume() - mended.volume()
-    if left or not 0 < shared_mm3 < SHARED * whole.volume():
+    left = mended is None or any(overlaps_itself(piece) for piece in mended.decompose())
+    shared_mm3 = 0.0 if mended is None else whole.volume() - mended.volume()
+    if mended is None or left or not 0 < shared_mm3 < SHARED * whole.volume():
         notes.append("left a body that passes through itself as it is: some of its volume may count twice")
         return solid
     notes.append(f"united a body that passes through itself with itself: {shared_mm3:.3g} mm3 counted twice")
