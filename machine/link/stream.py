@@ -165,14 +165,16 @@ class _Print:
         if isinstance(error, PortError):
             return Heaters.UNPROVED.value
         timeout_s = HEATERS_OFF_S.get(type(error), SETTLE_S)
-        heaters = self._shut_down(timeout_s, alive=not isinstance(error, FirmwareError))
+        alive = not isinstance(error, FirmwareError)
+        waits = alive and not isinstance(error, SilenceError)  # whose homing has been waited for already
+        heaters = self._shut_down(timeout_s, alive, waits)
         return f"{heaters.value}: {self._revival()}" if heaters is Heaters.HALTED else heaters.value
 
-    def _shut_down(self, timeout_s: float, alive: bool = True) -> Heaters:
-        """Heaters off, the tip lifted where the printer is alive and knows its place."""
+    def _shut_down(self, timeout_s: float, alive: bool = True, waits: bool = True) -> Heaters:
+        """Heaters off, the tip lifted where the printer is alive and knows its place; waits: for the end of homing."""
         exchange, feed = self.exchange, self.feed
         try:
-            heaters = heaters_off(exchange.wire, self.medium, timeout_s, alive and exchange.waits, feed.heed_emergency)
+            heaters = heaters_off(exchange.wire, self.medium, timeout_s, waits and exchange.waits, feed.heed_emergency)
             move = feed.lift_move() if heaters is Heaters.OFF and alive else None
             if move is not None:
                 feed.record_lift(lift_tip(exchange.wire, self.medium, *move))

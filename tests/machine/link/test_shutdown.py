@@ -9,6 +9,7 @@ from machine.link.identification import Kind, ask
 from machine.link.medium import Medium
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
+from machine.link.progress import Progress
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from machine.link.status import query_status
 from machine.link.stream import Outcome, print_lines
@@ -16,7 +17,7 @@ from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.simulator import SimulatedPrinter
 from machine.simulator.virtual import PATH, VirtualPrinter
-from profiles.errors import FirmwareError
+from profiles.errors import FirmwareError, SilenceError
 from profiles.profile import load
 
 SLOW = load(settings=["machine.z.speed_mm_s=2"])
@@ -69,6 +70,18 @@ def test_an_emergency_stop_is_heeded_while_homing_is_waited_for() -> None:
     with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; switch it off and on, or press its reset"):
         print_lines(HOMING, PATH, stop=stop, control=control, medium=watching(printer, b"G28 X Y Z", press), profile=SLOW)
     assert not printer.record.happened("homed XYZ")
+
+
+def test_a_printer_that_falls_silent_in_homing_is_not_waited_for_twice() -> None:
+    printer = VirtualPrinter(SLOW.machine, faults=FaultScript((Fault("stall", at=8, unit="line"),)))
+    silent_s: list[float] = []
+
+    def note(progress: Progress) -> None:
+        silent_s.append(progress.elapsed_s)
+
+    with pytest.raises(SilenceError, match="its heaters may still be on, look at the printer"):
+        print_lines(HOMING, PATH, on_progress=note, medium=printer.medium, profile=SLOW)
+    assert printer.medium.now_s() - silent_s[-1] < 15.0
 
 
 def test_a_printer_that_halts_while_it_is_cancelled_says_so() -> None:
