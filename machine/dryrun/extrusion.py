@@ -46,7 +46,9 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> list
         pushed = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0
         needed = length[mine] * (_area(program, rows, profile) if known else 1.0)
         if known:
-            problems += [*_whole_file(program, rows, pushed, needed), *_odd(program, rows, length[mine], pushed / needed)]
+            problems += _whole_file(program, rows, (pushed, needed), profile) or _odd(
+                program, rows, length[mine], pushed / needed
+            )
         problems += _layers(program, rows, (pushed, needed, length[mine]), spare, most)
     return problems
 
@@ -63,25 +65,28 @@ def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
 
 
 def _area(program: ParsedProgram, rows: NDArray[np.int64], profile: Profile) -> Floats:
-    """(m,) cross-section that the told width and height need, with the profile's own factors."""
+    """(m,) cross-section that the told width and height need, with the factors of the profile and of its parts."""
     width, height = program.width_mm[rows], program.height_mm[rows]
     area = pi * np.minimum(width, height) * height / 4.0 + np.maximum(width - height, 0.0) * height
     first = program.layer[rows] == program.layer[rows].min()
     on_plate = first & (program.part[rows] <= 1)
-    on_part = (program.part[rows] > 1) & (program.layer[rows] == 1)
-    process = profile.process
-    factor = np.where(on_plate, process.first_layer_flow, np.where(on_part, process.interface_flow, 1.0))
+    factor = np.where(on_plate, profile.process.first_layer_flow, 1.0)
+    for part in np.unique(program.part[rows[program.part[rows] > 1]]):
+        on_part = (program.part[rows] == part) & (program.layer[rows] == 1)
+        factor[on_part] = profile.of_part(int(part)).process.interface_flow
     return np.asarray(area * factor * profile.material.flow)
 
 
-def _whole_file(program: ParsedProgram, rows: NDArray[np.int64], pushed: Floats, needed: Floats) -> list[Finding]:
-    """A file that pushes far more or less everywhere."""
-    share = float(pushed.sum() / max(needed.sum(), 1e-9))
+def _whole_file(
+    program: ParsedProgram, rows: NDArray[np.int64], plastic: tuple[Floats, Floats], profile: Profile
+) -> list[Finding]:
+    """A file that pushes far more or less everywhere; plastic: (m,) pushed by each bead, and needed."""
+    share = float(plastic[0].sum() / max(plastic[1].sum(), 1e-9))
     if FILE_LEAST <= share <= FILE_MOST:
         return []
     message = (
         f"the file pushes {share:.2f} of the plastic that its own widths and heights need, {FILE_LEAST:g} to {FILE_MOST:g} "
-        "are allowed"
+        f"are allowed, with filament of {profile.material.diameter_mm:g} mm"
     )
     return [at_row(program, int(rows[0]), "error", "extrusion", message)]
 

@@ -65,7 +65,7 @@ def _left_on(program: ParsedProgram) -> list[Finding]:
 
 def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     """In every part the first bead at another temperature than the material's, or far from the rest of the file's."""
-    material, process, machine = profile.material, profile.process, profile.machine
+    material, machine = profile.material, profile.machine
     wanted = _levels(program, ("M104", "M109"))
     beads = (program.kind == MoveKind.EXTRUDE) & (wanted >= MELTING_C)
     if not beads.any():
@@ -74,7 +74,8 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
     least, most = usual - FAR_C, min(usual + FAR_C, machine.nozzle_limit_c)
     if own:
         told = (material.first_layer_nozzle_c, material.nozzle_c)
-        least, most = min(told) - 0.5, min(max(told) + process.interface_temperature_add_c, machine.nozzle_limit_c) + 0.5
+        hotter = max(profile.of_part(part).process.interface_temperature_add_c for part in (0, *program.parts))
+        least, most = min(told) - 0.5, min(max(told) + hotter, machine.nozzle_limit_c) + 0.5
     message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
     cool, hot = beads & (wanted < least), beads & (wanted > most)
     return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted, "error", "temperature", message)]
@@ -121,7 +122,8 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     still = (blown[at] == 0.0) & settled
     if own:
         expected = min(profile.material.fan_least, profile.material.fan) > 0.0
-        still &= expected & ((part != 1) | (np.arange(len(at)) - begun >= profile.material.fan_off_layers))
+        quiet = {each: _without_fan(each, profile) for each in set(part.tolist())}
+        still &= expected & (np.arange(len(at)) - begun >= np.array([quiet[each] for each in part.tolist()]))
     else:
         quick = seconds[at] < QUICKER * float(np.median(seconds[at][blown[at] > 0.0])) if (blown > 0.0).any() else ~still
         once = np.count_nonzero(np.diff(still.astype(np.int8), prepend=0) > 0) == 1
@@ -136,6 +138,14 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
         message = f"no fan blows in layer {program.layer[row]}, where the file's other layers have one (layers: {len(mine)})"
         problems.append(at_row(program, row, "error", "fan", message))
     return problems
+
+
+def _without_fan(part: int, profile: Profile) -> int:
+    """How many layers of a part are meant to have no fan at first."""
+    if part <= 1:
+        return profile.material.fan_off_layers
+    process = profile.of_part(part).process
+    return process.interface_layers if process.interface_fan == 0.0 else 0
 
 
 def _flow(program: ParsedProgram, profile: Profile) -> list[Finding]:

@@ -13,7 +13,7 @@ HEAT_OFF = re.compile(r"M104 [SP]0$")
 
 @dataclass(frozen=True)
 class Fault:
-    """code: of a finding that tells it, in this part and (unless 0) this layer; refused: the file cannot be read at all."""
+    """code: of a finding that tells it, in this part and (unless 0) this layer."""
 
     name: str
     code: str

@@ -1,0 +1,32 @@
+"""What a part's own settings ask for is no fault."""
+
+from machine.dryrun import dry_run
+from profiles.part_settings import PartSettings
+from tests.machine.dryrun.bent import bent
+from tests.machine.dryrun.planted import IN_2_1, Edit, fan_off, insert, layers, on, word
+
+
+def codes(edit: Edit, **of_part_2: float) -> set[str]:
+    """Errors of the edited program, but for what its comments tell of the parts' filament."""
+    profile, _, lines = bent("generic_ac")
+    own = [PartSettings(part=2, process=of_part_2)] if of_part_2 else []
+    run = dry_run(edit(list(lines)), profile.model_copy(update={"parts": own}))
+    return {f.code for f in run.errors} - {"contents"}
+
+
+def test_more_flow_on_an_interface_is_asked_for_by_its_part():
+    more = on(layers(2, 1), word("E", lambda e: 1.4 * e, "G1 .*[XY].*E[0-9]"))
+    assert codes(more) == {"extrusion"}
+    assert codes(more, interface_flow=1.4 * 1.05) == set()
+
+
+def test_a_hotter_interface_is_asked_for_by_its_part():
+    hotter = insert(IN_2_1, "M104 S255")
+    assert codes(hotter) == {"temperature"}
+    assert codes(hotter, interface_temperature_add_c=50.0) == set()
+
+
+def test_layers_on_plastic_without_fan_are_asked_for_by_their_part():
+    still = on(layers(2, 1, 15), fan_off)
+    assert codes(still) == {"fan"}
+    assert codes(still, interface_fan=0.0, interface_layers=40) == set()
