@@ -14,6 +14,7 @@ from machine.app.output import check_writable
 from machine.app.printer.command_session import CommandSession, LeftError, StopError
 from machine.app.printer.compatibility import check_speed, describe_answer, identify_printer
 from machine.app.printer.serial_log import TappedWire, new_log
+from machine.app.printer.server_checks import check_no_server
 from machine.app.requests import SIMULATED, ConsoleRequest
 from machine.app.terminal.interrupts import calling, interrupting
 from machine.app.terminal.progress import say
@@ -67,6 +68,7 @@ COLOURS: dict[type[Event], str] = {
 def console(request: ConsoleRequest) -> int:
     """Talk to a printer until the person leaves (0; 130 after Ctrl-C) or the pipe ends (1 when a command was not known)."""
     check_speed(request.sim_speed)
+    check_no_server(request.port)
     if request.log is not None:
         check_writable(request.log)
     machine, port = request.profile.machine, request.port

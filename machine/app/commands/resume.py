@@ -9,6 +9,7 @@ from machine.app.file_roles import check_roles, printing_files
 from machine.app.printer.compatibility import check_dialect
 from machine.app.printer.journal_folder import continue_journal
 from machine.app.printer.serial_log import new_log
+from machine.app.printer.server_checks import check_no_server
 from machine.app.printer.stream import Observers, PrintJob, report_end, stream_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import SIMULATED, PrintRequest
@@ -44,6 +45,7 @@ def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, 
     """
     if printing.port == SIMULATED:
         raise JournalError("--port sim: a simulated printer ends with its print; the port of a printer is expected")
+    check_no_server(printing.port)
     story = read_journal(journal)
     profile = _profile(journal, story.heading, named)
     check_dialect(profile.machine)

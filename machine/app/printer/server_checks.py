@@ -3,7 +3,7 @@
 from machine.app.printer.compatibility import check_printer, check_program, refuse
 from machine.firmware.klipper import stepper_name
 from machine.link.identification import Answer, Kind
-from machine.network.address import ServerAddress
+from machine.network.address import ServerAddress, is_server_address
 from machine.network.server import ACTIVE, Greeting, JobStatus, Phase
 from machine.network.servers import dialect_mismatch
 from machine.view.program import Program
@@ -32,6 +32,14 @@ def check_free(server: str, status: JobStatus) -> None:
         raise ServerError(f"{now}: wait until that is done; send without --start hands a file over meanwhile")
     if status.phase is Phase.OFFLINE:
         raise ServerError(f"{server} cannot print now: {status.message or 'its printer is not connected'}")
+
+
+def check_no_server(port: str) -> None:
+    """Refuse a print server where a line to a printer itself is needed. Raises ServerError."""
+    if is_server_address(port):
+        raise ServerError(
+            f"--port {port} is a print server, which takes whole files by print and send: a printer's port is expected"
+        )
 
 
 def lacking_steppers(greeting: Greeting, machine: Machine) -> str:

@@ -190,3 +190,9 @@ def test_the_emergency_key_halts_the_printer_behind_a_server() -> None:
             person.see(f"tiltprint: emergency stop: {address} has taken it; restart the printer before the next print")
             assert person.end() == 1
     assert job.commands == ["M112"]
+
+
+@pytest.mark.parametrize("command", [["console"], ["resume", "print.journal"]])
+def test_a_server_is_no_port_for_what_talks_to_the_printer_itself(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*command, "--port", "moonraker:host"]) == 1
+    assert "--port moonraker:host is a print server, which takes whole files by print and send" in capsys.readouterr().err
