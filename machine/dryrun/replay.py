@@ -28,6 +28,7 @@ SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, t
 LEVEL_SLACK_MM = 0.05  # a travel below the bead that was just laid; what lies there was laid at the same pose
 CROSSING_MM = 0.2  # on the way to a turn of the table, or from it to the next bead, the tip keeps so far above the print
 ACROSS_MM, WAY_MM = 0.5, 3.0  # a shorter way next to a bead is a wipe
+FEWEST_LEVELS = 3  # of beads, for a file's layers to be known by them
 INNER = 0.35  # of the bead's width: where what lies under it is looked for
 OWN = 3.0  # so many widths back along its path the plastic is the bead's own beginning
 MOST_TURNED = 100_000_000  # segments turned into the frames of all runs together
@@ -108,16 +109,29 @@ class Measured(NamedTuple):
 
 
 def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Beads:
-    """Widths and heights as the program's comments tell, else by the profile's layer and the filament pushed."""
-    process = profile.process
-    first = np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= process.first_layer_height_mm + 1e-3
-    usual = np.where(first, process.first_layer_height_mm, process.layer_height_mm)
-    height = np.where(program.height_mm[rows] > 0, program.height_mm[rows], usual)
+    """Widths and heights as the program's comments tell, else by its layers or the profile's, and the filament pushed."""
+    told = program.height_mm[rows]
+    first_mm, layer_mm = _layers_mm(segments[:, :, 2], bool((told > 0).any()), profile)
+    usual = np.where(np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
+    height = np.where(told > 0, told, usual)
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     area = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
     by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
     width = np.where(program.width_mm[rows] > 0, program.width_mm[rows], by_flow)
     return Beads(segments, rows, width, height, length)
+
+
+def _layers_mm(z_mm: Floats, told: bool, profile: Profile) -> tuple[float, float]:
+    """Heights of the first layer and of others for beads that tell none: the profile's, and in a file that tells none at all
+    those of its own level beads; z_mm: (m, 2) of the beads' ends.
+    """
+    process, most = profile.process, profile.machine.head.nozzle_mm  # a higher step is no layer's
+    first, usual = process.first_layer_height_mm, process.layer_height_mm
+    levels = np.unique(np.round(z_mm[z_mm[:, 0] == z_mm[:, 1], 1], 3))
+    if told or len(levels) < FEWEST_LEVELS:
+        return first, usual
+    step = float(np.median(np.diff(levels)))
+    return (float(levels[0]) if 0.0 < levels[0] <= most else first), (step if step <= most else usual)
 
 
 def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contacts:
