@@ -131,10 +131,11 @@ def _hurried(wanted: Callable[[], bool]) -> Iterator[None]:
 
 def end_at_once() -> None:
     """End this process as interrupted, whatever its threads do; its helpers end with it."""
-    if sys.stderr.isatty():
-        sys.stderr.write(SHOW_CURSOR)
-    sys.stderr.write("tiltprint: interrupted\n")
-    sys.stderr.flush()
+    with suppress(OSError, ValueError):  # the terminal, or who reads the pipe, has gone away
+        if sys.stderr.isatty():
+            sys.stderr.write(SHOW_CURSOR)
+        sys.stderr.write("tiltprint: interrupted\n")
+        sys.stderr.flush()
     leave(130)
 
 

@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
+from machine.app.printer.network_print import hand_over
 from machine.app.terminal.server_keys import LEAVING
 from machine.network import follow
 from machine.network.credentials import VARIABLE
+from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.octoprint import OctoPrint
 from tests.machine.network.stand_ins import KEY, stand_in
 from tests.machine.person import ROOT, Person
@@ -196,3 +198,21 @@ def test_the_emergency_key_halts_the_printer_behind_a_server() -> None:
 def test_a_server_is_no_port_for_what_talks_to_the_printer_itself(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*command, "--port", "moonraker:host"]) == 1
     assert "--port moonraker:host is a print server, which takes whole files by print and send" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("gone", "kept"), [(0, "keeps nothing of"), (7, "may hold all of")])
+def test_an_upload_that_is_broken_off_tells_what_the_server_has(gone: int, kept: str, capsys: pytest.CaptureFixture[str]) -> None:
+    class Interrupted:
+        name = "octoprint:host"
+
+        def has(self, file: str) -> bool:
+            return False
+
+        def upload(self, upload: GcodeUpload, sent: Sent) -> str:
+            sent(gone)
+            raise KeyboardInterrupt
+
+    server: object = Interrupted()
+    with pytest.raises(KeyboardInterrupt):
+        hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode")  # type: ignore[arg-type]
+    assert f"upload broken off: octoprint:host {kept} a.gcode" in capsys.readouterr().err

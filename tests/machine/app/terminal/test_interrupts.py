@@ -1,5 +1,6 @@
 """Interrupts: none is lost, whenever it comes."""
 
+import io
 import os
 import select
 import signal
@@ -11,6 +12,7 @@ from collections.abc import Callable
 
 import pytest
 
+from machine.app.terminal import interrupts
 from machine.app.terminal.interrupts import COMPILER, PATIENCE_S, calling, interrupting, outside_compiler, stopping
 
 BUSY_S = 30.0
@@ -130,3 +132,15 @@ def test_work_that_ends_by_itself_is_not_ended_again(capfd: pytest.CaptureFixtur
         signal.raise_signal(signal.SIGINT)
     signal.signal(signal.SIGINT, before)
     assert (threading.active_count(), capfd.readouterr().err) == (threads, "")
+
+
+def test_the_process_ends_although_nobody_reads_its_last_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Gone(io.StringIO):
+        def write(self, text: str) -> int:
+            raise BrokenPipeError
+
+    codes: list[int] = []
+    monkeypatch.setattr(sys, "stderr", Gone())
+    monkeypatch.setattr(interrupts, "leave", codes.append)
+    interrupts.end_at_once()
+    assert codes == [130]
