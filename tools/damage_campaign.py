@@ -19,8 +19,11 @@ import traceback
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
+from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 
@@ -212,31 +215,42 @@ def _try(read: Callable[[Path], None], file: Path) -> int:
     return 0
 
 
+@dataclass(frozen=True)
+class Trial:
+    """What became of one damaged file, after how long, and what was said."""
+
+    number: int
+    suffix: str
+    became: str
+    took_s: float
+    said: str
+
+
+def trial(seeds: list[tuple[str, bytes]], read: Callable[[Path], None], place: Path, number: int) -> Trial:
+    """Damage one of the seeds as its number says, and read it."""
+    dice = random.Random(number)
+    suffix, content = dice.choice(seeds)
+    file = place / f"{number}{suffix}"
+    file.write_bytes(damaged(excerpt(content, dice) if suffix == ".gcode" else content, dice))
+    began = perf_counter()
+    became = outcome(read, file)
+    took_s = perf_counter() - began
+    said = file.with_suffix(".txt")
+    text = said.read_text(errors="replace") if said.exists() else ""
+    file.unlink()
+    return Trial(number, suffix, became, took_s, text[-1500:])
+
+
 def campaign(seeds: list[tuple[str, bytes]], read: Callable[[Path], None], numbers: range, jobs: int, place: Path) -> list[str]:
     """Print what became of how many files, and how long the longest took; returns what went wrong."""
-
-    def run(number: int) -> tuple[int, str, str, float, str]:
-        dice = random.Random(number)
-        suffix, content = dice.choice(seeds)
-        file = place / f"{number}{suffix}"
-        file.write_bytes(damaged(excerpt(content, dice) if suffix == ".gcode" else content, dice))
-        began = perf_counter()
-        became = outcome(read, file)
-        took = perf_counter() - began
-        said = file.with_suffix(".txt").read_text(errors="replace")
-        file.unlink()
-        return number, suffix, became, took, said
-
-    with ThreadPoolExecutor(jobs) as pool:
-        results = list(pool.map(run, numbers))
-    counts = Counter((suffix, became) for _, suffix, became, _, _ in results)
+    # Processes, not threads: a process forked while another thread holds a lock waits for that lock for ever.
+    with ProcessPoolExecutor(jobs, get_context("fork")) as pool:
+        trials = list(pool.map(partial(trial, seeds, read, place), numbers, chunksize=50))
+    counts = Counter((each.suffix, each.became) for each in trials)
     print(", ".join(f"{suffix} {became}: {count}" for (suffix, became), count in sorted(counts.items())))
-    print(f"{len(results)} files, the longest took {max((took for _, _, _, took, _ in results), default=0.0):.1f} s")
-    return [
-        f"number {n}, {suffix}: {became}\n{said[-1500:]}"
-        for n, suffix, became, _, said in results
-        if became in (CRASHED, LIMITED)
-    ]
+    longest = max(trials, key=lambda each: each.took_s)
+    print(f"{len(trials)} files, number {longest.number} ({longest.suffix}) took longest: {longest.took_s:.1f} s", flush=True)
+    return [f"number {t.number}, {t.suffix}: {t.became}\n{t.said}" for t in trials if t.became in (CRASHED, LIMITED)]
 
 
 def wrong(given: argparse.Namespace) -> Iterator[str]:
