@@ -182,7 +182,8 @@ def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.Monkey
         return begun[-1]
 
     def interrupt(progress: Progress) -> None:
-        raise KeyboardInterrupt
+        if progress.stage > 0:
+            raise KeyboardInterrupt
 
     monkeypatch.setattr("mdp.search.beam.ahead", note)
     with pytest.raises(KeyboardInterrupt):
@@ -260,3 +261,12 @@ def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best() -> No
     front.offer(first)
     front.offer(twin)
     assert _take(problem, front, twin, profile, None, None).node.cost_mm2 == first.cost_mm2
+
+
+def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_needs_support_tells_nothing() -> None:
+    told: list[int] = []
+    decompose(shapes.tee(), "tee", load(), on_stage=lambda progress: told.append(progress.stage))
+    assert told[:2] == [0, 1]
+    told.clear()
+    decompose(shapes.box(10.0, 10.0, 10.0), "box", load(), on_stage=lambda progress: told.append(progress.stage))
+    assert told == []

@@ -108,8 +108,12 @@ NATIVE = """
 import hashlib
 from machine.app.terminal.interrupts import outside_compiler
 with outside_compiler():
-    print("ready", flush=True)
-    hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)  # native code for minutes
+    for _ in range(2):  # the signal may come before the first call
+        try:
+            print("ready", flush=True)
+            hashlib.pbkdf2_hmac("sha256", b"", b"", 10**9)  # native code for minutes
+        except KeyboardInterrupt:
+            pass
 """
 
 
@@ -119,7 +123,7 @@ def test_work_in_native_code_is_ended_with_the_process() -> None:
         process.stdout.readline()
         began_s = time.monotonic()
         process.send_signal(signal.SIGINT)
-        assert process.communicate() == ("", "tiltprint: interrupted\n")
+        assert process.communicate()[1] == "tiltprint: interrupted\n"
     assert process.returncode == 130
     assert PATIENCE_S < 2.0  # so long a person waits
     assert time.monotonic() - began_s < BUSY_S  # where the machine has other work too; by itself it would take minutes
