@@ -17,9 +17,11 @@ from machine.planning.timing import move_times
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
+from profiles.errors import GcodeError
 from profiles.profile import Profile
 from slicer.paths import Kind
 
+MOST_MM = 10_000.0  # five times what the largest printers reach
 STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1", "M226", "M600")
 
 
@@ -62,6 +64,7 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     """Read G-code lines and play them: times, deposited plastic, findings. Raises GcodeError for what is not G-code."""
     machine, text = profile.machine, lines if isinstance(lines, Sequence) else list(lines)
     program = parse_gcode(text, machine)
+    _refuse_far_places(program)
     rows = np.flatnonzero(program.kind == MoveKind.EXTRUDE)
     ends = [workpiece_path(machine, side[rows]) for side in (program.start, program.end)]
     segments = np.stack(ends, axis=1)
@@ -95,6 +98,16 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
         findings=tuple(findings),
         letters=tuple(axis_limits(machine)),
     )
+
+
+def _refuse_far_places(program: ParsedProgram) -> None:
+    """What is tried along a move takes as long as the move: one of a damaged number would be tried for days."""
+    far = np.abs(program.end[:, :3])
+    rows = np.flatnonzero((far > MOST_MM).any(axis=1))
+    if len(rows):
+        row, axis = rows[0], int(far[rows[0]].argmax())
+        place = f"{'XYZ'[axis]} comes to {program.end[row, axis]:g} mm"
+        raise GcodeError(f"line {program.line[row]}: {place}: no printer reaches beyond {MOST_MM:g}")
 
 
 def retractions(program: ParsedProgram) -> int:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from machine.dryrun import DryRun, dry_run, summary
 from machine.planning.timing import move_times
+from profiles.errors import GcodeError
 from profiles.profile import load
 from tests.machine.hand import printed, text, whole
 
@@ -213,3 +214,9 @@ def test_the_summary_s_figures_are_those_of_the_post_and_the_arm() -> None:
 def test_an_empty_text_makes_an_empty_run() -> None:
     figures = summary(dry_run([], CLEAN))
     assert (figures["time_s"], figures["bounds_mm"], figures["axes"]["X"], figures["findings"]) == (0.0, [], [], [])
+
+
+@pytest.mark.parametrize("line", ["G1 X1 Y4294967296 E0.1", "G0 Z-100000", "G1 X20000 E1"])
+def test_a_place_that_no_printer_reaches_is_refused_with_its_line(line: str) -> None:
+    with pytest.raises(GcodeError, match=r"line 2: [XYZ] comes to .* mm: no printer reaches beyond 10000"):
+        dry_run(["G1 X1 F600", line], load())
