@@ -1,4 +1,4 @@
-"""The command line of models: decompose, export, simulate, view. Heavy imports stay inside the commands."""
+"""The command line of models: decompose, export, simulate, view, edit. Heavy imports stay inside the commands."""
 
 from collections.abc import Callable
 from os.path import exists  # pathlib's raises for a name that is too long
@@ -223,4 +223,33 @@ def view(
     return view(request, open_)
 
 
-COMMANDS: dict[str, Callable[..., int]] = {"decompose": decompose, "export": export, "simulate": simulate, "view": view}
+def edit(
+    model: Annotated[
+        str | None, typer.Argument(metavar="[MODEL|PLAN]", show_default=False, help="a model file, demo:NAME, or a plan (.toml)")
+    ] = None,
+    port: Annotated[
+        int,
+        typer.Option(
+            "--port", metavar="N", min=0, max=65535, show_default=False, help="serve it on this port; else on any free one"
+        ),
+    ] = 0,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="only tell the address")] = False,
+    machine: MachineName = "generic_ac",
+    material: MaterialName = "pla",
+    process: ProcessName = "standard",
+    settings: Settings = None,
+) -> int:
+    """Open the workbench: a page on this computer to look, lay down, cut and save. Ctrl-C ends it."""
+    from machine.app.commands.edit import edit
+    from machine.app.requests import EditRequest
+
+    return edit(EditRequest(profile_of(machine, material, process, settings), model, port, not no_browser))
+
+
+COMMANDS: dict[str, Callable[..., int]] = {
+    "decompose": decompose,
+    "export": export,
+    "simulate": simulate,
+    "view": view,
+    "edit": edit,
+}

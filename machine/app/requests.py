@@ -81,6 +81,16 @@ class ModelRequest:
 
 
 @dataclass(frozen=True)
+class EditRequest:
+    """The workbench. model: a model or a plan to begin with; port: of this computer, 0: any free one; browser: open it there."""
+
+    profile: "Profile"
+    model: str | None = None
+    port: int = 0
+    browser: bool = True
+
+
+@dataclass(frozen=True)
 class PrintRequest:
     """A printer at a port, and how a print on it is recorded and watched.
 

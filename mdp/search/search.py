@@ -17,6 +17,7 @@ from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
+from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile
 from mdp.ranking.candidates import REASONS
 from mdp.ranking.ranker import Ranker, ranker_named
@@ -39,11 +40,12 @@ MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the search stands: after which stage, 0 when it begins."""
+    """Where the search stands: after which stage, 0 when it begins. planes: of the best so far, in the order of its cuts."""
 
     stage: int
     beam: int
     best_share: float
+    planes: tuple[Plane, ...] = ()
 
 
 def decompose(
@@ -298,7 +300,8 @@ def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:
 
 
 def _report(problem: Problem, report: Callable[[Progress], None], stage: int, held: int, best: Node) -> None:
-    report(Progress(stage, held, best.cost_mm2 / problem.model.risky_mm2))
+    planes = tuple(cut.base for cut in best.cuts)
+    report(Progress(stage, held, best.cost_mm2 / problem.model.risky_mm2, planes))
 
 
 def _continues(problem: Problem, stage: int) -> bool:

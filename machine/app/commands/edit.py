@@ -1,0 +1,76 @@
+"""The edit command: the workbench, served on this computer until Ctrl-C."""
+
+import asyncio
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+
+from machine.app.requests import GCODE_SUFFIXES, EditRequest
+from machine.app.terminal.progress import say
+from machine.app.terminal.report import show
+from machine.app.workbench.serve import serve_workbench
+from machine.app.workbench.session import Session
+from mdp.plans.plan_file import PlanFile
+from mdp.plans.reading import read_plan
+from mdp.read import DEMO, check_file, locate
+from profiles.errors import MeshError, PlanError
+
+PLAN_SUFFIX = ".toml"
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What lies on the workbench first: a model's file and name, and the plan to cut it by."""
+
+    path: Path
+    name: str
+    plan: PlanFile | None = None
+
+
+def edit(request: EditRequest) -> int:
+    """Serve the page; a model that cannot be read is told in it, a file that is not there at once."""
+    opened = None if request.model is None else _find(request.model)
+
+    def begin(session: Session) -> None:
+        if opened is not None:
+            session.start(_open(session, opened))
+
+    def announce(address: str) -> None:
+        show(f"{address}\n")
+        say("the workbench is there, for this computer alone; Ctrl-C ends it")
+        if request.browser:
+            asyncio.get_running_loop().run_in_executor(None, _show_in_browser, address)
+
+    serve_workbench(request.profile, begin, announce, request.port)
+    return 0
+
+
+async def _open(session: Session, opened: Opened) -> None:
+    await session.open_model(opened.path, opened.name)
+    if opened.plan is not None:
+        await session.take_plan(opened.plan)
+
+
+def _find(model: str) -> Opened:
+    """The files of a MODEL or a PLAN. Raises UserError for those that are not there."""
+    if Path(model).suffix.lower() == PLAN_SUFFIX and not model.startswith(DEMO):
+        return _of_plan(Path(model), read_plan(Path(model)))
+    if Path(model).suffix.lower() in GCODE_SUFFIXES:
+        raise MeshError(f"{model} is G-code, which is sliced already: tiltprint view shows it")
+    path = locate(model)
+    check_file(path)
+    return Opened(path, model if model.startswith(DEMO) else path.name)
+
+
+def _of_plan(file: Path, plan: PlanFile) -> Opened:
+    """The model that a plan names: one that ships, or the file of that name beside the plan."""
+    path = locate(plan.model) if plan.model.startswith(DEMO) else file.parent / Path(plan.model).name
+    if not plan.model or not path.is_file():
+        told = f"its model {plan.model} is not beside it" if plan.model else "it names no model"
+        raise PlanError(f"plan {file}: {told}: open the model first, then choose the plan in the page")
+    return Opened(path, plan.model, plan)
+
+
+def _show_in_browser(address: str) -> None:
+    if not webbrowser.open(address):
+        say("no browser could be opened: open the address in one")

@@ -1,0 +1,166 @@
+"""Bench: what lies on the workbench, as one value. Every command gives a new one, so undo and redo are values too."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mdp.decomposition import FrontRow
+from mdp.mesh import Floats, Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
+from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow
+from mdp.zone import NO_ZONES, Zones
+from profiles.frozen import Vector
+from profiles.profile import Profile
+
+MOST_STEPS = 200  # that can be undone
+STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A model as it is read: its name, its file, its mesh in mm on z = 0, and a sentence for every repair."""
+
+    name: str
+    path: Path
+    mesh: Mesh
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A model, how it is turned, and how it is cut.
+
+    rotation: rows of what turns the model as it is read. cuts: the base planes of the parts from the second on, in print order;
+    None: nobody has cut it yet. rows: the front that the cuts were chosen from, ever more parts; recommended: how many parts the
+    search would take, 0: no search has been.
+    """
+
+    profile: Profile
+    model: Model | None = None
+    rotation: tuple[Vector, ...] = STANDING
+    cuts: tuple[PlannedPart, ...] | None = None
+    zones: Zones = NO_ZONES
+    rows: tuple[FrontRow, ...] = ()
+    recommended: int = 0
+
+    @property
+    def parts(self) -> int:
+        """How many parts the cuts make; 0: it is not cut yet."""
+        return 0 if self.cuts is None else len(self.cuts) + 1
+
+    @property
+    def turned(self) -> Floats | None:
+        """(3, 3) how the model is turned; None: it stands as it is read, so a plan needs not say it."""
+        return None if self.rotation == STANDING else np.array(self.rotation)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A command's word and the bench after it."""
+
+    word: str
+    bench: Bench
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """The bench with all that came before it and all that was undone; the last of each is the nearest."""
+
+    now: Step
+    before: tuple[Step, ...] = ()
+    undone: tuple[Step, ...] = ()
+
+    def do(self, word: str, bench: Bench) -> "History":
+        """A further step; what was undone is forgotten."""
+        return History(Step(word, bench), (*self.before, self.now)[-MOST_STEPS:])
+
+    def undo(self) -> "History":
+        """One step back, or the same where there is none."""
+        if not self.before:
+            return self
+        return History(self.before[-1], self.before[:-1], (*self.undone, self.now))
+
+    def redo(self) -> "History":
+        """One step forth again, or the same where there is none."""
+        if not self.undone:
+            return self
+        return History(self.undone[-1], (*self.before, self.now), self.undone[:-1])
+
+
+def with_model(bench: Bench, model: Model) -> Bench:
+    """Another model on the bench, as it is read and uncut."""
+    return Bench(bench.profile.of_all_parts, model)
+
+
+def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
+    """The model turned otherwise; its cuts were for the way that it stood before."""
+    rows = tuple(_vector(row) for row in rotation)
+    return bench if rows == bench.rotation else Bench(bench.profile.of_all_parts, bench.model, rows)
+
+
+def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
+    """The front of a search, cut by the row that it has chosen."""
+    chosen = next(row for row in rows if row.chosen)
+    return replace(bench, rows=tuple(rows), cuts=parts_of(chosen), recommended=chosen.parts)
+
+
+def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: Profile) -> Bench:
+    """The planes of a plan. rows: its front, measured; profile: with the plan's settings of single parts."""
+    rotation = STANDING if plan.orientation is None else plan.orientation
+    return Bench(profile, bench.model, rotation, plan.parts, plan.zones, tuple(rows))
+
+
+def with_parts(bench: Bench, count: int) -> Bench:
+    """The row of the front with so many parts taken. Raises KeyError where there is none."""
+    rows = {row.parts: row for row in bench.rows}
+    return replace(bench, cuts=parts_of(rows[count]))
+
+
+def parts_of(row: FrontRow) -> tuple[PlannedPart, ...]:
+    """The parts of a row from the second on, in print order."""
+    return tuple(PlannedPart(_vector(plane.normal), float(plane.offset_mm)) for plane in reversed(row.planes))
+
+
+def plan_of_bench(bench: Bench, name: str) -> PlanFile:
+    """What is to be cut, as a plan's file says it. The model is the one on the bench, so it needs no sha256."""
+    rows = tuple(PlannedRow(parts_of(row), row.support_area_mm2, row.seam_mm, row.cost_mm2) for row in bench.rows)
+    orientation = None if bench.rotation == STANDING else bench.rotation
+    model = "" if bench.model is None else bench.model.name
+    return PlanFile(name, model, "", orientation, bench.cuts or (), bench.zones, rows, tuple(bench.profile.parts))
+
+
+def overhang_mm2(bench: Bench) -> float:
+    """Area that overhangs too far and does not stand on the platform, as the model is turned now; 0 without a model."""
+    if bench.model is None:
+        return 0.0
+    mesh, up = bench.model.mesh, np.array(bench.rotation[2])
+    down = mesh.normals @ up < threshold(bench.profile.process.self_supporting_angle_deg)
+    heights = mesh.vertices @ up
+    low = heights <= heights.min() + PLATFORM_TOLERANCE_MM
+    return float(mesh.areas_mm2[down & ~low[mesh.faces].all(axis=1)].sum())
+
+
+def laid_down(bench: Bench, normal: Floats) -> Floats:
+    """(3, 3) the rotation that lays a face of this outward normal, of the model as it is read, on the platform the short way."""
+    now = np.array(bench.rotation)
+    return np.asarray(_shortest(now @ normal, -UP) @ now)
+
+
+def _shortest(start: Floats, end: Floats) -> Floats:
+    """(3, 3) the least rotation that carries one unit vector into another."""
+    across, along = np.cross(start, end), float(start @ end)
+    if along < -1.0 + 1e-12:  # half a turn, about any axis across
+        axis = np.eye(3)[int(np.argmin(np.abs(start)))]
+        axis = axis - (axis @ start) * start
+        axis /= np.linalg.norm(axis)
+        return np.asarray(2.0 * np.outer(axis, axis) - np.eye(3))
+    x, y, z = across
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + along))
+
+
+def _vector(values: Sequence[float] | Floats) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

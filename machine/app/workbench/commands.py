@@ -1,0 +1,97 @@
+"""Commands: what a page asks for, checked and turned into a new bench. Nothing here reads, writes or waits."""
+
+from collections.abc import Callable
+from math import isfinite, radians
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from machine.app.workbench.bench import Bench, History, Model, laid_down, with_parts, with_rotation
+from mdp.mesh import Floats
+from mdp.pose import about
+from profiles.errors import PlanError
+
+AXES = {"x": 0, "y": 1, "z": 2}
+TURN_DIGITS = 15  # so that quarter turns are exact
+ROTATION_ERROR = 1e-6
+
+
+def obey(history: History, asked: dict[str, Any]) -> History:
+    """The history after a command `{"do": NAME, ...}` of a page. Raises PlanError with a sentence for what cannot be done."""
+    name = asked.get("do")
+    if name == "undo":
+        return history.undo()
+    if name == "redo":
+        return history.redo()
+    if not isinstance(name, str) or name not in COMMANDS:
+        raise PlanError(f"{name!r} is no command of the workbench: {', '.join(('undo', 'redo', *COMMANDS))} are known")
+    bench = history.now.bench
+    if bench.model is None:
+        raise PlanError("there is no model on the workbench yet: choose a file first")
+    word, command = COMMANDS[name]
+    after = command(bench, bench.model, asked)
+    return history if after is bench else history.do(word, after)
+
+
+def _turn(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
+    """Turn the model by `deg` about the axis `axis` of the machine."""
+    axis, angle_deg = asked.get("axis"), asked.get("deg")
+    if axis not in AXES:
+        raise PlanError(f"axis is {axis!r}: {', '.join(AXES)} are allowed")
+    if not _is_number(angle_deg) or abs(angle_deg) > 360.0:
+        raise PlanError(f"deg is {angle_deg!r}: a number from -360 to 360 is allowed")
+    turned = about(np.eye(3)[AXES[axis]], radians(angle_deg)) @ np.array(bench.rotation)
+    return with_rotation(bench, _rounded(turned))
+
+
+def _stand(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
+    """Turn the model as the rows of `rotation` say."""
+    given = asked.get("rotation")
+    rows = given if isinstance(given, list) and len(given) == 3 else []
+    if not rows or not all(isinstance(row, list) and len(row) == 3 and all(map(_is_number, row)) for row in rows):
+        raise PlanError("rotation: three rows of three numbers are expected")
+    matrix = np.array(rows, dtype=np.float64)
+    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=ROTATION_ERROR) or np.linalg.det(matrix) < 0.0:
+        raise PlanError("rotation: its rows are no rotation")
+    return with_rotation(bench, matrix.tolist())
+
+
+def _lay(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
+    """Lay the face of a number down on the platform."""
+    face, faces = asked.get("face"), len(model.mesh.faces)
+    if not isinstance(face, int) or isinstance(face, bool) or not 0 <= face < faces:
+        raise PlanError(f"face is {face!r}: 0 to {faces - 1} is allowed")
+    normal = model.mesh.normals[face]
+    if not normal.any():
+        raise PlanError(f"face {face} has no area, so nothing can be laid on it")
+    return with_rotation(bench, _rounded(laid_down(bench, normal)))
+
+
+def _take(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
+    """Take the row of the front with `parts` parts."""
+    parts = asked.get("parts")
+    known = [row.parts for row in bench.rows]
+    if not isinstance(parts, int) or parts not in known:
+        raise PlanError(
+            f"parts is {parts!r}: {', '.join(map(str, known)) or 'nothing, for no parts have been found,'} is allowed"
+        )
+    return bench if parts == bench.parts else with_parts(bench, parts)
+
+
+COMMANDS: dict[str, tuple[str, Callable[[Bench, Model, dict[str, Any]], Bench]]] = {
+    "turn": ("turn the model", _turn),
+    "stand": ("lay the model down", _stand),
+    "lay": ("lay a face down", _lay),
+    "take": ("take another number of parts", _take),
+}
+
+
+def _rounded(matrix: Floats) -> list[list[float]]:
+    """Rows of a rotation made orthogonal again after many turns, without the noise of the last digit."""
+    left, _, right = np.linalg.svd(matrix)
+    rows: list[list[float]] = (np.round(left @ right, TURN_DIGITS) + 0.0).tolist()
+    return rows
+
+
+def _is_number(value: Any) -> TypeGuard[int | float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

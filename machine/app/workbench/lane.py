@@ -1,0 +1,75 @@
+"""Lane: tasks one after the other in a process that stays warm; stopping one ends the process, the next one starts another."""
+
+import asyncio
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from machine.app.workbench.worker import DONE, LENGTH, TELLS, frame
+from profiles.errors import UserError
+
+COMMAND = (sys.executable, "-m", "machine.app.workbench.worker")
+
+
+class Lane:
+    """One process for one task at a time. All methods from the event loop."""
+
+    def __init__(self) -> None:
+        self._process: asyncio.subprocess.Process | None = None
+        self._free = asyncio.Lock()
+
+    async def warm(self) -> None:
+        """Start the process before it is needed."""
+        async with self._free:
+            await self._ready()
+
+    async def run(self, task: str, *given: Any, tell: Callable[[Any], None] = lambda value: None) -> Any:
+        """What a function of `tasks` gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
+        async with self._free:
+            process = await self._ready()
+            try:
+                return await self._ask(process, (task, given), tell)
+            except (asyncio.IncompleteReadError, ConnectionError):
+                self.stop()
+                raise UserError("the process that did this work has ended before it was done: try it again") from None
+            except asyncio.CancelledError:
+                self.stop()
+                raise
+
+    def stop(self) -> None:
+        """End the process and all that it has started."""
+        process, self._process = self._process, None
+        if process is None or process.returncode is not None:
+            return
+        with suppress(ProcessLookupError, PermissionError):
+            if hasattr(os, "killpg"):
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+
+    async def _ready(self) -> asyncio.subprocess.Process:
+        if self._process is None or self._process.returncode is not None:
+            pipe, nowhere = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
+            self._process = await asyncio.create_subprocess_exec(
+                *COMMAND, stdin=pipe, stdout=pipe, stderr=nowhere, start_new_session=True
+            )
+        return self._process
+
+    async def _ask(self, process: asyncio.subprocess.Process, asked: Any, tell: Callable[[Any], None]) -> Any:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(frame(asked))
+        await process.stdin.drain()
+        while True:
+            (length,) = LENGTH.unpack(await process.stdout.readexactly(LENGTH.size))
+            kind, value = pickle.loads(await process.stdout.readexactly(length))
+            if kind == TELLS:
+                tell(value)
+            elif kind == DONE:
+                return value
+            else:
+                raise UserError(value)

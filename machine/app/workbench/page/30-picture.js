@@ -1,0 +1,87 @@
+// Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
+
+const MODEL_COLOUR = [176, 184, 194];
+
+/** {show(model, matrix), red(marks), cut(planes, colours), fit, ask, ray}: all drawn when the browser next draws. */
+function pictureOf(canvas, camera) {
+  const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
+  if (!gl) return null;
+  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, machine: null, dark: false };
+  let card = null, asked = false, count = 0;
+  const build = () => {
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    card = { frame: frameOf(gl, 4), table: null, solid: null };
+    table();
+    solid();
+  };
+  const table = () => {
+    if (!scene.machine) return;
+    const { table: body } = bodiesOf(scene.machine, scene.dark);
+    card.table = { solid: solidOf(gl, body.solid), lines: linesOf(gl, body.lines) };
+  };
+  const solid = () => {
+    if (!scene.model) return;
+    const colours = new Uint8Array(12 * scene.model.count);
+    card.colours = paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours);
+    card.solid = solidOf(gl, { places: scene.model.corners, colours });
+  };
+  const draw = () => {
+    asked = false;
+    if (gl.isContextLost()) return;
+    const density = Math.min(devicePixelRatio || 1, 2);
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
+    if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+    const view = camera.toEye(), lens = camera.lens(width / height);
+    const seenAs = (matrix) => ({ toEye: multiply(view, matrix), toClip: multiply(lens, multiply(view, matrix)) });
+    const flat = seenAs(IDENTITY), below = camera.eye()[2] < 0;
+    card.frame.begin(width, height);
+    if (card.table && !below) paintPlate(flat);
+    if (card.solid) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts });
+    if (card.table && below) paintPlate(flat, { strength: 0.18 });
+    card.frame.show();
+    document.documentElement.dataset.drawn = ++count;
+  };
+  const paintPlate = (seen, look = {}) => {
+    card.table.solid.draw(seen, look);
+    card.table.lines.draw(seen.toClip, { lift: 1e-5 });
+  };
+  const ask = () => {
+    if (!asked) requestAnimationFrame(draw);
+    asked = true;
+  };
+  canvas.addEventListener("webglcontextlost", (event) => { event.preventDefault(); PROGRAMS.delete(gl); });
+  canvas.addEventListener("webglcontextrestored", () => { build(); ask(); });
+  new ResizeObserver(ask).observe(canvas);
+  build();
+  return {
+    ask,
+    machine: (machine, dark) => { Object.assign(scene, { machine, dark }); table(); ask(); },
+    show: (model) => { scene.model = model; scene.red = null; card.solid = null; solid(); ask(); },
+    stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
+    red: (marks) => {
+      scene.red = marks;
+      if (card.solid) card.solid.paint(paintedRed(scene.model.count, marks, MODEL_COLOUR, card.colours));
+      ask();
+    },
+    cut: (planes, colours) => {
+      const drawable = planes && planes.length <= MOST_CUTS;
+      scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;
+      ask();
+    },
+    fit: () => {
+      const corners = Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => scene.box[(i >> axis) & 1][axis]));
+      camera.fit(corners, canvas.clientWidth / Math.max(canvas.clientHeight, 1));
+      ask();
+    },
+    /** From where and along what an event on the canvas looks, in the frame of the model as it is read. */
+    ray: (event) => {
+      const box = canvas.getBoundingClientRect(), back = undone(scene.matrix), eye = camera.eye();
+      const x = ((event.clientX - box.left) / box.width * 2 - 1) * (box.width / box.height) * HALF_HEIGHT;
+      const y = (1 - ((event.clientY - box.top) / box.height) * 2) * HALF_HEIGHT;
+      const along = add(unit(sub(camera.target, eye)), add(scaled(camera.right(), x), scaled(camera.up(), y)));
+      return [carried(back, eye), turned(back, along)];
+    },
+  };
+}

@@ -1,0 +1,54 @@
+// Parts panel: the search, its front as a slider, and what is saved.
+
+const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
+const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
+
+function partsPanel(bench) {
+  $("find").addEventListener("click", () => bench.send({ do: "search" }));
+  $("stop").addEventListener("click", () => bench.send({ do: "stop" }));
+  $("front").addEventListener("input", () => { const row = bench.state.front[$("front").value]; tellRow(row, bench.state); bench.look(row); });
+  $("front").addEventListener("change", () => bench.send({ do: "take", parts: bench.state.front[$("front").value].parts }));
+  $("recommended").addEventListener("click", () => bench.send({ do: "take", parts: bench.state.recommended }));
+  $("save-plan").addEventListener("click", () => save("plan.toml"));
+  $("save-parts").addEventListener("click", () => save("parts.zip"));
+  return {
+    told: (state, before) => {
+      const { front, search, parts, recommended } = state;
+      $("find").disabled = Boolean(search);
+      $("stop").hidden = !search;
+      $("search-told").textContent = search ? search.text : "";
+      document.body.classList.toggle("no-cuts", !front.length);
+      if (!front.length) return;
+      const fresh = JSON.stringify([front, parts, recommended]) !== JSON.stringify([before?.front, before?.parts, before?.recommended]);
+      if (!fresh) return; // a finger may be on the slider
+      const place = front.findIndex((row) => row.parts === parts);
+      $("front").max = front.length - 1;
+      $("front").value = place;
+      $("front").disabled = front.length < 2;
+      marksUnder(front, recommended);
+      tellRow(front[place], state);
+      listIn("front-notes", state.notes);
+      $("recommended").hidden = !recommended;
+    },
+  };
+}
+
+function marksUnder(front, recommended) {
+  $("front-marks").replaceChildren(...front.map(({ parts }, place) => {
+    const best = parts === recommended;
+    const mark = made("span", { text: `${parts}${best ? " ✓" : ""}`, className: best ? "recommended" : "", title: best ? "recommended" : "" });
+    mark.style.left = `${front.length > 1 ? (100 * place) / (front.length - 1) : 0}%`;
+    return mark;
+  }));
+}
+
+function tellRow(row, { recommended }) {
+  const orDash = (value, told) => (value === null ? "–" : told(value)), best = row.parts === recommended;
+  $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
+  $("recommended").disabled = best;
+  tellIn("front-told", [
+    ["parts", `${row.parts}${best ? ` (recommended: ${row.reason})` : ""}`], ["area to support", mm2(row.support_area_mm2)],
+    ["seams", `${row.seam_mm.toFixed(0)} mm`], ["takes about", orDash(row.time_s, roughly)],
+    ["plastic", orDash(row.filament_mm, (long) => `${(long / 1000).toFixed(1)} m`)],
+  ]);
+}

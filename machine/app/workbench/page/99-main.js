@@ -1,0 +1,187 @@
+// Main: the line to the server, the picture and the panels put together.
+
+function main() {
+  const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
+  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, preview: null };
+  const dark = themeOf((now) => { if (picture && bench.state) picture.machine(bench.state.machine, now); });
+  const line = lineTo((state) => follow(state), (gone) => {
+    root.dataset.line = gone ? "lost" : "open";
+    notice(gone ? "The line to tiltprint is lost; trying again." : "");
+  });
+  bench.send = line.send;
+  bench.lay = (whether) => {
+    bench.laying = whether;
+    $("lay").setAttribute("aria-pressed", whether);
+    notice(whether ? "Click the face that is to lie on the platform." : "");
+  };
+  /** Where the model stands now, and red what overhangs: the figure is the server's as soon as nothing moves. */
+  const stand = (rotation, live) => {
+    if (!bench.triangles) return;
+    const began = performance.now(), { limit, platform_mm: platform } = bench.state;
+    const found = overhanging(bench.triangles, rotation[2], limit, platform);
+    bench.red = found.red;
+    if (live) $("overhang").textContent = mm2(found.area);
+    if (picture) {
+      picture.stand(standingBy(rotation, bench.triangles.vertices));
+      bench.look();
+    }
+    root.dataset.liveMs = (performance.now() - began).toFixed(1);
+  };
+  bench.preview = (rotation) => stand(rotation, true);
+  /** Parts in their colours where they are looked at, else red faces; row: of the front, before it is taken. */
+  bench.look = (row = null) => {
+    if (!picture || !bench.triangles) return;
+    const { search, cuts, parts, colours } = bench.state;
+    const planes = row ? row.planes : search && search.planes.length ? search.planes : parts ? cuts : null;
+    const cut = bench.tab === "parts" && planes;
+    picture.cut(cut ? planes : null, colours);
+    picture.red(cut ? null : bench.red);
+    legend(cut ? colours.slice(0, planes.length + 1) : null);
+  };
+  const panels = [modelPanel(bench), partsPanel(bench)];
+  const follow = async (state) => {
+    const before = bench.state;
+    bench.state = state;
+    tellState(state);
+    panels.forEach((panel) => panel.told(state, before));
+    if (picture && !before) picture.machine(state.machine, dark());
+    const key = state.model ? state.model.key : "";
+    if (key !== bench.key) await fetchModel(key);
+    else stand(state.rotation, false);
+    if (bench.state.version === state.version) root.dataset.version = state.version;
+  };
+  const fetchModel = async (key) => {
+    bench.key = key;
+    bench.triangles = null;
+    if (key && bench.state.model.drawn) {
+      const answer = await fetch(`model/${key}`);
+      if (!answer.ok || bench.key !== key) return;
+      bench.triangles = trianglesFrom(await answer.arrayBuffer());
+    }
+    if (picture) picture.show(bench.triangles);
+    stand(bench.state.rotation, false);
+    if (picture) picture.fit();
+    root.dataset.shown = key;
+  };
+  tabsOf((tab) => { bench.tab = tab; bench.look(); });
+  $("undo").addEventListener("click", () => bench.send({ do: "undo" }));
+  $("redo").addEventListener("click", () => bench.send({ do: "redo" }));
+  if (picture) {
+    handle($("canvas"), camera, { changed: picture.ask, pressed: (event) => press(event, bench, picture) });
+    viewsOf(camera, picture);
+  }
+  keysOf(bench, camera, picture);
+  root.dataset.state = picture ? "ready" : "failed";
+  if (!picture) {
+    document.body.classList.add("no-picture");
+    notice("This browser shows no WebGL2, so there is no picture; all else works.");
+  }
+}
+
+/** A click on the model: the face is laid down when that was asked for. */
+function press(event, bench, picture) {
+  if (!bench.laying || !bench.triangles) return;
+  const face = faceMet(bench.triangles, ...picture.ray(event));
+  if (face < 0) return;
+  bench.lay(false);
+  bench.send({ do: "lay", face });
+}
+
+function tellState({ model, problem, busy, undo, redo, search, machine, material, process }) {
+  const root = document.documentElement;
+  document.title = model ? `${model.name} – tiltprint` : "tiltprint";
+  $("title").textContent = model ? model.name : "tiltprint";
+  $("summary").textContent = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : `${machine.name} · ${material} · ${process}`;
+  root.dataset.busy = busy;
+  root.toggleAttribute("data-searching", Boolean(search));
+  document.body.classList.toggle("no-model", !model);
+  document.body.classList.toggle("has-model", Boolean(model));
+  $("drop").hidden = Boolean(model);
+  $("problem").textContent = problem;
+  $("problem").hidden = !problem;
+  for (const [id, word] of [["undo", undo], ["redo", redo]]) {
+    $(id).disabled = !word;
+    $(id).setAttribute("aria-label", word ? `${id}: ${word}` : id);
+  }
+}
+
+function legend(colours) {
+  const entries = (colours || []).slice(0, 24).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`));
+  $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));
+}
+
+function swatch(colour) {
+  const mark = made("span", { className: "swatch" });
+  mark.style.backgroundColor = colour;
+  return mark;
+}
+
+function tabsOf(chosen) {
+  const all = [...document.querySelectorAll("[role=tab]")];
+  const choose = (tab) => {
+    all.forEach((each) => {
+      each.setAttribute("aria-selected", each === tab);
+      each.tabIndex = each === tab ? 0 : -1;
+      $(each.getAttribute("aria-controls")).hidden = each !== tab;
+    });
+    chosen(tab.getAttribute("aria-controls"));
+  };
+  all.forEach((tab, k) => {
+    tab.addEventListener("click", () => choose(tab));
+    tab.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      const next = all[(k + step + all.length) % all.length];
+      choose(next);
+      next.focus();
+      event.stopPropagation();
+    });
+  });
+}
+
+/** Dark or light: what the system prefers until the person says otherwise. */
+function themeOf(changed) {
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  let told = null;
+  const dark = () => (told === null ? system.matches : told);
+  const show = () => { document.documentElement.dataset.theme = dark() ? "dark" : "light"; changed(dark()); };
+  system.addEventListener("change", show);
+  $("theme").addEventListener("click", () => { told = !dark(); show(); });
+  show();
+  return dark;
+}
+
+function viewsOf(camera, picture) {
+  const views = { ...VIEWS, corner: [CORNERS[0], 24] };
+  document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => {
+    [camera.yaw, camera.pitch] = views[button.dataset.view].map((angle) => angle * RAD);
+    picture.ask();
+  }));
+  $("fit").addEventListener("click", picture.fit);
+}
+
+/** Everything that hands do to the view, from the keyboard; undo and redo. */
+function keysOf(bench, camera, picture) {
+  const turn = 6 * RAD, shift = 0.05;
+  const arrow = (x, y) => (event) => { if (event.shiftKey) camera.pan(-x * shift, y * shift); else camera.orbit(-x * turn, y * turn); };
+  const keys = {
+    ArrowLeft: arrow(-1, 0), ArrowRight: arrow(1, 0), ArrowUp: arrow(0, 1), ArrowDown: arrow(0, -1),
+    "+": () => camera.zoom(0.85), "=": () => camera.zoom(0.85), "-": () => camera.zoom(1 / 0.85),
+    f: () => $("fit").click(), d: () => $("theme").click(), Escape: () => bench.lay(false),
+  };
+  ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
+  addEventListener("keydown", (event) => {
+    if ((event.ctrlKey || event.metaKey) && ["z", "y"].includes(event.key.toLowerCase())) {
+      event.preventDefault();
+      return bench.send({ do: event.shiftKey || event.key.toLowerCase() === "y" ? "redo" : "undo" });
+    }
+    if (event.ctrlKey || event.metaKey || event.altKey || ["INPUT", "SELECT"].includes(event.target.tagName)) return;
+    const act = keys[event.key] || keys[event.key.toLowerCase()];
+    if (!act) return;
+    event.preventDefault();
+    act(event);
+    if (picture) picture.ask();
+  });
+}
+
+main();

@@ -1,0 +1,81 @@
+"""Serve: the workbench run from its address to Ctrl-C: nothing of it goes on afterwards."""
+
+import asyncio
+import secrets
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import uvicorn
+
+from machine.app.terminal.interrupts import calling
+from machine.app.workbench.guard import HOST
+from machine.app.workbench.server import application
+from machine.app.workbench.session import Session
+from profiles.errors import OutputError
+from profiles.profile import Profile
+
+GRACE_S = 1  # for answers under way when it ends
+MOST_SENT = 1 << 20  # bytes of one message of a page; files come by another way
+
+
+class Server(uvicorn.Server):
+    """uvicorn's, with the interrupts left to the program."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Nothing: Ctrl-C calls `stop`."""
+        yield
+
+    def stop(self) -> None:
+        """End soon; asked again, at once."""
+        self.force_exit = self.should_exit
+        self.should_exit = True
+
+
+def listen(port: int) -> socket.socket:
+    """A socket at a port of this computer, 0: any free one. Raises OutputError for one that cannot be had."""
+    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        own.bind((HOST, port))
+    except (OSError, OverflowError) as error:
+        own.close()
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise OutputError(f"--port {port} cannot be used: {reason.lower()}; without it any free one is taken") from None
+    return own
+
+
+def serve_workbench(profile: Profile, begin: Callable[[Session], None], announce: Callable[[str], None], port: int = 0) -> None:
+    """Serve until Ctrl-C. begin: given the session when it is there; announce: given the address when it answers."""
+    own, token = listen(port), secrets.token_urlsafe(24)
+    with own:
+        asyncio.run(_serve(profile, begin, announce, own, token))
+
+
+async def _serve(
+    profile: Profile, begin: Callable[[Session], None], announce: Callable[[str], None], own: socket.socket, token: str
+) -> None:
+    number = own.getsockname()[1]
+    session = Session(profile)
+    settings = uvicorn.Config(
+        application(session, token, number),
+        log_config=None,
+        lifespan="off",
+        ws="websockets-sansio",
+        ws_max_size=MOST_SENT,
+        timeout_graceful_shutdown=GRACE_S,
+        server_header=False,
+        proxy_headers=False,
+    )
+    server = Server(settings)
+    try:
+        session.warm()
+        begin(session)
+        with calling(server.stop):
+            answering = asyncio.create_task(server.serve(sockets=[own]))
+            while not server.started and not answering.done():
+                await asyncio.sleep(0.01)
+            announce(f"http://{HOST}:{number}/{token}/")
+            await answering
+    finally:
+        session.close()

@@ -1,0 +1,95 @@
+"""Snapshot: what a page is told of the session, as JSON; the model's triangles as bytes of their own."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from machine.app.workbench.bench import Bench, Model, overhang_mm2
+from machine.app.workbench.session import Session
+from machine.view.parts import page_colours
+from machine.view.scene import machine_bodies
+from mdp.decomposition import FrontRow
+from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
+from mdp.plane import Plane
+
+MOST_FACES = 2_000_000  # that a page draws
+
+
+def snapshot(session: Session) -> dict[str, Any]:
+    """Everything but the triangles; small enough to be told whole whenever anything changes."""
+    bench, history, search = session.bench, session.history, session.search
+    resting = session.resting[1] if session.resting is not None and session.resting[0] is bench.model else ()
+    planes = [] if search is None else [_plane(plane) for plane in reversed(search.searched.planes)]
+    return {
+        "version": session.version,
+        "problem": session.problem,
+        "busy": session.busy,
+        "undo": history.now.word if history.before else "",
+        "redo": history.undone[-1].word if history.undone else "",
+        "model": None if bench.model is None else _model(bench.model),
+        "rotation": bench.rotation,
+        "limit": threshold(bench.profile.process.self_supporting_angle_deg),
+        "platform_mm": PLATFORM_TOLERANCE_MM,
+        "overhang_mm2": _overhang_mm2(bench),
+        "resting": [
+            {"rotation": each.rotation, "words": each.words, "overhang_mm2": each.overhang_mm2, "height_mm": each.height_mm}
+            for each in resting
+        ],
+        "search": None if search is None else {"text": search.searched.text, "planes": planes},
+        "front": [_row(row) for row in bench.rows],
+        "parts": bench.parts,
+        "recommended": bench.recommended,
+        "cuts": [_plane(part.plane) for part in bench.cuts or () if part.plane is not None],
+        "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
+        "notes": session.notes if bench.rows else (),
+        "machine": machine_bodies(bench.profile.machine, known=True),
+        "material": bench.profile.material.name,
+        "process": bench.profile.process.name,
+    }
+
+
+def triangles(model: Model) -> bytes:
+    """Two counts as uint32, then vertices (n, 3) float32 in mm and faces (m, 3) uint32, all little-endian."""
+    vertices, faces = model.mesh.vertices.astype("<f4"), model.mesh.faces.astype("<u4")
+    return np.array([len(vertices), len(faces)], "<u4").tobytes() + vertices.tobytes() + faces.tobytes()
+
+
+def model_key(model: Model) -> str:
+    """What tells one model of this run from another: the page asks for its triangles by it."""
+    return f"{id(model.mesh):x}"
+
+
+def _model(model: Model) -> dict[str, Any]:
+    low, high = model.mesh.bounds_mm
+    return {
+        "key": model_key(model),
+        "name": model.name,
+        "faces": len(model.mesh.faces),
+        "size_mm": (high - low).tolist(),
+        "volume_mm3": model.mesh.volume_mm3,
+        "notes": model.notes,
+        "drawn": len(model.mesh.faces) <= MOST_FACES,
+    }
+
+
+def _row(row: FrontRow) -> dict[str, Any]:
+    return {
+        "parts": row.parts,
+        "support_area_mm2": row.support_area_mm2,
+        "seam_mm": row.seam_mm,
+        "cost_mm2": row.cost_mm2,
+        "time_s": row.time_s,
+        "filament_mm": row.filament_mm,
+        "reason": row.reason,
+        "planes": [_plane(plane) for plane in reversed(row.planes)],
+    }
+
+
+def _plane(plane: Plane) -> dict[str, Any]:
+    return {"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm}
+
+
+@lru_cache(maxsize=4)
+def _overhang_mm2(bench: Bench) -> float:
+    return overhang_mm2(bench)

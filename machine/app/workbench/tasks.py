@@ -1,0 +1,131 @@
+"""Tasks: the long work of the workbench, each a function that a process of its own runs; the values go there and back pickled."""
+
+import io
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from machine.app.pipeline import compilers
+from machine.app.pipeline.pricing import pricing
+from machine.app.workbench.bench import Bench, Model, plan_of_bench
+from mdp.decomposition import Decomposition, FrontRow
+from mdp.mesh import Mesh
+from mdp.plane import Plane
+from mdp.plans.plan_file import PlanFile, plan_of
+from mdp.plans.writing import plan_text
+from mdp.read import read_mesh
+from mdp.save import FOLDER_FILES, part_file, stl, threemf
+from mdp.search.laying import distinct_orientations
+from mdp.search.orientation import in_words, side_in_words, standing_still
+from mdp.search.search import Progress, cut_by_plan, decompose
+from profiles.errors import MeshError
+from profiles.profile import Profile
+
+PLAN_NAME = "plan.toml"
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """How far a search is: a sentence, and the planes of the best so far in the order of its cuts."""
+
+    text: str
+    planes: tuple[Plane, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Resting:
+    """An orientation in which a model rests: rows of its rotation, how to say it, and what it leaves hanging."""
+
+    rotation: tuple[tuple[float, ...], ...]
+    words: str
+    overhang_mm2: float
+    height_mm: float
+
+
+@dataclass(frozen=True)
+class Files:
+    """What is saved: the plan's text, and the folder of `decompose -o` as a zip."""
+
+    plan: str
+    folder: bytes
+
+
+Tell = Callable[[Any], None]  # what a task says meanwhile
+
+
+def read_model(tell: Tell, path: Path, name: str, profile: Profile) -> Model:
+    """The model of a file, with the sentences of the command line; a file from the page has the name it had there."""
+    try:
+        mesh, notes = read_mesh(path, profile.process.scale, profile.process.rotate_deg)
+    except MeshError as error:
+        raise MeshError(str(error).replace(str(path), name)) from None
+    return Model(name, path, mesh, notes)
+
+
+def rank_resting(tell: Tell, mesh: Mesh, profile: Profile) -> tuple[Resting, ...]:
+    """The orientations in which a model rests, the most promising first."""
+    compilers.wait_for(compilers.JUDGE)
+    return tuple(
+        Resting(
+            tuple(tuple(float(value) for value in row) for row in each.rotation),
+            side_in_words(each) or in_words(each),
+            each.risky_mm2,
+            each.height_mm,
+        )
+        for each in distinct_orientations(mesh, profile)
+    )
+
+
+def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[str, ...]]:
+    """The front of a search as `decompose` makes it, and its notes."""
+
+    def show(progress: Progress) -> None:
+        if progress.stage == 0:
+            compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text)))
+            return
+        left = f"{100 * progress.best_share:.1f} % of the risky area left"
+        tell(Searched(f"stage {progress.stage}, {progress.beam} in the beam, {left}", progress.planes))
+
+    mesh, name = _standing(bench)
+    compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
+    zones = PlanFile("", zones=bench.zones)
+    found = decompose(mesh, name, bench.profile, on_stage=show, by_hand=zones, price=pricing(bench.profile.of_all_parts))
+    return found.front, found.notes
+
+
+def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
+    """The front of a plan for the model on the bench, measured; PlanError where it cannot be cut."""
+    return _cut(bench, plan, prices=True).front
+
+
+def make_files(tell: Tell, bench: Bench) -> Files:
+    """The files of the parts as the bench has them."""
+    made = _cut(bench, plan_of_bench(bench, PLAN_NAME))
+    plan = plan_text(plan_of(made, bench.zones, bench.turned, bench.profile.parts))
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        parts = [(part_file(part.index), stl(part.mesh)) for part in made.parts]
+        for name, text in (*parts, (FOLDER_FILES[0], threemf(made)), (PLAN_NAME, plan.encode())):
+            entry = zipfile.ZipInfo(name, ZIP_DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, text)
+    return Files(plan, content.getvalue())
+
+
+def _cut(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
+    mesh, name = _standing(bench, plan)
+    compilers.wait_for(compilers.JUDGE)
+    return cut_by_plan(mesh, name, bench.profile, plan, price=pricing(bench.profile.of_all_parts) if prices else None)
+
+
+def _standing(bench: Bench, plan: PlanFile | None = None) -> tuple[Mesh, str]:
+    """The mesh as it is cut, turned as the plan says or else as the bench does, and the model's name."""
+    assert bench.model is not None
+    turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
+    mesh = bench.model.mesh
+    return (mesh if turned is None else standing_still(mesh, turned)), bench.model.name

@@ -1,0 +1,71 @@
+"""Worker: a process that does one task after another, as its parent asks over a pipe; it ends with its parent.
+
+A task cannot be interrupted in compiled code, so it is stopped by ending the process with all that it has started.
+"""
+
+import os
+import pickle
+import signal
+import struct
+import sys
+from contextlib import suppress
+from queue import SimpleQueue
+from threading import Thread
+from typing import Any, BinaryIO
+
+LENGTH = struct.Struct("<Q")
+TELLS, DONE, REFUSED = "tells", "done", "refused"
+
+
+def frame(value: Any) -> bytes:
+    """A value as it goes through the pipe."""
+    content = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
+    return LENGTH.pack(len(content)) + content
+
+
+def main() -> None:
+    """Do what is asked until the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent speaks, and ends this process
+    asked, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    with open(os.devnull, "r+b") as nowhere:  # what work prints must not reach the pipe
+        os.dup2(nowhere.fileno(), 0)
+        os.dup2(nowhere.fileno(), 1)
+    waiting: SimpleQueue[Any] = SimpleQueue()
+    Thread(target=_listen, args=(asked, waiting), daemon=True).start()
+    from machine.app.workbench import tasks
+
+    while True:
+        name, given = waiting.get()
+        _answer(answers, _result(getattr(tasks, name), given, answers))
+
+
+def _result(task: Any, given: tuple[Any, ...], answers: BinaryIO) -> tuple[str, Any]:
+    from machine.app.crash import log_bug
+    from profiles.errors import UserError
+
+    try:
+        return DONE, task(lambda value: _answer(answers, (TELLS, value)), *given)
+    except UserError as error:
+        return REFUSED, str(error)
+    except Exception as error:  # noqa: BLE001 - a bug becomes a sentence and a log file, and the workbench goes on
+        log = log_bug(error, sys.argv)
+        return REFUSED, f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"
+
+
+def _answer(answers: BinaryIO, value: Any) -> None:
+    answers.write(frame(value))
+    answers.flush()
+
+
+def _listen(asked: BinaryIO, waiting: "SimpleQueue[Any]") -> None:
+    """In a thread: take what the parent asks; when it is gone, end this process and all that it has started."""
+    with suppress(OSError):
+        while len(head := asked.read(LENGTH.size)) == LENGTH.size:
+            waiting.put(pickle.loads(asked.read(*LENGTH.unpack(head))))
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)  # it leads a group of its own
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    main()

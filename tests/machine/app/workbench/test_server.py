@@ -1,0 +1,163 @@
+"""The workbench as a process: whom it answers, from a file to its plan and parts, and that it ends with all it started."""
+
+import io
+import signal
+import socket
+import time
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from websockets.exceptions import InvalidStatus
+
+from machine.app.cli import main
+from mdp.save import stl
+from tests.machine.workbench import QUICK, Running, is_there, workbench
+from tests.shapes import tee
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Running]:
+    with workbench(*QUICK) as running:
+        yield running
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_page_is_below_the_token_alone_and_keeps_to_itself(bench: Running) -> None:
+    assert bench.ask("")[0] == 200
+    assert bench.ask("/")[0] == 404
+    assert bench.ask("/nobody/line")[0] == 404
+    assert bench.ask("", Host="evil.example")[0] == 403
+    assert bench.ask("", Origin="http://evil.example")[0] == 403
+
+
+def test_a_file_from_another_origin_is_not_taken(bench: Running) -> None:
+    assert bench.ask("file?name=a.stl", "POST", b"solid")[0] == 403
+    assert bench.ask("file?name=a.stl", "POST", b"solid", Origin="http://evil.example")[0] == 403
+
+
+@pytest.mark.parametrize(("origin", "place"), [("http://evil.example", None), (None, "/nobody/")])
+def test_a_line_from_another_origin_or_without_the_token_is_refused(
+    bench: Running, origin: str | None, place: str | None
+) -> None:
+    with pytest.raises(InvalidStatus) as refused, bench.line(origin, place):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+def test_a_broken_model_is_told_as_the_command_line_tells_it(
+    bench: Running, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken = folder / "broken.stl"
+    broken.write_bytes(stl(tee())[:400])
+    assert main(["decompose", "broken.stl"]) == 1
+    sentence = capsys.readouterr().err.splitlines()[-1].removeprefix("tiltprint: ")
+    with bench.line() as page:
+        status, _ = bench.send(broken)
+        assert status == 422
+        assert page.until(lambda state: state["problem"])["problem"] == sentence
+
+
+def test_a_command_that_is_none_is_told_and_ends_nothing(bench: Running) -> None:
+    with bench.line() as page:
+        for text in ("", "[]", "{", '"undo"', "[" * 50_000):
+            page.say(text)
+        page.until(lambda state: "no command of the workbench" in state["problem"])
+        page.do("demo", name="/etc/passwd")
+        page.until(lambda state: state["problem"].startswith("/etc/passwd: only the models that ship"))
+
+
+def test_a_model_becomes_the_plan_and_the_parts_of_the_command_line(bench: Running, folder: Path) -> None:
+    model = folder / "tee.stl"
+    model.write_bytes(stl(tee()))
+    assert main(["decompose", "tee.stl", *QUICK, "-o", "parts"]) == 0
+    with bench.line() as page:
+        assert bench.send(model)[0] == 200
+        page.until(lambda state: state["model"] and state["model"]["name"] == "tee.stl")
+        page.do("search")
+        page.until(lambda state: state["search"])
+        found = page.until(lambda state: state["front"] and not state["search"])
+        assert found["parts"] == found["recommended"]
+    assert bench.ask("plan.toml")[1] == (folder / "parts" / "plan.toml").read_bytes()
+    made = zipfile.ZipFile(io.BytesIO(bench.ask("parts.zip")[1]))
+    assert sorted(made.namelist()) == sorted(path.name for path in (folder / "parts").iterdir() if path.suffix != ".json")
+    assert all(made.read(name) == (folder / "parts" / name).read_bytes() for name in made.namelist())
+    with bench.line() as page:
+        page.do("take", parts=1)
+        page.until(lambda state: state["parts"] == 1)
+        page.do("turn", axis="x", deg=90)
+        page.until(lambda state: not state["front"])
+        page.do("undo")
+        page.do("undo")
+        assert page.until(lambda state: state["parts"] == found["parts"])["front"] == found["front"]
+
+
+def test_a_plan_that_is_dropped_cuts_the_model_and_one_of_another_model_is_refused(bench: Running, folder: Path) -> None:
+    (folder / "other.stl").write_bytes(stl(tee(8.0)))
+    assert main(["decompose", "other.stl", *QUICK, "--plan", "plan.toml"]) == 0
+    (folder / "tee.stl").write_bytes(stl(tee()))
+    with bench.line() as page:
+        bench.send(folder / "tee.stl")
+        assert bench.send(folder / "plan.toml")[0] == 422
+        assert "plan plan.toml was made of another model" in page.until(lambda state: state["problem"])["problem"]
+        bench.send(folder / "other.stl")
+        assert bench.send(folder / "plan.toml")[0] == 200
+        assert page.until(lambda state: state["parts"])["undo"] == "open plan.toml"
+    assert bench.ask("plan.toml")[1] == (folder / "plan.toml").read_bytes()
+
+
+def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:
+    deaf = []
+    for _ in range(50):
+        own = socket.create_connection(("127.0.0.1", bench.port))
+        own.sendall(
+            f"GET {bench.place}line HTTP/1.1\r\nHost: 127.0.0.1:{bench.port}\r\nOrigin: http://127.0.0.1:{bench.port}\r\n"
+            "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+        )
+        deaf.append(own)
+    with bench.line() as page:
+        began = time.monotonic()
+        for k in range(1000):
+            page.do("demo", name=f"{k}{'.' * 5000}")
+        page.until(lambda state: state["problem"].startswith("999."))
+        assert time.monotonic() - began < 10.0
+    for own in deaf:
+        own.close()
+
+
+def test_ctrl_c_ends_it_within_two_seconds_with_all_it_has_started_even_while_it_searches() -> None:
+    with workbench("demo:tree") as running:
+        with running.line() as page:
+            page.until(lambda state: state["model"])
+            page.do("search")
+            page.until(lambda state: state["search"])
+            started = running.children()
+            assert len(started) >= 2
+            running.process.send_signal(signal.SIGINT)
+            began = time.monotonic()
+            assert running.process.wait(10.0) == 0
+            assert time.monotonic() - began < 2.0
+        while any(map(is_there, started)):
+            assert time.monotonic() - began < 2.0
+
+
+def test_what_is_not_there_is_one_sentence(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert main(["edit", "--no-browser", "--port", str(port)]) == 1
+    assert f"--port {port} cannot be used: address already in use" in capsys.readouterr().err
+    (folder / "plan.toml").write_text('version = 1\nmodel = "gone.stl"\n')
+    for model, said in (
+        ("none.stl", "there is no such file"),
+        ("plan.toml", "gone.stl is not beside it"),
+        ("a.gcode", "is G-code"),
+    ):
+        assert main(["edit", "--no-browser", model]) == 1
+        assert said in capsys.readouterr().err

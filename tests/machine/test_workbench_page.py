@@ -1,0 +1,168 @@
+"""The workbench in a real browser: from a file to a saved plan that the command line cuts to the same parts."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from machine.app.cli import main
+from mdp.save import stl
+from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.workbench import QUICK, Running, workbench
+from tests.shapes import ball, tee
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
+
+WINDOW = (900, 560)
+FOUND = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"
+IDLE = "document.documentElement.dataset.busy === ''"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with Browser(WINDOW) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Running]:
+    with workbench(*QUICK) as running:
+        yield running
+
+
+def choose(browser: Browser, name: str, content: bytes) -> None:
+    """A file chosen as a person does, and shown."""
+    browser.value(
+        f"""{{ const bytes = Uint8Array.from({list(content)}), chosen = new DataTransfer();
+        chosen.items.add(new File([bytes], {json.dumps(name)}));
+        document.documentElement.dataset.shown = '';
+        $('file').files = chosen.files;
+        $('file').dispatchEvent(new Event('change')); }}"""
+    )
+
+
+def open_model(browser: Browser, bench: Running, name: str, content: bytes) -> None:
+    browser.open(bench.address)
+    browser.wait(f"document.documentElement.dataset.line === 'open' && {IDLE}")
+    choose(browser, name, content)
+    browser.wait(f"document.documentElement.dataset.shown && $('title').textContent === {json.dumps(name)} && {IDLE}")
+
+
+def saved(browser: Browser, button: str) -> str:
+    """The text that a button saves."""
+    browser.value(
+        "{ const make = URL.createObjectURL; URL.createObjectURL = (blob) => { window.saved = blob; return make(blob); }; }"
+    )
+    browser.click(button)
+    browser.wait("window.saved")
+    text: str = browser.value("window.saved.text()")
+    return text
+
+
+def area(browser: Browser) -> float:
+    return float(browser.value("$('overhang').textContent").removesuffix(" mm²"))
+
+
+def drag_slider(browser: Browser, slider: str, value: int, event: str) -> None:
+    browser.value(f"{{ $('{slider}').value = {value}; $('{slider}').dispatchEvent(new Event('{event}')); }}")
+
+
+def test_a_file_becomes_a_plan_that_the_command_line_cuts_to_the_same_parts(
+    browser: Browser, bench: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("tee.stl").write_bytes(stl(tee()))
+    open_model(browser, bench, "tee.stl", Path("tee.stl").read_bytes())
+    assert "40.0 × 10.0 × 40.0 mm" in browser.value("$('model-told').textContent")
+    browser.click("#tab-parts")
+    browser.click("#find")
+    browser.wait(FOUND)
+    parts = int(browser.value("$('front-told').querySelector('dd').textContent").split()[0])
+    assert "recommended" in browser.value("$('front-told').textContent")
+    Path("plan.toml").write_text(saved(browser, "#save-plan"))
+    assert main(["decompose", "tee.stl", *QUICK, "--plan", "plan.toml", "--json", "by-plan.json"]) == 0
+    assert main(["decompose", "tee.stl", *QUICK, "--json", "searched.json"]) == 0
+    by_plan, searched = (json.loads(Path(name).read_text())["parts"] for name in ("by-plan.json", "searched.json"))
+    assert (len(by_plan), by_plan) == (parts, searched)
+    assert browser.complaints == []
+    assert all(address.startswith((bench.address, "data:", "blob:", "ws:")) for address in browser.requests)
+
+
+def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_let_go(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    browser.click("#tab-parts")
+    browser.click("#find")
+    browser.wait(FOUND)
+    assert browser.value("$('legend').textContent") != ""
+    drag_slider(browser, "front", 0, "input")
+    assert browser.value("$('front-told').querySelector('dd').textContent") == "1"
+    assert browser.value("$('legend').querySelectorAll('span.swatch').length") == 1
+    drag_slider(browser, "front", 0, "change")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: take another number of parts'")
+    browser.key("1")  # a view, not a step
+    browser.click("#undo")
+    browser.wait("$('front').value === $('front').max && !$('redo').disabled")
+
+
+def test_red_follows_the_model_while_it_turns_and_the_server_says_the_same(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "ball.stl", stl(ball(30.0, 320)))  # 51,200 faces
+    browser.click("#tab-model")
+    before = area(browser)
+    drag_slider(browser, "turn-x", 90, "input")
+    live = area(browser)
+    took = [float(browser.value("document.documentElement.dataset.liveMs"))]
+    for angle in range(91, 101):
+        drag_slider(browser, "turn-x", angle, "input")
+        took.append(float(browser.value("document.documentElement.dataset.liveMs")))
+    assert np.median(took) < 50.0
+    drag_slider(browser, "turn-x", 90, "input")
+    drag_slider(browser, "turn-x", 90, "change")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay the model down' && $('turn-x').value === '0'")
+    assert area(browser) == pytest.approx(live, abs=0.2)
+    assert before > 500.0
+
+
+def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    browser.click("#tab-model")
+    browser.click("[data-view=top]")
+    browser.click("#fit")
+    browser.click("#lay")
+    browser.press(
+        *browser.value(
+            "(() => { const b = $('canvas').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
+        )
+    )
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay a face down'")
+    assert area(browser) == 0.0  # upside down a T needs no support
+    assert browser.value("$('lay').getAttribute('aria-pressed')") == "false"
+
+
+def test_a_broken_model_is_told_and_the_one_before_it_stays(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    choose(browser, "<img onerror=alert(1)>.stl", stl(tee())[:400])
+    browser.wait("!$('problem').hidden")
+    told = "is cut short: it holds 6 of the 28 facets that its header announces"
+    assert browser.value("$('problem').textContent") == f"<img onerror=alert(1)>.stl: {told}"
+    assert browser.value("$('title').textContent") == "tee.stl"
+
+
+def test_when_the_workbench_ends_the_page_says_so(browser: Browser) -> None:
+    with workbench() as running:
+        browser.open(running.address)
+        browser.wait("document.documentElement.dataset.line === 'open'")
+    browser.wait("document.documentElement.dataset.line === 'lost'")
+    assert "line to tiltprint is lost" in browser.value("$('notice').textContent")
+
+
+def test_without_webgl_the_numbers_and_the_front_are_there(bench: Running) -> None:
+    with Browser(WINDOW, flags=("--disable-3d-apis",)) as blind:
+        open_model(blind, bench, "tee.stl", stl(tee()))
+        assert blind.value("document.documentElement.dataset.state") == "failed"
+        assert area(blind) > 0.0
+        blind.click("#tab-parts")
+        blind.click("#find")
+        blind.wait(FOUND)
+        assert "area to support" in blind.value("$('front-told').textContent")

@@ -1,0 +1,99 @@
+"""A workbench that runs: `tiltprint edit` as a process, its address, and a page of it without a browser."""
+
+import http.client
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from websockets.sync.client import ClientConnection, connect
+
+PATIENCE_S = 120.0
+QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2")
+
+
+class Running:
+    """address: as it was told; port, place: its parts."""
+
+    def __init__(self, process: "subprocess.Popen[str]", address: str) -> None:
+        self.process, self.address = process, address
+        self.port, self.place = urlsplit(address).port, urlsplit(address).path
+
+    def ask(self, path: str, method: str = "GET", body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
+        """Status and content of an answer; a path without a leading stroke lies below the token."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
+        connection.request(method, path if path.startswith("/") else self.place + path, body, headers)
+        answer = connection.getresponse()
+        content = answer.read()
+        connection.close()
+        return answer.status, content
+
+    def send(self, file: Path) -> tuple[int, bytes]:
+        """A file as a page of this server sends it."""
+        return self.ask(f"file?name={file.name}", "POST", file.read_bytes(), Origin=f"http://127.0.0.1:{self.port}")
+
+    @contextmanager
+    def line(self, origin: str | None = None, place: str | None = None) -> Iterator["Page"]:
+        """A page's line; origin: of the page, None: one of this server."""
+        address = f"ws://127.0.0.1:{self.port}{self.place if place is None else place}line"
+        with connect(address, origin=origin or f"http://127.0.0.1:{self.port}", max_size=None, proxy=None) as socket:
+            yield Page(socket)
+
+    def children(self) -> list[int]:
+        """The processes that it has started and that are still there."""
+        listed = subprocess.run(["ps", "-eo", "pid,ppid"], capture_output=True, text=True, check=True).stdout.split()[2:]
+        return [int(pid) for pid, parent in zip(listed[::2], listed[1::2], strict=True) if int(parent) == self.process.pid]
+
+
+class Page:
+    """What a page hears and says."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self._socket = socket
+        self.state: dict[str, Any] = json.loads(socket.recv(PATIENCE_S))
+
+    def do(self, command: str, **given: Any) -> None:
+        self.say(json.dumps({"do": command, **given}))
+
+    def say(self, text: str) -> None:
+        self._socket.send(text)
+
+    def until(self, condition: Any) -> dict[str, Any]:
+        """The first state that fulfils a condition."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not condition(self.state):
+            self.state = json.loads(self._socket.recv(max(0.0, end_s - time.monotonic())))
+        return self.state
+
+
+@contextmanager
+def workbench(*arguments: str) -> Iterator[Running]:
+    """`tiltprint edit` with these arguments, ended by Ctrl-C."""
+    command = [sys.executable, "-m", "machine.app.cli", "edit", "--no-browser", *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        assert process.stdout is not None
+        yield Running(process, process.stdout.readline().strip())
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        try:
+            process.wait(PATIENCE_S)
+        finally:
+            process.kill()
+
+
+def is_there(pid: int) -> bool:
+    """Whether a process still runs."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
