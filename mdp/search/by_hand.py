@@ -60,12 +60,18 @@ def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
         planned, label = plan.parts[number - 2], f"plan {plan.name}: part {number}"
         _check_offset(problem, planned, label)
         plane = planned.plane or _complete(problem, node, planned, label)
-        why = _refusal(problem, node, plane)
-        following = problem.cut(node, plane) if why is None else None
-        if following is None:
-            raise PlanError(f"{label} cannot be cut off: {why or _find_hindrance(problem, node, plane)}")
+        following = cut_or_refuse(problem, node, plane)
+        if isinstance(following, str):
+            raise PlanError(f"{label} cannot be cut off: {following}")
         node = following
     return node
+
+
+def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | str:
+    """The node after a person's cut, or the reason why it cannot be made."""
+    why = _refusal(problem, node, plane)
+    following = problem.cut(node, plane) if why is None else None
+    return following if following is not None else why or _find_hindrance(problem, node, plane)
 
 
 def _check_offset(problem: Problem, planned: PlannedPart, label: str) -> None:

@@ -140,6 +140,31 @@ def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: 
     assert browser.value("$('lay').getAttribute('aria-pressed')") == "false"
 
 
+def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_back(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    browser.click("#tab-parts")
+    browser.click("[data-view=front]")
+    browser.click("#fit")
+    browser.click("#add")
+    browser.wait("!$('plane').hidden && !$('handles').hidden && $('plane-told').textContent")
+    assert browser.value("$('plane-offset').value") == "20.00"
+    x, y = browser.value(
+        "(() => { const b = $('hand-along').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
+    )
+    browser.drag((x, y), (x, y - 20))
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: move a plane'")
+    moved = float(browser.value("$('plane-offset').value"))
+    assert 20.0 < moved < 30.0
+    assert float(browser.value("document.documentElement.dataset.triedMs")) > 0
+    drag_slider(browser, "plane-offset", 70, "change")
+    browser.wait("!$('problem').hidden")
+    assert "misses the model" in browser.value("$('problem').textContent")
+    browser.wait(f"Math.abs(Number($('plane-offset').value) - {moved}) < 0.01 && !$('handles').hidden")
+    browser.value("$('hand-tilt-a').focus()")
+    browser.key("ArrowUp")
+    browser.wait("Math.abs(Number($('plane-tilt').value) - 1) < 0.11")
+
+
 def test_a_broken_model_is_told_and_the_one_before_it_stays(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "tee.stl", stl(tee()))
     choose(browser, "<img onerror=alert(1)>.stl", stl(tee())[:400])

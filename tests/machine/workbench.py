@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 from websockets.sync.client import ClientConnection, connect
 
-PATIENCE_S = 120.0
+PATIENCE_S = 60.0
 QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2")
 
 

@@ -34,7 +34,7 @@ class Bench:
 
     rotation: rows of what turns the model as it is read. cuts: the base planes of the parts from the second on, in print order;
     None: nobody has cut it yet. rows: the front that the cuts were chosen from, ever more parts; recommended: how many parts the
-    search would take, 0: no search has been.
+    search would take, 0: no search has been. locked: those of the cuts that a search begins with and nobody moves.
     """
 
     profile: Profile
@@ -44,6 +44,7 @@ class Bench:
     zones: Zones = NO_ZONES
     rows: tuple[FrontRow, ...] = ()
     recommended: int = 0
+    locked: frozenset[PlannedPart] = frozenset()
 
     @property
     def parts(self) -> int:
@@ -103,7 +104,12 @@ def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
     """The front of a search, cut by the row that it has chosen."""
     chosen = next(row for row in rows if row.chosen)
-    return replace(bench, rows=tuple(rows), cuts=parts_of(chosen), recommended=chosen.parts)
+    return with_cuts(replace(bench, rows=tuple(rows), recommended=chosen.parts), parts_of(chosen))
+
+
+def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:
+    """Other planes; what is locked of them stays so."""
+    return replace(bench, cuts=cuts, locked=bench.locked & frozenset(cuts))
 
 
 def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: Profile) -> Bench:
@@ -115,7 +121,7 @@ def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: P
 def with_parts(bench: Bench, count: int) -> Bench:
     """The row of the front with so many parts taken. Raises KeyError where there is none."""
     rows = {row.parts: row for row in bench.rows}
-    return replace(bench, cuts=parts_of(rows[count]))
+    return with_cuts(bench, parts_of(rows[count]))
 
 
 def parts_of(row: FrontRow) -> tuple[PlannedPart, ...]:
@@ -129,6 +135,12 @@ def plan_of_bench(bench: Bench, name: str) -> PlanFile:
     orientation = None if bench.rotation == STANDING else bench.rotation
     model = "" if bench.model is None else bench.model.name
     return PlanFile(name, model, "", orientation, bench.cuts or (), bench.zones, rows, tuple(bench.profile.parts))
+
+
+def locked_plan(bench: Bench) -> PlanFile:
+    """What a search begins with: the locked planes, cut first, and the zones."""
+    parts = tuple(part for part in bench.cuts or () if part in bench.locked)
+    return PlanFile("the locked planes", parts=parts, zones=bench.zones)
 
 
 def overhang_mm2(bench: Bench) -> float:

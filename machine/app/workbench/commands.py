@@ -1,12 +1,14 @@
 """Commands: what a page asks for, checked and turned into a new bench. Nothing here reads, writes or waits."""
 
 from collections.abc import Callable
-from math import isfinite, radians
-from typing import Any, TypeGuard
+from dataclasses import replace
+from math import radians
+from typing import Any
 
 import numpy as np
 
 from machine.app.workbench.bench import Bench, History, Model, laid_down, with_parts, with_rotation
+from machine.app.workbench.planes import is_number, planned_part
 from mdp.mesh import Floats
 from mdp.pose import about
 from profiles.errors import PlanError
@@ -38,7 +40,7 @@ def _turn(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
     axis, angle_deg = asked.get("axis"), asked.get("deg")
     if axis not in AXES:
         raise PlanError(f"axis is {axis!r}: {', '.join(AXES)} are allowed")
-    if not _is_number(angle_deg) or abs(angle_deg) > 360.0:
+    if not is_number(angle_deg) or abs(angle_deg) > 360.0:
         raise PlanError(f"deg is {angle_deg!r}: a number from -360 to 360 is allowed")
     turned = about(np.eye(3)[AXES[axis]], radians(angle_deg)) @ np.array(bench.rotation)
     return with_rotation(bench, _rounded(turned))
@@ -48,7 +50,7 @@ def _stand(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
     """Turn the model as the rows of `rotation` say."""
     given = asked.get("rotation")
     rows = given if isinstance(given, list) and len(given) == 3 else []
-    if not rows or not all(isinstance(row, list) and len(row) == 3 and all(map(_is_number, row)) for row in rows):
+    if not rows or not all(isinstance(row, list) and len(row) == 3 and all(map(is_number, row)) for row in rows):
         raise PlanError("rotation: three rows of three numbers are expected")
     matrix = np.array(rows, dtype=np.float64)
     if not np.allclose(matrix @ matrix.T, np.eye(3), atol=ROTATION_ERROR) or np.linalg.det(matrix) < 0.0:
@@ -75,7 +77,15 @@ def _take(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
         raise PlanError(
             f"parts is {parts!r}: {', '.join(map(str, known)) or 'nothing, for no parts have been found,'} is allowed"
         )
-    return bench if parts == bench.parts else with_parts(bench, parts)
+    taken = with_parts(bench, parts)
+    return bench if taken.cuts == bench.cuts else taken
+
+
+def _lock(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
+    """Lock the plane of a part, or unlock it."""
+    part = planned_part(bench, asked.get("part"))
+    locked = bench.locked | {part} if asked.get("locked") is True else bench.locked - {part}
+    return bench if locked == bench.locked else replace(bench, locked=locked)
 
 
 COMMANDS: dict[str, tuple[str, Callable[[Bench, Model, dict[str, Any]], Bench]]] = {
@@ -83,6 +93,7 @@ COMMANDS: dict[str, tuple[str, Callable[[Bench, Model, dict[str, Any]], Bench]]]
     "stand": ("lay the model down", _stand),
     "lay": ("lay a face down", _lay),
     "take": ("take another number of parts", _take),
+    "lock": ("lock a plane", _lock),
 }
 
 
@@ -91,7 +102,3 @@ def _rounded(matrix: Floats) -> list[list[float]]:
     left, _, right = np.linalg.svd(matrix)
     rows: list[list[float]] = (np.round(left @ right, TURN_DIGITS) + 0.0).tolist()
     return rows
-
-
-def _is_number(value: Any) -> TypeGuard[int | float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -13,14 +13,16 @@ from typing import Any
 
 from machine.app.crash import log_bug
 from machine.app.pipeline.given_plan import with_plan_settings
-from machine.app.workbench.bench import Bench, History, Model, Step, parts_of, with_front, with_model, with_plan
+from machine.app.workbench.bench import Bench, History, Model, Step, parts_of, with_cuts, with_front, with_model, with_plan
 from machine.app.workbench.commands import obey
 from machine.app.workbench.lane import Lane
+from machine.app.workbench.planes import EDITS, Cuts, edited
 from machine.app.workbench.tasks import Files, Resting, Searched
 from mdp.decomposition import FrontRow
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.read import locate
+from mdp.search.trial import Trial
 from profiles.errors import PlanError, UserError
 from profiles.profile import Profile
 
@@ -46,9 +48,14 @@ class Session:
         self.busy = ""  # what the page waits for
         self.search: Search | None = None
         self.resting: tuple[Model, tuple[Resting, ...]] | None = None
+        self.trial: tuple[Bench, Cuts, Trial] | None = None  # of planes on this bench
         self.version = 0
         self._changed = asyncio.Event()
-        self._quick, self._long = Lane(), Lane()
+        self._quick, self._long, self._hand = Lane(), Lane(), Lane()
+        self._hands = asyncio.Lock()
+        self._wanted: Cuts | None = None  # tried next, whatever else was wanted meanwhile
+        self._known: tuple[object, ...] = ()  # what the numbered bench of the trials is made of
+        self._known_number = 0
         self._folder = tempfile.TemporaryDirectory(prefix="tiltprint-")
         self._numbers = itertools.count(1)
         self._tasks: set[asyncio.Task[None]] = set()
@@ -63,8 +70,8 @@ class Session:
         """End all work; its files go."""
         for task in self._tasks:
             task.cancel()
-        self._quick.stop()
-        self._long.stop()
+        for lane in (self._quick, self._long, self._hand):
+            lane.stop()
         self._folder.cleanup()
 
     def tell(self) -> None:
@@ -146,6 +153,10 @@ class Session:
                 self._search()
             case "stop":
                 self._stop()
+            case "try":
+                self._try(edited(self.bench, {**asked, "do": "move"})[1])
+            case name if name in EDITS:
+                self.start(self._edit(*edited(self.bench, asked)))
             case "demo":
                 self.start(self.open_demo(str(asked.get("name"))))
             case _:
@@ -207,6 +218,41 @@ class Session:
             rows = await self._quick.run("measure_plan", search.bench, plan)
             self._do("stop the search", with_front(search.bench, rows))
 
+    def _try(self, cuts: Cuts) -> None:
+        """Have planes tried, the newest ones as soon as the ones before are done."""
+        waiting, self._wanted = self._wanted is not None, cuts
+        if not waiting:
+            self.start(self._try_newest())
+
+    async def _try_newest(self) -> None:
+        async with self._hands:
+            cuts, self._wanted = self._wanted, None
+            if cuts is not None and self.bench.model is not None:
+                bench = self.bench
+                self.trial = bench, cuts, await self._attempt(bench, cuts)
+
+    async def _attempt(self, bench: Bench, cuts: Cuts) -> Trial:
+        """The figures of planes; the bench goes to the process once, not with every move of a hand."""
+        made_of = (bench.model, bench.rotation, bench.profile, bench.zones)
+        if any(one is not other for one, other in zip(made_of, self._known or (None,) * 4, strict=True)):
+            self._known, self._known_number = made_of, self._known_number + 1
+        trial: Trial | None = await self._hand.run("try_cuts", self._known_number, None, cuts)
+        if trial is None:
+            trial = await self._hand.run("try_cuts", self._known_number, bench, cuts)
+        assert trial is not None
+        return trial
+
+    async def _edit(self, word: str, cuts: Cuts) -> None:
+        """Take planes that can be cut. Raises PlanError with the reason for those that cannot be."""
+        bench = self.bench
+        async with self._hands:
+            trial = await self._attempt(bench, cuts)
+        if trial.refused:
+            raise PlanError(f"part {trial.refused_part} cannot be cut off: {trial.refused}")
+        if self.bench is bench:
+            self.trial = bench, cuts, trial
+            self._do(word, with_cuts(bench, cuts))
+
     async def _rank(self, model: Model) -> None:
         resting = await self._quick.run("rank_resting", model.mesh, self.bench.profile.of_all_parts)
         self.resting = model, resting
@@ -218,6 +264,8 @@ class Session:
     def _become(self, history: History) -> None:
         """Go on with another history; a search for a model that is not there any more, or lies otherwise, ends."""
         self.history = history
+        if self.bench.cuts is not None and (self.trial is None or self.trial[1] != self.bench.cuts):
+            self._try(self.bench.cuts)
         search = self.search
         if search is not None and (search.bench.model, search.bench.rotation) != (self.bench.model, self.bench.rotation):
             self.search = None

@@ -1,11 +1,13 @@
 """Snapshot: what a page is told of the session, as JSON; the model's triangles as bytes of their own."""
 
+from dataclasses import asdict
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from machine.app.workbench.bench import Bench, Model, overhang_mm2
+from machine.app.workbench.planes import Cuts
 from machine.app.workbench.session import Session
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
@@ -40,7 +42,9 @@ def snapshot(session: Session) -> dict[str, Any]:
         "front": [_row(row) for row in bench.rows],
         "parts": bench.parts,
         "recommended": bench.recommended,
-        "cuts": [_plane(part.plane) for part in bench.cuts or () if part.plane is not None],
+        "cuts": _cuts(bench.cuts or ()),
+        "locked": [part in bench.locked for part in bench.cuts or ()],
+        "trial": _trial(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.notes if bench.rows else (),
         "machine": machine_bodies(bench.profile.machine, known=True),
@@ -84,6 +88,18 @@ def _row(row: FrontRow) -> dict[str, Any]:
         "reason": row.reason,
         "planes": [_plane(plane) for plane in reversed(row.planes)],
     }
+
+
+def _trial(session: Session) -> dict[str, Any] | None:
+    """The figures of the planes that were tried last, or why they cannot be cut."""
+    if session.trial is None or session.trial[0].model is not session.bench.model:
+        return None
+    _, cuts, trial = session.trial
+    return {"cuts": _cuts(cuts), **asdict(trial)}
+
+
+def _cuts(cuts: Cuts) -> list[dict[str, Any]]:
+    return [_plane(part.plane) for part in cuts if part.plane is not None]
 
 
 def _plane(plane: Plane) -> dict[str, Any]:

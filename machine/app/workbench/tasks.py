@@ -11,17 +11,19 @@ import numpy as np
 
 from machine.app.pipeline import compilers
 from machine.app.pipeline.pricing import pricing
-from machine.app.workbench.bench import Bench, Model, plan_of_bench
+from machine.app.workbench.bench import Bench, Model, locked_plan, plan_of_bench
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, plan_of
+from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
 from mdp.plans.writing import plan_text
 from mdp.read import read_mesh
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
 from mdp.search.laying import distinct_orientations
 from mdp.search.orientation import in_words, side_in_words, standing_still
+from mdp.search.problem import Problem
 from mdp.search.search import Progress, cut_by_plan, decompose
+from mdp.search.trial import Trial, Trials
 from profiles.errors import MeshError
 from profiles.profile import Profile
 
@@ -93,14 +95,28 @@ def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[st
 
     mesh, name = _standing(bench)
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
-    zones = PlanFile("", zones=bench.zones)
-    found = decompose(mesh, name, bench.profile, on_stage=show, by_hand=zones, price=pricing(bench.profile.of_all_parts))
+    locked, price = locked_plan(bench), pricing(bench.profile.of_all_parts)
+    found = decompose(mesh, name, bench.profile, on_stage=show, by_hand=locked, price=price)
     return found.front, found.notes
 
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
     """The front of a plan for the model on the bench, measured; PlanError where it cannot be cut."""
     return _cut(bench, plan, prices=True).front
+
+
+_trials: tuple[int, Trials] | None = None  # of the bench that this process has heard of last
+
+
+def try_cuts(tell: Tell, number: int, bench: Bench | None, cuts: tuple[PlannedPart, ...]) -> Trial | None:
+    """Planes tried on a bench, which has a number so that it is sent once; None: this process has not heard of it, send it."""
+    global _trials
+    if bench is not None:
+        compilers.wait_for(compilers.JUDGE)
+        _trials = number, Trials(Problem(_standing(bench)[0], bench.profile, bench.zones))
+    if _trials is None or _trials[0] != number:
+        return None
+    return _trials[1].attempt([plane for part in cuts if (plane := part.plane) is not None])
 
 
 def make_files(tell: Tell, bench: Bench) -> Files:

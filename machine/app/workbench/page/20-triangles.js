@@ -60,6 +60,12 @@ function faceMet({ corners, count }, from, along) {
   return best;
 }
 
+/** Where a ray meets a face. */
+function placeMet({ corners, normals }, face, from, along) {
+  const normal = [0, 1, 2].map((k) => normals[3 * face + k]), [corner] = cornersAt(corners, face);
+  return add(from, scaled(along, dot(normal, sub(corner, from)) / dot(normal, along)));
+}
+
 /** The matrix that turns the model by rows of a rotation, sets it on z = 0 and centres it. */
 function standingBy(rows, vertices) {
   const [a, b, c] = rows, least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity];
@@ -84,4 +90,24 @@ function turnedFurther(rows, [x, y, z]) {
 /** A plane of the platform's frame in the frame of the model as it is read. */
 function planeBefore({ normal, offset_mm: offset }, matrix) {
   return { normal: turned(undone(matrix), normal), offset_mm: offset - dot(normal, matrix.slice(12, 15)) };
+}
+
+/** Middle and reach of what a plane cuts of the triangles, without what later planes have taken: {centre_mm, radius_mm}, or null.
+ * All in the frame of the platform, in which `matrix` puts the triangles. */
+function sectionOf({ corners, count }, plane, later, matrix) {
+  const heights = (place, { normal, offset_mm: offset }) => dot(normal, place) - offset, found = [];
+  const own = planeBefore(plane, matrix);
+  for (let face = 0; face < count; face++) {
+    const around = cornersAt(corners, face), high = around.map((place) => heights(place, own));
+    for (let k = 0; k < 3; k++) {
+      const n = (k + 1) % 3;
+      if (high[k] > 0 === high[n] > 0) continue;
+      const place = carried(matrix, around[k].map((x, axis) => mix(x, around[n][axis], high[k] / (high[k] - high[n]))));
+      if (later.every((other) => heights(place, other) <= 0)) found.push(place);
+    }
+  }
+  if (!found.length) return null;
+  const [least, most] = bounds(found.flat()), centre = scaled(add(least, most), 0.5);
+  const middle = sub(centre, scaled(plane.normal, heights(centre, plane)));
+  return { centre_mm: middle, radius_mm: Math.max(...found.map((place) => length(sub(place, middle))), 1) };
 }

@@ -2,11 +2,14 @@
 
 const MODEL_COLOUR = [176, 184, 194];
 
-/** {show(model, matrix), red(marks), cut(planes, colours), fit, ask, ray}: all drawn when the browser next draws. */
-function pictureOf(canvas, camera) {
+const PLANE_COLOUR = [30, 120, 190];
+
+/** {show(model), stand, red(marks), cut(planes, colours), plane, fit, ask, ray, placeOf}: drawn when the browser next draws;
+ * drawn() is called after that. */
+function pictureOf(canvas, camera, drawn) {
   const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
   if (!gl) return null;
-  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, machine: null, dark: false };
+  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, plane: null, machine: null, dark: false };
   let card = null, asked = false, count = 0;
   const build = () => {
     gl.enable(gl.DEPTH_TEST);
@@ -15,6 +18,7 @@ function pictureOf(canvas, camera) {
     card = { frame: frameOf(gl, 4), table: null, solid: null };
     table();
     solid();
+    plane();
   };
   const table = () => {
     if (!scene.machine) return;
@@ -40,8 +44,19 @@ function pictureOf(canvas, camera) {
     if (card.table && !below) paintPlate(flat);
     if (card.solid) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts });
     if (card.table && below) paintPlate(flat, { strength: 0.18 });
+    if (card.plane) {
+      card.plane.rim.draw(flat.toClip, { lift: 1e-4 });
+      card.plane.disc.draw(flat, { strength: 0.3 });
+    }
     card.frame.show();
+    scene.toClip = flat.toClip;
+    drawn();
     document.documentElement.dataset.drawn = ++count;
+  };
+  const plane = () => {
+    if (!scene.plane) return void (card.plane = null);
+    const { discs, rims } = planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR);
+    card.plane = { disc: solidOf(gl, discs), rim: linesOf(gl, rims) };
   };
   const paintPlate = (seen, look = {}) => {
     card.table.solid.draw(seen, look);
@@ -70,6 +85,16 @@ function pictureOf(canvas, camera) {
       scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;
       ask();
     },
+    /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
+    plane: (held) => { scene.plane = held; plane(); ask(); },
+    /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
+    placeOf: (place) => {
+      const [x, y, , w] = scene.toClip ? projected(scene.toClip, place) : [0, 0, 0, 0];
+      return w > 0 ? [(x + 1) / 2 * canvas.clientWidth, (1 - y) / 2 * canvas.clientHeight] : null;
+    },
+    carried: (place) => carried(scene.matrix, place),
+    box: () => scene.box,
+    matrix: () => scene.matrix,
     fit: () => {
       const corners = Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => scene.box[(i >> axis) & 1][axis]));
       camera.fit(corners, canvas.clientWidth / Math.max(canvas.clientHeight, 1));

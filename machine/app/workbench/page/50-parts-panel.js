@@ -17,16 +17,18 @@ function partsPanel(bench) {
       $("find").disabled = Boolean(search);
       $("stop").hidden = !search;
       $("search-told").textContent = search ? search.text : "";
-      document.body.classList.toggle("no-cuts", !front.length);
+      document.body.classList.toggle("no-cuts", !parts);
+      $("front-field").hidden = !front.length;
       if (!front.length) return;
-      const fresh = JSON.stringify([front, parts, recommended]) !== JSON.stringify([before?.front, before?.parts, before?.recommended]);
+      const told = ({ front, parts, recommended, cuts } = {}) => JSON.stringify([front, parts, recommended, cuts]);
+      const fresh = told(state) !== told(before || undefined);
       if (!fresh) return; // a finger may be on the slider
       const place = front.findIndex((row) => row.parts === parts);
       $("front").max = front.length - 1;
-      $("front").value = place;
+      $("front").value = Math.max(place, 0);
       $("front").disabled = front.length < 2;
       marksUnder(front, recommended);
-      tellRow(front[place], state);
+      tellRow(front[Math.max(place, 0)], state);
       listIn("front-notes", state.notes);
       $("recommended").hidden = !recommended;
     },
@@ -42,12 +44,13 @@ function marksUnder(front, recommended) {
   }));
 }
 
-function tellRow(row, { recommended }) {
+function tellRow(row, { recommended, parts, cuts }) {
+  const byHand = row.parts === parts && JSON.stringify(row.planes) !== JSON.stringify(cuts);
   const orDash = (value, told) => (value === null ? "–" : told(value)), best = row.parts === recommended;
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
-  $("recommended").disabled = best;
+  $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
-    ["parts", `${row.parts}${best ? ` (recommended: ${row.reason})` : ""}`], ["area to support", mm2(row.support_area_mm2)],
+    ["parts", `${row.parts}${byHand ? ", changed by hand since; this is how they were found" : best ? ` (recommended: ${row.reason})` : ""}`], ["area to support", mm2(row.support_area_mm2)],
     ["seams", `${row.seam_mm.toFixed(0)} mm`], ["takes about", orDash(row.time_s, roughly)],
     ["plastic", orDash(row.filament_mm, (long) => `${(long / 1000).toFixed(1)} m`)],
   ]);

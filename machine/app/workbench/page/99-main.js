@@ -1,8 +1,8 @@
 // Main: the line to the server, the picture and the panels put together.
 
 function main() {
-  const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
-  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, preview: null };
+  const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => bench.placeHandles()), root = document.documentElement;
+  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, placeHandles: () => {} };
   const dark = themeOf((now) => { if (picture && bench.state) picture.machine(bench.state.machine, now); });
   const line = lineTo((state) => follow(state), (gone) => {
     root.dataset.line = gone ? "lost" : "open";
@@ -31,14 +31,15 @@ function main() {
   /** Parts in their colours where they are looked at, else red faces; row: of the front, before it is taken. */
   bench.look = (row = null) => {
     if (!picture || !bench.triangles) return;
-    const { search, cuts, parts, colours } = bench.state;
-    const planes = row ? row.planes : search && search.planes.length ? search.planes : parts ? cuts : null;
+    const { search, parts, colours } = bench.state;
+    const planes = row ? row.planes : search && search.planes.length ? search.planes : parts ? bench.planes() : null;
     const cut = bench.tab === "parts" && planes;
     picture.cut(cut ? planes : null, colours);
     picture.red(cut ? null : bench.red);
     legend(cut ? colours.slice(0, planes.length + 1) : null);
   };
-  const panels = [modelPanel(bench), partsPanel(bench)];
+  bench.picture = picture;
+  const panels = [modelPanel(bench), partsPanel(bench), planesPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;
@@ -48,6 +49,7 @@ function main() {
     const key = state.model ? state.model.key : "";
     if (key !== bench.key) await fetchModel(key);
     else stand(state.rotation, false);
+    bench.showPlane();
     if (bench.state.version === state.version) root.dataset.version = state.version;
   };
   const fetchModel = async (key) => {
@@ -63,7 +65,7 @@ function main() {
     if (picture) picture.fit();
     root.dataset.shown = key;
   };
-  tabsOf((tab) => { bench.tab = tab; bench.look(); });
+  tabsOf((tab) => { bench.tab = tab; bench.look(); bench.showPlane(); });
   $("undo").addEventListener("click", () => bench.send({ do: "undo" }));
   $("redo").addEventListener("click", () => bench.send({ do: "redo" }));
   if (picture) {
@@ -78,13 +80,16 @@ function main() {
   }
 }
 
-/** A click on the model: the face is laid down when that was asked for. */
+/** A click on the model: the face is laid down or the plane takes its place when that was asked for; else a part is chosen. */
 function press(event, bench, picture) {
-  if (!bench.laying || !bench.triangles) return;
-  const face = faceMet(bench.triangles, ...picture.ray(event));
+  if (!bench.triangles) return;
+  const [from, along] = picture.ray(event), face = faceMet(bench.triangles, from, along);
   if (face < 0) return;
-  bench.lay(false);
-  bench.send({ do: "lay", face });
+  if (bench.laying) {
+    bench.lay(false);
+    bench.send({ do: "lay", face });
+  } else if (bench.snapping) bench.snapTo(face);
+  else if (bench.tab === "parts" && bench.state.parts > 1) bench.choosePartAt(placeMet(bench.triangles, face, from, along));
 }
 
 function tellState({ model, problem, busy, undo, redo, search, machine, material, process }) {
@@ -167,7 +172,7 @@ function keysOf(bench, camera, picture) {
   const keys = {
     ArrowLeft: arrow(-1, 0), ArrowRight: arrow(1, 0), ArrowUp: arrow(0, 1), ArrowDown: arrow(0, -1),
     "+": () => camera.zoom(0.85), "=": () => camera.zoom(0.85), "-": () => camera.zoom(1 / 0.85),
-    f: () => $("fit").click(), d: () => $("theme").click(), Escape: () => bench.lay(false),
+    f: () => $("fit").click(), d: () => $("theme").click(), Escape: () => { bench.lay(false); bench.snap(false); bench.select(0); },
   };
   ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
   addEventListener("keydown", (event) => {

@@ -112,6 +112,36 @@ def test_a_plan_that_is_dropped_cuts_the_model_and_one_of_another_model_is_refus
     assert bench.ask("plan.toml")[1] == (folder / "plan.toml").read_bytes()
 
 
+def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, folder: Path) -> None:
+    (folder / "tee.stl").write_bytes(stl(tee()))
+    arm = {"normal": [1, 0, 0], "offset_mm": 8.0}
+    with bench.line() as page:
+        bench.send(folder / "tee.stl")
+        page.do("add", **arm)
+        page.until(lambda state: state["parts"] == 2 and state["trial"])
+        page.do("try", part=2, normal=[1, 0, 0], offset_mm=30.0)
+        tried = page.until(lambda state: state["trial"] and state["trial"]["refused"])
+        assert "misses the model" in tried["trial"]["refused"]
+        assert tried["cuts"] == [{"normal": [1.0, 0.0, 0.0], "offset_mm": 8.0}]
+        page.do("move", part=2, normal=[1, 0, 0], offset_mm=30.0)
+        refused = page.until(lambda state: state["problem"])
+        assert refused["problem"].startswith("part 2 cannot be cut off: its plane misses the model")
+        page.do("move", part=2, normal=[1, 0, 0], offset_mm=9.5)
+        page.until(lambda state: state["undo"] == "move a plane")
+        page.do("lock", part=2, locked=True)
+        page.do("search")
+        page.until(lambda state: state["search"])
+        found = page.until(lambda state: state["front"] and not state["search"])
+        assert (found["cuts"][-1], found["locked"][-1]) == ({"normal": [1.0, 0.0, 0.0], "offset_mm": 9.5}, True)
+        assert found["parts"] > 2
+    (folder / "plan.toml").write_bytes(bench.ask("plan.toml")[1])
+    assert main(["decompose", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "parts"]) == 0
+    made = zipfile.ZipFile(io.BytesIO(bench.ask("parts.zip")[1]))
+    names = [name for name in made.namelist() if name.endswith(".stl")]
+    assert len(names) == found["parts"]
+    assert all(made.read(name) == (folder / "parts" / name).read_bytes() for name in names)
+
+
 def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:
     deaf = []
     for _ in range(50):

@@ -1,0 +1,72 @@
+// Handles: three knobs at the plane in hand: one moves it along its normal, two tilt it; by hand, finger or arrow keys.
+
+const REACH = 1.12; // of a section's radius at which the knobs of the tilt stand, as wide as its disc
+const LEAST_PIXELS = 0.5; // of a mm along the normal: seen head on, a plane would jump
+const STEP_MM = 0.5, STEP_DEG = 1;
+
+function handlesOf(bench) {
+  const knobs = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
+  /** The plane in hand with its section, drawn where planes are looked at. */
+  bench.showPlane = () => {
+    const plane = bench.tab === "parts" && bench.triangles && bench.state.model ? bench.plane() : null;
+    const later = plane ? bench.planes().slice(bench.selected - 1) : [];
+    bench.section = plane && bench.picture ? sectionOf(bench.triangles, plane, later, bench.picture.matrix()) : null;
+    if (bench.picture) bench.picture.plane(bench.section ? { ...plane, ...bench.section } : null);
+    if (bench.picture && !bench.section) $("handles").hidden = true;
+  };
+  const placeOf = ({ tilts }) => {
+    const { centre_mm: centre, radius_mm: radius } = bench.section, { normal } = bench.plane();
+    if (tilts === null) return add(centre, scaled(normal, 0.6 * radius));
+    return add(centre, scaled(beside(normal)[tilts], REACH * radius));
+  };
+  bench.placeHandles = () => {
+    $("handles").hidden = !bench.section || !bench.plane() || bench.locked();
+    if ($("handles").hidden) return;
+    for (const knob of knobs) {
+      const place = bench.picture.placeOf(placeOf(knob));
+      $(knob.id).hidden = !place;
+      if (place) $(knob.id).style.transform = `translate(${place[0]}px, ${place[1]}px)`;
+    }
+  };
+  /** The plane moved by so many mm at a knob, from how it was when it was taken. */
+  const moved = ({ plane, section, tilts }, mm) => {
+    if (tilts === null) return { normal: plane.normal, offset_mm: plane.offset_mm + mm };
+    const axes = beside(plane.normal), angle = Math.atan2(mm, REACH * section.radius_mm);
+    const normal = unit(turned(rotated(cross(axes[tilts], plane.normal), angle), plane.normal));
+    return { normal, offset_mm: dot(normal, section.centre_mm) };
+  };
+  const taken = (knob) => ({ plane: bench.plane(), section: bench.section, tilts: knob.tilts });
+  knobs.forEach((knob) => {
+    const button = $(knob.id);
+    let grip = null;
+    button.addEventListener("pointerdown", (event) => {
+      const place = placeOf(knob), from = bench.picture.placeOf(place), to = bench.picture.placeOf(add(place, bench.plane().normal));
+      if (!from || !to) return;
+      const way = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...way), LEAST_PIXELS);
+      grip = { ...taken(knob), start: [event.clientX, event.clientY], way: way.map((x) => x / pixels), pixels };
+      button.setPointerCapture(event.pointerId);
+    });
+    button.addEventListener("pointermove", (event) => {
+      if (!grip) return;
+      const along = (event.clientX - grip.start[0]) * grip.way[0] + (event.clientY - grip.start[1]) * grip.way[1];
+      bench.hold(moved(grip, along / grip.pixels));
+    });
+    const lift = (event) => {
+      if (!grip) return;
+      const hand = bench.hand;
+      grip = null;
+      if (hand && event.type === "pointerup") bench.put(hand.plane);
+      else bench.select(bench.selected);
+    };
+    button.addEventListener("pointerup", lift);
+    button.addEventListener("pointercancel", lift);
+    button.addEventListener("keydown", (event) => {
+      const step = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const mm = knob.tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * bench.section.radius_mm;
+      bench.put(moved(taken(knob), step * mm));
+    });
+  });
+}

@@ -1,0 +1,58 @@
+"""Planes tried by hand: the same figures as the cuts have, whatever was tried before, and why a plane is refused."""
+
+import numpy as np
+import pytest
+
+from mdp.mesh import Mesh
+from mdp.plane import Plane
+from mdp.plans.plan_file import PlanFile, PlannedPart
+from mdp.search.problem import Problem
+from mdp.search.search import cut_by_plan
+from mdp.search.trial import Trials, smallest_edge_deg
+from profiles.profile import load
+from tests.shapes import box, tee
+
+PROFILE = load(settings=["search.directions=60"])
+ARMS = (Plane(np.array([1.0, 0.0, 0.0]), 8.0), Plane(np.array([-1.0, 0.0, 0.0]), 8.0))
+
+
+def trials(mesh: Mesh) -> Trials:
+    return Trials(Problem(mesh, PROFILE))
+
+
+def test_figures_are_those_of_the_cuts_themselves() -> None:
+    mesh, tried = tee(), trials(tee()).attempt(ARMS)
+    plan = PlanFile("", parts=tuple(PlannedPart(tuple(plane.normal.tolist()), plane.offset_mm) for plane in ARMS))
+    cut = cut_by_plan(mesh, "tee", PROFILE, plan)
+    assert [part.volume_mm3 for part in tried.parts if part] == pytest.approx([part.volume_mm3 for part in cut.parts[1:]])
+    assert tried.seam_mm == pytest.approx(sum(part.rim_mm for part in tried.parts if part)) == pytest.approx(cut.seam_mm)
+    assert cut.chosen is not None
+    assert tried.support_area_mm2 == pytest.approx(cut.chosen.support_area_mm2)
+
+
+def test_what_was_tried_before_changes_nothing() -> None:
+    moving, moved = trials(tee()), [(Plane(ARMS[0].normal, 8.0 + 0.25 * k), ARMS[1]) for k in (3, 1, 4, 1, 5)]
+    assert [moving.attempt(planes) for planes in moved] == [trials(tee()).attempt(planes) for planes in moved]
+    assert moving.attempt(ARMS[::-1]) == trials(tee()).attempt(ARMS[::-1])
+
+
+def test_the_plane_that_cannot_be_cut_is_named_with_the_reason() -> None:
+    outside = Plane(np.array([1.0, 0.0, 0.0]), 25.0)
+    tried = trials(tee()).attempt((outside, ARMS[1]))
+    assert (tried.refused_part, tried.support_area_mm2) == (2, None)
+    assert "misses the model" in tried.refused
+    assert tried.parts[0] is None
+    assert tried.parts[1] is not None
+
+
+def test_no_plane_at_all_is_the_model_in_one_piece() -> None:
+    tried = trials(tee()).attempt(())
+    assert (tried.parts, tried.refused, tried.seam_mm) == ((), "", 0.0)
+    assert tried.support_area_mm2 == pytest.approx(300.0)  # the undersides of both arms, 15 by 10 mm
+
+
+@pytest.mark.parametrize(("lean_deg", "edge_deg"), [(0.0, 90.0), (30.0, 60.0), (60.0, 30.0)])
+def test_the_edge_of_a_cut_is_as_sharp_as_it_leans_against_the_wall(lean_deg: float, edge_deg: float) -> None:
+    lean = np.radians(lean_deg)
+    plane = Plane(np.array([np.sin(lean), 0.0, np.cos(lean)]), 50.0 * float(np.cos(lean)))
+    assert smallest_edge_deg(box(10.0, 10.0, 100.0), plane) == pytest.approx(edge_deg)
