@@ -1,6 +1,7 @@
 """Pipeline: joins the stages, from a model's name to parts, sliced parts, G-code lines and the dry run."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -151,31 +152,37 @@ def _hint(decomposition: Decomposition, better: OtherWay | None) -> tuple[str, .
     return (f"{lying} in one piece it {' and '.join(figures)}: try --orient",)
 
 
-def build(decomposition: Decomposition, profile: Profile, pictures: bool = False, stops: Sequence[Stop] = ()) -> Program:
+def build(
+    decomposition: Decomposition,
+    profile: Profile,
+    pictures: bool = False,
+    stops: Sequence[Stop] = (),
+    report: Report | None = None,
+) -> Program:
     """Slice, plan, write and dry-run a decomposition. Raises MoveError, before slicing, for a part outside the axes' ranges.
 
     pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show. stops: where the print waits
-    for a person.
+    for a person. report: where progress is shown; None: on the terminal.
     """
     parts = decomposition.parts
     check_parts(parts, profile)
-    compilers.wait_for(compilers.PROGRAM)
-    with reporting() as report:
+    compilers.wait_for(compilers.PROGRAM, report)
+    with reporting() if report is None else nullcontext(report) as told:
 
         def show(begun: int, of: int, layers: int, all_layers: int) -> None:
             percent = min(100, 100 * layers // max(all_layers, 1))
-            report(f"slicing part {max(begun, 1)} of {of}: {percent} % of all layers", percent / 100)
+            told(f"slicing part {max(begun, 1)} of {of}: {percent} % of all layers", percent / 100)
 
         sliced = slice_parts(parts, profile, show)
-        report("planning moves")
+        told("planning moves")
         program = plan(decomposition, sliced, profile, stops)
         for note in _left_out(program, profile):
             say(f"{decomposition.name}: {note}")
         lines = tuple(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
-            compilers.wait_for(compilers.PICTURES, report)
+            compilers.wait_for(compilers.PICTURES, told)
             lines = with_thumbnails(lines, decomposition, profile)
-        report("dry run")
+        told("dry run")
         run = dry_run(lines, profile)
     return Program(lines, run, decomposition, sliced)
 

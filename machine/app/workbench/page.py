@@ -31,7 +31,7 @@ def workbench_page(port: int) -> tuple[bytes, str]:
 def policy(style: str, script: str, port: int) -> str:
     """What the page may do: its own script and style, pictures that it has made itself, and talk to its server."""
     line = " ".join(f"ws://{name}:{port}" for name in ("127.0.0.1", "localhost"))
-    rest = "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    rest = "frame-src 'self'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     return f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; connect-src 'self' {line}; {rest}"
 
 

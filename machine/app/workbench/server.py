@@ -17,6 +17,7 @@ from machine.app.workbench.guard import Guard
 from machine.app.workbench.page import workbench_page
 from machine.app.workbench.session import Session
 from machine.app.workbench.snapshot import model_key, snapshot, triangles
+from machine.app.workbench.tasks import Sliced
 from mdp.read import MOST_BYTES
 from profiles.errors import PlanError
 
@@ -33,6 +34,9 @@ def application(session: Session, token: str, port: int) -> ASGIApp:
         Route("/{token}/file", _answering(session, _take_file), methods=["POST"]),
         Route("/{token}/plan.toml", _answering(session, _plan)),
         Route("/{token}/parts.zip", _answering(session, _folder)),
+        Route("/{token}/print/{key}", _answering(session, _print_page)),
+        Route("/{token}/print.html", _answering(session, _shared_page)),
+        Route("/{token}/print.gcode", _answering(session, _gcode)),
         WebSocketRoute("/{token}/line", _line(session)),
     ]
     return Guard(Starlette(routes=routes), token, port)
@@ -98,6 +102,31 @@ async def _plan(session: Session, request: Request) -> Response:
 async def _folder(session: Session, request: Request) -> Response:
     files = await session.files()
     return _download(files.folder, "application/zip", f"{_stem(session)}-parts.zip")
+
+
+async def _print_page(session: Session, request: Request) -> Response:
+    """The page of the print as `view` writes it, with its own content security policy in it."""
+    return Response(_slices(session).page, media_type="text/html")
+
+
+async def _shared_page(session: Session, request: Request) -> Response:
+    return _download(_slices(session).page, "text/html", f"{_stem(session)}.html")
+
+
+async def _gcode(session: Session, request: Request) -> Response:
+    sliced = _slices(session)
+    if sliced.errors:
+        raise PlanError(
+            f"the dry run found {sliced.errors} errors: no G-code is saved; tiltprint export --force does so all the same"
+        )
+    return _download(sliced.gcode, "text/plain", f"{_stem(session)}.gcode")
+
+
+def _slices(session: Session) -> Sliced:
+    sliced = session.shown_slices()
+    if sliced is None:
+        raise PlanError("what is on the workbench is not sliced yet: slice it first")
+    return sliced
 
 
 def _download(content: bytes, kind: str, name: str) -> Response:

@@ -17,7 +17,7 @@ from machine.app.workbench.bench import Bench, History, Model, Step, parts_of, w
 from machine.app.workbench.commands import obey
 from machine.app.workbench.lane import Lane
 from machine.app.workbench.planes import EDITS, Cuts, edited
-from machine.app.workbench.tasks import Files, Resting, Searched
+from machine.app.workbench.tasks import Files, Resting, Searched, Sliced
 from mdp.decomposition import FrontRow
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
@@ -47,6 +47,8 @@ class Session:
         self.notes: tuple[str, ...] = ()  # of the last search
         self.busy = ""  # what the page waits for
         self.search: Search | None = None
+        self.slicing: Search | None = None
+        self.sliced: tuple[Bench, Sliced] | None = None
         self.resting: tuple[Model, tuple[Resting, ...]] | None = None
         self.trial: tuple[Bench, Cuts, Trial] | None = None  # of planes on this bench
         self.version = 0
@@ -60,6 +62,7 @@ class Session:
         self._numbers = itertools.count(1)
         self._tasks: set[asyncio.Task[None]] = set()
         self._searching: asyncio.Task[None] | None = None
+        self._slicing: asyncio.Task[None] | None = None
 
     @property
     def bench(self) -> Bench:
@@ -153,6 +156,9 @@ class Session:
                 self._search()
             case "stop":
                 self._stop()
+                self._stop_slicing()
+            case "slice":
+                self._slice()
             case "try":
                 self._try(edited(self.bench, {**asked, "do": "move"})[1])
             case name if name in EDITS:
@@ -218,6 +224,33 @@ class Session:
             rows = await self._quick.run("measure_plan", search.bench, plan)
             self._do("stop the search", with_front(search.bench, rows))
 
+    def shown_slices(self) -> Sliced | None:
+        """The slices of what lies on the bench now; None where they are of something else."""
+        if self.sliced is None or _printed(self.sliced[0]) != _printed(self.bench):
+            return None
+        return self.sliced[1]
+
+    def _slice(self) -> None:
+        if self.bench.model is None:
+            raise PlanError("there is no model on the workbench yet: choose a file first")
+        if self.slicing is None:
+            self.slicing = Search(self.bench, Searched("cutting the parts"))
+            self._slicing = self.start(self._make_slices(self.bench))
+
+    async def _make_slices(self, bench: Bench) -> None:
+        def follow(searched: Searched) -> None:
+            self.slicing = Search(bench, searched)
+            self.tell()
+
+        try:
+            self.sliced = bench, await self._long.run("slice_bench", bench, tell=follow)
+        finally:
+            self.slicing = None
+
+    def _stop_slicing(self) -> None:
+        if self._slicing is not None:
+            self._slicing.cancel()
+
     def _try(self, cuts: Cuts) -> None:
         """Have planes tried, the newest ones as soon as the ones before are done."""
         waiting, self._wanted = self._wanted is not None, cuts
@@ -271,6 +304,8 @@ class Session:
             self.search = None
             if self._searching is not None:
                 self._searching.cancel()
+        if self.slicing is not None and _printed(self.slicing.bench) != _printed(self.bench):
+            self._stop_slicing()
         self.tell()
 
     @contextmanager
@@ -283,3 +318,8 @@ class Session:
         finally:
             self.busy = ""
             self.tell()
+
+
+def _printed(bench: Bench) -> tuple[object, ...]:
+    """What of a bench decides what is printed."""
+    return bench.model, bench.rotation, bench.cuts, id(bench.profile)

@@ -15,6 +15,7 @@ from mdp.decomposition import FrontRow
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.plane import Plane
 
+MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # that a page draws
 
 
@@ -39,6 +40,8 @@ def snapshot(session: Session) -> dict[str, Any]:
             for each in resting
         ],
         "search": None if search is None else {"text": search.searched.text, "planes": planes},
+        "slicing": None if session.slicing is None else {"text": session.slicing.searched.text},
+        "sliced": _sliced(session),
         "front": [_row(row) for row in bench.rows],
         "parts": bench.parts,
         "recommended": bench.recommended,
@@ -87,6 +90,19 @@ def _row(row: FrontRow) -> dict[str, Any]:
         "filament_mm": row.filament_mm,
         "reason": row.reason,
         "planes": [_plane(plane) for plane in reversed(row.planes)],
+    }
+
+
+def _sliced(session: Session) -> dict[str, Any] | None:
+    sliced = session.shown_slices()
+    if sliced is None:
+        return None
+    return {
+        "key": f"{id(sliced):x}",
+        "time_s": sliced.time_s,
+        "filament_mm": sliced.filament_mm,
+        "findings": sliced.findings[:MOST_FINDINGS],
+        "errors": sliced.errors,
     }
 
 

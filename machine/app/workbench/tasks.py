@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 
 from machine.app.pipeline import compilers
+from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.pricing import pricing
 from machine.app.workbench.bench import Bench, Model, locked_plan, plan_of_bench
+from machine.dryrun.dryrun import summary
+from machine.view.page import print_page
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
 from mdp.plane import Plane
@@ -131,6 +134,36 @@ def make_files(tell: Tell, bench: Bench) -> Files:
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, text)
     return Files(plan, content.getvalue())
+
+
+@dataclass(frozen=True, eq=False)
+class Sliced:
+    """A sliced bench: the page of the print and its G-code, what it takes, and what its dry run complains of. errors: how many of
+    the findings are errors, with which the command line writes no file without --force."""
+
+    page: bytes
+    gcode: bytes
+    time_s: float
+    filament_mm: float
+    findings: tuple[str, ...]
+    errors: int
+
+
+def slice_bench(tell: Tell, bench: Bench) -> Sliced:
+    """The parts on the bench sliced, planned, written and dry-run, as `export --plan` does; uncut, the model in one piece."""
+    profile = bench.profile
+    made = _cut(bench, plan_of_bench(bench, PLAN_NAME))
+    program = build(made, profile, pictures=True, report=lambda text, share=None: tell(Searched(text)))
+    tell(Searched("drawing the page"))
+    found, values = program.run.findings, summary(program.run)
+    return Sliced(
+        print_page(made.name, program, profile),
+        ("\n".join(program.lines) + "\n").encode(),
+        values["time_s"],
+        values["filament_mm"],
+        tuple(f"{each.severity}: {each.message}" for each in found),
+        sum(each.severity == "error" for each in found),
+    )
 
 
 def _cut(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:

@@ -33,13 +33,13 @@ function main() {
     if (!picture || !bench.triangles) return;
     const { search, parts, colours } = bench.state;
     const planes = row ? row.planes : search && search.planes.length ? search.planes : parts ? bench.planes() : null;
-    const cut = bench.tab === "parts" && planes;
+    const cut = bench.tab !== "model" && planes;
     picture.cut(cut ? planes : null, colours);
     picture.red(cut ? null : bench.red);
     legend(cut ? colours.slice(0, planes.length + 1) : null);
   };
   bench.picture = picture;
-  const panels = [modelPanel(bench), partsPanel(bench), planesPanel(bench)];
+  const panels = [modelPanel(bench), partsPanel(bench), planesPanel(bench), slicesPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;
@@ -92,11 +92,11 @@ function press(event, bench, picture) {
   else if (bench.tab === "parts" && bench.state.parts > 1) bench.choosePartAt(placeMet(bench.triangles, face, from, along));
 }
 
-function tellState({ model, problem, busy, undo, redo, search, machine, material, process }) {
+function tellState({ model, problem, busy, undo, redo, search, slicing, machine, material, process }) {
   const root = document.documentElement;
   document.title = model ? `${model.name} – tiltprint` : "tiltprint";
   $("title").textContent = model ? model.name : "tiltprint";
-  $("summary").textContent = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : `${machine.name} · ${material} · ${process}`;
+  $("summary").textContent = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : `${machine.name} · ${material} · ${process}`;
   root.dataset.busy = busy;
   root.toggleAttribute("data-searching", Boolean(search));
   document.body.classList.toggle("no-model", !model);

@@ -142,6 +142,25 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
     assert all(made.read(name) == (folder / "parts" / name).read_bytes() for name in names)
 
 
+def test_slices_are_the_g_code_of_the_command_line_and_go_when_the_model_turns(bench: Running, folder: Path) -> None:
+    (folder / "tee.stl").write_bytes(stl(tee(5.0, 20.0, 20.0)))
+    assert bench.ask("print.gcode")[0] == 422
+    with bench.line() as page:
+        bench.send(folder / "tee.stl")
+        page.do("add", normal=[1, 0, 0], offset_mm=5.0)
+        page.until(lambda state: state["parts"] == 2)
+        page.do("slice")
+        page.until(lambda state: state["slicing"])
+        sliced = page.until(lambda state: state["sliced"] and not state["slicing"])["sliced"]
+        (folder / "plan.toml").write_bytes(bench.ask("plan.toml")[1])
+        assert main(["export", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "tee.gcode", "--html", "tee.html"]) == 0
+        assert bench.ask("print.gcode")[1] == (folder / "tee.gcode").read_bytes()
+        assert bench.ask(f"print/{sliced['key']}")[1] == bench.ask("print.html")[1] == (folder / "tee.html").read_bytes()
+        page.do("turn", axis="z", deg=30)
+        page.until(lambda state: not state["sliced"])
+    assert bench.ask("print.gcode")[0] == 422
+
+
 def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:
     deaf = []
     for _ in range(50):
