@@ -16,7 +16,8 @@ from urllib.parse import urlsplit
 from websockets.sync.client import ClientConnection, connect
 
 PATIENCE_S = 60.0
-QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2")
+COARSE = ("layer_height_mm=0.4", "first_layer_height_mm=0.4", "line_width_mm=0.8")
+QUICK = ("--set", "search.directions=60", "--set", "search.beam_width=2", *(f"--set=process.{each}" for each in COARSE))
 
 
 class Running:
@@ -69,7 +70,11 @@ class Page:
         """The first state that fulfils a condition."""
         end_s = time.monotonic() + PATIENCE_S
         while not condition(self.state):
-            self.state = json.loads(self._socket.recv(max(0.0, end_s - time.monotonic())))
+            try:
+                self.state = json.loads(self._socket.recv(max(0.0, end_s - time.monotonic())))
+            except TimeoutError:
+                told = {key: self.state[key] for key in ("problem", "busy", "undo", "parts", "search", "slicing")}
+                raise AssertionError(f"that never came, only {told}") from None
         return self.state
 
 

@@ -143,11 +143,11 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
 
 
 def test_slices_are_the_g_code_of_the_command_line_and_go_when_the_model_turns(bench: Running, folder: Path) -> None:
-    (folder / "tee.stl").write_bytes(stl(tee(5.0, 20.0, 20.0)))
+    (folder / "tee.stl").write_bytes(stl(tee()))
     assert bench.ask("print.gcode")[0] == 422
     with bench.line() as page:
         bench.send(folder / "tee.stl")
-        page.do("add", normal=[1, 0, 0], offset_mm=5.0)
+        page.do("add", normal=[1, 0, 0], offset_mm=8.0)
         page.until(lambda state: state["parts"] == 2)
         page.do("slice")
         page.until(lambda state: state["slicing"])
