@@ -241,9 +241,10 @@ def edit(
 ) -> int:
     """Open the workbench: a page on this computer to look, lay down, cut and save. Ctrl-C ends it."""
     from machine.app.commands.edit import edit
-    from machine.app.requests import EditRequest
+    from machine.app.requests import EditRequest, Given
 
-    return edit(EditRequest(profile_of(machine, material, process, settings), model, port, not no_browser))
+    given = Given(machine, material, process, tuple(settings or ()))
+    return edit(EditRequest(profile_of(machine, material, process, settings), given, model, port, not no_browser))
 
 
 COMMANDS: dict[str, Callable[..., int]] = {

@@ -81,10 +81,22 @@ class ModelRequest:
 
 
 @dataclass(frozen=True)
+class Given:
+    """What a profile is made of: the names of its machine, material and process, and KEY=VALUE settings over them."""
+
+    machine: str = "generic_ac"
+    material: str = "pla"
+    process: str = "standard"
+    settings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class EditRequest:
-    """The workbench. model: a model or a plan to begin with; port: of this computer, 0: any free one; browser: open it there."""
+    """The workbench. given: what the profile is made of; model: a model or a plan to begin with; port: of this computer, 0: any
+    free one; browser: open it there."""
 
     profile: "Profile"
+    given: Given
     model: str | None = None
     port: int = 0
     browser: bool = True

@@ -165,6 +165,22 @@ def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_bac
     browser.wait("Math.abs(Number($('plane-tilt').value) - 1) < 0.11")
 
 
+def test_a_setting_is_found_by_a_word_changed_and_marked(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    browser.click("#tab-settings")
+    browser.wait("document.querySelectorAll('[data-key]').length > 100")
+    browser.value("{ $('search-settings').value = 'steepest overhang'; $('search-settings').dispatchEvent(new Event('input')); }")
+    assert browser.value("document.querySelectorAll('[data-key]').length") == 1
+    before = area(browser)
+    browser.value(
+        "{ const input = document.querySelector('[data-key] input'); input.value = 5; input.dispatchEvent(new Event('change')); }"
+    )
+    browser.wait("document.querySelector('[data-key].changed')")
+    assert area(browser) >= before
+    browser.click("#undo")
+    browser.wait("document.querySelector('[data-key]:not(.changed)')")
+
+
 def test_a_broken_model_is_told_and_the_one_before_it_stays(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "tee.stl", stl(tee()))
     choose(browser, "<img onerror=alert(1)>.stl", stl(tee())[:400])

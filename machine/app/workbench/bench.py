@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from machine.app.requests import Given
+from machine.app.workbench.settings import USUAL
 from mdp.decomposition import FrontRow
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
@@ -45,6 +47,7 @@ class Bench:
     rows: tuple[FrontRow, ...] = ()
     recommended: int = 0
     locked: frozenset[PlannedPart] = frozenset()
+    given: Given = USUAL
 
     @property
     def parts(self) -> int:
@@ -92,13 +95,13 @@ class History:
 
 def with_model(bench: Bench, model: Model) -> Bench:
     """Another model on the bench, as it is read and uncut."""
-    return Bench(bench.profile.of_all_parts, model)
+    return Bench(bench.profile.of_all_parts, model, given=bench.given)
 
 
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
     """The model turned otherwise; its cuts were for the way that it stood before."""
     rows = tuple(_vector(row) for row in rotation)
-    return bench if rows == bench.rotation else Bench(bench.profile.of_all_parts, bench.model, rows)
+    return bench if rows == bench.rotation else Bench(bench.profile.of_all_parts, bench.model, rows, given=bench.given)
 
 
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
@@ -112,10 +115,15 @@ def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:
     return replace(bench, cuts=cuts, locked=bench.locked & frozenset(cuts))
 
 
+def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
+    """Another profile: the figures of the front were for the one before, the planes may serve all the same."""
+    return replace(bench, given=given, profile=profile, rows=(), recommended=0)
+
+
 def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: Profile) -> Bench:
     """The planes of a plan. rows: its front, measured; profile: with the plan's settings of single parts."""
     rotation = STANDING if plan.orientation is None else plan.orientation
-    return Bench(profile, bench.model, rotation, plan.parts, plan.zones, tuple(rows))
+    return Bench(profile, bench.model, rotation, plan.parts, plan.zones, tuple(rows), given=bench.given)
 
 
 def with_parts(bench: Bench, count: int) -> Bench:

@@ -13,7 +13,6 @@ from machine.app.workbench.guard import HOST
 from machine.app.workbench.server import application
 from machine.app.workbench.session import Session
 from profiles.errors import OutputError
-from profiles.profile import Profile
 
 GRACE_S = 1  # for answers under way when it ends
 MOST_SENT = 1 << 20  # bytes of one message of a page; files come by another way
@@ -45,18 +44,21 @@ def listen(port: int) -> socket.socket:
     return own
 
 
-def serve_workbench(profile: Profile, begin: Callable[[Session], None], announce: Callable[[str], None], port: int = 0) -> None:
-    """Serve until Ctrl-C. begin: given the session when it is there; announce: given the address when it answers."""
+def serve_workbench(
+    make: Callable[[], Session], begin: Callable[[Session], None], announce: Callable[[str], None], port: int = 0
+) -> None:
+    """Serve until Ctrl-C. make: the session, made in the event loop; begin: given it when it is there; announce: given the
+    address when it answers."""
     own, token = listen(port), secrets.token_urlsafe(24)
     with own:
-        asyncio.run(_serve(profile, begin, announce, own, token))
+        asyncio.run(_serve(make, begin, announce, own, token))
 
 
 async def _serve(
-    profile: Profile, begin: Callable[[Session], None], announce: Callable[[str], None], own: socket.socket, token: str
+    make: Callable[[], Session], begin: Callable[[Session], None], announce: Callable[[str], None], own: socket.socket, token: str
 ) -> None:
     number = own.getsockname()[1]
-    session = Session(profile)
+    session = make()
     settings = uvicorn.Config(
         application(session, token, number),
         log_config=None,

@@ -16,10 +16,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from machine.app.workbench.guard import Guard
 from machine.app.workbench.page import workbench_page
 from machine.app.workbench.session import Session
+from machine.app.workbench.settings import settings_list
 from machine.app.workbench.snapshot import model_key, snapshot, triangles
 from machine.app.workbench.tasks import Sliced
 from mdp.read import MOST_BYTES
 from profiles.errors import PlanError
+from profiles.places import KINDS, known
 
 MOST_COMMAND = 100_000  # characters
 PLAN_SUFFIX = ".toml"
@@ -37,6 +39,7 @@ def application(session: Session, token: str, port: int) -> ASGIApp:
         Route("/{token}/print/{key}", _answering(session, _print_page)),
         Route("/{token}/print.html", _answering(session, _shared_page)),
         Route("/{token}/print.gcode", _answering(session, _gcode)),
+        Route("/{token}/settings.json", _answering(session, _settings)),
         WebSocketRoute("/{token}/line", _line(session)),
     ]
     return Guard(Starlette(routes=routes), token, port)
@@ -111,6 +114,14 @@ async def _print_page(session: Session, request: Request) -> Response:
 
 async def _shared_page(session: Session, request: Request) -> Response:
     return _download(_slices(session).page, "text/html", f"{_stem(session)}.html")
+
+
+async def _settings(session: Session, request: Request) -> Response:
+    bench = session.bench
+    names = {
+        kind: {"names": sorted({*known(kind), getattr(bench.given, kind)}), "name": getattr(bench.given, kind)} for kind in KINDS
+    }
+    return JSONResponse({"profiles": names, "settings": settings_list(bench.profile, bench.given)})
 
 
 async def _gcode(session: Session, request: Request) -> Response:

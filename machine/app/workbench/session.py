@@ -7,16 +7,29 @@ import sys
 import tempfile
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from machine.app.crash import log_bug
 from machine.app.pipeline.given_plan import with_plan_settings
-from machine.app.workbench.bench import Bench, History, Model, Step, parts_of, with_cuts, with_front, with_model, with_plan
+from machine.app.requests import Given
+from machine.app.workbench.bench import (
+    Bench,
+    History,
+    Model,
+    Step,
+    parts_of,
+    with_cuts,
+    with_front,
+    with_model,
+    with_plan,
+    with_profile,
+)
 from machine.app.workbench.commands import obey
 from machine.app.workbench.lane import Lane
 from machine.app.workbench.planes import EDITS, Cuts, edited
+from machine.app.workbench.settings import profile_as_given, with_name, with_setting
 from machine.app.workbench.tasks import Files, Resting, Searched, Sliced
 from mdp.decomposition import FrontRow
 from mdp.plans.plan_file import PlanFile
@@ -41,8 +54,8 @@ class Search:
 class Session:
     """All from the event loop; the pages wait for `changed`. A context: leaving it ends the work and the temporary files."""
 
-    def __init__(self, profile: Profile) -> None:
-        self.history = History(Step("", Bench(profile)))
+    def __init__(self, profile: Profile, given: Given) -> None:
+        self.history = History(Step("", Bench(profile, given=given)))
         self.problem = ""  # what could not be done last
         self.notes: tuple[str, ...] = ()  # of the last search
         self.busy = ""  # what the page waits for
@@ -159,6 +172,13 @@ class Session:
                 self._stop_slicing()
             case "slice":
                 self._slice()
+            case "set":
+                value = asked.get("value")
+                key = str(asked.get("key"))
+                self._take_given(f"set {key}", with_setting(self.bench.given, key, None if value is None else str(value)))
+            case "profile":
+                name = str(asked.get("name"))
+                self._take_given(f"take {name}", with_name(self.bench.given, str(asked.get("kind")), name))
             case "try":
                 self._try(edited(self.bench, {**asked, "do": "move"})[1])
             case name if name in EDITS:
@@ -286,6 +306,28 @@ class Session:
             self.trial = bench, cuts, trial
             self._do(word, with_cuts(bench, cuts))
 
+    def _take_given(self, word: str, given: Given) -> None:
+        profile = profile_as_given(given, self.bench.profile)
+        self.start(self._change_profile(word, with_profile(self.bench, given, profile)))
+
+    async def _change_profile(self, word: str, bench: Bench) -> None:
+        """Take another profile; planes that it forbids go, and a model that it scales or turns otherwise is read again."""
+        refused, before, model = "", self.bench, self.bench.model
+        new, old = bench.profile.process, before.profile.process
+        if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
+            with self._waiting(f"reading {model.name}"):
+                model = await self._quick.run("read_model", model.path, model.name, bench.profile.of_all_parts)
+            bench = replace(with_model(bench, model), rotation=bench.rotation)
+            self.start(self._rank(model))
+        elif bench.cuts is not None:
+            async with self._hands:
+                trial = await self._attempt(bench, bench.cuts)
+            if trial.refused:
+                refused = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
+                bench = replace(bench, cuts=None, locked=frozenset())
+        self._do(word, bench)
+        self.problem = refused
+
     async def _rank(self, model: Model) -> None:
         resting = await self._quick.run("rank_resting", model.mesh, self.bench.profile.of_all_parts)
         self.resting = model, resting
@@ -322,4 +364,4 @@ class Session:
 
 def _printed(bench: Bench) -> tuple[object, ...]:
     """What of a bench decides what is printed."""
-    return bench.model, bench.rotation, bench.cuts, id(bench.profile)
+    return bench.model, bench.rotation, bench.cuts, bench.profile

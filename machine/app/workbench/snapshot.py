@@ -50,6 +50,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "trial": _trial(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.notes if bench.rows else (),
+        "given": asdict(bench.given),
         "machine": machine_bodies(bench.profile.machine, known=True),
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,

@@ -39,7 +39,7 @@ function main() {
     legend(cut ? colours.slice(0, planes.length + 1) : null);
   };
   bench.picture = picture;
-  const panels = [modelPanel(bench), partsPanel(bench), planesPanel(bench), slicesPanel(bench)];
+  const panels = [modelPanel(bench), partsPanel(bench), planesPanel(bench), slicesPanel(bench), settingsPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;

@@ -161,6 +161,25 @@ def test_slices_are_the_g_code_of_the_command_line_and_go_when_the_model_turns(b
     assert bench.ask("print.gcode")[0] == 422
 
 
+def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbids(bench: Running, folder: Path) -> None:
+    (folder / "tee.stl").write_bytes(stl(tee()))
+    with bench.line() as page:
+        bench.send(folder / "tee.stl")
+        page.do("add", normal=[1, 0, 0], offset_mm=8.0)
+        page.until(lambda state: state["parts"] == 2)
+        page.do("set", key="process.walls", value="400")
+        assert "process.walls" in page.until(lambda state: state["problem"])["problem"]
+        page.do("profile", kind="machine", name="three_axis")
+        gone = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["problem"])
+        assert gone["parts"] == 0
+        assert "the planes were taken away, for part 2 cannot be cut off: " in gone["problem"]
+        page.do("undo")
+        page.until(lambda state: state["parts"] == 2 and state["given"]["machine"] == "generic_ac")
+        page.do("set", key="process.scale", value="2")
+        assert page.until(lambda state: state["model"]["size_mm"][0] > 79)["parts"] == 0
+        page.do("undo")
+
+
 def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:
     deaf = []
     for _ in range(50):
