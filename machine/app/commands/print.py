@@ -1,19 +1,19 @@
 """The print command: a model or a G-code file on a printer at a port, or on the simulated one."""
 
-from dataclasses import replace
 from pathlib import Path
 
 from machine.app.commands.send import print_on_server
 from machine.app.file_roles import check_model_files, printing_files, program_beside
 from machine.app.output import check_writable
-from machine.app.pipeline.programs import load_program, refuse_errors
-from machine.app.printer.compatibility import check_dialect, check_port, check_printer, check_program, is_rate_limited
+from machine.app.pipeline.programs import load_program
+from machine.app.printer.compatibility import check_machine, check_port
 from machine.app.printer.journal_folder import check_new_journal
+from machine.app.printer.ready import ready_program
 from machine.app.printer.stream import PrintJob, print_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
 from machine.app.terminal.report import print_table, show
-from machine.dryrun.starvation import check_baud, find_starvation
+from machine.dryrun.starvation import check_baud
 from machine.network.address import is_server_address
 
 
@@ -30,17 +30,12 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     check_baud(printing.baud)
     answer = check_port(printing.port, printing.baud, printing.sim_speed)
     if not request.is_gcode:
-        check_dialect(request.profile.machine)
-        check_printer(answer, request.profile.machine, request.force)
+        check_machine(answer, request.profile.machine, request.force)
     loaded = load_program(request)
-    program, profile = loaded.program, loaded.profile
+    profile = loaded.profile
     if request.is_gcode:
-        check_dialect(profile.machine)
-        check_printer(answer, profile.machine, request.force)
-    check_program(answer, program, profile, request.name, request.force)
-    refuse_errors(program, request.force)
-    if is_rate_limited(printing.port):
-        program = replace(program, run=find_starvation(program.run, program.lines, profile.machine, printing.baud))
+        check_machine(answer, profile.machine, request.force)
+    program = ready_program(answer, loaded.program, profile, request.name, printing, request.force)
     show(print_table(program, profile))
     job = PrintJob(request.name, program, profile, Path(request.model) if request.is_gcode else None)
     with serve_watch_page(job.name, program, profile, printing.watch_port) as watchers:

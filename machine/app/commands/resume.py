@@ -6,11 +6,12 @@ from math import hypot
 from pathlib import Path
 
 from machine.app.file_roles import check_roles, printing_files
+from machine.app.printer.attendance import Observers
 from machine.app.printer.compatibility import check_dialect
 from machine.app.printer.journal_folder import continue_journal
 from machine.app.printer.serial_log import new_log
 from machine.app.printer.server_checks import check_no_server
-from machine.app.printer.stream import Observers, PrintJob, report_end, stream_program
+from machine.app.printer.stream import PrintJob, report_end, stream_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import SIMULATED, PrintRequest
 from machine.app.terminal.interrupts import interrupting

@@ -128,6 +128,12 @@ def check_printer(answer: Answer | None, machine: Machine, force: bool) -> None:
         refuse(firmware_mismatch(answer, machine), force)
 
 
+def check_machine(answer: Answer | None, machine: Machine, force: bool) -> None:
+    """Refuse a machine whose firmware takes no lines, or is not that of the printer; force: of the latter only say so."""
+    check_dialect(machine)
+    check_printer(answer, machine, force)
+
+
 def check_program(answer: Answer | None, program: Program, profile: Profile, file: str, force: bool) -> None:
     """Refuse a program that was made for another machine, or that leaves the limits that the firmware tells; force: say so."""
     own, sections = read_embedded_profile(program.lines, profile, frozenset())

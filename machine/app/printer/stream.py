@@ -1,25 +1,23 @@
 """Stream: a program to a printer, or to the simulated one on a pseudo-terminal, shown to the person watching."""
 
-import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
 
+from machine.app.printer.attendance import Attendance, AtTerminal, Observers
 from machine.app.printer.journal_folder import new_journal
 from machine.app.printer.serial_log import SerialLog, new_log, tap
 from machine.app.requests import SIMULATED, PrintRequest
 from machine.app.terminal.interrupts import stopping
-from machine.app.terminal.keys import Keyboard
-from machine.app.terminal.print_display import Follow, PrintDisplay
+from machine.app.terminal.print_display import Follow
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import show
-from machine.app.terminal.screen import Course, Words
+from machine.app.terminal.screen import Course
 from machine.firmware import dialect_of
 from machine.link.identification import Answer, Kind
 from machine.link.journal import Journal
-from machine.link.pending_commands import Control
 from machine.link.progress import Progress, Schedule
 from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
@@ -50,25 +48,21 @@ class PrintJob:
     source: Path | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Observers:
-    """Who is told of a print besides the person at the terminal: the serial log, the journal, the page that follows it."""
+def print_program(
+    job: PrintJob, request: PrintRequest, follow: Follow | None = None, attendance: Attendance | None = None
+) -> int:
+    """Stream a program to the printer asked for and say how it ended; 130 when a person stopped it. Raises PrinterError.
 
-    log: SerialLog
-    journal: Journal | None = None
-    follow: Follow | None = None
-
-
-def print_program(job: PrintJob, request: PrintRequest, follow: Follow | None = None) -> int:
-    """Stream a program to the printer asked for and say how it ended; 130 when a person stopped it. Raises PrinterError."""
+    attendance: of a person who is not at the terminal.
+    """
     simulated = request.port == SIMULATED
     title = f"{job.name} to {'the simulated printer' if simulated else request.port}"
     journalled = _journal(job, request.journal) if not simulated or request.journal is not None else nullcontext()
     with new_log("print", title, request.log) as log, _LogPointer(log), journalled as journal:
         observers = Observers(log, journal, follow)
         if simulated:
-            return _print_simulated(job, request, observers)
-        return report_end(stream_program(job, request, observers), log, journal)
+            return _print_simulated(job, request, observers, attendance)
+        return report_end(stream_program(job, request, observers, attendance=attendance), log, journal)
 
 
 def _journal(job: PrintJob, file: Path | None) -> AbstractContextManager[Journal | None]:
@@ -82,14 +76,15 @@ def _journal(job: PrintJob, file: Path | None) -> AbstractContextManager[Journal
         return nullcontext()
 
 
-def _print_simulated(job: PrintJob, request: PrintRequest, observers: Observers) -> int:
+def _print_simulated(job: PrintJob, request: PrintRequest, observers: Observers, attendance: Attendance | None) -> int:
     """Stream to the simulated printer and tell what it has done."""
     machine = job.profile.machine
     usb = job.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
     speed = request.sim_speed or inf
     with SimulatedPrinter(machine, speed, BuildOptions(queue=QUEUE)) as printer:
         pace = speed if isfinite(speed) else None
-        outcome = stream_program(replace(job, profile=usb), replace(request, port=printer.path), observers, pace=pace)
+        there = replace(request, port=printer.path)
+        outcome = stream_program(replace(job, profile=usb), there, observers, pace=pace, attendance=attendance)
         record = printer.record
     if outcome.cancelled:
         return report_end(outcome, observers.log)
@@ -111,18 +106,19 @@ def stream_program(
     observers: Observers,
     begin: Callable[[PrinterStatus], ResumePoint] | None = None,
     pace: float | None = 1.0,
+    attendance: Attendance | None = None,
 ) -> Outcome:
-    """Stream a program while a person watches: screen or lines, keys, Ctrl-C, log, journal.
+    """Stream a program while a person watches, at the terminal without an `attendance`: display, commands, Ctrl-C, log, journal.
 
     begin: of a resumed print. pace: seconds of the print that pass in one of the clock; None: as fast as it goes.
     """
-    stop, control, words, course = threading.Event(), Control(), Words(), Course(job.program.run)
+    person, course = attendance or AtTerminal(), Course(job.program.run)
 
     def traffic(direction: str, data: bytes) -> None:
         observers.log.note(direction, data)
-        words.hear(direction, data)
+        person.words.hear(direction, data)
 
-    with stopping(stop), PrintDisplay(observers.log.title, course, Keyboard(control), words) as display:
+    with stopping(person.stop), person.show(observers, course) as display:
 
         def begin_then_show(status: PrinterStatus) -> ResumePoint:
             start = ResumePoint(1, ()) if begin is None else begin(status)
@@ -142,10 +138,10 @@ def stream_program(
             request.port,
             request.baud,
             on_progress,
-            stop,
+            person.stop,
             Schedule(course.remaining_s, pace),
             limit=dialect_of(job.profile.machine).longest_line,
-            control=control,
+            control=person.control,
             profile=job.profile,
             medium=tap(traffic),
             journal=observers.journal,

@@ -7,8 +7,8 @@ from threading import Event
 import pytest
 
 from machine.app.cli import main
-from machine.app.commands import ports as ports_command
-from machine.app.commands.ports import PortReport, ask_port, describe, port_json
+from machine.app.printer import port_reports
+from machine.app.printer.port_reports import PortReport, ask_port, describe, port_json
 from machine.app.printer.running_simulators import announced
 from machine.link.identification import Answer, Kind
 from machine.link.port import SerialDevice, open_port
@@ -29,8 +29,8 @@ def device(path: str) -> SerialDevice:
 def here(monkeypatch: pytest.MonkeyPatch) -> list[SerialDevice]:
     """The ports of this computer, as the test fills them in."""
     devices: list[SerialDevice] = []
-    monkeypatch.setattr(ports_command, "serial_devices", lambda: tuple(devices))
-    hear_out(monkeypatch, ports_command)
+    monkeypatch.setattr(port_reports, "serial_devices", lambda: tuple(devices))
+    hear_out(monkeypatch, port_reports)
     return devices
 
 
@@ -58,7 +58,7 @@ def test_several_ports_are_asked_at_a_time_and_told_in_order(
         on_terminal(scripted({}, "hello?")) as stranger,
         on_terminal(lambda *_: b"") as mute,
     ):
-        hear_out(monkeypatch, ports_command, mute)
+        hear_out(monkeypatch, port_reports, mute)
         here += [device(printer.path), device(stranger), device(mute), device("/dev/no-such-port")]
         assert main(["ports", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

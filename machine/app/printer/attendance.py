@@ -1,0 +1,56 @@
+"""Attendance: who stands at a print, sees where it is and commands it: a person at the terminal, or at a page."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from threading import Event as Flag
+from typing import Protocol
+
+from machine.app.printer.serial_log import SerialLog
+from machine.app.terminal.keys import Keyboard
+from machine.app.terminal.print_display import PrintDisplay
+from machine.app.terminal.screen import Course, Words
+from machine.link.journal import Journal
+from machine.link.pending_commands import Control
+from machine.link.progress import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Observers:
+    """Who is told of a print besides the person at it: the serial log, the journal, the page that follows it."""
+
+    log: SerialLog
+    journal: Journal | None = None
+    follow: Callable[[Progress], None] | None = None
+
+
+class Display(Protocol):
+    """Shows progress from open() on: before, a person may be asked something."""
+
+    def open(self) -> None:
+        """Begin to show what comes."""
+
+    def __call__(self, progress: Progress) -> None:
+        """Show where the print stands; in the thread of the stream, which must not wait for it."""
+
+
+class Attendance(Protocol):
+    """control, stop: what is asked of the print, and that it is to end; words: what the printer says is kept there."""
+
+    control: Control
+    stop: Flag
+    words: Words
+
+    def show(self, observers: Observers, course: Course) -> AbstractContextManager[Display]:
+        """What shows the print while it runs."""
+
+
+class AtTerminal:
+    """A screen with keys on a terminal, plain lines elsewhere."""
+
+    def __init__(self) -> None:
+        self.control, self.stop, self.words = Control(), Flag(), Words()
+
+    def show(self, observers: Observers, course: Course) -> PrintDisplay:
+        """The screen."""
+        return PrintDisplay(observers.log.title, course, Keyboard(self.control), self.words)
