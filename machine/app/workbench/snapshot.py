@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from machine.app.workbench.bench import Bench, Model, overhang_mm2
+from machine.app.workbench.fit import standing
 from machine.app.workbench.planes import Cuts
 from machine.app.workbench.session import Session
 from machine.view.parts import page_colours
@@ -32,6 +33,8 @@ def snapshot(session: Session) -> dict[str, Any]:
         "redo": history.undone[-1].word if history.undone else "",
         "model": None if bench.model is None else _model(bench.model),
         "rotation": bench.rotation,
+        "scale": bench.profile.process.scale,
+        "standing": None if (stands := standing(bench)) is None else asdict(stands),
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATFORM_TOLERANCE_MM,
         "overhang_mm2": _overhang_mm2(bench),

@@ -92,6 +92,7 @@ function pictureOf(canvas, camera, drawn) {
       const [x, y, , w] = scene.toClip ? projected(scene.toClip, place) : [0, 0, 0, 0];
       return w > 0 ? [(x + 1) / 2 * canvas.clientWidth, (1 - y) / 2 * canvas.clientHeight] : null;
     },
+    eye: () => camera.eye(),
     carried: (place) => carried(scene.matrix, place),
     box: () => scene.box,
     matrix: () => scene.matrix,
@@ -100,12 +101,16 @@ function pictureOf(canvas, camera, drawn) {
       camera.fit(corners, canvas.clientWidth / Math.max(canvas.clientHeight, 1));
       ask();
     },
-    /** From where and along what an event on the canvas looks, in the frame of the model as it is read. */
-    ray: (event) => {
-      const box = canvas.getBoundingClientRect(), back = undone(scene.matrix), eye = camera.eye();
+    /** From where and along what an event on the canvas looks, in the frame of the platform. */
+    sight: (event) => {
+      const box = canvas.getBoundingClientRect(), eye = camera.eye();
       const x = ((event.clientX - box.left) / box.width * 2 - 1) * (box.width / box.height) * HALF_HEIGHT;
       const y = (1 - ((event.clientY - box.top) / box.height) * 2) * HALF_HEIGHT;
-      const along = add(unit(sub(camera.target, eye)), add(scaled(camera.right(), x), scaled(camera.up(), y)));
+      return [eye, add(unit(sub(camera.target, eye)), add(scaled(camera.right(), x), scaled(camera.up(), y)))];
+    },
+    /** The same in the frame of the model as it is read. */
+    ray(event) {
+      const back = undone(scene.matrix), [eye, along] = this.sight(event);
       return [carried(back, eye), turned(back, along)];
     },
   };

@@ -1,8 +1,8 @@
 // Main: the line to the server, the picture and the panels put together.
 
 function main() {
-  const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => bench.placeHandles()), root = document.documentElement;
-  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, placeHandles: () => {} };
+  const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => { bench.placeHandles(); bench.placeRings(); }), root = document.documentElement;
+  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, placeHandles: () => {}, placeRings: () => {} };
   const dark = themeOf((now) => { if (picture && bench.state) picture.machine(bench.state.machine, now); });
   const line = lineTo((state) => follow(state), (gone) => {
     root.dataset.line = gone ? "lost" : "open";
@@ -13,6 +13,7 @@ function main() {
     bench.laying = whether;
     $("lay").setAttribute("aria-pressed", whether);
     notice(whether ? "Click the face that is to lie on the platform." : "");
+    if (picture) picture.ask(); // the rings give way
   };
   /** Where the model stands now, and red what overhangs: the figure is the server's as soon as nothing moves. */
   const stand = (rotation, live) => {
@@ -39,7 +40,7 @@ function main() {
     legend(cut ? colours.slice(0, planes.length + 1) : null);
   };
   bench.picture = picture;
-  const panels = [modelPanel(bench), partsPanel(bench), planesPanel(bench), slicesPanel(bench), settingsPanel(bench)];
+  const panels = [modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), slicesPanel(bench), settingsPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;
@@ -72,6 +73,7 @@ function main() {
     handle($("canvas"), camera, { changed: picture.ask, pressed: (event) => press(event, bench, picture) });
     viewsOf(camera, picture);
   }
+  ringsOf(bench);
   keysOf(bench, camera, picture);
   root.dataset.state = picture ? "ready" : "failed";
   if (!picture) {
@@ -172,7 +174,7 @@ function keysOf(bench, camera, picture) {
   const keys = {
     ArrowLeft: arrow(-1, 0), ArrowRight: arrow(1, 0), ArrowUp: arrow(0, 1), ArrowDown: arrow(0, -1),
     "+": () => camera.zoom(0.85), "=": () => camera.zoom(0.85), "-": () => camera.zoom(1 / 0.85),
-    f: () => $("fit").click(), d: () => $("theme").click(), Escape: () => { bench.lay(false); bench.snap(false); bench.select(0); },
+    f: () => $("fit").click(), d: () => $("theme").click(), r: () => $("show-rings").click(), Escape: () => { bench.lay(false); bench.snap(false); bench.select(0); },
   };
   ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
   addEventListener("keydown", (event) => {

@@ -1,0 +1,36 @@
+"""Fit: how large the model stands on the platform, and whether the machine reaches all of it."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from machine.app.workbench.bench import Bench
+from machine.planning.limits import check_parts
+from mdp.search.orientation import standing_still
+from mdp.search.parts import one_piece
+from profiles.errors import MoveError
+
+
+@dataclass(frozen=True)
+class Standing:
+    """size_mm: along the platform's axes, as the model is turned; problem: what the machine does not reach of it in one piece, in
+    the sentence that `export` has for it, "" where it reaches all."""
+
+    size_mm: tuple[float, float, float]
+    problem: str
+
+
+@lru_cache(maxsize=4)
+def standing(bench: Bench) -> Standing | None:
+    """The model as it stands on the platform; None without one."""
+    if bench.model is None:
+        return None
+    turned = bench.turned
+    mesh = bench.model.mesh if turned is None else standing_still(bench.model.mesh, turned)
+    x, y, z = (float(side) for side in np.ptp(mesh.bounds_mm, axis=0))
+    try:
+        check_parts((one_piece(mesh, bench.profile.machine),), bench.profile)
+    except MoveError as error:
+        return Standing((x, y, z), str(error))
+    return Standing((x, y, z), "")

@@ -1,0 +1,82 @@
+"""The model on the workbench in a real browser: turned by its rings, scaled, and told where the machine does not reach it."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from mdp.save import stl
+from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.test_workbench_page import WINDOW, area, drag_slider, open_model
+from tests.machine.workbench import QUICK, Running, workbench
+from tests.shapes import tee
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
+
+RING_Y = """(() => { const path = document.querySelector('[data-ring=y] .near'), box = $('rings').getBoundingClientRect();
+  const at = (share) => path.getPointAtLength(share * path.getTotalLength());
+  return [at(0.5), at(0.6)].map(({ x, y }) => [x + box.x, y + box.y]); })()"""
+TURNED = "$('undo').getAttribute('aria-label') === 'undo: turn the model'"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with Browser(WINDOW) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Running]:
+    with workbench(*QUICK) as running:
+        yield running
+
+
+def told_by(browser: Browser, ring: str) -> str:
+    text: str = browser.value(f"document.querySelector('[data-ring={ring}]').getAttribute('aria-valuetext')")
+    return text
+
+
+def arrow_up(browser: Browser, event: str) -> None:
+    given = "{ key: 'ArrowUp', shiftKey: true, bubbles: true }"
+    browser.value(f"document.activeElement.dispatchEvent(new KeyboardEvent('{event}', {given}))")
+
+
+def test_a_drag_of_a_ring_turns_the_model_in_one_step_and_red_follows_it(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    standing = area(browser)
+    start, end = (tuple(place) for place in browser.value(RING_Y))
+    browser.hold(start, end)
+    live, angle = area(browser), told_by(browser, "y")
+    browser.release(end)
+    browser.wait(TURNED)
+    assert angle not in ("0 degrees", "")
+    assert live != standing
+    assert area(browser) == pytest.approx(live, abs=0.2)
+    browser.click("#undo")
+    browser.wait("$('undo').getAttribute('aria-label').startsWith('undo: open')")
+    assert area(browser) == standing
+
+
+def test_arrow_keys_turn_a_ring_and_shift_takes_15_degrees_at_once(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    browser.value("document.querySelector('[data-ring=x]').focus()")
+    for _ in range(6):
+        arrow_up(browser, "keydown")
+    assert told_by(browser, "x") == "90 degrees"
+    arrow_up(browser, "keyup")
+    browser.wait(TURNED)
+    browser.wait("$('size-z').value === '10.00' && $('size-y').value === '40.00'")  # a T of 40 x 10 x 40 mm, laid on its back
+
+
+def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_is_told(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    drag_slider(browser, "size-x", 60, "change")
+    browser.wait("$('scale').value === '150' && $('size-y').value === '15.00'")
+    assert "reaches all of it" in browser.value("$('fit-told').textContent")
+    drag_slider(browser, "scale", 2000, "change")
+    browser.wait("$('fit-told').classList.contains('refused')")
+    assert "process.scale makes the model smaller" in browser.value("$('fit-told').textContent")
+    drag_slider(browser, "scale", -3, "change")
+    browser.wait("$('scale').value === '2000'")
+    browser.click("#scale-as-read")
+    browser.wait("$('scale').value === '100'")
+    assert browser.complaints == []
