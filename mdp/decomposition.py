@@ -8,6 +8,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.pose import Pose
+from mdp.zone import UNMARKED, Marked
 from profiles.errors import DecompositionError
 
 VOLUME_TOLERANCE = 1e-6
@@ -22,7 +23,7 @@ class Part:
     the pose, so rotation @ direction = +z and a point w has part coordinates rotation @ w - (0, 0, base.offset_mm).
     feather_share is the share of its base's rim, where that is seen, at which base and surface meet at less than 20 degrees.
     needing (m,): the faces that need support, needing_upright (m,): those of the model's that would if it were printed straight
-    up in one piece; None: all that overhang.
+    up in one piece; None: all that overhang. no_seam, no_support: where a person wants no layer to begin and nothing held up.
     """
 
     index: int
@@ -35,6 +36,8 @@ class Part:
     feather_share: float = 0.0
     needing: Mask | None = None
     needing_upright: Mask | None = None
+    no_seam: Marked = UNMARKED
+    no_support: Marked = UNMARKED
 
     @property
     def direction(self) -> Floats:

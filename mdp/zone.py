@@ -1,16 +1,18 @@
-"""Zone: a box of the workpiece frame, or faces of a colour, where a person wants no cut at all, or no seam.
+"""Zone: a box of the workpiece frame, or faces of a surface, where a person wants no cut at all, no seam or no support.
 
-Which colour means what is the person's to say: a colour alone marks nothing.
+Faces are named by a colour of the model's file or by a point and how far they reach around it. Which colour means what is the
+person's to say: a colour alone marks nothing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
 from mdp.formats.surface import Indices
-from mdp.mesh import Floats, Mesh
+from mdp.grown import Grown
+from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
 from mdp.repair.edges import connected_components
@@ -26,6 +28,11 @@ class Zone:
 
     min_mm: Vector
     max_mm: Vector
+
+    def moved(self, shift_mm: Vector) -> "Zone":
+        """The box somewhere else."""
+        low, high = (np.add(corner, shift_mm).tolist() for corner in (self.min_mm, self.max_mm))
+        return Zone((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
     def spans_mm(self, directions: Floats) -> Floats:
         """(k, 1, 2) least and greatest direction . p over the box for (k, 3) directions."""
@@ -62,9 +69,9 @@ class Patches:
     starts: Indices
 
     @classmethod
-    def of(cls, mesh: Mesh, colour: int) -> "Patches":
-        """The faces of a mesh that have a colour."""
-        faces = mesh.faces[_has(mesh, colour)].astype(np.int64)
+    def of(cls, mesh: Mesh, chosen: Mask) -> "Patches":
+        """The chosen (m,) faces of a mesh."""
+        faces = mesh.faces[chosen].astype(np.int64)
         label = connected_components(len(mesh.vertices), faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())
         vertices = np.unique(faces)
         vertices = vertices[np.argsort(label[vertices], kind="stable")]
@@ -97,38 +104,80 @@ def _united(low: Floats, high: Floats) -> Floats:
     return spans
 
 
-def _has(mesh: Mesh, colour: int) -> Mask:
-    return np.zeros(len(mesh.faces), dtype=np.bool_) if mesh.colours is None else mesh.colours == colour
+AnyZone = Zone | Painted | Grown
+
+
+def faces_of(mesh: Mesh, zone: Painted | Grown) -> Mask:
+    """(m,) the faces of a mesh that a zone means."""
+    if isinstance(zone, Grown):
+        return zone.faces(mesh)
+    return np.zeros(len(mesh.faces), dtype=np.bool_) if mesh.colours is None else mesh.colours == zone.colour
 
 
 @dataclass(frozen=True)
 class Zones:
-    """What a person keeps the search out of. keep: no plane passes through; no_seam: rims there weigh many times."""
+    """What a person keeps the program out of. keep: no plane passes through; no_seam: rims there weigh many times, and layers do
+    not begin there; no_support: what overhangs there is not held up, and weighs many times."""
 
-    keep: tuple[Zone | Painted, ...] = ()
-    no_seam: tuple[Zone | Painted, ...] = ()
+    keep: tuple[AnyZone, ...] = ()
+    no_seam: tuple[AnyZone, ...] = ()
+    no_support: tuple[AnyZone, ...] = ()
 
     def on(self, mesh: Mesh) -> "ZonesOnModel":
-        """The zones with the faces that a model has of their colours."""
-        keep = tuple(Patches.of(mesh, zone.colour) if isinstance(zone, Painted) else zone for zone in self.keep)
-        boxes = tuple(zone for zone in self.no_seam if isinstance(zone, Zone))
-        colours = [zone.colour for zone in self.no_seam if isinstance(zone, Painted)]
-        faces = np.any([_has(mesh, colour) for colour in colours], axis=0) if colours else None
-        return ZonesOnModel(keep, boxes, faces)
+        """The zones with the faces that they mean on a model."""
+        keep = tuple(zone if isinstance(zone, Zone) else Patches.of(mesh, faces_of(mesh, zone)) for zone in self.keep)
+        return ZonesOnModel(keep, Marked.of(mesh, self.no_seam), Marked.of(mesh, self.no_support))
+
+
+@dataclass(frozen=True, eq=False)
+class Marked:
+    """Where something is unwanted: in boxes of the workpiece frame, and on (m,) faces of a mesh; None: none is named."""
+
+    boxes: tuple[Zone, ...] = ()
+    faces: Mask | None = None
+
+    @classmethod
+    def of(cls, mesh: Mesh, zones: Sequence[AnyZone]) -> "Marked":
+        """What zones mark of a mesh."""
+        named = [faces_of(mesh, zone) for zone in zones if not isinstance(zone, Zone)]
+        boxes = tuple(zone for zone in zones if isinstance(zone, Zone))
+        return cls(boxes, np.any(named, axis=0) if named else None)
+
+    @property
+    def anywhere(self) -> bool:
+        """Whether anything is marked at all."""
+        return bool(self.boxes) or self.faces is not None
+
+    def among(self, sources: Ints) -> "Marked":
+        """The same for a piece of the mesh. sources: (k,) of which of its faces each of the piece's is one, below 0: of none."""
+        if self.faces is None:
+            return self
+        known = (sources >= 0) & (sources < len(self.faces))
+        return replace(self, faces=known & self.faces[np.where(known, sources, 0)])
+
+    def repeated(self, shifts_mm: Sequence[Vector]) -> "Marked":
+        """The same for a mesh that is there so many times, each shifted otherwise."""
+        boxes = tuple(box.moved(shift) for shift in shifts_mm for box in self.boxes)
+        return Marked(boxes, None if self.faces is None else np.tile(self.faces, len(shifts_mm)))
+
+    def touched(self, mesh: Mesh) -> Mask:
+        """(m,) the faces of the mesh that are marked or reach into a box."""
+        faces = touched(mesh, self.boxes)
+        return faces if self.faces is None else faces | self.faces
 
 
 @dataclass(frozen=True, eq=False)
 class ZonesOnModel:
-    """The zones of a search. no_seam_faces: (m,) which of the model's faces are painted so; None: no colour says so."""
+    """The zones of a search, with the faces of the model that they mean."""
 
     keep: tuple[Zone | Patches, ...] = ()
-    no_seam: tuple[Zone, ...] = ()
-    no_seam_faces: Mask | None = None
+    no_seam: Marked = Marked()
+    no_support: Marked = Marked()
 
     @property
-    def keep_seams_away(self) -> bool:
-        """Whether seams are unwanted anywhere."""
-        return bool(self.no_seam) or self.no_seam_faces is not None
+    def by_face(self) -> bool:
+        """Whether it matters of which face of the model each face of a part is a piece."""
+        return self.no_seam.faces is not None or self.no_support.anywhere
 
     def crossed(self, plane: Plane) -> int | None:
         """Number, from 1, of the first zone to keep whole that a plane passes through."""
@@ -139,7 +188,7 @@ class ZonesOnModel:
         return None
 
 
-NO_ZONES, NOWHERE = Zones(), ZonesOnModel()
+NO_ZONES, NOWHERE, UNMARKED = Zones(), ZonesOnModel(), Marked()
 
 
 def touched(mesh: Mesh, zones: Sequence[Zone]) -> Mask:

@@ -34,6 +34,7 @@ from slicer.walls.gap import gaps
 from slicer.walls.overhang import split_overhangs
 from slicer.walls.seam import Surroundings, place_seams, rear_of
 from slicer.walls.thin import thin_walls
+from slicer.walls.unwanted_seam import unwanted_segments
 from slicer.walls.variable.pieces import in_pieces
 from slicer.walls.walls import wall_beads
 
@@ -65,10 +66,10 @@ def slice_site(site: Site, supports: Supports, on_layer: Callable[[int, int], No
     bounds_mm = part.in_part_frame().bounds_mm
     rear = rear_of(bounds_mm)
     layers: list[Layer] = []
-    tip, seams = rear, np.zeros((0, 2))
+    tip, seams, unwanted = rear, np.zeros((0, 2)), unwanted_segments(part, stack.heights.cut_mm)
     usual = bottom_layers(profile.process) if profile.process.spiral_vase else len(stack.outlines)
     for i in range(min(usual, len(stack.outlines))):
-        around = Surroundings(rear, seams, tip, stack.edges, float(stack.heights.cut_mm[i]), i)
+        around = Surroundings(rear, seams, tip, stack.edges, float(stack.heights.cut_mm[i]), i, unwanted[i])
         beads = [*_part_beads(stack, i), *_auxiliary_beads(stack, i, part, later)]
         beads = [bead if bead.kind in WALLS else simplify_bead(bead) for bead in beads]
         beads, seams = place_seams(beads, profile.process, around)

@@ -4,7 +4,6 @@ Area that needs support is scarred where support touches it, and every cut leave
 search.seam_mm wide, less of one where it is hidden. The paper's J is the special case of a seam without width.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +13,10 @@ from mdp.cost.model_need import ModelNeed
 from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface
 from mdp.cut import Solid, mesh_of
 from mdp.mesh import Floats, Mesh, dot
-from mdp.overhang import Mask, standing
+from mdp.overhang import standing
 from mdp.plane import Plane
 from mdp.sweep.rims import measure_rim
-from mdp.zone import NOWHERE, Zone, ZonesOnModel, touched
+from mdp.zone import NOWHERE, ZonesOnModel
 from profiles.profile import Profile
 from profiles.search import Search
 
@@ -26,13 +25,12 @@ NO_SEAM_WEIGHT = 100.0  # of a rim where a person wants no seam
 
 @dataclass(frozen=True, eq=False)
 class SeamPlaces:
-    """Where on a model seams cost how much. by_source: (m,) how much a mm of rim counts on each of the model's faces; no_seam:
-    boxes in which it counts NO_SEAM_WEIGHT times; no_seam_faces: the faces on which it does."""
+    """Where on a model seams cost how much. by_source: (m,) how much a mm of rim counts on each of the model's faces; zones: of
+    the search; where they want no seam it counts NO_SEAM_WEIGHT times."""
 
     surface: ModelSurface
     by_source: Floats
-    no_seam: Sequence[Zone]
-    no_seam_faces: Mask
+    zones: ZonesOnModel
 
     @classmethod
     def of(cls, surface: ModelSurface, solid: Solid, hidden_share: float, zones: ZonesOnModel = NOWHERE) -> "SeamPlaces":
@@ -40,17 +38,14 @@ class SeamPlaces:
         mesh = mesh_of(solid)
         hidden = hidden_shares(mesh) if hidden_share < 1.0 else np.zeros(len(mesh.faces))
         by_source = 1.0 - (1.0 - hidden_share) * surface.by_source(solid, hidden)
-        faces = np.zeros(len(by_source), dtype=np.bool_)
-        if zones.no_seam_faces is not None:
-            faces[: len(zones.no_seam_faces)] = zones.no_seam_faces
-        return cls(surface, by_source, zones.no_seam, faces)
+        return cls(surface, by_source, zones)
 
     def weights(self, solid: Solid) -> Floats:
         """(m,) how much a mm of rim counts on each face of what cuts have left of the model: 0 on faces that they laid open,
         which the parts on them cover, and on those that stand on the platform."""
         mesh, sources = mesh_of(solid), self.surface.sources(solid)
         free = (sources == MADE_BY_A_CUT) | standing(mesh)
-        unwanted = touched(mesh, self.no_seam) | self.no_seam_faces[sources]
+        unwanted = self.zones.no_seam.among(sources).touched(mesh)
         return np.where(free, 0.0, self.by_source[sources] * np.where(unwanted, NO_SEAM_WEIGHT, 1.0))
 
 

@@ -5,27 +5,36 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface
-from mdp.cut import Solid
+from mdp.cut import Solid, mesh_of
 from mdp.mesh import Mesh, dot
 from mdp.overhang import Mask, risky_upright, threshold
 from mdp.plane import Plane
 from mdp.support_need.need import ModelPieces, SupportNeed, needs_support
-from mdp.support_need.patches import UNSUPPORTABLE
+from mdp.support_need.patches import CARRIES_ITSELF, UNSUPPORTABLE
+from mdp.zone import UNMARKED, Marked
 from profiles.profile import Profile
+
+NO_SUPPORT_WEIGHT = 100.0  # of an area that needs support where a person wants none
 
 
 @dataclass(frozen=True, eq=False)
 class ModelNeed:
-    """The surface of a model and what it needs along any direction."""
+    """The surface of a model and what it needs along any direction; no_support: where an area that needs it counts
+    NO_SUPPORT_WEIGHT times, for it would hang."""
 
     surface: ModelSurface
     need: SupportNeed
+    no_support: Marked = UNMARKED
 
     def pieces(self, solid: Solid) -> ModelPieces:
         """The faces of what was cut from the model, as mesh_of orders them. manifold3d may number a few more than the model has:
         they count as made by a cut."""
         sources = self.surface.sources(solid)
-        return ModelPieces(self.need, np.where(sources < len(self.surface.mesh.faces), sources, np.int32(MADE_BY_A_CUT)))
+        sources = np.where(sources < len(self.surface.mesh.faces), sources, np.int32(MADE_BY_A_CUT))
+        if not self.no_support.anywhere:
+            return ModelPieces(self.need, sources)
+        barred = self.no_support.among(sources).touched(mesh_of(solid))
+        return ModelPieces(self.need, sources, np.where(barred, NO_SUPPORT_WEIGHT, 1.0))
 
 
 def needing_upright(mesh: Mesh, profile: Profile) -> Mask:
@@ -38,12 +47,15 @@ def needing_upright(mesh: Mesh, profile: Profile) -> Mask:
     return needing
 
 
-def unsupportable_mm2(mesh: Mesh, pieces: ModelPieces, plane: Plane) -> float:
-    """Area above a plane that needs support along its normal and has but air beneath it. mesh: what the plane cuts."""
+def excess_mm2(mesh: Mesh, pieces: ModelPieces, plane: Plane) -> float:
+    """By how much what needs support above a plane along its normal counts more than its area: over nothing but air, and where
+    none is wanted. mesh: what the plane cuts."""
+    classes, counts = pieces.along(plane.normal), np.ones(len(mesh.faces)) if pieces.counts is None else pieces.counts
+    times = np.where(classes == UNSUPPORTABLE, pieces.need.weight, 1.0) * counts
     risky = dot(mesh.normals, plane.normal) < threshold(pieces.need.process.self_supporting_angle_deg)
-    chosen = np.flatnonzero(risky & (pieces.along(plane.normal) == UNSUPPORTABLE))
+    chosen = np.flatnonzero(risky & (classes != CARRIES_ITSELF) & (times != 1.0))
     low, middle, high = np.sort(plane.heights_mm(mesh.vertices)[mesh.faces[chosen]], axis=1).T
     with np.errstate(divide="ignore", invalid="ignore"):
         lower, upper = low * low / ((middle - low) * (high - low)), high * high / ((high - middle) * (high - low))
     share = np.where(middle > 0.0, 1.0 - np.where(low < 0.0, lower, 0.0), np.where(high > 0.0, upper, 0.0))
-    return float((mesh.areas_mm2[chosen] * share).sum())
+    return float((mesh.areas_mm2[chosen] * share * (times[chosen] - 1.0)).sum())

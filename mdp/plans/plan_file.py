@@ -17,6 +17,10 @@
     [[no_seam]]                         # seams here count a hundred times: a box, or the faces of a colour of the model's file
     colour = "#00ff00"
 
+    [[no_support]]                      # nothing is held up here: the faces around a point that turn from it by at most so much
+    point_mm = [0.0, -12.5, 41.0]
+    angle_deg = 30.0
+
     [[front]]                           # the best decomposition of every other number of parts, for --parts
     planes = [[0.0, 0.0, 1.0, 40.0]]    # normal and offset_mm of part 2, 3, ...
 
@@ -39,9 +43,10 @@ from profiles.part_settings import PartSettings
 
 VERSION = 1
 GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for coordinates lie on whole and half micrometres
-KEYS = ("version", "model", "sha256", "orientation", "part", "keep", "no_seam", "front")
+ZONE_KINDS = ("keep", "no_seam", "no_support")  # as mdp.zone.Zones has them
+KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "front")
 PART_KEYS = ("normal", "offset_mm", "process")
-ZONE_KEYS = ("min_mm", "max_mm", "colour")
+ZONE_KEYS = ("min_mm", "max_mm", "colour", "point_mm", "angle_deg")
 ROW_KEYS = ("planes", "support_area_mm2", "seam_mm", "cost_mm2")
 
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from mdp.colour import parse_colour
-from mdp.plans.plan_file import KEYS, PART_KEYS, ROW_KEYS, VERSION, ZONE_KEYS, PlanFile, PlannedPart, PlannedRow
-from mdp.zone import Painted, Zone, Zones
+from mdp.grown import MOST_GROWN_DEG, Grown
+from mdp.plans.plan_file import KEYS, PART_KEYS, ROW_KEYS, VERSION, ZONE_KEYS, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.zone import AnyZone, Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
@@ -52,12 +53,12 @@ class _Reader:
         settings = tuple(self._settings(part, number) for number, part in tables if part.get("process"))
         if parts and parts[0] != PlannedPart(None, None):
             raise self._error("part 1 stands on the platform and has no plane: put an empty [[part]] before the first plane")
-        keep, no_seam = (self._zones(table, key) for key in ("keep", "no_seam"))
+        zones = Zones(*(self._zones(table, kind) for kind in ZONE_KINDS))
         rows = [self._row(row, number) for number, row in enumerate(self._list(table, "front", MOST_PARTS), start=1)]
         if len({len(row.parts) for row in rows}) < len(rows):
             raise self._error("two rows of [[front]] have the same number of planes: one is allowed for each")
         model, sha = self._text(table, "model"), self._text(table, "sha256")
-        turned, zones = self._orientation(table), Zones(keep, no_seam)
+        turned = self._orientation(table)
         return PlanFile(self.name, model, sha, turned, tuple(parts[1:]), zones, tuple(rows), settings)
 
     def _part(self, table: dict[str, Any], number: int) -> PlannedPart:
@@ -86,13 +87,16 @@ class _Reader:
         support, seam, cost = (self._number(table.get(key, 0.0), where + key, 1e15) for key in ROW_KEYS[1:])
         return PlannedRow(tuple(parts), support, seam, cost)
 
-    def _zones(self, table: dict[str, Any], key: str) -> tuple[Zone | Painted, ...]:
-        zones: list[Zone | Painted] = []
+    def _zones(self, table: dict[str, Any], key: str) -> tuple[AnyZone, ...]:
+        zones: list[AnyZone] = []
         for number, values in enumerate(self._list(table, key, MOST_ZONES), start=1):
             where = f"{key} {number}: "
             self._only(values, ZONE_KEYS, where)
             if "colour" in values:
                 zones.append(self._painted(values, where))
+                continue
+            if "point_mm" in values or "angle_deg" in values:
+                zones.append(self._grown(values, where))
                 continue
             low, high = (self._vector(values.get(corner), where + corner) for corner in ZONE_KEYS[:2])
             if not all(least < most for least, most in zip(low, high, strict=True)):
@@ -100,9 +104,19 @@ class _Reader:
             zones.append(Zone(low, high))
         return tuple(zones)
 
+    def _grown(self, values: dict[str, Any], where: str) -> Grown:
+        if not set(values) <= {"point_mm", "angle_deg"}:
+            raise self._error(f"{where}has a point and a box: one of them is allowed")
+        point_mm = self._vector(values.get("point_mm"), f"{where}point_mm")
+        angle_deg = self._number(values.get("angle_deg"), f"{where}angle_deg")
+        if not 0.0 <= angle_deg <= MOST_GROWN_DEG:
+            raise self._error(f"{where}angle_deg is {angle_deg:g}: 0 to {MOST_GROWN_DEG:g} is allowed")
+        return Grown(point_mm, angle_deg)
+
     def _painted(self, values: dict[str, Any], where: str) -> Painted:
         if len(values) > 1:
-            raise self._error(f"{where}has a colour and a box: one of them is allowed")
+            other = "a point" if set(values) & {"point_mm", "angle_deg"} else "a box"
+            raise self._error(f"{where}has a colour and {other}: one of them is allowed")
         text = values["colour"]
         colour = parse_colour(text) if isinstance(text, str) else None
         if colour is None:

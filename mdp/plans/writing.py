@@ -6,8 +6,9 @@ from typing import Any
 import tomlkit
 
 from mdp.colour import colour_text
-from mdp.plans.plan_file import ROW_KEYS, VERSION, PlanFile, PlannedPart, PlannedRow
-from mdp.zone import Painted, Zone
+from mdp.grown import Grown
+from mdp.plans.plan_file import ROW_KEYS, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.zone import AnyZone, Painted
 
 
 def plan_text(plan: PlanFile) -> str:
@@ -23,17 +24,20 @@ def plan_text(plan: PlanFile) -> str:
     parts = (PlannedPart(None, None, "part 1 stands on the platform"), *plan.parts)
     settings = {each.part: each.process for each in plan.settings}
     document["part"] = _tables([_part_table(part, settings.get(k, {})) for k, part in enumerate(parts, start=1)])
-    for key, zones in (("keep", plan.zones.keep), ("no_seam", plan.zones.no_seam)):
+    for kind in ZONE_KINDS:
+        zones: Sequence[AnyZone] = getattr(plan.zones, kind)
         if zones:
-            document[key] = _tables([_table(_zone_values(zone)) for zone in zones])
+            document[kind] = _tables([_table(_zone_values(zone)) for zone in zones])
     if plan.front:
         document["front"] = _tables([_row_table(row) for row in plan.front])
     return tomlkit.dumps(document)
 
 
-def _zone_values(zone: Zone | Painted) -> dict[str, Any]:
+def _zone_values(zone: AnyZone) -> dict[str, Any]:
     if isinstance(zone, Painted):
         return {"colour": colour_text(zone.colour)}
+    if isinstance(zone, Grown):
+        return {"point_mm": list(zone.point_mm), "angle_deg": zone.angle_deg}
     return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm)}
 
 

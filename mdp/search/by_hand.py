@@ -12,10 +12,11 @@ import numpy as np
 from mdp.clearance import find_obstacle, lowest_body
 from mdp.colour import NO_COLOUR, colour_text
 from mdp.cut import above, mesh_of
+from mdp.grown import FARTHEST_MM, Grown
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import threshold
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart, mesh_sha256
+from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, mesh_sha256
 from mdp.pose import poses
 from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, residual_mm2
 from mdp.search.node import Node
@@ -38,19 +39,26 @@ def check_model(plan: PlanFile, mesh: Mesh, name: str) -> None:
         )
 
 
-def check_colours(plan: PlanFile, mesh: Mesh, name: str) -> None:
-    """Raise PlanError where a plan means faces of a colour that the model has none of."""
-    for key, zones in (("keep", plan.zones.keep), ("no_seam", plan.zones.no_seam)):
-        for number, zone in enumerate(zones, start=1):
-            if not isinstance(zone, Painted):
-                continue
-            label = f"plan {plan.name}: {key} {number}: colour is {colour_text(zone.colour)}"
-            if mesh.colours is None:
-                raise PlanError(f"{label}, but {name} paints no face: a 3MF or a PLY file with colours is expected")
-            used = [colour for colour in np.unique(mesh.colours).tolist() if colour != NO_COLOUR]
-            if zone.colour not in used:
-                shown = ", ".join(map(colour_text, used[:MOST_SHOWN])) + (", ..." if len(used) > MOST_SHOWN else "")
-                raise PlanError(f"{label}, but no face of {name} is painted so; its colours are {shown}")
+def check_zones(plan: PlanFile, mesh: Mesh, name: str) -> None:
+    """Raise PlanError where a plan means faces that the model has not: of a colour, or around a point."""
+    for kind in ZONE_KINDS:
+        for number, zone in enumerate(getattr(plan.zones, kind), start=1):
+            label = f"plan {plan.name}: {kind} {number}:"
+            if isinstance(zone, Painted):
+                _check_colour(zone, mesh, name, label)
+            elif isinstance(zone, Grown) and (away_mm := zone.away_mm(mesh)) > FARTHEST_MM:
+                point = ", ".join(f"{x:g}" for x in zone.point_mm)
+                raise PlanError(f"{label} point_mm is [{point}], {away_mm:.3g} mm from {name}: up to {FARTHEST_MM:g} is allowed")
+
+
+def _check_colour(zone: Painted, mesh: Mesh, name: str, label: str) -> None:
+    label = f"{label} colour is {colour_text(zone.colour)}"
+    if mesh.colours is None:
+        raise PlanError(f"{label}, but {name} paints no face: a 3MF or a PLY file with colours is expected")
+    used = [colour for colour in np.unique(mesh.colours).tolist() if colour != NO_COLOUR]
+    if zone.colour not in used:
+        shown = ", ".join(map(colour_text, used[:MOST_SHOWN])) + (", ..." if len(used) > MOST_SHOWN else "")
+        raise PlanError(f"{label}, but no face of {name} is painted so; its colours are {shown}")
 
 
 def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:

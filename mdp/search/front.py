@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from mdp.cost.cost import CostTerms
-from mdp.cost.model_need import unsupportable_mm2
+from mdp.cost.model_need import excess_mm2
 from mdp.decomposition import FrontRow, Part
 from mdp.search.node import Node
 from profiles.profile import Profile
@@ -67,21 +67,26 @@ class Front:
 
 
 def front_row(node: Node, terms: CostTerms) -> FrontRow:
-    """A node with what it costs, the cuts apart. An area over air counts once in the area that needs support."""
+    """A node with what it costs, the cuts apart. Every area counts once in the area that needs support."""
     seams = node.seams
     scars_mm2 = sum(terms.seam_mm * seam.weighted_mm + terms.cut_mm2 for seam in seams)
     planes = tuple(cut.base for cut in node.cuts)
-    over_mm2 = 0.0 if terms.need is None else (terms.need.need.weight - 1.0) * _over_air_mm2(node)
+    over_mm2 = 0.0 if terms.need is None else _excess_mm2(node) + node.remainder.risky_mm2 - _plain_mm2(node)
     return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2)
 
 
-def _over_air_mm2(node: Node) -> float:
-    """Area that needs support and can hardly get any."""
+def _excess_mm2(node: Node) -> float:
+    """By how much what needs support on the parts cut off counts more than its area."""
     if node.parent is None:
         return 0.0
     before = node.parent.remainder
-    here_mm2 = 0.0 if before.pieces is None else unsupportable_mm2(before.mesh, before.pieces, node.cuts[-1].base)
-    return here_mm2 + _over_air_mm2(node.parent)
+    here_mm2 = 0.0 if before.pieces is None else excess_mm2(before.mesh, before.pieces, node.cuts[-1].base)
+    return here_mm2 + _excess_mm2(node.parent)
+
+
+def _plain_mm2(node: Node) -> float:
+    """The area of what remains that needs support."""
+    return float(node.remainder.mesh.areas_mm2[node.remainder.risky].sum())
 
 
 def price_row(row: FrontRow, parts: Sequence[Part], price: Pricing) -> FrontRow:

@@ -63,8 +63,8 @@ class Node:
 
     @cached_property
     def risky_mm2(self) -> float:
-        """Area of what remains that needs support when it is printed straight up."""
-        return float(self.remainder.mesh.areas_mm2[self.remainder.risky].sum())
+        """Area of what remains that needs support when it is printed straight up; where none is wanted it counts more."""
+        return self.remainder.risky_mm2
 
     @cached_property
     def residual_mm2(self) -> float:

@@ -2,7 +2,7 @@
 
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms
-from mdp.cut import mesh_of
+from mdp.cut import Solid, mesh_of
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
 from mdp.overhang import Mask, risky_above, risky_upright
@@ -12,6 +12,7 @@ from mdp.pose_sequence import least_rotation
 from mdp.search.node import Node
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import CARRIES_ITSELF
+from mdp.zone import Marked
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -51,9 +52,17 @@ def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ..
                 feather_share=feathered[position],
                 needing=None if pieces is None else risky,
                 needing_upright=None if pieces is None else _needing_upright(mesh, pieces, node.terms),
+                **_marked(node, node.cuts[-position].solid if position else node.solid),
             )
         )
     return tuple(parts)
+
+
+def _marked(node: Node, solid: Solid) -> dict[str, Marked]:
+    """Where of a part no seam and no support is wanted."""
+    zones = node.places.zones
+    sources = node.places.surface.sources(solid)
+    return {"no_seam": zones.no_seam.among(sources), "no_support": zones.no_support.among(sources)}
 
 
 def _needing(mesh: Mesh, base: Plane, pieces: ModelPieces | None, terms: CostTerms) -> Mask:

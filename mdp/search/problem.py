@@ -56,12 +56,12 @@ class Problem:
         self.settings = settings
         self.machine = profile.machine if settings.clearance else without_limits(profile.machine)
         self.mesh, self.zones = mesh, zones.on(mesh)
-        solid = solid_of(mesh, apart=self.zones.no_seam_faces is not None)
+        solid = solid_of(mesh, apart=self.zones.by_face)
         self.surface = ModelSurface.of(mesh, solid)
         self.terms = cost_terms(profile, settings)
         if settings.objective == "scar":
             need = SupportNeed.of(mesh, profile.process, settings.unsupportable_weight)
-            self.terms = replace(self.terms, need=ModelNeed(self.surface, need))
+            self.terms = replace(self.terms, need=ModelNeed(self.surface, need, self.zones.no_support))
         hidden_share = settings.hidden_seam_share if self.terms.seam_mm > 0.0 else 1.0
         places = SeamPlaces.of(self.surface, solid, hidden_share, self.zones)
         self.root = self.start = Node(solid, (), self.terms, places)
@@ -120,7 +120,7 @@ class Problem:
         def check_planes(direction: Ints, offset_mm: Floats) -> Feasibility:
             return check(remainder, self.limits, self.settings, direction, offset_mm)
 
-        hopeless_mm2 = 0.0 if hopeless is None else float(remainder.facets.mesh.areas_mm2[hopeless].sum())
+        hopeless_mm2 = 0.0 if hopeless is None else float(remainder.facets.counted_mm2[hopeless].sum())
         enough_mm2, is_weak = self.least_gain_mm2, partial(self.is_weak, node)
         situation = self._situation(node, hopeless_mm2)
         return CandidateTable(scored, self.limits, situation, check_planes, enough_mm2, is_weak)

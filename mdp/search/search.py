@@ -23,7 +23,7 @@ from mdp.ranking.candidates import REASONS
 from mdp.ranking.ranker import Ranker, ranker_named
 from mdp.ranking.record import Trace
 from mdp.search.beam import Beam
-from mdp.search.by_hand import check_colours, check_model, cut_by_hand
+from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
@@ -74,7 +74,7 @@ def decompose(
     mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     planned = PlanFile("") if by_hand is None else by_hand
     check_model(planned, mesh, name)
-    check_colours(planned, mesh, name)
+    check_zones(planned, mesh, name)
     problem = Problem(mesh, profile, planned.zones)
     problem.start = cut_by_hand(problem, planned)
     if parts is not None and parts <= len(problem.start.cuts):
@@ -94,7 +94,7 @@ def decompose(
     if on_record is not None and trace is not None:
         on_record(trace.to_bytes())
     taken = _take(problem, front, best, profile, parts, price)
-    notes = (*_notes(problem, taken, parts), *_no_seam_note(problem))
+    notes = (*_notes(problem, taken, parts), *_zone_notes(problem))
     return _decomposition(problem, taken, profile, Outcome(name, ranker, rounds, perf_counter() - began, notes))
 
 
@@ -154,7 +154,7 @@ def cut_by_plan(
             raise PlanError(f"plan {plan.name}: part {number} has no {missing}: decompose --planes {plan.name} has it found")
     mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     check_model(plan, mesh, name)
-    check_colours(plan, mesh, name)
+    check_zones(plan, mesh, name)
     problem = Problem(mesh, profile, plan.zones)
     node = cut_by_hand(problem, plan)
     made = make_parts(node, problem.machine, profile)
@@ -206,7 +206,7 @@ def _decomposition(problem: Problem, taken: Taken, profile: Profile, outcome: Ou
         parts=parts,
         beam_width=profile.search.beam_width,
         ranker=outcome.ranker,
-        risky_area_mm2=problem.root.risky_mm2,
+        risky_area_mm2=float(problem.root.remainder.mesh.areas_mm2[problem.root.remainder.risky].sum()),
         residual_area_mm2=sum(part.risky_area_mm2 for part in parts),
         candidates_evaluated=problem.evaluated,
         rounds=outcome.rounds,
@@ -327,6 +327,10 @@ def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
     return (f"--parts {wanted}: {where} no more than {parts}",) if wanted is not None and parts < wanted else ()
 
 
-def _no_seam_note(problem: Problem) -> tuple[str, ...]:
-    free = problem.zones.keep_seams_away and problem.terms.seam_mm <= 0.0
-    return ("[[no_seam]] changes nothing where seams cost nothing (search.objective, search.seam_mm)",) if free else ()
+def _zone_notes(problem: Problem) -> tuple[str, ...]:
+    zones, terms, notes = problem.zones, problem.terms, []
+    if zones.no_seam.anywhere and terms.seam_mm <= 0.0:
+        notes.append("[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)")
+    if zones.no_support.anywhere and terms.need is None:
+        notes.append('[[no_support]] changes no cut where all that overhangs counts (search.objective = "risky")')
+    return tuple(notes)

@@ -119,10 +119,11 @@ def _needing_upright(surface: LinkedFaces, limits: Limits) -> Mask:
 @dataclass(frozen=True, eq=False)
 class ModelPieces:
     """What a model's faces need, and (m,) of which of them each face of something cut from it is a piece, below 0: a cut laid it
-    open."""
+    open. counts: (m,) how many times an area on each counts that needs support; None: once."""
 
     need: SupportNeed
     sources: Ints
+    counts: Floats | None = None
 
     @property
     def upright(self) -> Mask:

@@ -101,7 +101,17 @@ class Remainder:
     @cached_property
     def facets(self) -> Facets:
         """The surface laid out for sweeping."""
-        return lay_out(self.mesh, self.risky, self.seam_weights, None if self.pieces is None else self.pieces.sources)
+        pieces = self.pieces
+        if pieces is None:
+            return lay_out(self.mesh, self.risky, self.seam_weights)
+        return lay_out(self.mesh, self.risky, self.seam_weights, pieces.sources, pieces.counts)
+
+    @cached_property
+    def risky_mm2(self) -> float:
+        """What is risky upright, as it counts."""
+        areas = self.mesh.areas_mm2
+        counts = None if self.pieces is None else self.pieces.counts
+        return float((areas if counts is None else areas * counts)[self.risky].sum())
 
     def needs(self, directions: Floats) -> NeedsTable:
         """What the risky faces need along (k, 3) directions."""
@@ -165,7 +175,7 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle; hopeless: (m,)
     the faces, as remainder.facets orders them, that no cut can save."""
     facets, lost = remainder.facets, np.zeros(0, np.bool_) if hopeless is None else hopeless
-    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.mesh.areas_mm2, facets.risky, risky_below, lost)
+    surface = Overhangs(facets.points, facets.corners, facets.normals, facets.counted_mm2, facets.risky, risky_below, lost)
     shape = (len(directions), remainder.most_columns(step_mm))
     columns = np.zeros((2, shape[0]), np.int32)
     swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(4)))

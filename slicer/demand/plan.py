@@ -122,7 +122,7 @@ def _ground(site: Site, region: Polygons, top_mm: float, earlier: Sequence[Groun
     far_mm = max(site.far_mm, _reach_mm(region))
     count = max(min(int(np.searchsorted(heights.bottom_mm, top_mm)), len(heights.tip_mm)), 1)
     low = replace(heights, tip_mm=heights.tip_mm[:count], height_mm=heights.height_mm[:count], cut_mm=heights.cut_mm[:count])
-    blocked = blocked_areas(part, site.later, low, 0.0, far_mm)
+    blocked = site.shut(blocked_areas(part, site.later, low, 0.0, far_mm), low)
     if site.beneath is not None:
         near_table = low_areas(part, least_tip_height_mm(site.profile.machine, part.pose), low, far_mm)
         blocked = [union([one, other]) for one, other in zip(blocked, near_table, strict=True)]

@@ -12,7 +12,7 @@ from profiles.profile import Profile
 from slicer.bead import first_layer_process, with_line_width
 from slicer.finish.compensation import compensate
 from slicer.finish.vase import vase_profile
-from slicer.geometry.polygons import Polygons, clean
+from slicer.geometry.polygons import Polygons, clean, union
 from slicer.heights import Heights, layer_heights
 from slicer.interface.interface import plastic_beneath
 from slicer.interface.interlock import cut_grooves
@@ -22,6 +22,7 @@ from slicer.support.blocker import blocked_areas, far_mm
 from slicer.support.overhang import Overhang, detect_overhangs
 from slicer.support.pedestal import pedestal_layers, without_pedestal
 from slicer.support.support import Supports, generate_supports
+from slicer.support.unwanted import shut_areas, without_unwanted
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +58,16 @@ class Site:
     def supports(self) -> Supports:
         """The support that stands on the platform, on the part itself and on what lies beneath its base plane."""
         blocked = blocked_areas(self.part, self.later, self.heights, self.process.support_distance_mm, self.far_mm)
+        blocked = self.shut(blocked, self.heights)
         hanging = [overhang.hanging for overhang in self.overhangs]
         return generate_supports(hanging, self.outlines, self.heights, self.process, self.beneath, blocked, self.floor)
+
+    def shut(self, blocked: list[Polygons], heights: Heights) -> list[Polygons]:
+        """Where support cannot be, and where a person wants none."""
+        if not self.part.no_support.anywhere:
+            return blocked
+        unwanted = shut_areas(self.part, heights, self.process)
+        return [union([one, other]) for one, other in zip(blocked, unwanted, strict=True)]
 
     def up_to(self, top_mm: float) -> "Site":
         """The site with empty layers on top as far as that height."""
@@ -107,7 +116,7 @@ def survey(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequenc
         outlines=outlines,
         own=own,
         uncut=uncut,
-        overhangs=detect_overhangs(mesh, outlines, heights.cut_mm, process, below),
+        overhangs=without_unwanted(detect_overhangs(mesh, outlines, heights.cut_mm, process, below), part, heights.cut_mm),
         beneath=below,
         floor=plate_outline(profile.machine.table),
         pedestal_layers=pedestal_count,

@@ -36,8 +36,8 @@ def detect_overhangs(
     level_mm, arch_mm = (inf, inf) if process.support == "none" else (process.bridge_mm, process.arch_longest_mm)
     overhangs = [Overhang(Polygons(), ())] * len(outlines)
     risky = facing_down(mesh, UP, process.self_supporting_angle_deg)
-    needing = _by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, below is None))
-    for i, triangles in _by_layer(mesh, cuts_mm, risky).items():
+    needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, below is None))
+    for i, triangles in faces_by_layer(mesh, cuts_mm, risky).items():
         if i == 0 and below is None:
             continue
         bank = outlines[i - 1] if i else offset(below, RIM_MM)
@@ -71,7 +71,7 @@ def _sort_islands(
     return Overhang(Polygons.compose(rest) ^ need if rest else Polygons(), tuple(spans))
 
 
-def _by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
+def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
     """Chosen faces seen from above, (3, 2) counter-clockwise, by the layers whose strip of the surface they belong to."""
     corners = mesh.vertices[mesh.faces[chosen]]
     first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1))

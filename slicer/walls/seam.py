@@ -6,7 +6,7 @@ beside their outer wall.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +38,7 @@ class Surroundings:
     """What the seams of a layer heed. rear: (2,) a point behind the part; before: (k, 2) outer seams of the layer below.
 
     tip: (2,) where the nozzle comes from. interfaces: (n, 6) segments of their edges, z_mm: the layer's middle. layer: number.
+    unwanted: (k, 6) segments at z_mm, within a line width of which a person wants no seam.
     """
 
     rear: Floats
@@ -46,6 +47,7 @@ class Surroundings:
     interfaces: Floats
     z_mm: float
     layer: int
+    unwanted: Floats = field(default_factory=lambda: NO_EDGES)
 
 
 def rear_of(bounds_mm: Floats) -> Floats:
@@ -59,9 +61,9 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
 
     The walls that run round come as loops (n, 2), solid on their left, and become polylines. A wall stops short of its
     beginning by seam_gap of its width. An outer wall that is near an interface's edge all round begins and ends a line width
-    inside instead, over its inner walls.
+    inside instead, over its inner walls, and so does one on which a person wants no seam anywhere.
     """
-    interfaces = _at_height(around, process.interface_seam_mm)
+    interfaces = _at_height(around, process)
     seams: dict[int, Floats] = {}
     out = list(beads)
     for kind in WALLS:
@@ -71,7 +73,7 @@ def place_seams(beads: Sequence[Bead], process: Process, around: Surroundings) -
                 loop = np.ascontiguousarray(bead.points)
                 lead_mm = 0.0
                 if kind is Kind.INNER_WALL:
-                    loop, _ = _start_at_best(loop, _beside(loop, known), interfaces._replace(edges=NO_EDGES))
+                    loop, _ = _start_at_best(loop, _beside(loop, known), interfaces._replace(edges=NO_EDGES, keep_mm=np.zeros(0)))
                 else:
                     loop, free = _start_at_best(loop, _target(loop, process, around), interfaces)
                     seams[k] = loop[0]
@@ -96,18 +98,19 @@ class _Target(NamedTuple):
 
 
 class _Interfaces(NamedTuple):
-    """edges: (n, 6) segments of interface edges that seams at the height z keep clear of by keep_mm."""
+    """edges: (n, 6) segments of interface edges, and others, that seams at the height z keep clear of by keep_mm (n,)."""
 
     edges: Floats
     z: float
-    keep_mm: float
+    keep_mm: Floats
 
 
-def _at_height(around: Surroundings, keep_mm: float) -> _Interfaces:
-    """Those interface edges that lie within reach of a layer."""
-    z = around.interfaces[:, [2, 5]] - around.z_mm
-    edges = np.ascontiguousarray(around.interfaces[(z.min(axis=1) < keep_mm) & (z.max(axis=1) > -keep_mm)])
-    return _Interfaces(edges, float(around.z_mm), float(keep_mm))
+def _at_height(around: Surroundings, process: Process) -> _Interfaces:
+    """Those interface edges that lie within reach of a layer, and where a person wants no seam."""
+    keep_mm, z = process.interface_seam_mm, around.interfaces[:, [2, 5]] - around.z_mm
+    near = around.interfaces[(z.min(axis=1) < keep_mm) & (z.max(axis=1) > -keep_mm)]
+    distances_mm = np.repeat([keep_mm, process.line_width_mm], [len(near), len(around.unwanted)])
+    return _Interfaces(np.concatenate([near, around.unwanted]), float(around.z_mm), distances_mm)
 
 
 def _start_at_best(loop: Floats, target: _Target, interfaces: _Interfaces) -> tuple[Floats, bool]:
@@ -292,6 +295,6 @@ def _clear(interfaces: _Interfaces, x: float, y: float) -> bool:
     """Whether a place at their height keeps clear of all interface edges."""
     for e in range(len(interfaces.edges)):
         begin, end = interfaces.edges[e, :3], interfaces.edges[e, 3:]
-        if squared_distance_in_space((x, y, interfaces.z), begin, end) < interfaces.keep_mm * interfaces.keep_mm:
+        if squared_distance_in_space((x, y, interfaces.z), begin, end) < interfaces.keep_mm[e] * interfaces.keep_mm[e]:
             return False
     return True

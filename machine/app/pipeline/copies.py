@@ -48,6 +48,8 @@ def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tup
             f"has room for {len(places)} with {gap_mm:g} mm between them"
         )
     mesh = _repeated(part.mesh, places)
+    middle = part.mesh.bounds_mm[:, :2].mean(axis=0)
+    shifts = [(x - float(middle[0]), y - float(middle[1]), 0.0) for x, y in places]
     many = replace(
         part,
         mesh=mesh,
@@ -55,6 +57,8 @@ def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tup
         risky_area_mm2=count * part.risky_area_mm2,
         needing=_tiled(part.needing, count),
         needing_upright=_tiled(part.needing_upright, count),
+        no_seam=part.no_seam.repeated(shifts),
+        no_support=part.no_support.repeated(shifts),
     )
     risky_mm2, residual_mm2 = count * decomposition.risky_area_mm2, count * decomposition.residual_area_mm2
     plated = replace(decomposition, mesh=mesh, parts=(many,), risky_area_mm2=risky_mm2, residual_area_mm2=residual_mm2, front=())

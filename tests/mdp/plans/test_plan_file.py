@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mdp.grown import Grown
 from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow, mesh_sha256
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
@@ -33,6 +34,7 @@ OPEN = st.builds(
 ROWS = st.builds(PlannedRow, st.lists(WHOLE, max_size=3).map(tuple), st.floats(0, 1e9), st.floats(0, 1e9), st.floats(0, 1e9))
 CORNERS = st.tuples(*[st.floats(-9e4, 9e4)] * 3)
 ZONES = CORNERS.map(lambda low: Zone(low, (low[0] + 1.0, low[1] + 20.0, low[2] + 300.0)))
+GROWN = st.builds(Grown, CORNERS, st.floats(0.0, 180.0))
 COLOURS = st.builds(Painted, st.integers(0, 0xFFFFFF))
 TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 PLANS = st.builds(
@@ -42,7 +44,7 @@ PLANS = st.builds(
     sha256=st.text("0123456789abcdef", max_size=64),
     orientation=st.sampled_from([None, TURNED]),
     parts=st.lists(OPEN, max_size=5).map(tuple),
-    zones=st.builds(Zones, *[st.lists(ZONES | COLOURS, max_size=2).map(tuple)] * 2),
+    zones=st.builds(Zones, *[st.lists(ZONES | COLOURS | GROWN, max_size=2).map(tuple)] * 3),
     settings=st.sampled_from([(), (PartSettings(part=1, process={"infill_pattern": "gyroid", "infill_density": 0.4}),)]),
     front=st.lists(ROWS, max_size=3, unique_by=lambda row: len(row.parts)).map(tuple),
 )
@@ -92,6 +94,14 @@ REFUSED = [
     ),
     ("version = 1\n[[no_seam]]\ncolour = 0xff0000", "no_seam 1: colour is 16711680: # and six hexadecimal digits are expected"),
     ("version = 1\n[[keep]]\ncolour = '#ff0000'\nmin_mm = [0, 0, 0]", "keep 1: has a colour and a box: one of them is allowed"),
+    ("version = 1\n[[keep]]\ncolour = '#ff0000'\nangle_deg = 3", "keep 1: has a colour and a point: one of them is allowed"),
+    ("version = 1\n[[no_support]]\nangle_deg = 3", "no_support 1: point_mm is missing: 3 numbers in brackets are expected"),
+    ("version = 1\n[[keep]]\npoint_mm = [0, 0, 0]", "keep 1: angle_deg is missing: a number is expected"),
+    ("version = 1\n[[keep]]\npoint_mm = [0, 0, 0]\nangle_deg = 181", "keep 1: angle_deg is 181: 0 to 180 is allowed"),
+    (
+        "version = 1\n[[keep]]\npoint_mm = [0, 0, 0]\nmin_mm = [0, 0, 0]",
+        "keep 1: has a point and a box: one of them is allowed",
+    ),
     ("version = 1\n[keep]\nmin_mm = [0, 0, 0]", "[[keep]] tables are expected"),
     ("version = 1\n[[front]]\nplanes = 4", "front 1: planes is 4: a list of [x, y, z, offset_mm] is expected"),
     ("version = 1\n[[front]]\nplanes = [[0, 0, 1]]", "front 1: planes is [0, 0, 1]: 4 numbers in brackets are expected"),

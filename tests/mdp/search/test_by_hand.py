@@ -295,7 +295,7 @@ def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:
 def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:
     zones = Zones(no_seam=(Zone((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),))
     found = decompose(shapes.tee(), "shape", _profile("search.seam_mm=0"), by_hand=_by_hand(zones=zones))
-    assert "[[no_seam]] changes nothing where seams cost nothing (search.objective, search.seam_mm)" in found.notes
+    assert "[[no_seam]] keeps no cut away where seams cost nothing (search.objective, search.seam_mm)" in found.notes
 
 
 def test_the_published_search_starts_from_planes_by_hand_too() -> None:

@@ -1,0 +1,81 @@
+"""What a person marks on a part, in its layers: where none begins, and where no support is printed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mdp.decomposition import Part
+from mdp.grown import Grown
+from mdp.mesh import Floats
+from mdp.zone import AnyZone, Marked, Zone
+from slicer.parts import slice_parts
+from slicer.paths import Kind, SlicedPart
+from slicer.slice import slice_part
+from slicer.walls.unwanted_seam import unwanted_segments
+from tests.shapes import box, tee
+from tests.slicer.hand import BARE, cut, of_kind, profile, volume_mm3, whole
+
+BACK = Grown((0.0, 10.0, 5.0), 1.0)
+BACK_BOX = Zone((-20.0, 8.0, -1.0), (20.0, 12.0, 30.0))
+SUPPORTED = profile("process.skirt_loops=0", "process.support=auto")
+RIGHT_ARM = Zone((4.5, -10.0, -1.0), (25.0, 10.0, 35.0))
+
+
+def without_seam(part: Part, *zones: AnyZone) -> Part:
+    return replace(part, no_seam=Marked.of(part.mesh, zones))
+
+
+def begins(sliced: SlicedPart) -> Floats:
+    return np.array([path.points[0] for path in of_kind(sliced, Kind.OUTER_WALL)])
+
+
+def support_x_mm(sliced: SlicedPart) -> Floats:
+    strokes = of_kind(sliced, Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
+    return np.concatenate([path.points[:, 0] for path in strokes])
+
+
+@pytest.mark.parametrize("zone", [BACK, BACK_BOX])
+def test_layers_begin_at_the_rear_unless_no_seam_is_wanted_there(zone: AnyZone) -> None:
+    part = whole(box(20.0, 20.0, 4.0))
+    free, kept = (slice_part(each, profile(*BARE)) for each in (part, without_seam(part, zone)))
+    assert begins(free)[:, 1].min() > 9.0
+    assert begins(kept)[:, 1].max() < 9.5
+    assert len(begins(free)) == len(begins(kept))
+
+
+def test_boxes_that_share_a_leaning_part_share_its_walls() -> None:
+    leaning = cut(tee(), ((0.6, 0.0, 0.8), 33.0))[1]
+    cuts_mm = np.arange(0.1, 9.0, 0.2)
+
+    def wall_mm(zone: Marked) -> Floats:
+        """Of every layer; all of it in the zone's box, if it has one."""
+        layers = [each.reshape(-1, 2, 3) for each in unwanted_segments(replace(leaning, no_seam=zone), cuts_mm)]
+        for within in zone.boxes:
+            spots = (np.concatenate(layers) + np.array([0.0, 0.0, leaning.base.offset_mm])) @ leaning.rotation
+            assert (spots >= np.array(within.min_mm) - 1e-9).all()
+            assert (spots <= np.array(within.max_mm) + 1e-9).all()
+        return np.array([np.linalg.norm(each[:, 1] - each[:, 0], axis=1).sum() for each in layers])
+
+    left, right = Zone((-50.0, -50.0, 0.0), (50.0, 1.0, 50.0)), Zone((-50.0, 1.0, 0.0), (50.0, 50.0, 50.0))
+    whole_mm = wall_mm(Marked(faces=np.ones(len(leaning.mesh.faces), dtype=np.bool_)))
+    np.testing.assert_allclose(wall_mm(Marked((left,))) + wall_mm(Marked((right,))), whole_mm, rtol=1e-9)
+    assert whole_mm.min() > 20.0
+
+
+def test_a_wall_on_which_no_seam_is_wanted_anywhere_begins_inside() -> None:
+    part = whole(box(20.0, 20.0, 4.0))
+    kept = slice_part(without_seam(part, Zone((-15.0, -15.0, -1.0), (15.0, 15.0, 9.0))), profile(*BARE))
+    assert np.abs(begins(kept)).max(axis=1).max() < 9.6
+
+
+@pytest.mark.parametrize("zone", [RIGHT_ARM, Grown((12.0, 0.0, 30.0), 1.0)])
+def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zone: AnyZone) -> None:
+    part = whole(tee())
+    (free,) = slice_parts([part], SUPPORTED)
+    (kept,) = slice_parts([replace(part, no_support=Marked.of(part.mesh, [zone]))], SUPPORTED)
+    assert support_x_mm(free).max() > 15.0
+    assert support_x_mm(kept).max() < 6.0
+    assert support_x_mm(kept).min() == pytest.approx(support_x_mm(free).min(), abs=0.5)
+    assert kept.unsupported == ()
+    assert volume_mm3(kept, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)
