@@ -8,8 +8,8 @@ from pathlib import Path
 from machine.app.requests import GCODE_SUFFIXES, EditRequest
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import show
-from machine.app.workbench.serve import serve_workbench
-from machine.app.workbench.session import Session
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.web.serve import serve_workbench
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.read import DEMO, check_file, locate

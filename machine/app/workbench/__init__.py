@@ -1,1 +1,1 @@
-"""Workbench: the program's window in the browser: what is on it, the commands, the long work and the server."""
+"""Workbench: the program's window in the browser: the bench, the long work, the sessions and the server."""

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from machine.app.workbench.bench import STANDING, Bench, History, Model, Step, overhang_mm2, plan_of_bench, with_front
-from machine.app.workbench.commands import obey
+from machine.app.workbench.bench.bench import STANDING, Bench, History, Model, Step, overhang_mm2, plan_of_bench, with_front
+from machine.app.workbench.bench.commands import obey
 from mdp.decomposition import FrontRow
 from mdp.overhang import risky_upright
 from mdp.plane import Plane

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from machine.app.workbench.bench import Bench, History, Model, Step, locked_plan, with_cuts
-from machine.app.workbench.commands import obey
-from machine.app.workbench.planes import edited
+from machine.app.workbench.bench.bench import Bench, History, Model, Step, locked_plan, with_cuts
+from machine.app.workbench.bench.commands import obey
+from machine.app.workbench.bench.planes import edited
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.profile import load

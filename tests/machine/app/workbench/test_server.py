@@ -118,7 +118,7 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
     with bench.line() as page:
         bench.send(folder / "tee.stl")
         page.do("add", **arm)
-        page.until(lambda state: state["parts"] == 2 and state["trial"])
+        page.until(lambda state: state["undo"] == "add a plane" and state["trial"])
         page.do("try", part=2, normal=[1, 0, 0], offset_mm=30.0)
         tried = page.until(lambda state: state["trial"] and state["trial"]["refused"])
         assert "misses the model" in tried["trial"]["refused"]

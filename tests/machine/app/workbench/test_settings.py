@@ -3,7 +3,7 @@
 import pytest
 
 from machine.app.requests import Given
-from machine.app.workbench.settings import USUAL, profile_as_given, settings_list, with_name, with_setting
+from machine.app.workbench.bench.settings import USUAL, profile_as_given, settings_list, with_name, with_setting
 from profiles.errors import ProfileError
 from profiles.profile import load
 

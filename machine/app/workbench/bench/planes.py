@@ -3,7 +3,7 @@
 from math import hypot, isfinite
 from typing import Any, TypeGuard
 
-from machine.app.workbench.bench import Bench
+from machine.app.workbench.bench.bench import Bench
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS

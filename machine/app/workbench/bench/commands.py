@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from machine.app.workbench.bench import Bench, History, Model, laid_down, with_parts, with_rotation
-from machine.app.workbench.planes import is_number, planned_part
+from machine.app.workbench.bench.bench import Bench, History, Model, laid_down, with_parts, with_rotation
+from machine.app.workbench.bench.planes import is_number, planned_part
 from mdp.mesh import Floats
 from mdp.pose import about
 from profiles.errors import PlanError

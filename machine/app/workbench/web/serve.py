@@ -9,9 +9,10 @@ from contextlib import contextmanager
 import uvicorn
 
 from machine.app.terminal.interrupts import calling
-from machine.app.workbench.guard import HOST
-from machine.app.workbench.server import application
-from machine.app.workbench.session import Session
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.session.workbench import Workbench
+from machine.app.workbench.web.guard import HOST
+from machine.app.workbench.web.server import application
 from profiles.errors import OutputError
 
 GRACE_S = 1  # for answers under way when it ends
@@ -47,8 +48,8 @@ def listen(port: int) -> socket.socket:
 def serve_workbench(
     make: Callable[[], Session], begin: Callable[[Session], None], announce: Callable[[str], None], port: int = 0
 ) -> None:
-    """Serve until Ctrl-C. make: the session, made in the event loop; begin: given it when it is there; announce: given the
-    address when it answers."""
+    """Serve until Ctrl-C. make: a session, made in the event loop; begin: given the first one when it is there; announce: given
+    its address when it answers."""
     own, token = listen(port), secrets.token_urlsafe(24)
     with own:
         asyncio.run(_serve(make, begin, announce, own, token))
@@ -58,9 +59,10 @@ async def _serve(
     make: Callable[[], Session], begin: Callable[[Session], None], announce: Callable[[str], None], own: socket.socket, token: str
 ) -> None:
     number = own.getsockname()[1]
-    session = make()
+    workbench = Workbench(make)
+    first = workbench.open()
     settings = uvicorn.Config(
-        application(session, token, number),
+        application(workbench, token, number),
         log_config=None,
         lifespan="off",
         ws="websockets-sansio",
@@ -71,13 +73,12 @@ async def _serve(
     )
     server = Server(settings)
     try:
-        session.warm()
-        begin(session)
+        begin(workbench.sessions[first])
         with calling(server.stop):
             answering = asyncio.create_task(server.serve(sockets=[own]))
             while not server.started and not answering.done():
                 await asyncio.sleep(0.01)
-            announce(f"http://{HOST}:{number}/{token}/")
+            announce(f"http://{HOST}:{number}/{token}/{first}/")
             await answering
     finally:
-        session.close()
+        workbench.close_all()

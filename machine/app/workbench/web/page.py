@@ -15,7 +15,10 @@ MARKER = re.compile(r"/\*(?:STYLE|SCRIPT)\*/")
 
 def workbench_page(port: int) -> tuple[bytes, str]:
     """The page and its content security policy. port: of the server, to which alone the page may talk."""
-    view, own = resources.files("machine.view").joinpath("template"), resources.files("machine.app.workbench").joinpath("page")
+    view, own = (
+        resources.files("machine.view").joinpath("template"),
+        resources.files("machine.app.workbench.web").joinpath("page"),
+    )
     names = sorted(file.name for file in own.iterdir() if file.name.endswith(".js"))
     texts = [
         *(view.joinpath(name).read_text("utf-8") for name in SHARED),

@@ -8,6 +8,7 @@ import pickle
 import signal
 import struct
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from queue import SimpleQueue
 from threading import Thread
@@ -15,6 +16,7 @@ from typing import Any, BinaryIO
 
 LENGTH = struct.Struct("<Q")
 TELLS, DONE, REFUSED = "tells", "done", "refused"
+Tell = Callable[[Any], None]  # what a task says meanwhile
 
 
 def frame(value: Any) -> bytes:
@@ -32,11 +34,11 @@ def main() -> None:
         os.dup2(nowhere.fileno(), 1)
     waiting: SimpleQueue[Any] = SimpleQueue()
     Thread(target=_listen, args=(asked, waiting), daemon=True).start()
-    from machine.app.workbench import tasks
+    from machine.app.workbench.work.tasks import TASKS
 
     while True:
         name, given = waiting.get()
-        _answer(answers, _result(getattr(tasks, name), given, answers))
+        _answer(answers, _result(TASKS[name], given, answers))
 
 
 def _result(task: Any, given: tuple[Any, ...], answers: BinaryIO) -> tuple[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from machine.app.requests import Given
-from machine.app.workbench.settings import USUAL
+from machine.app.workbench.bench.settings import USUAL
 from mdp.decomposition import FrontRow
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from machine.app.workbench.bench import Bench
+from machine.app.workbench.bench.bench import Bench
 from machine.planning.limits import check_parts
 from mdp.search.orientation import standing_still
 from mdp.search.parts import one_piece

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from machine.app.workbench.bench import Bench, Model, overhang_mm2
-from machine.app.workbench.fit import standing
-from machine.app.workbench.planes import Cuts
-from machine.app.workbench.session import Session
+from machine.app.workbench.bench.bench import Bench, Model, overhang_mm2
+from machine.app.workbench.bench.fit import standing
+from machine.app.workbench.bench.planes import Cuts
+from machine.app.workbench.session.session import Session
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
 from mdp.decomposition import FrontRow
@@ -22,7 +22,7 @@ MOST_FACES = 2_000_000  # that a page draws
 
 def snapshot(session: Session) -> dict[str, Any]:
     """Everything but the triangles; small enough to be told whole whenever anything changes."""
-    bench, history, search = session.bench, session.history, session.search
+    bench, history, search = session.bench, session.history, session.finding.search
     resting = session.resting[1] if session.resting is not None and session.resting[0] is bench.model else ()
     planes = [] if search is None else [_plane(plane) for plane in reversed(search.searched.planes)]
     return {
@@ -43,7 +43,7 @@ def snapshot(session: Session) -> dict[str, Any]:
             for each in resting
         ],
         "search": None if search is None else {"text": search.searched.text, "planes": planes},
-        "slicing": None if session.slicing is None else {"text": session.slicing.searched.text},
+        "slicing": None if session.slicing.under_way is None else {"text": session.slicing.under_way.text},
         "sliced": _sliced(session),
         "front": [_row(row) for row in bench.rows],
         "parts": bench.parts,
@@ -52,7 +52,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "locked": [part in bench.locked for part in bench.cuts or ()],
         "trial": _trial(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
-        "notes": session.notes if bench.rows else (),
+        "notes": session.finding.notes if bench.rows else (),
         "given": asdict(bench.given),
         "machine": machine_bodies(bench.profile.machine, known=True),
         "material": bench.profile.material.name,
@@ -98,7 +98,7 @@ def _row(row: FrontRow) -> dict[str, Any]:
 
 
 def _sliced(session: Session) -> dict[str, Any] | None:
-    sliced = session.shown_slices()
+    sliced = session.slicing.shown()
     if sliced is None:
         return None
     return {
@@ -112,9 +112,9 @@ def _sliced(session: Session) -> dict[str, Any] | None:
 
 def _trial(session: Session) -> dict[str, Any] | None:
     """The figures of the planes that were tried last, or why they cannot be cut."""
-    if session.trial is None or session.trial[0].model is not session.bench.model:
+    if session.trying.trial is None or session.trying.trial[0].model is not session.bench.model:
         return None
-    _, cuts, trial = session.trial
+    _, cuts, trial = session.trying.trial
     return {"cuts": _cuts(cuts), **asdict(trial)}
 
 

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from machine.app.workbench.worker import DONE, LENGTH, TELLS, frame
+from machine.app.workbench.work.worker import DONE, LENGTH, TELLS, frame
 from profiles.errors import UserError
 
-COMMAND = (sys.executable, "-m", "machine.app.workbench.worker")
+COMMAND = (sys.executable, "-m", "machine.app.workbench.work.worker")
 
 
 class Lane:
@@ -28,7 +28,7 @@ class Lane:
             await self._ready()
 
     async def run(self, task: str, *given: Any, tell: Callable[[Any], None] = lambda value: None) -> Any:
-        """What a function of `tasks` gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
+        """What a task gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
         async with self._free:
             process = await self._ready()
             try:

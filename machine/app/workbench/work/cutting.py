@@ -1,34 +1,25 @@
-"""Tasks: the long work of the workbench, each a function that a process of its own runs; the values go there and back pickled."""
+"""Cutting: finding parts, cutting by planes and making the parts' files, as tasks of the workbench."""
 
 import io
 import zipfile
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from machine.app.pipeline import compilers
-from machine.app.pipeline.pipeline import build
 from machine.app.pipeline.pricing import pricing
-from machine.app.workbench.bench import Bench, Model, locked_plan, plan_of_bench
-from machine.dryrun.dryrun import summary
-from machine.view.page import print_page
+from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench
+from machine.app.workbench.work.worker import Tell
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
 from mdp.plans.writing import plan_text
-from mdp.read import read_mesh
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
-from mdp.search.laying import distinct_orientations
-from mdp.search.orientation import in_words, side_in_words, standing_still
+from mdp.search.orientation import standing_still
 from mdp.search.problem import Problem
 from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.search.trial import Trial, Trials
-from profiles.errors import MeshError
-from profiles.profile import Profile
 
 PLAN_NAME = "plan.toml"
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
@@ -42,48 +33,12 @@ class Searched:
     planes: tuple[Plane, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Resting:
-    """An orientation in which a model rests: rows of its rotation, how to say it, and what it leaves hanging."""
-
-    rotation: tuple[tuple[float, ...], ...]
-    words: str
-    overhang_mm2: float
-    height_mm: float
-
-
 @dataclass(frozen=True)
 class Files:
     """What is saved: the plan's text, and the folder of `decompose -o` as a zip."""
 
     plan: str
     folder: bytes
-
-
-Tell = Callable[[Any], None]  # what a task says meanwhile
-
-
-def read_model(tell: Tell, path: Path, name: str, profile: Profile) -> Model:
-    """The model of a file, with the sentences of the command line; a file from the page has the name it had there."""
-    try:
-        mesh, notes = read_mesh(path, profile.process.scale, profile.process.rotate_deg)
-    except MeshError as error:
-        raise MeshError(str(error).replace(str(path), name)) from None
-    return Model(name, path, mesh, notes)
-
-
-def rank_resting(tell: Tell, mesh: Mesh, profile: Profile) -> tuple[Resting, ...]:
-    """The orientations in which a model rests, the most promising first."""
-    compilers.wait_for(compilers.JUDGE)
-    return tuple(
-        Resting(
-            tuple(tuple(float(value) for value in row) for row in each.rotation),
-            side_in_words(each) or in_words(each),
-            each.risky_mm2,
-            each.height_mm,
-        )
-        for each in distinct_orientations(mesh, profile)
-    )
 
 
 def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[str, ...]]:
@@ -105,7 +60,7 @@ def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[st
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
     """The front of a plan for the model on the bench, measured; PlanError where it cannot be cut."""
-    return _cut(bench, plan, prices=True).front
+    return cut_bench(bench, plan, prices=True).front
 
 
 _trials: tuple[int, Trials] | None = None  # of the bench that this process has heard of last
@@ -124,7 +79,7 @@ def try_cuts(tell: Tell, number: int, bench: Bench | None, cuts: tuple[PlannedPa
 
 def make_files(tell: Tell, bench: Bench) -> Files:
     """The files of the parts as the bench has them."""
-    made = _cut(bench, plan_of_bench(bench, PLAN_NAME))
+    made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     plan = plan_text(plan_of(made, bench.zones, bench.turned, bench.profile.parts))
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as archive:
@@ -136,37 +91,8 @@ def make_files(tell: Tell, bench: Bench) -> Files:
     return Files(plan, content.getvalue())
 
 
-@dataclass(frozen=True, eq=False)
-class Sliced:
-    """A sliced bench: the page of the print and its G-code, what it takes, and what its dry run complains of. errors: how many of
-    the findings are errors, with which the command line writes no file without --force."""
-
-    page: bytes
-    gcode: bytes
-    time_s: float
-    filament_mm: float
-    findings: tuple[str, ...]
-    errors: int
-
-
-def slice_bench(tell: Tell, bench: Bench) -> Sliced:
-    """The parts on the bench sliced, planned, written and dry-run, as `export --plan` does; uncut, the model in one piece."""
-    profile = bench.profile
-    made = _cut(bench, plan_of_bench(bench, PLAN_NAME))
-    program = build(made, profile, pictures=True, report=lambda text, share=None: tell(Searched(text)))
-    tell(Searched("drawing the page"))
-    found, values = program.run.findings, summary(program.run)
-    return Sliced(
-        print_page(made.name, program, profile),
-        ("\n".join(program.lines) + "\n").encode(),
-        values["time_s"],
-        values["filament_mm"],
-        tuple(f"{each.severity}: {each.message}" for each in found),
-        sum(each.severity == "error" for each in found),
-    )
-
-
-def _cut(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
+def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
+    """The model on the bench cut by a plan; prices: the rows of its front measured, too."""
     mesh, name = _standing(bench, plan)
     compilers.wait_for(compilers.JUDGE)
     return cut_by_plan(mesh, name, bench.profile, plan, price=pricing(bench.profile.of_all_parts) if prices else None)

@@ -1,0 +1,117 @@
+"""Desk: what all work of a session stands on: the history, the processes, and the pages that wait for news."""
+
+import asyncio
+import itertools
+import re
+import sys
+import tempfile
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from machine.app.crash import log_bug
+from machine.app.workbench.bench.bench import Bench, History, Step
+from machine.app.workbench.work.lane import Lane
+from profiles.errors import UserError
+
+UNSAFE = re.compile(r"[^\w .()+-]")
+LONGEST_NAME = 100
+
+
+class Desk:
+    """All from the event loop; the pages wait for `changed`.
+
+    problem: what could not be done last; busy: what the pages wait for. The lanes: quick for what a person waits for, long for
+    searches and slices, hand for planes in hand. followers: called after every change of the bench.
+    """
+
+    def __init__(self, bench: Bench) -> None:
+        self.history = History(Step("", bench))
+        self.problem = ""
+        self.busy = ""
+        self.version = 0
+        self.quick, self.long, self.hand = Lane(), Lane(), Lane()
+        self.followers: list[Callable[[], None]] = []
+        self._changed = asyncio.Event()
+        self._folder = tempfile.TemporaryDirectory(prefix="tiltprint-")
+        self._numbers = itertools.count(1)
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def bench(self) -> Bench:
+        """What lies on the workbench now."""
+        return self.history.now.bench
+
+    def close(self) -> None:
+        """End all work; its files go."""
+        for task in self._tasks:
+            task.cancel()
+        for lane in (self.quick, self.long, self.hand):
+            lane.stop()
+        self._folder.cleanup()
+
+    def tell(self) -> None:
+        """Let the pages know that something has changed."""
+        self.version += 1
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    async def changed(self, seen: int) -> None:
+        """Return when there is something newer than the version that was seen."""
+        while self.version == seen:
+            await self._changed.wait()
+
+    def start(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+        """Have work done beside the pages; what it is refused becomes the sentence that they show."""
+
+        async def attempt() -> None:
+            try:
+                await work
+            except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+                self.refuse(error)
+            finally:
+                self.tell()
+
+        task = asyncio.create_task(attempt())
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
+
+    def new_file(self, name: str) -> Path:
+        """A place in the session's own folder for a file that a page sends."""
+        folder = Path(self._folder.name) / str(next(self._numbers))
+        folder.mkdir()
+        return folder / (UNSAFE.sub("_", name)[-LONGEST_NAME:].strip(". ") or "model")
+
+    def refuse(self, error: Exception) -> str:
+        """Tell the pages what could not be done, a bug with the log that it got; the sentence."""
+        if isinstance(error, UserError):
+            self.problem = str(error)
+        else:
+            self.problem = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, sys.argv)}"
+        self.tell()
+        return self.problem
+
+    def do(self, word: str, bench: Bench) -> None:
+        """Take a further step, which can be undone."""
+        self.problem = ""
+        self.become(self.history.do(word, bench))
+
+    def become(self, history: History) -> None:
+        """Go on with another history."""
+        self.history = history
+        for follow in self.followers:
+            follow()
+        self.tell()
+
+    @contextmanager
+    def waiting(self, words: str) -> Iterator[None]:
+        """While it is open, the pages show what they wait for."""
+        self.busy = words
+        self.tell()
+        try:
+            yield
+        finally:
+            self.busy = ""
+            self.tell()

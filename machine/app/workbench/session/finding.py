@@ -1,0 +1,78 @@
+"""Finding: the search for parts that a session has under way, and what it takes of one that is stopped."""
+
+import asyncio
+from dataclasses import dataclass
+
+from machine.app.workbench.bench.bench import Bench, parts_of, with_front
+from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.work.cutting import Searched
+from mdp.decomposition import FrontRow
+from mdp.plans.plan_file import PlanFile
+from profiles.errors import PlanError
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A search under way: the bench that it began with, and how far it is."""
+
+    bench: Bench
+    searched: Searched
+
+
+class Finding:
+    """search: the one under way; notes: of the last one."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.search: Search | None = None
+        self.notes: tuple[str, ...] = ()
+        self._desk = desk
+        self._task: asyncio.Task[None] | None = None
+        desk.followers.append(self._follow)
+
+    def begin(self) -> None:
+        """Search for the parts of what lies on the bench, if no search is under way. Raises PlanError without a model."""
+        bench = self._desk.bench
+        if bench.model is None:
+            raise PlanError("there is no model on the workbench yet: choose a file first")
+        if self.search is None:
+            self.search = Search(bench, Searched("beginning"))
+            self._task = self._desk.start(self._find(bench))
+
+    def stop(self) -> None:
+        """End the search; the best that it has met so far is taken."""
+        search, self.search = self.search, None
+        if search is None or self._task is None:
+            return
+        self._task.cancel()
+        self._desk.start(self._desk.long.warm())
+        if search.searched.planes:
+            self._desk.start(self._take_best(search))
+
+    async def _find(self, bench: Bench) -> None:
+        def follow(searched: Searched) -> None:
+            if self.search is not None and self.search.bench is bench:
+                self.search = Search(bench, searched)
+                self._desk.tell()
+
+        try:
+            rows, self.notes = await self._desk.long.run("find_parts", bench, tell=follow)
+            self._desk.do("find parts", with_front(bench, rows))
+        finally:
+            if self.search is not None and self.search.bench is bench:
+                self.search = None
+
+    async def _take_best(self, search: Search) -> None:
+        planes = FrontRow(search.searched.planes, 0.0, 0.0, 0.0)
+        orientation = None if search.bench.turned is None else search.bench.rotation
+        plan = PlanFile("the search", "", "", orientation, parts_of(planes), search.bench.zones)
+        with self._desk.waiting("cutting the best so far"):
+            rows = await self._desk.quick.run("measure_plan", search.bench, plan)
+            self._desk.do("stop the search", with_front(search.bench, rows))
+
+    def _follow(self) -> None:
+        """A search for a model that is not there any more, or lies otherwise, ends."""
+        search, bench = self.search, self._desk.bench
+        if search is not None and (search.bench.model, search.bench.rotation) != (bench.model, bench.rotation):
+            self.search = None
+            if self._task is not None:
+                self._task.cancel()

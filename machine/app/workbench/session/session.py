@@ -1,0 +1,131 @@
+"""Session: one bench, the work under way for it, and what its pages may ask for."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from machine.app.pipeline.given_plan import with_plan_settings
+from machine.app.requests import Given
+from machine.app.workbench.bench.bench import Bench, Model, with_model, with_plan, with_profile
+from machine.app.workbench.bench.commands import obey
+from machine.app.workbench.bench.planes import EDITS, edited
+from machine.app.workbench.bench.settings import profile_as_given, with_name, with_setting
+from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.finding import Finding
+from machine.app.workbench.session.slicing import Slicing
+from machine.app.workbench.session.trying import Trying
+from machine.app.workbench.work.cutting import Files
+from machine.app.workbench.work.models import Resting
+from mdp.plans.plan_file import PlanFile
+from mdp.plans.reading import read_plan
+from mdp.read import locate
+from profiles.errors import PlanError
+from profiles.profile import Profile
+
+
+class Session(Desk):
+    """A desk with all that is done on it. resting: the ways in which a model rests."""
+
+    def __init__(self, profile: Profile, given: Given) -> None:
+        super().__init__(Bench(profile, given=given))
+        self.finding, self.slicing, self.trying = Finding(self), Slicing(self), Trying(self)
+        self.resting: tuple[Model, tuple[Resting, ...]] | None = None
+
+    def warm(self) -> None:
+        """Load the program's heavy parts while nobody waits."""
+        self.start(self.quick.warm())
+        self.start(self.long.warm())
+
+    async def open_model(self, path: Path, name: str) -> None:
+        """Put the model of a file on the bench. Raises UserError as the command line tells it."""
+        with self.waiting(f"reading {name}"):
+            model = await self.quick.run("read_model", path, name, self.bench.profile.of_all_parts)
+            self.do(f"open {name}", with_model(self.bench, model))
+        self.start(self._rank(model))
+
+    async def open_demo(self, name: str) -> None:
+        """Put a model that ships with the program on the bench. Raises UserError for an unknown one."""
+        if not name.startswith("demo:"):
+            raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
+        await self.open_model(locate(name), name)
+
+    async def open_plan(self, path: Path) -> None:
+        """Cut the model on the bench by a plan. Raises UserError for one that cannot be read, or of another model."""
+        try:
+            plan = read_plan(path)
+        except PlanError as error:
+            raise PlanError(str(error).replace(str(path), path.name)) from None
+        await self.take_plan(plan)
+
+    async def take_plan(self, plan: PlanFile) -> None:
+        """The same for a plan that is read already."""
+        if self.bench.model is None:
+            raise PlanError(
+                f"plan {plan.name}: there is no model on the workbench to cut by it: open {plan.model or 'its model'} first"
+            )
+        with self.waiting(f"cutting by {plan.name}"):
+            bench = self.bench
+            profile = with_plan_settings(bench.profile.of_all_parts, plan)
+            rows = await self.quick.run("measure_plan", bench, plan)
+            self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
+
+    def command(self, asked: dict[str, Any]) -> None:
+        """Do what a page asks for. Raises UserError for what cannot be done."""
+        self.problem = ""
+        match asked.get("do"):
+            case "search":
+                self.finding.begin()
+            case "stop":
+                self.finding.stop()
+                self.slicing.stop()
+            case "slice":
+                self.slicing.begin()
+            case "set":
+                value = asked.get("value")
+                key = str(asked.get("key"))
+                self._take_given(f"set {key}", with_setting(self.bench.given, key, None if value is None else str(value)))
+            case "profile":
+                name = str(asked.get("name"))
+                self._take_given(f"take {name}", with_name(self.bench.given, str(asked.get("kind")), name))
+            case "try":
+                self.trying.move(edited(self.bench, {**asked, "do": "move"})[1])
+            case name if name in EDITS:
+                self.start(self.trying.take(*edited(self.bench, asked)))
+            case "demo":
+                self.start(self.open_demo(str(asked.get("name"))))
+            case _:
+                self.become(obey(self.history, asked))
+        self.tell()
+
+    async def files(self) -> Files:
+        """What can be saved of the parts on the bench. Raises UserError where they cannot be cut."""
+        if self.bench.model is None or self.bench.cuts is None:
+            raise PlanError("there are no parts to save yet: find them first")
+        with self.waiting("cutting the parts"):
+            files: Files = await self.quick.run("make_files", self.bench)
+        return files
+
+    def _take_given(self, word: str, given: Given) -> None:
+        profile = profile_as_given(given, self.bench.profile)
+        self.start(self._change_profile(word, with_profile(self.bench, given, profile)))
+
+    async def _change_profile(self, word: str, bench: Bench) -> None:
+        """Take another profile; planes that it forbids go, and a model that it scales or turns otherwise is read again."""
+        refused, before, model = "", self.bench, self.bench.model
+        new, old = bench.profile.process, before.profile.process
+        if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
+            with self.waiting(f"reading {model.name}"):
+                model = await self.quick.run("read_model", model.path, model.name, bench.profile.of_all_parts)
+            bench = replace(with_model(bench, model), rotation=bench.rotation)
+            self.start(self._rank(model))
+        elif bench.cuts is not None:
+            trial = await self.trying.attempt(bench, bench.cuts)
+            if trial.refused:
+                refused = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
+                bench = replace(bench, cuts=None, locked=frozenset())
+        self.do(word, bench)
+        self.problem = refused
+
+    async def _rank(self, model: Model) -> None:
+        resting = await self.quick.run("rank_resting", model.mesh, self.bench.profile.of_all_parts)
+        self.resting = model, resting

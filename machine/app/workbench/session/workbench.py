@@ -1,0 +1,37 @@
+"""Workbench: the sessions of one run of the program by number, each with its own bench and its own pages."""
+
+from collections.abc import Callable
+
+from machine.app.workbench.session.session import Session
+from profiles.errors import PlanError
+
+MOST_SESSIONS = 20
+
+
+class Workbench:
+    """sessions: by number, from 1 on; a number is not given again."""
+
+    def __init__(self, make: Callable[[], Session]) -> None:
+        self.sessions: dict[int, Session] = {}
+        self._make = make
+        self._last = 0
+
+    def open(self) -> int:
+        """The number of a new session with an empty bench. Raises PlanError where there are too many."""
+        if len(self.sessions) >= MOST_SESSIONS:
+            raise PlanError(f"{MOST_SESSIONS} benches are open, which is the most: close one first")
+        self._last += 1
+        self.sessions[self._last] = session = self._make()
+        session.warm()
+        return self._last
+
+    def close(self, number: int) -> None:
+        """End a session and its work."""
+        session = self.sessions.pop(number, None)
+        if session is not None:
+            session.close()
+
+    def close_all(self) -> None:
+        """End all of them."""
+        for number in list(self.sessions):
+            self.close(number)

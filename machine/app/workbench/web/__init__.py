@@ -1,0 +1,1 @@
+"""The workbench's server, its page, and what the page is told."""

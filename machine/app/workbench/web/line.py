@@ -1,0 +1,53 @@
+"""Line: the websocket between a session and a page: state out, commands in."""
+
+import asyncio
+import json
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.web.snapshot import snapshot
+from profiles.errors import PlanError
+
+MOST_COMMAND = 100_000  # characters
+
+
+async def talk(session: Session, socket: WebSocket) -> None:
+    """State out, commands in, until either side goes. A page that reads nothing holds up nobody but itself."""
+    await socket.accept()
+    told = asyncio.create_task(_tell(session, socket))
+    heard = asyncio.create_task(_hear(session, socket))
+    done, left = await asyncio.wait((told, heard), return_when=asyncio.FIRST_COMPLETED)
+    for task in left:
+        task.cancel()
+    for task in done:
+        if not isinstance(task.exception(), WebSocketDisconnect | RuntimeError | None):
+            task.result()
+
+
+async def _tell(session: Session, socket: WebSocket) -> None:
+    """The newest state whenever there is one; what came in between while a slow page was reading is left out."""
+    while True:
+        seen = session.version
+        await socket.send_text(json.dumps(snapshot(session)))
+        await session.changed(seen)
+
+
+async def _hear(session: Session, socket: WebSocket) -> None:
+    while True:
+        text = await socket.receive_text()
+        try:
+            session.command(_parsed(text))
+        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+            session.refuse(error)
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    try:
+        asked = json.loads(text) if len(text) <= MOST_COMMAND else None
+    except (ValueError, RecursionError):
+        asked = None
+    if not isinstance(asked, dict):
+        raise PlanError("what the page has sent is no command of the workbench")
+    return asked

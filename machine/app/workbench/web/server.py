@@ -1,0 +1,126 @@
+"""Server: the addresses of the workbench: its page, its sessions' models, files and lines."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocket
+
+from machine.app.workbench.bench.settings import settings_list
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.session.workbench import Workbench
+from machine.app.workbench.web.downloads import folder, gcode, plan, print_page, shared_page
+from machine.app.workbench.web.guard import Guard
+from machine.app.workbench.web.line import talk
+from machine.app.workbench.web.page import workbench_page
+from machine.app.workbench.web.snapshot import model_key, triangles
+from mdp.read import MOST_BYTES
+from profiles.errors import PlanError
+from profiles.places import KINDS, known
+
+PLAN_SUFFIX = ".toml"
+NO_SESSION = "this bench is not open any more\n"
+NO_SESSION_CODE = 4404  # of a websocket that is closed for that
+Answer = Callable[[Request], Awaitable[Response]]
+
+
+def application(workbench: Workbench, token: str, port: int) -> ASGIApp:
+    """The whole server, below `/TOKEN/`; the number of a session follows."""
+    below = "/{token}/{session:int}/"
+
+    def route(path: str, act: Callable[[Session, Request], Awaitable[Response]], method: str = "GET") -> Route:
+        return Route(below + path, _answering(workbench, act), methods=[method])
+
+    routes = [
+        route("", _page(port)),
+        route("model/{key}", _model),
+        route("file", _take_file, "POST"),
+        route("plan.toml", plan),
+        route("parts.zip", folder),
+        route("print/{key}", print_page),
+        route("print.html", shared_page),
+        route("print.gcode", gcode),
+        route("settings.json", _settings),
+        WebSocketRoute(below + "line", _line(workbench)),
+    ]
+    return Guard(Starlette(routes=routes), token, port)
+
+
+def _page(port: int) -> Callable[[Session, Request], Awaitable[Response]]:
+    content, policy = workbench_page(port)
+
+    async def answer(session: Session, request: Request) -> Response:
+        return Response(content, media_type="text/html", headers={"content-security-policy": policy})
+
+    return answer
+
+
+def _answering(workbench: Workbench, act: Callable[[Session, Request], Awaitable[Response]]) -> Answer:
+    async def answer(request: Request) -> Response:
+        session = workbench.sessions.get(request.path_params["session"])
+        if session is None:
+            return Response(NO_SESSION, 404)
+        try:
+            return await act(session, request)
+        except ClientDisconnect:  # the page has gone while it sent a file
+            return Response(status_code=400)
+        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
+            return JSONResponse({"problem": session.refuse(error)}, status_code=422)
+
+    return answer
+
+
+def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
+    async def connect(socket: WebSocket) -> None:
+        session = workbench.sessions.get(socket.path_params["session"])
+        if session is None:
+            await socket.accept()
+            await socket.close(NO_SESSION_CODE, NO_SESSION.strip())
+        else:
+            await talk(session, socket)
+
+    return connect
+
+
+async def _model(session: Session, request: Request) -> Response:
+    model = session.bench.model
+    if model is None or model_key(model) != request.path_params["key"]:
+        return Response("this model is not on the workbench any more\n", 404)
+    return Response(await asyncio.to_thread(triangles, model), media_type="application/octet-stream")
+
+
+async def _take_file(session: Session, request: Request) -> Response:
+    """A model or a plan that the person has chosen or dropped, into the session's own folder."""
+    name = Path(request.query_params.get("name", "")).name
+    path = session.new_file(name)
+    await _receive(request, path, name)
+    if path.suffix.lower() == PLAN_SUFFIX:
+        await session.open_plan(path)
+    else:
+        await session.open_model(path, name)
+    return JSONResponse({})
+
+
+async def _receive(request: Request, path: Path, name: str) -> None:
+    size = 0
+    with path.open("wb") as file:
+        async for piece in request.stream():
+            size += len(piece)
+            if size > MOST_BYTES:
+                raise PlanError(
+                    f"{name}: has more than {MOST_BYTES} bytes, at most so many are read: a model of fewer faces is needed"
+                )
+            file.write(piece)
+
+
+async def _settings(session: Session, request: Request) -> Response:
+    bench = session.bench
+    names = {
+        kind: {"names": sorted({*known(kind), getattr(bench.given, kind)}), "name": getattr(bench.given, kind)} for kind in KINDS
+    }
+    return JSONResponse({"profiles": names, "settings": settings_list(bench.profile, bench.given)})

@@ -1,0 +1,1 @@
+"""The long work of the workbench, done in processes of its own."""

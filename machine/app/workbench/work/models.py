@@ -1,0 +1,47 @@
+"""Models: reading one, and the ways in which it rests, as tasks of the workbench."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from machine.app.pipeline import compilers
+from machine.app.workbench.bench.bench import Model
+from machine.app.workbench.work.worker import Tell
+from mdp.mesh import Mesh
+from mdp.read import read_mesh
+from mdp.search.laying import distinct_orientations
+from mdp.search.orientation import in_words, side_in_words
+from profiles.errors import MeshError
+from profiles.profile import Profile
+
+
+@dataclass(frozen=True, eq=False)
+class Resting:
+    """An orientation in which a model rests: rows of its rotation, how to say it, and what it leaves hanging."""
+
+    rotation: tuple[tuple[float, ...], ...]
+    words: str
+    overhang_mm2: float
+    height_mm: float
+
+
+def read_model(tell: Tell, path: Path, name: str, profile: Profile) -> Model:
+    """The model of a file, with the sentences of the command line; a file from the page has the name it had there."""
+    try:
+        mesh, notes = read_mesh(path, profile.process.scale, profile.process.rotate_deg)
+    except MeshError as error:
+        raise MeshError(str(error).replace(str(path), name)) from None
+    return Model(name, path, mesh, notes)
+
+
+def rank_resting(tell: Tell, mesh: Mesh, profile: Profile) -> tuple[Resting, ...]:
+    """The orientations in which a model rests, the most promising first."""
+    compilers.wait_for(compilers.JUDGE)
+    return tuple(
+        Resting(
+            tuple(tuple(float(value) for value in row) for row in each.rotation),
+            side_in_words(each) or in_words(each),
+            each.risky_mm2,
+            each.height_mm,
+        )
+        for each in distinct_orientations(mesh, profile)
+    )

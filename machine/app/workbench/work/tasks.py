@@ -1,0 +1,13 @@
+"""Tasks: the long work of the workbench by name, each a function that a process of its own runs; the values go there and back
+pickled."""
+
+from collections.abc import Callable
+from typing import Any
+
+from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan, try_cuts
+from machine.app.workbench.work.models import rank_resting, read_model
+from machine.app.workbench.work.slices import slice_bench
+
+TASKS: dict[str, Callable[..., Any]] = {
+    task.__name__: task for task in (read_model, rank_resting, find_parts, measure_plan, try_cuts, make_files, slice_bench)
+}
