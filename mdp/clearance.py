@@ -14,6 +14,7 @@ import numpy as np
 from mdp.head import bodies, corners, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, poses, rotation, shift
+from profiles.frozen import Vector
 from profiles.machine import Machine
 
 
@@ -24,15 +25,28 @@ def least_tip_height_mm(machine: Machine, pose: Pose) -> float:
 
 def lowest_body(machine: Machine, pose: Pose) -> tuple[float, str]:
     """The same, and the body of the head that asks for it."""
+    needed_mm, name, _ = lowest_place(machine, pose)
+    return needed_mm, name
+
+
+def lowest_place(machine: Machine, pose: Pose) -> tuple[float, str, Vector]:
+    """The same, and the place of that body that comes nearest to the table, from the tip in the machine frame, mm."""
     normal = rotation(machine, pose) @ UP
     across, along = hypot(normal[0], normal[1]), float(normal[2])
     if across < 1e-9:
-        return 0.0, "nozzle tip"
-    needed = [(radius * across - height * along, "hot end") for radius, height in machine.head.silhouette_mm]
+        return 0.0, "nozzle tip", (0.0, 0.0, 0.0)
+    aside = -normal[:2] / across
+    needed: list[tuple[float, str, Vector]] = []
+    for radius, height in machine.head.silhouette_mm:
+        place = float(radius * aside[0]), float(radius * aside[1]), float(height)
+        needed.append((radius * across - height * along, "hot end", place))
     for box in machine.head.boxes:
-        needed.append((float(-(corners(box.min_mm, box.max_mm) @ normal).min()), box.name))
-    height, name = max(needed)
-    return max(0.0, height + machine.clearance_mm), name
+        places = corners(box.min_mm, box.max_mm)
+        heights = places @ normal
+        x, y, z = (float(value) for value in places[int(np.argmin(heights))])
+        needed.append((float(-heights.min()), box.name, (x, y, z)))
+    height, name, place = max(needed)
+    return max(0.0, height + machine.clearance_mm), name, place
 
 
 def least_height_mm(machine: Machine, direction: Floats) -> float:

@@ -5,7 +5,7 @@ the machine's reach, lets the head meet the table, leaves a sliver or a base tha
 that stays whole. That a cut gains little, makes a small part or a long seam is the person's to judge.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,17 +69,25 @@ def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
         _check_offset(problem, planned, label)
         plane = planned.plane or _complete(problem, node, planned, label)
         following = cut_or_refuse(problem, node, plane)
-        if isinstance(following, str):
-            raise PlanError(f"{label} cannot be cut off: {following}")
+        if isinstance(following, Refusal):
+            raise PlanError(f"{label} cannot be cut off: {following.text}")
         node = following
     return node
 
 
-def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | str:
+@dataclass(frozen=True)
+class Refusal:
+    """Why a person's plane cannot cut; reason: what the sweep found against it, FEASIBLE: nothing."""
+
+    text: str
+    reason: Reason = Reason.FEASIBLE
+
+
+def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     """The node after a person's cut, or the reason why it cannot be made."""
     why = _refusal(problem, node, plane)
     following = problem.cut(node, plane) if why is None else None
-    return following if following is not None else why or _find_hindrance(problem, node, plane)
+    return following if following is not None else why or Refusal(_find_hindrance(problem, node, plane))
 
 
 def _check_offset(problem: Problem, planned: PlannedPart, label: str) -> None:
@@ -94,18 +102,19 @@ def _limits(problem: Problem, directions: Floats) -> Bounds:
     return replace(problem.bounds_along(directions), least_volume_mm3=0.0, least_interface_mm2=0.0)
 
 
-def _refusal(problem: Problem, node: Node, plane: Plane) -> str | None:
+def _refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
     """Why a person's plane may not cut a node; None: the sweep finds nothing against it."""
     missed = _miss(problem, node, plane)
     if missed is not None:
-        return missed
+        return Refusal(missed)
     limits = _limits(problem, plane.normal[None])
     checked = problem.check_plane(node, plane, limits)
     reason = Reason(int(checked.reason[0]))
     if reason == Reason.WEAK:
         stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
-        return f"{REASONS[reason]}: {problem.load_n:g} N at its top are {stress}"
-    return _explain(problem, plane, limits, reason, float(checked.fragile_mm[0]))
+        return Refusal(f"{REASONS[reason]}: {problem.load_n:g} N at its top are {stress}", reason)
+    text = _explain(problem, plane, limits, reason, float(checked.fragile_mm[0]))
+    return None if text is None else Refusal(text, reason)
 
 
 def _miss(problem: Problem, node: Node, plane: Plane) -> str | None:

@@ -12,9 +12,11 @@ import numpy as np
 
 from mdp.mesh import Mesh, dot
 from mdp.plane import Plane
-from mdp.search.by_hand import cut_or_refuse
+from mdp.search.by_hand import Refusal, cut_or_refuse
 from mdp.search.front import front_row
+from mdp.search.neck import find_neck
 from mdp.search.node import Node
+from mdp.search.obstacle import Obstacle, find_refused
 from mdp.search.problem import Problem
 
 Key = tuple[float, float, float, float]
@@ -34,13 +36,14 @@ class TriedPart:
 @dataclass(frozen=True)
 class Trial:
     """parts: those that could be cut off, from the second in print order on, None for the others. refused: why the part of this
-    number cannot be, "" where all can; support_area_mm2, seam_mm: of all parts, where all can."""
+    number cannot be, "" where all can, and obstacle: where; support_area_mm2, seam_mm: of all parts, where all can."""
 
     parts: tuple[TriedPart | None, ...]
     refused_part: int = 0
     refused: str = ""
     support_area_mm2: float | None = None
     seam_mm: float | None = None
+    obstacle: Obstacle | None = None
 
 
 class Trials:
@@ -59,13 +62,24 @@ class Trials:
         del self._cut[alike:]
         for done in range(alike, len(keys)):
             node = self._cut[-1][1] if self._cut else self._problem.root
-            following = cut_or_refuse(self._problem, node, planes[len(planes) - 1 - done])
-            if isinstance(following, str):
-                return Trial(self._parts(len(planes)), len(planes) + 1 - done, following)
+            plane = planes[len(planes) - 1 - done]
+            following = cut_or_refuse(self._problem, node, plane)
+            if isinstance(following, Refusal):
+                obstacle = find_refused(self._problem, node, plane, following)
+                return Trial(self._parts(len(planes)), len(planes) + 1 - done, following.text, obstacle=obstacle)
             self._cut.append((keys[done], following))
         last = self._cut[-1][1] if self._cut else self._problem.root
         row = front_row(last, self._problem.terms)
         return Trial(self._parts(len(planes)), 0, "", row.support_area_mm2, row.seam_mm)
+
+    def neck(self, planes: Sequence[Plane], number: int, reach_mm: float) -> Plane | None:
+        """The neck near the plane of the part of a number, of what the parts printed after it leave; None: there is none, or
+        those cannot be cut off. planes as in attempt."""
+        later = planes[number - 1 :]
+        if self.attempt(later).refused:
+            return None
+        node = self._cut[-1][1] if self._cut else self._problem.root
+        return find_neck(node.remainder.mesh, node.seam_weights, planes[number - 2], reach_mm)
 
     def _parts(self, count: int) -> tuple[TriedPart | None, ...]:
         tried = [_measure(node) for _, node in self._cut]

@@ -56,3 +56,31 @@ def test_the_edge_of_a_cut_is_as_sharp_as_it_leans_against_the_wall(lean_deg: fl
     lean = np.radians(lean_deg)
     plane = Plane(np.array([np.sin(lean), 0.0, np.cos(lean)]), 50.0 * float(np.cos(lean)))
     assert smallest_edge_deg(box(10.0, 10.0, 100.0), plane) == pytest.approx(edge_deg)
+
+
+def test_where_the_head_would_meet_the_table_it_is_shown_at_the_lowest_place_of_the_part() -> None:
+    leaning, machine = Plane(np.array([0.8, 0.0, 0.6]), 12.0), PROFILE.machine
+    tried = trials(box()).attempt((leaning,))
+    assert tried.obstacle is not None
+    touch = tried.obstacle.touch
+    assert touch is not None
+    assert f"the head's {touch.body} would meet the table" in tried.refused
+    assert np.array(touch.rotation) @ leaning.normal == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert touch.tip_mm[::2] == pytest.approx((10.0, 4.0 / 0.6))  # where the plane leaves the wall
+    silhouette = [touch.tip_mm[2] + height * 0.6 - radius * 0.8 for radius, height in machine.head.silhouette_mm]
+    assert min(silhouette) < machine.clearance_mm
+    assert touch.touched_mm[2] == 0.0
+
+
+def test_what_would_float_is_marked_at_its_lowest_place() -> None:
+    tried = trials(tee()).attempt((Plane(np.array([0.8, 0.0, 0.6]), 12.0),))
+    assert "would not stand on the platform" in tried.refused
+    assert tried.obstacle is not None
+    ((x, _, z),) = tried.obstacle.places_mm
+    assert (x, z) == (-20.0, 30.0)
+
+
+def test_the_neck_is_that_of_what_the_parts_printed_later_leave() -> None:
+    tried, thick = trials(tee()), Plane(np.array([0.0, 0.0, 1.0]), 29.0)
+    assert tried.neck((thick, ARMS[0], ARMS[1]), 2, 5.0) is None
+    assert tried.neck((Plane(np.array([1.0, 0.0, 0.0]), 50.0), thick), 2, 5.0) is None

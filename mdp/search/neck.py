@@ -1,0 +1,163 @@
+"""Neck: near a plane, the one that a model is thinnest at: whose rim is shorter than that of every plane close to it.
+
+Towards the end of a model rims get shorter, too, down to nothing: that is no neck. Of a neck the rim grows on both sides of the
+plane, and however the plane is tilted.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import atan2, ceil, cos, pi, radians, sin
+
+import numpy as np
+
+from mdp.mesh import Floats, Ints, Mesh, dot
+from mdp.overhang import UP
+from mdp.plane import Plane
+from mdp.pose import about
+from mdp.sweep.rims import measure_rim
+
+REACH_SHARE, REACH_DEG = 0.15, 25.0  # how far a neck is looked for: of the diagonal of what is cut, and tilted by so much
+RISE = 0.02  # share by which a rim must grow on either side
+OFFSETS, RINGS = 48, 3  # of the first look: planes along each direction, and rings of directions around the first
+MOST_TRIED = 4  # of the necks of the first look that are refined
+LEAST_MM, LEAST_DEG = 0.005, 0.02  # finer, nobody cuts
+NEAR_MM = 1e-6  # corners nearer to a plane count as above it, or rims along edges would be lost
+
+
+@dataclass(frozen=True, eq=False)
+class _Surface:
+    """Vertices, faces, normals and areas near a plane, and (m,) 1 where a rim is seen."""
+
+    vertices: Floats
+    faces: Ints
+    normals: Floats
+    areas_mm2: Floats
+    seen: Floats
+
+    def rim_mm(self, plane: Plane) -> float:
+        """The length of a plane's rim where it is seen."""
+        heights = self._heights_mm(plane)
+        return float(measure_rim(self.faces, heights, dot(self.normals, plane.normal), self.areas_mm2, self.seen, 0.0).length)
+
+    def _heights_mm(self, plane: Plane) -> Floats:
+        heights: Floats = plane.heights_mm(self.vertices)
+        heights[np.abs(heights) < NEAR_MM] = NEAR_MM
+        return heights
+
+    def centre_mm(self, plane: Plane) -> Floats:
+        """(3,) the middle of a plane's rim."""
+        heights = self._heights_mm(plane)[self.faces]
+        crossed = (heights.min(axis=1) < 0.0) & (heights.max(axis=1) > 0.0) & (self.seen > 0.0)
+        near = self.vertices[self.faces[crossed]].reshape(-1, 3)
+        middle = 0.5 * (near.min(axis=0) + near.max(axis=0))
+        centre: Floats = middle - plane.heights_mm(middle[None])[0] * plane.normal
+        return centre
+
+
+def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float, reach_deg: float = REACH_DEG) -> Plane | None:
+    """The plane of the shortest rim among the necks near a plane; None: there is none, or the plane misses the mesh.
+
+    seen: (m,) above 0 for the faces on which a rim counts. The middle of the neck's rim is at most reach_mm from the plane and
+    its normal at most reach_deg from the plane's.
+    """
+    heights = plane.heights_mm(mesh.vertices)
+    if heights.max() <= 0.0 or heights.min() >= 0.0:
+        return None
+    surface = _near(mesh, seen, heights, reach_mm, reach_deg)
+    if surface.rim_mm(plane) <= 0.0:
+        return None
+    centre = surface.centre_mm(plane)
+    found = sorted(_first_look(surface, plane.normal, centre, reach_mm, reach_deg), key=lambda each: each[0])
+    necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS, reach_deg / RINGS) for _, begin in found[:MOST_TRIED]]
+    allowed = [neck for neck in necks if _is_neck(surface, neck, plane, centre, (reach_mm, reach_deg))]
+    return min(allowed, key=surface.rim_mm, default=None)
+
+
+def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float, reach_deg: float) -> _Surface:
+    """What of a mesh a plane of the search can meet: all of it but what lies far above and below."""
+    wide_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
+    far_mm = 2.0 * reach_mm + wide_mm * sin(radians(min(reach_deg, 90.0)))
+    around = heights[mesh.faces]
+    kept = (around.min(axis=1) <= far_mm) & (around.max(axis=1) >= -far_mm)
+    weights = (seen[kept] > 0.0).astype(np.float64)
+    return _Surface(mesh.vertices, mesh.faces[kept], np.ascontiguousarray(mesh.normals[kept]), mesh.areas_mm2[kept], weights)
+
+
+def _first_look(
+    surface: _Surface, normal: Floats, centre: Floats, reach_mm: float, reach_deg: float
+) -> Iterator[tuple[float, Plane]]:
+    """Planes whose rim is shorter than those of their neighbours along their normal, with their rims."""
+    steps = np.linspace(-reach_mm, reach_mm, OFFSETS + 1)
+    for direction in _directions(normal, reach_deg):
+        planes = [Plane(direction, float(direction @ centre) + float(step)) for step in steps]
+        rims = np.array([surface.rim_mm(each) for each in planes])
+        for k in range(1, OFFSETS):
+            if 0.0 < rims[k] <= min(rims[k - 1], rims[k + 1]) and rims[k] < max(rims[k - 1], rims[k + 1]):
+                yield float(rims[k]), planes[k]
+
+
+def _directions(normal: Floats, reach_deg: float) -> Iterator[Floats]:
+    """A direction and rings of others around it, up to the reach."""
+    aside, across = _beside(normal)
+    yield normal
+    for ring in range(1, RINGS + 1):
+        for k in range(6 * ring):
+            turn, tilt = pi * k / (3 * ring), radians(reach_deg * ring / RINGS)
+            yield cos(tilt) * normal + sin(tilt) * (cos(turn) * aside + sin(turn) * across)
+
+
+def _beside(normal: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors across a direction and each other."""
+    helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else UP
+    aside = np.cross(normal, helper)
+    aside /= np.linalg.norm(aside)
+    return aside, np.cross(normal, aside)
+
+
+def _refined(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -> Plane:
+    """The plane of the shortest rim that is reached downhill: moved, or tilted about the middle of its rim, ever less."""
+    least = surface.rim_mm(plane)
+    while step_mm > LEAST_MM or step_deg > LEAST_DEG:
+        tried = [
+            (rim, each) for each in _around(surface, plane, step_mm, step_deg) if 0.0 < (rim := surface.rim_mm(each)) < least
+        ]
+        if tried:
+            least, plane = min(tried, key=lambda each: each[0])
+        else:
+            step_mm, step_deg = 0.5 * step_mm, 0.5 * step_deg
+    return plane
+
+
+def _around(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -> Iterator[Plane]:
+    """Planes one step away."""
+    centre, tilt = surface.centre_mm(plane), radians(step_deg)
+    yield Plane(plane.normal, plane.offset_mm + step_mm)
+    yield Plane(plane.normal, plane.offset_mm - step_mm)
+    aside, across = _beside(plane.normal)
+    for k in range(8):
+        axis = cos(0.25 * pi * k) * aside + sin(0.25 * pi * k) * across
+        normal = about(axis, tilt) @ plane.normal
+        normal /= np.linalg.norm(normal)
+        yield Plane(normal, float(normal @ centre))
+
+
+def _is_neck(surface: _Surface, neck: Plane, plane: Plane, centre: Floats, reach: tuple[float, float]) -> bool:
+    """Whether a plane lies within reach and its rim grows on both sides, before it gets shorter again."""
+    reach_mm, reach_deg = reach
+    tilt_deg = np.degrees(atan2(float(np.linalg.norm(np.cross(neck.normal, plane.normal))), float(neck.normal @ plane.normal)))
+    away_mm = abs(float(plane.heights_mm(surface.centre_mm(neck)[None])[0]))
+    if tilt_deg > reach_deg - LEAST_DEG or away_mm > reach_mm:
+        return False
+    least, step_mm = surface.rim_mm(neck), 2.0 * reach_mm / OFFSETS
+    return all(_rises(surface, neck, side * step_mm, least) for side in (-1.0, 1.0))
+
+
+def _rises(surface: _Surface, neck: Plane, step_mm: float, least: float) -> bool:
+    """Whether the rim grows by RISE within the reach one way, before it gets shorter than the neck's."""
+    for k in range(1, ceil(OFFSETS / 2) + 1):
+        rim = surface.rim_mm(Plane(neck.normal, neck.offset_mm + k * step_mm))
+        if rim < least * (1.0 - 1e-9):
+            return False
+        if rim >= (1.0 + RISE) * least:
+            return True
+    return False

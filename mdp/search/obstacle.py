@@ -1,0 +1,116 @@
+"""Obstacle: where a person's plane is in the way of something: the head at the place where it would touch, or places marked."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdp.clearance import lowest_place
+from mdp.cut import Solid, above, below, mesh_of
+from mdp.mesh import Floats, Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.plane import Plane
+from mdp.pose import poses, rotation, shift
+from mdp.ranking.candidates import COPLANAR_MM, Reason
+from mdp.search.by_hand import Refusal
+from mdp.search.node import Node
+from mdp.search.problem import Problem
+from mdp.zone import Zone
+from profiles.frozen import Vector
+
+MOST_PLACES = 20
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The head at the place where one of its bodies would touch the table. All in the workpiece frame, mm: tip_mm; rotation: rows
+    of what turns the workpiece frame into the machine's there; body: its name; touched_mm: the place on the table."""
+
+    body: str
+    tip_mm: Vector
+    rotation: tuple[Vector, ...]
+    touched_mm: Vector
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """places_mm: of the workpiece frame, where what a plane is refused for lies; touch: the head that would meet the table."""
+
+    places_mm: tuple[Vector, ...] = ()
+    touch: Touch | None = None
+
+
+def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -> Obstacle | None:
+    """Where a plane that may not cut a node is in the way; None: nobody knows."""
+    match refusal.reason:
+        case Reason.CLEARANCE:
+            return Obstacle(touch=_touch(problem, node, plane))
+        case Reason.PLATFORM:
+            centre, radius = problem.platform_disc
+            across = plane.normal[:2] / max(float(np.hypot(*plane.normal[:2])), 1e-12)
+            return Obstacle((_vector([*(centre + radius * across), 0.0]),))
+        case Reason.FLOATING:
+            return _lowest(below(node.solid, plane), np.array([0.0, 0.0, 1.0]), PLATFORM_TOLERANCE_MM)
+        case Reason.INTERFACE:
+            return _lowest(above(node.solid, plane), plane.normal, plane.offset_mm + COPLANAR_MM)
+        case Reason.KEEP:
+            zone = problem.zones.keep[(problem.zones.crossed(plane) or 1) - 1]
+            corners = np.array([zone.min_mm, zone.max_mm]) if isinstance(zone, Zone) else zone.points
+            return Obstacle((_vector(0.5 * (corners.min(axis=0) + corners.max(axis=0))),))
+        case Reason.WEAK:
+            section = _section(node.remainder.mesh, plane)
+            return Obstacle((_vector(0.5 * (section.min(axis=0) + section.max(axis=0))),))
+        case Reason.FEASIBLE:
+            return _outside(problem, mesh_of(above(node.solid, plane)).vertices, plane)
+    return None
+
+
+def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
+    """The head at the lowest place of what is cut off, at the pose that needs least."""
+    machine, mesh = problem.machine, node.remainder.mesh
+    options = [(*lowest_place(machine, pose), pose) for pose in poses(machine, plane.normal)]
+    if not options:
+        return None
+    _, body, place, pose = min(options, key=lambda option: option[0])
+    printed = np.vstack([mesh.vertices[plane.heights_mm(mesh.vertices) > 0.0], _section(mesh, plane)])
+    tip, turned = printed[int(np.argmin(printed[:, 2]))], rotation(machine, pose)
+    x, y, _ = tip + np.array(place) @ turned
+    return Touch(body, _vector(tip), tuple(_vector(row) for row in turned), (float(x), float(y), 0.0))
+
+
+def _section(mesh: Mesh, plane: Plane) -> Floats:
+    """(k, 3) where the edges of a mesh pass through a plane."""
+    heights = plane.heights_mm(mesh.vertices)
+    starts, ends = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    passing = (heights[starts] > 0.0) & (heights[ends] <= 0.0)
+    a, b = starts[passing], ends[passing]
+    share = (heights[a] / (heights[a] - heights[b]))[:, None]
+    places: Floats = mesh.vertices[a] + share * (mesh.vertices[b] - mesh.vertices[a])
+    return places
+
+
+def _lowest(solid: Solid, upward: Floats, ground_mm: float) -> Obstacle | None:
+    """The lowest place, along a direction, of every piece of a solid that does not reach down to the ground."""
+    places = []
+    for piece in solid.decompose():
+        vertices = mesh_of(piece).vertices
+        heights = vertices @ upward
+        if heights.min() > ground_mm:
+            places.append(_vector(vertices[int(np.argmin(heights))]))
+    return Obstacle(tuple(places[:MOST_PLACES])) if places else None
+
+
+def _outside(problem: Problem, points: Floats, plane: Plane) -> Obstacle | None:
+    """The places of a part that the axes do not reach, the farthest for each axis and side."""
+    machine, places = problem.machine, []
+    for pose in poses(machine, plane.normal)[:1] if len(points) else []:
+        reached = points @ rotation(machine, pose).T + shift(machine, pose)
+        for axis, limits in enumerate(axis.limits_mm for axis in (machine.x, machine.y, machine.z)):
+            low, high = int(np.argmin(reached[:, axis])), int(np.argmax(reached[:, axis]))
+            places += [points[low]] if reached[low, axis] < limits[0] else []
+            places += [points[high]] if reached[high, axis] > limits[1] else []
+    return Obstacle(tuple(_vector(place) for place in places)) if places else None
+
+
+def _vector(values: object) -> Vector:
+    x, y, z = (float(value) for value in np.asarray(values, dtype=np.float64))
+    return x, y, z
