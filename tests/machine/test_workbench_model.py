@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.test_workbench_page import WINDOW, area, drag_slider, open_model
+from tests.machine.test_workbench_page import FOUND, WINDOW, area, drag_slider, open_model
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import tee
 
@@ -41,7 +42,8 @@ def arrow_up(browser: Browser, event: str) -> None:
 
 
 def test_a_drag_of_a_ring_turns_the_model_in_one_step_and_red_follows_it(browser: Browser, bench: Running) -> None:
-    open_model(browser, bench, "tee.stl", stl(tee()))
+    open_model(browser, bench, "dragged.stl", stl(tee()))
+    browser.wait("!$('rings').hasAttribute('hidden')")
     standing = area(browser)
     start, end = (tuple(place) for place in browser.value(RING_Y))
     browser.hold(start, end)
@@ -57,7 +59,8 @@ def test_a_drag_of_a_ring_turns_the_model_in_one_step_and_red_follows_it(browser
 
 
 def test_arrow_keys_turn_a_ring_and_shift_takes_15_degrees_at_once(browser: Browser, bench: Running) -> None:
-    open_model(browser, bench, "tee.stl", stl(tee()))
+    open_model(browser, bench, "keys.stl", stl(tee()))
+    browser.wait("!$('rings').hasAttribute('hidden')")
     browser.value("document.querySelector('[data-ring=x]').focus()")
     for _ in range(6):
         arrow_up(browser, "keydown")
@@ -68,7 +71,7 @@ def test_arrow_keys_turn_a_ring_and_shift_takes_15_degrees_at_once(browser: Brow
 
 
 def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_is_told(browser: Browser, bench: Running) -> None:
-    open_model(browser, bench, "tee.stl", stl(tee()))
+    open_model(browser, bench, "sized.stl", stl(tee()))
     drag_slider(browser, "size-x", 60, "change")
     browser.wait("$('scale').value === '150' && $('size-y').value === '15.00'")
     assert "reaches all of it" in browser.value("$('fit-told').textContent")
@@ -80,3 +83,31 @@ def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_i
     browser.click("#scale-as-read")
     browser.wait("$('scale').value === '100'")
     assert browser.complaints == []
+
+
+def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "apart.stl", stl(tee()))
+    browser.click("#tab-parts")
+    browser.click("#find")
+    browser.wait(f"{FOUND} && document.documentElement.dataset.pieces === '2'")
+    first, second = browser.value("[...$('parts-list').querySelectorAll('td.words')].map((cell) => cell.textContent)")
+    assert first == "straight up"
+    assert "° to the " in second
+    browser.click("[data-view=front]")
+    drag_slider(browser, "apart", 1, "input")
+    browser.click("#fit")
+    browser.wait("new Promise((drawn) => requestAnimationFrame(() => drawn(true)))")
+    left, top, width, height = browser.value(
+        "(() => { const b = $('canvas').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()"
+    )
+    heights = (top + share * height for share in np.arange(0.05, 0.95, 0.05))
+    met = next(chosen for y in heights if (chosen := part_at(browser, left + width / 2, y)))
+    assert met == "2"  # from above downwards the part that was lifted off comes first
+    assert browser.value("$('planes').querySelector(':checked').value") == "2"
+
+
+def part_at(browser: Browser, x: float, y: float) -> str | None:
+    """The part that is chosen after a click."""
+    browser.press(x, y)
+    chosen: str | None = browser.value("$('parts-list').querySelector(':checked')?.value")
+    return chosen

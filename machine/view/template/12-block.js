@@ -4,8 +4,10 @@ const MAGIC = "TILTVW01";
 const HOLDS = { u8: Uint8Array, u16: Uint16Array, i32: Int32Array, f32: Float32Array, f64: Float64Array };
 
 /** {header, array}; array(name) decodes a column list: one typed array a column, in whole multiples of the scale. */
-async function openBlock(text) {
-  const bytes = await inflated(unlettered(text));
+const openBlock = (text) => blockOf(unlettered(text));
+
+async function blockOf(pressed) {
+  const bytes = await inflated(pressed);
   const magic = new TextDecoder().decode(bytes.subarray(0, 8));
   if (magic !== MAGIC) throw new Error(`the page's data begin with ${magic}, not ${MAGIC}`);
   const size = new DataView(bytes.buffer).getUint32(8, true);

@@ -59,6 +59,11 @@ class Bench:
         """(3, 3) how the model is turned; None: it stands as it is read, so a plan needs not say it."""
         return None if self.rotation == STANDING else np.array(self.rotation)
 
+    @property
+    def printed(self) -> tuple[object, ...]:
+        """What of it decides what is printed."""
+        return self.model, self.rotation, self.cuts, self.profile
+
 
 @dataclass(frozen=True, eq=False)
 class Step:

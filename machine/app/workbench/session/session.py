@@ -12,6 +12,7 @@ from machine.app.workbench.bench.planes import EDITS, edited
 from machine.app.workbench.bench.settings import profile_as_given, with_name, with_setting
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
+from machine.app.workbench.session.pieces import Pieces
 from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.trying import Trying
 from machine.app.workbench.work.cutting import Files
@@ -29,6 +30,7 @@ class Session(Desk):
     def __init__(self, profile: Profile, given: Given) -> None:
         super().__init__(Bench(profile, given=given))
         self.finding, self.slicing, self.trying = Finding(self), Slicing(self), Trying(self)
+        self.pieces = Pieces(self)
         self.resting: tuple[Model, tuple[Resting, ...]] | None = None
 
     def warm(self) -> None:

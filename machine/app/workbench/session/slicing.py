@@ -29,7 +29,7 @@ class Slicing:
 
     def shown(self) -> Sliced | None:
         """The slices of what lies on the bench now; None where they are of something else."""
-        if self.done is None or _printed(self.done[0]) != _printed(self._desk.bench):
+        if self.done is None or self.done[0].printed != self._desk.bench.printed:
             return None
         return self.done[1]
 
@@ -65,10 +65,5 @@ class Slicing:
             self.under_way = None
 
     def _follow(self) -> None:
-        if self.under_way is not None and _printed(self.under_way.bench) != _printed(self._desk.bench):
+        if self.under_way is not None and self.under_way.bench.printed != self._desk.bench.printed:
             self.stop()
-
-
-def _printed(bench: Bench) -> tuple[object, ...]:
-    """What of a bench decides what is printed."""
-    return bench.model, bench.rotation, bench.cuts, bench.profile

@@ -41,6 +41,7 @@ def application(workbench: Workbench, token: str, port: int) -> ASGIApp:
         route("model/{key}", _model),
         route("file", _take_file, "POST"),
         route("plan.toml", plan),
+        route("pieces", _pieces),
         route("parts.zip", folder),
         route("print/{key}", print_page),
         route("print.html", shared_page),
@@ -92,6 +93,10 @@ async def _model(session: Session, request: Request) -> Response:
     if model is None or model_key(model) != request.path_params["key"]:
         return Response("this model is not on the workbench any more\n", 404)
     return Response(await asyncio.to_thread(triangles, model), media_type="application/octet-stream")
+
+
+async def _pieces(session: Session, request: Request) -> Response:
+    return Response(await session.pieces.block(), media_type="application/octet-stream")
 
 
 async def _take_file(session: Session, request: Request) -> Response:

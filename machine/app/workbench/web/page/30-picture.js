@@ -9,7 +9,7 @@ const PLANE_COLOUR = [30, 120, 190];
 function pictureOf(canvas, camera, drawn) {
   const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
   if (!gl) return null;
-  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, plane: null, machine: null, dark: false };
+  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], plane: null, machine: null, dark: false };
   let card = null, asked = false, count = 0;
   const build = () => {
     gl.enable(gl.DEPTH_TEST);
@@ -19,6 +19,7 @@ function pictureOf(canvas, camera, drawn) {
     table();
     solid();
     plane();
+    pieces();
   };
   const table = () => {
     if (!scene.machine) return;
@@ -42,7 +43,8 @@ function pictureOf(canvas, camera, drawn) {
     const flat = seenAs(IDENTITY), below = camera.eye()[2] < 0;
     card.frame.begin(width, height);
     if (card.table && !below) paintPlate(flat);
-    if (card.solid) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts });
+    if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
+    else if (card.solid) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts });
     if (card.table && below) paintPlate(flat, { strength: 0.18 });
     if (card.plane) {
       card.plane.rim.draw(flat.toClip, { lift: 1e-4 });
@@ -58,6 +60,7 @@ function pictureOf(canvas, camera, drawn) {
     const { discs, rims } = planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR);
     card.plane = { disc: solidOf(gl, discs), rim: linesOf(gl, rims) };
   };
+  const pieces = () => { card.pieces = scene.pieces && piecesOn(gl, scene.pieces, scene.chosen); };
   const paintPlate = (seen, look = {}) => {
     card.table.solid.draw(seen, look);
     card.table.lines.draw(seen.toClip, { lift: 1e-5 });
@@ -85,6 +88,14 @@ function pictureOf(canvas, camera, drawn) {
       scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;
       ask();
     },
+    /** The parts as bodies of their own, each shifted, in place of the model; chosen: the number of the part that stands out, 0: all. */
+    pieces: (found, shifts, chosen) => {
+      const same = scene.pieces === found, repainted = scene.chosen !== chosen;
+      Object.assign(scene, { pieces: found, shifts, chosen });
+      if (!same) pieces();
+      else if (found && repainted) card.pieces.paint(chosen);
+      ask();
+    },
     /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
     plane: (held) => { scene.plane = held; plane(); ask(); },
     /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
@@ -97,7 +108,8 @@ function pictureOf(canvas, camera, drawn) {
     box: () => scene.box,
     matrix: () => scene.matrix,
     fit: () => {
-      const corners = Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => scene.box[(i >> axis) & 1][axis]));
+      const boxes = scene.pieces ? scene.pieces.parts.map(({ box }, k) => box.map((place) => add(place, scene.shifts[k]))) : [scene.box];
+      const corners = boxes.flatMap((box) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => box[(i >> axis) & 1][axis])));
       camera.fit(corners, canvas.clientWidth / Math.max(canvas.clientHeight, 1));
       ask();
     },

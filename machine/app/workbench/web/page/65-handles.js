@@ -8,7 +8,7 @@ function handlesOf(bench) {
   const knobs = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
   /** The plane in hand with its section, drawn where planes are looked at. */
   bench.showPlane = () => {
-    const plane = bench.tab === "parts" && bench.triangles && bench.state.model ? bench.plane() : null;
+    const plane = bench.tab === "parts" && !bench.apart() && bench.triangles && bench.state.model ? bench.plane() : null;
     const later = plane ? bench.planes().slice(bench.selected - 1) : [];
     bench.section = plane && bench.picture ? sectionOf(bench.triangles, plane, later, bench.picture.matrix()) : null;
     if (bench.picture) bench.picture.plane(bench.section ? { ...plane, ...bench.section } : null);

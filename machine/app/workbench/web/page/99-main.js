@@ -36,11 +36,12 @@ function main() {
     const planes = row ? row.planes : search && search.planes.length ? search.planes : parts ? bench.planes() : null;
     const cut = bench.tab !== "model" && planes;
     picture.cut(cut ? planes : null, colours);
+    bench.showApart();
     picture.red(cut ? null : bench.red);
     legend(cut ? colours.slice(0, planes.length + 1) : null);
   };
   bench.picture = picture;
-  const panels = [modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), slicesPanel(bench), settingsPanel(bench)];
+  const panels = [modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), apartPanel(bench), slicesPanel(bench), settingsPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;
@@ -66,7 +67,7 @@ function main() {
     if (picture) picture.fit();
     root.dataset.shown = key;
   };
-  tabsOf((tab) => { bench.tab = tab; bench.look(); bench.showPlane(); });
+  tabsOf((tab) => { bench.tab = tab; if (bench.state) bench.fetchPieces(); bench.look(); bench.showPlane(); });
   $("undo").addEventListener("click", () => bench.send({ do: "undo" }));
   $("redo").addEventListener("click", () => bench.send({ do: "redo" }));
   if (picture) {
@@ -85,6 +86,7 @@ function main() {
 /** A click on the model: the face is laid down or the plane takes its place when that was asked for; else a part is chosen. */
 function press(event, bench, picture) {
   if (!bench.triangles) return;
+  if (bench.apart()) return bench.pieceAt(event);
   const [from, along] = picture.ray(event), face = faceMet(bench.triangles, from, along);
   if (face < 0) return;
   if (bench.laying) {

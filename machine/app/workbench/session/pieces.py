@@ -1,0 +1,22 @@
+"""Pieces: the parts on the bench as bodies of their own for the page, cut once for all that ask."""
+
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.session.desk import Desk
+from profiles.errors import PlanError
+
+
+class Pieces:
+    """The last ones that were asked for."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._drawn: tuple[Bench, bytes] | None = None
+
+    async def block(self) -> bytes:
+        """Those of what lies on the bench, as `work.pieces` packs them. Raises PlanError where there are none."""
+        bench = self._desk.bench
+        if bench.model is None or bench.cuts is None:
+            raise PlanError("there are no parts to look at yet: find them first")
+        if self._drawn is None or self._drawn[0].printed != bench.printed:
+            self._drawn = bench, await self._desk.quick.run("draw_pieces", bench)
+        return self._drawn[1]

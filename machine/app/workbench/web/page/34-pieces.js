@@ -1,0 +1,78 @@
+// Pieces: the parts as bodies of their own, drawn apart along their printing directions, so that the faces of the cuts are seen.
+
+const CUT_MM = 2e-3; // within which a corner lies in the plane of a cut: places come in thousandths of a mm
+const PALER = [190, 194, 199]; // what parts that are not chosen fade to
+const FADED = 0.6, CUT_WHITE = 0.5, ARROW_DARK = 0.35;
+const ARROW_OVER = 0.02, ARROW_SPAN = 0.5; // of the model's size: how far above a part its arrow begins, and for which size it is drawn
+
+/** {header, parts: [{part, range, foot: of its arrow, way, box, cut}], places, marks, span} of the server's block. */
+async function piecesIn(bytes) {
+  const block = await blockOf(bytes), surfaces = surfacesOf(block);
+  if (!surfaces) return null;
+  const { places, marks, parts, apart } = surfaces, bases = parts.slice(1).map(({ part }) => part.base);
+  const [low, high] = bounds(places), span = length(sub(high, low));
+  const described = parts.map(({ part, range }, k) => {
+    const [least, most] = bounds(places.subarray(3 * range[0], 3 * range[1])), planes = bases.slice(Math.max(k - 1, 0));
+    let top = 0;
+    for (let i = 3 * range[0]; i < 3 * range[1]; i += 3) top = Math.max(top, dot(part.base.normal, [places[i], places[i + 1], places[i + 2]]) - part.base.offset_mm);
+    const foot = add(part.base.centre_mm, scaled(part.direction, top + ARROW_OVER * span)), tip = add(foot, scaled(part.direction, 0.3 * ARROW_SPAN * span));
+    return { part, range, foot, way: apart.get(part), box: bounds([...least, ...most, ...tip]), cut: cutFaces(places, range, planes) };
+  });
+  return { header: block.header, parts: described, places, marks, span };
+}
+
+/** Which faces of a range lie in one of the planes. */
+function cutFaces(places, [first, end], planes) {
+  const cut = new Uint8Array((end - first) / 3), within = ({ normal: [x, y, z], offset_mm: offset }, at) => {
+    for (let k = at; k < at + 9; k += 3) if (Math.abs(places[k] * x + places[k + 1] * y + places[k + 2] * z - offset) > CUT_MM) return false;
+    return true;
+  };
+  for (let face = 0; face < cut.length; face++) cut[face] = planes.some((plane) => within(plane, 3 * first + 9 * face));
+  return cut;
+}
+
+/** How far each part is from its place when they are drawn apart by a share of the model's size. */
+const shiftsOf = ({ parts, span }, share) => parts.map(({ way }) => scaled(way, share * span));
+
+/** Colours of all corners: the parts', paler those not chosen (0: all are), light the cuts, red what needs support. */
+function pieceColours({ parts, marks, places }, chosen) {
+  const words = new Uint32Array(places.length / 3);
+  for (const { part, range, cut } of parts) {
+    const own = rgb(part.colour), plain = chosen && chosen !== part.index ? own.map((x, k) => mix(x, PALER[k], FADED)) : own;
+    const [red, light, colour] = [wordOf(RED, 255), wordOf(plain.map((x) => mix(x, 255, CUT_WHITE)), 254), wordOf(plain, 254)];
+    for (let corner = range[0]; corner < range[1]; corner++) {
+      const face = Math.floor(corner / 3);
+      words[corner] = marks[face] & LEFT.printed ? red : cut[face - range[0] / 3] ? light : colour;
+    }
+  }
+  return new Uint8Array(words.buffer);
+}
+
+/** Their drawing: {draw(seenAt, shifts), paint(chosen)}; seenAt(shift): how the eye sees what is shifted so. */
+function piecesOn(gl, pieces, chosen) {
+  const solid = solidOf(gl, { places: pieces.places, colours: pieceColours(pieces, chosen) });
+  const tipped = pieces.parts.map(({ part, foot }) => ({ ...part, base: { ...part.base, radius_mm: 1, centre_mm: foot } }));
+  const arrows = solidOf(gl, arrowsOf(tipped, (part) => rgb(part.colour).map((x) => mix(x, 0, ARROW_DARK)), ARROW_SPAN * pieces.span));
+  const share = arrows.corners / pieces.parts.length;
+  return {
+    draw: (seenAt, shifts) => pieces.parts.forEach(({ range }, k) => {
+      const seen = seenAt(shifts[k]);
+      solid.draw(seen, { range });
+      arrows.draw(seen, { range: [k * share, (k + 1) * share] });
+    }),
+    paint: (number) => solid.paint(pieceColours(pieces, number)),
+  };
+}
+
+/** The number of the part that a ray of the platform's frame meets first; 0: none. */
+function pieceMet({ places, parts }, shifts, [from, along]) {
+  let best = 0, least = Infinity;
+  parts.forEach(({ part, range }, k) => {
+    const corners = places.subarray(3 * range[0], 3 * range[1]), start = sub(from, shifts[k]);
+    const face = faceMet({ corners, count: (range[1] - range[0]) / 3 }, start, along);
+    if (face < 0) return;
+    const [a, b, c] = cornersAt(corners, face), normal = cross(sub(b, a), sub(c, a)), far = dot(normal, sub(a, start)) / dot(normal, along);
+    if (far < least) [best, least] = [part.index, far];
+  });
+  return best;
+}

@@ -1,0 +1,34 @@
+"""Pieces: the parts as bodies of their own for the page, as a block like the one of `view`, with what of them needs support."""
+
+from machine.app.workbench.bench.bench import Bench, plan_of_bench
+from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
+from machine.app.workbench.work.worker import Tell
+from machine.planning.limits import check_parts
+from machine.view.encoding import pack
+from machine.view.parts import page_colours
+from machine.view.scene import solids, surfaces
+from mdp.decomposition import Decomposition
+from profiles.errors import MoveError
+from profiles.profile import Profile
+
+
+def draw_pieces(tell: Tell, bench: Bench) -> bytes:
+    """The parts as the bench has them, for the page to draw apart."""
+    return pieces_block(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.profile)
+
+
+def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
+    """Surfaces and figures of all parts in print order, and as `fit` what the machine does not reach of them, in the sentence of
+    `export`."""
+    colours = page_colours(len(decomposition.parts))
+    parts = [part | {"colour": colour} for part, colour in zip(solids(decomposition, profile), colours, strict=True)]
+    return pack({"parts": parts, "fit": out_of_reach(decomposition, profile)}, surfaces(decomposition, profile))
+
+
+def out_of_reach(decomposition: Decomposition, profile: Profile) -> str:
+    """What the machine does not reach of the parts in their poses; "" where it reaches all."""
+    try:
+        check_parts(decomposition.parts, profile)
+    except MoveError as error:
+        return str(error)
+    return ""
