@@ -55,6 +55,7 @@ def of_print(
         "live": live,
         "time_s": run.time_s,
         "filament_mm": float(np.max(run.program.filament_mm, initial=0.0)),
+        "lines": len(program.lines),
         "types": list(run.program.types),
         "layers_by": by_layer.by,
         "thinned": {"rows": count, "kept": len(shown)} if len(shown) < count else None,
@@ -81,6 +82,7 @@ def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, An
         "filament": {
             "material": material.name, "diameter_mm": material.diameter_mm, "density_g_cm3": material.density_g_cm3,
         },
+        "lines": 0,
         "types": [""],
         "layers_by": "comments",
         "thinned": None,

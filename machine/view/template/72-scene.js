@@ -27,6 +27,9 @@ function sceneOf(print, bells) {
     const next = now + (by < 0 && !complete ? 0 : by) + (by > 0 && !complete ? -1 : 0);
     scene.go(rows.layers[clamp(next, 0, rows.layers.length - 1)].last);
   };
+  /** What the print has reached with a layer, where it is before that: so that the layer is seen. */
+  scene.goTo = ({ last: end }) => { if (scene.row < end) scene.go(end); };
+  scene.goToLine = (line) => scene.go(countUpTo(rows.line, line) - 1);
   scene.time = () => {
     if (!rows.count) return 0;
     const start = scene.row ? rows.time[scene.row - 1] : 0;

@@ -108,9 +108,9 @@ function themeOf(scene, bells) {
     bells.ring("theme");
   };
   let told = false;
-  const toggle = () => { told = true; choose(!scene.dark); };
+  const tell = (dark) => { told = true; choose(dark); };
   system.addEventListener("change", () => { if (!told) choose(system.matches); });
-  $("theme").addEventListener("click", toggle);
+  $("theme").addEventListener("click", () => tell(!scene.dark));
   choose(system.matches);
-  return toggle;
+  return tell;
 }

@@ -20,18 +20,22 @@ function findingsOf(print, scene, bells, camera, stop) {
     camera.target = carried(standing(print.chain, scene.place, scene.riding).work, findings[k].workpiece_mm);
     bells.ring("look");
   };
+  const open = (k) => {
+    $("tab-findings").click();
+    if (findings[k].row >= 0) choose(k);
+    items[k].scrollIntoView({ block: "nearest" });
+  };
   /** The next of those under a marker, from its first on. */
   const press = ({ members }) => {
-    $("tab-findings").click();
-    choose(members[(members.indexOf(chosen) + 1) % members.length]);
-    items[chosen].scrollIntoView({ block: "nearest" });
+    open(members[(members.indexOf(chosen) + 1) % members.length]);
   };
   const markers = markersOf(press);
-  return (toClip, canvas) => {
+  const showMarkers = (toClip, canvas) => {
     const shown = scene.on.findings && !scene.tried;
     $("markers").hidden = !shown;
     if (shown) markers(groupsOf(findings, placed, toClip, canvas), findings, chosen);
   };
+  return { showMarkers, open: (k) => { if (items[k]) open(k); } };
 }
 
 /** [{x, y, members: places in the list}] of the findings in the picture; x, y: pixels of the first of each group. */

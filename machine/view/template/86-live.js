@@ -3,7 +3,7 @@
 const ASK_EVERY_MS = 1000;
 const OVER = ["done", "stopped"];
 
-function follow({ rows }, scene, player) {
+function follow(scene, player) {
   const badge = $("live");
   badge.hidden = false;
   let shown = -1;
@@ -18,7 +18,7 @@ function follow({ rows }, scene, player) {
     badge.textContent = liveTold(state);
     if (state.line && state.line !== shown && !player.playing) {
       shown = state.line;
-      scene.go(Math.max(countUpTo(rows.line, state.line) - 1, 0));
+      scene.goToLine(state.line);
     }
     return OVER.includes(state.state) ? null : setTimeout(ask, ASK_EVERY_MS);
   };

@@ -1,6 +1,6 @@
 // Keys: everything that hands can do, from the keyboard too.
 
-function keysOf({ scene, camera, player, look, fit, toggleTheme }) {
+function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
   const turn = 6 * RAD, shift = 0.05;
   const arrow = (x, y) => (event) => {
     if (event.shiftKey) camera.pan(-x * shift, y * shift); else camera.orbit(-x * turn, y * turn);
@@ -20,7 +20,7 @@ function keysOf({ scene, camera, player, look, fit, toggleTheme }) {
     PageUp: () => scene.goLayer(1), PageDown: () => scene.goLayer(-1), Home: () => scene.go(0), End: () => scene.go(Infinity),
     t: press("show-travels"), s: press("show-seams"), m: press("show-machine"), b: press("show-beads"),
     r: () => { $("frame").value = scene.riding ? "machine" : "workpiece"; $("frame").dispatchEvent(new Event("change")); },
-    f: fit, d: toggleTheme, "?": () => $("help").showModal(),
+    f: fit, d: () => chooseTheme(!scene.dark), "?": () => $("help").showModal(),
   };
   ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
   addEventListener("keydown", (event) => {
@@ -37,6 +37,7 @@ function keysOf({ scene, camera, player, look, fit, toggleTheme }) {
 /** Keys that the element in focus needs itself: a list, a slider, a button. */
 function taken({ key, target: { tagName, type } }) {
   if (tagName === "SELECT") return key.length === 1 || /^(Arrow|Page|Home|End)/.test(key);
+  if (tagName === "INPUT" && type === "number") return true;
   if (tagName === "INPUT" && type === "radio" && /^Arrow/.test(key)) return true;
   if (tagName === "INPUT" && type === "range" && /^(Arrow|Page|Home|End)/.test(key)) return true;
   return key === " " && ["BUTTON", "SUMMARY", "INPUT"].includes(tagName);

@@ -12,15 +12,17 @@ async function main() {
   frontOf(print, scene);
   readoutsOf(print, scene, ring);
   layerSliders(print, scene, ring);
-  const toggleTheme = themeOf(scene, ring), player = courseOf(print, scene, ring);
-  const showMarkers = findingsOf(print, scene, ring, camera, player.stop);
+  layerTimes(scene, ring);
+  const chooseTheme = themeOf(scene, ring), player = courseOf(print, scene, ring);
+  const findings = findingsOf(print, scene, ring, camera, player.stop), code = textOf(print, scene, ring, player.stop);
   scene.go(rows.count - 1);
+  outsideOf({ scene, findings, code, chooseTheme });
   if (!gl) return withoutPicture();
-  const picture = pictureOf(gl, print, scene, camera, ring, showMarkers);
+  const picture = pictureOf(gl, print, scene, camera, ring, findings.showMarkers);
   const fit = fitting(print, scene, camera, picture, ring);
-  keysOf({ scene, camera, player, look: picture.moved, fit, toggleTheme });
+  keysOf({ scene, camera, player, look: picture.moved, fit, chooseTheme });
   handle(picture.canvas, camera, { changed: picture.moved, pressed: (event) => goTo(picture.rowAt(event), scene, player) });
-  if (header.live && location.protocol.startsWith("http")) follow(print, scene, player);
+  if (header.live && location.protocol.startsWith("http")) follow(scene, player);
   document.documentElement.dataset.openedMs = performance.now().toFixed(0);
   document.documentElement.dataset.state = "ready";
 }

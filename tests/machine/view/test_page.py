@@ -111,7 +111,7 @@ def test_view_names_the_page_after_the_file(folder: Path, capsys: pytest.Capture
     Path("moves.gcode").write_text(MOVES)
     assert main(["view", "moves.gcode"]) == 0
     told = capsys.readouterr().out
-    assert told.startswith("moves.html: 0.1 MB, 3 moves")
+    assert told.startswith("moves.html: 0.2 MB, 3 moves")
     header, found = opened(Path("moves.html").read_bytes())
     assert (header["source"], header["machine"]["known"]) == ("foreign", False)
     assert found["end"][-1].tolist() == [10.0, 10.0, 0.2, 0.0, 0.0]

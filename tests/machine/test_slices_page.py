@@ -1,0 +1,108 @@
+"""Slices looked at in a real browser: layers typed, their times, and the G-code text beside the picture."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from machine.view.page import print_page
+from tests.machine import hand
+from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.test_browser import WINDOW, opened, program, put, row, text
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with Browser(WINDOW) as running:
+        yield running
+
+
+@pytest.fixture
+def page(browser: Browser, tmp_path: Path) -> Browser:
+    """The post and the arm, opened as a file."""
+    profile, printed = program()
+    return opened(browser, tmp_path, print_page("post and arm", printed, profile))
+
+
+def type_in(browser: Browser, name: str, value: object) -> None:
+    browser.value(
+        f"{{ const e = document.getElementById('{name}'); e.value = '{value}'; e.dispatchEvent(new Event('change')); }}"
+    )
+
+
+def choose_text(browser: Browser, lines: tuple[str, ...]) -> None:
+    """The print's file, chosen in the page as a person does."""
+    content = "\n".join(lines) + "\n"
+    browser.value(
+        f"""{{ const chosen = new DataTransfer();
+        chosen.items.add(new File([{json.dumps(content)}], 'print.gcode'));
+        document.getElementById('code-file').files = chosen.files;
+        document.getElementById('code-file').dispatchEvent(new Event('change')); }}"""
+    )
+    browser.wait("document.body.classList.contains('has-text') || document.getElementById('code-told').textContent")
+
+
+def marked(browser: Browser) -> str:
+    """The line of text that is marked, when the list has come to rest."""
+    browser.value("new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 30))")
+    return str(browser.value("document.querySelector('#code-seen .now')?.textContent"))
+
+
+def layer(browser: Browser, end: str) -> list[str]:
+    return [browser.value(f"document.getElementById('layer-{end}{of}').value") for of in ("", "-number", "-mm")]
+
+
+def test_number_and_height_of_a_layer_can_be_typed(page: Browser) -> None:
+    put(page, "part", 2)
+    assert layer(page, "high") == ["2", "3", "0.60"]
+    type_in(page, "layer-high-number", 2)
+    assert layer(page, "high") == ["1", "2", "0.40"]
+    type_in(page, "layer-low-mm", 0.35)
+    assert layer(page, "low") == ["1", "2", "0.40"]
+    type_in(page, "layer-high-number", "")
+    assert layer(page, "high") == ["1", "2", "0.40"]
+
+
+def test_a_click_beside_the_layers_goes_to_that_layer_whose_time_is_told(page: Browser) -> None:
+    put(page, "position", 0)
+    x, y, high = page.value(
+        "(() => { const bars = document.getElementById('layer-times').getBoundingClientRect();"
+        " return [bars.right - 3, bars.y, bars.height]; })()"
+    )
+    page.press(x, y + 8)
+    top = page.value("Number(document.getElementById('layer-high').max)")
+    assert layer(page, "high")[0] == str(top)
+    assert row(page) > 0  # what is chosen is printed, too
+    page.press(x, y + high - 8)
+    assert layer(page, "high")[0] == "0"
+    assert "layer 1, 0.20 mm, takes " in page.value("document.getElementById('layer-high').getAttribute('aria-valuetext')")
+
+
+def test_the_text_follows_the_slider_and_the_slider_the_text(page: Browser) -> None:
+    lines = hand.text("generic_ac")
+    page.click("#tab-code")
+    choose_text(page, lines)
+    put(page, "position", 40)
+    line = int(text(page, "readout-line"))
+    assert marked(page) == f"{line}{lines[line - 1]}"
+    type_in(page, "code-line", line + 7)
+    moved = row(page)
+    assert marked(page) == f"{line + 7}{lines[line + 6]}"
+    assert int(text(page, "readout-line")) <= line + 7
+    assert moved > 40
+    page.value("document.getElementById('code-lines').focus()")
+    page.key("ArrowUp")
+    assert marked(page) == f"{line + 6}{lines[line + 5]}"
+    page.click(f"[data-line='{line}']")
+    assert row(page) == 40
+
+
+def test_the_text_of_another_print_is_not_shown(page: Browser) -> None:
+    lines = hand.text("generic_ac")
+    page.click("#tab-code")
+    choose_text(page, lines[:-2])
+    assert f"print.gcode has {len(lines) - 2} lines; the file of this print has {len(lines)}" in text(page, "code-told")
+    assert not page.value("document.body.classList.contains('has-text')")
