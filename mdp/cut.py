@@ -53,6 +53,21 @@ def below(solid: Solid, plane: Plane) -> Solid:
     return solid - _half_space(solid, plane)
 
 
+def corners_above(mesh: Mesh, plane: Plane) -> Floats:
+    """(n, 3) the corners of what of a mesh lies above a plane, some of them twice: its vertices, and where its edges pass through.
+    Nothing is cut."""
+    heights = plane.heights_mm(mesh.vertices)
+    upper = heights > 0.0
+    crossing = [mesh.vertices[upper]]
+    for k in range(3):
+        starts, ends = mesh.faces[:, k], mesh.faces[:, k - 2]
+        rising = ~upper[starts] & upper[ends]  # every edge rises along one of its two faces
+        low, high = starts[rising], ends[rising]
+        share = (heights[low] / (heights[low] - heights[high]))[:, None]
+        crossing.append(mesh.vertices[low] + share * (mesh.vertices[high] - mesh.vertices[low]))
+    return np.concatenate(crossing)
+
+
 def convex_hull(points: Floats) -> Mesh:
     """The mesh of the convex hull of (n, 3) points."""
     return mesh_of(m3.Manifold.hull_points(points.copy()))

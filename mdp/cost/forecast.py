@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdp.cost.clipping import along, chord_mm, clip_below, flat_area_mm2, rim_per_mm
 from mdp.cost.cost import CostTerms
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, part
@@ -19,17 +20,15 @@ from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask, threshold
 from mdp.plane import Plane
 from mdp.support_need.patches import NEEDS_SUPPORT, UNSUPPORTABLE, Classes
-from mdp.sweep.rims import ROUNDING_MM, weigh_chord
+from mdp.sweep.rims import ROUNDING_MM
 from mdp.sweep.sweep import Remainder
-
-LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no length of its own
 
 
 class Faces(NamedTuple):
     """Faces of a solid: (m, 3, 3) corners, (m, 3) normals, (m,) areas, which are risky upright, the cosine of normal and
     direction below which a face is risky along that direction; (m,) mm2 that a mm of rim costs on each, (0,) where seams cost
-    nothing, by how much more on a feather edge; of which faces of the model they are pieces, see integrals.Needs, and how many
-    times what is unsupportable counts."""
+    nothing, by how much more on a feather edge; of which faces of the model they are pieces, see integrals.Needs, how many
+    times what is unsupportable counts, and (m,) how many times an area on each that needs support."""
 
     corners: Floats
     normals: Floats
@@ -40,6 +39,7 @@ class Faces(NamedTuple):
     feather: float
     sources: Ints
     weight: float
+    counts: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +64,8 @@ class Surface:
         pieces = remainder.pieces
         sources = np.zeros(0, np.int32) if pieces is None else pieces.sources[counted]
         weight = 1.0 if pieces is None else pieces.need.weight
-        areas, normals = mesh.areas_mm2[counted], mesh.normals[counted]
-        faces = Faces(corners, normals, areas, risky[counted], least, seam_mm, terms.feather, sources, weight)
+        areas, normals, counts = mesh.areas_mm2[counted], mesh.normals[counted], counts_of(remainder)[counted]
+        faces = Faces(corners, normals, areas, risky[counted], least, seam_mm, terms.feather, sources, weight, counts)
         return cls(remainder, faces, terms.cut_mm2)
 
     def classes(self, planes: Sequence[Plane]) -> Classes:
@@ -81,6 +81,12 @@ class Surface:
         offsets = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
         needs = self.classes(planes) if classes is None else classes
         return _sum_left(self.faces, _normals(planes), offsets, needs) + self.cut_mm2 * len(planes)
+
+
+def counts_of(remainder: Remainder) -> Floats:
+    """(m,) how many times an area on each face counts that needs support."""
+    pieces = remainder.pieces
+    return np.ones(len(remainder.risky)) if pieces is None or pieces.counts is None else pieces.counts
 
 
 def _normals(planes: Sequence[Plane]) -> Floats:
@@ -102,95 +108,32 @@ def _sum_left(surface: Faces, directions: Floats, offsets: Floats, classes: Clas
         for cut in range(len(offsets)):
             lowest, highest = np.inf, -np.inf
             for i in range(size):
-                heights[i] = _along(polygon, i, directions, cut) - offsets[cut]
+                heights[i] = along(polygon, i, directions, cut) - offsets[cut]
                 lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
             if highest <= 0.0:
                 continue
             below = 0.0
             if lowest < 0.0:
                 if len(surface.seam_mm) > 0 and highest > ROUNDING_MM and lowest < -ROUNDING_MM:
-                    cosine = _along(normals, face, directions, cut)
-                    total += surface.seam_mm[face] * _rim(polygon, heights, size) * _per_mm(cosine, surface.feather)
-                size = _clip_below(polygon, spare, heights, size)
+                    cosine = along(normals, face, directions, cut)
+                    total += surface.seam_mm[face] * chord_mm(polygon, heights, size) * rim_per_mm(cosine, surface.feather)
+                size = clip_below(polygon, spare, heights, size)
                 polygon, spare = spare, polygon
-                below = _flat_area(polygon, size, normals, face)
-            if _along(normals, face, directions, cut) < surface.risky_below:
-                total += (area - below) * _weight(surface, classes, cut, face)
+                below = flat_area_mm2(polygon, size, normals, face)
+            if along(normals, face, directions, cut) < surface.risky_below:
+                total += (area - below) * weight_along(surface, classes, cut, face) * surface.counts[face]
             area = below
             if lowest >= 0.0:
                 break
         if risky[face]:
-            total += area
+            total += area * surface.counts[face]
     return total
 
 
 @part
-def _weight(surface: Faces, classes: Classes, cut: int, face: int) -> float:
+def weight_along(surface: Faces, classes: Classes, cut: int, face: int) -> float:
     """How many times a face counts that is risky along the normal of a cut."""
     if len(surface.sources) == 0 or surface.sources[face] < 0:
         return 1.0
     of_face = classes[cut, surface.sources[face]]
     return surface.weight if of_face == UNSUPPORTABLE else 1.0 if of_face == NEEDS_SUPPORT else 0.0
-
-
-@part
-def _along(points: Floats, row: int, directions: Floats, other: int) -> float:
-    """Product of a row with a row of another array."""
-    product: float = points[row, 0] * directions[other, 0] + points[row, 1] * directions[other, 1]
-    product += points[row, 2] * directions[other, 2]
-    return product
-
-
-@part
-def _rim(polygon: Floats, heights: Floats, size: int) -> float:
-    """Length of a convex polygon's chord at height 0; it reaches to both sides."""
-    first, last = floats(3, 0.0), floats(3, 0.0)
-    count = 0
-    for i in range(size):
-        j = i + 1 if i + 1 < size else 0
-        crosses = heights[i] * heights[j] < 0.0
-        if crosses or heights[i] == 0.0:
-            share = heights[i] / (heights[i] - heights[j]) if crosses else 0.0
-            for axis in range(3):
-                last[axis] = polygon[i, axis] + share * (polygon[j, axis] - polygon[i, axis])
-                if count == 0:
-                    first[axis] = last[axis]
-            count += 1
-    return float(np.sqrt((last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2 + (last[2] - first[2]) ** 2))
-
-
-@part
-def _per_mm(cosine: float, feather: float) -> float:
-    """How much a mm of rim counts where a face's normal has that cosine with the plane's."""
-    sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
-    return float(weigh_chord(cosine, feather) / max(sine, LEAST_SINE))
-
-
-@part
-def _clip_below(polygon: Floats, below: Floats, heights: Floats, size: int) -> int:
-    """Put into `below` what of a convex polygon lies below height 0; the number of its corners."""
-    count = 0
-    for i in range(size):
-        j = i + 1 if i + 1 < size else 0
-        if heights[i] <= 0.0:
-            for axis in range(3):
-                below[count, axis] = polygon[i, axis]
-            count += 1
-        if heights[i] * heights[j] < 0.0:
-            share = heights[i] / (heights[i] - heights[j])
-            for axis in range(3):
-                below[count, axis] = polygon[i, axis] + share * (polygon[j, axis] - polygon[i, axis])
-            count += 1
-    return count
-
-
-@part
-def _flat_area(polygon: Floats, size: int, normals: Floats, face: int) -> float:
-    """Area of a flat convex polygon with a known unit normal."""
-    twice = 0.0
-    for i in range(1, size - 1):
-        a0, a1, a2 = polygon[i, 0] - polygon[0, 0], polygon[i, 1] - polygon[0, 1], polygon[i, 2] - polygon[0, 2]
-        b0, b1, b2 = polygon[i + 1, 0] - polygon[0, 0], polygon[i + 1, 1] - polygon[0, 1], polygon[i + 1, 2] - polygon[0, 2]
-        across = normals[face, 0] * (a1 * b2 - a2 * b1) + normals[face, 1] * (a2 * b0 - a0 * b2)
-        twice += across + normals[face, 2] * (a0 * b1 - a1 * b0)
-    return 0.5 * twice

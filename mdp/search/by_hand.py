@@ -11,7 +11,7 @@ import numpy as np
 
 from mdp.clearance import find_obstacle, lowest_body
 from mdp.colour import NO_COLOUR, colour_text
-from mdp.cut import above, mesh_of
+from mdp.cut import corners_above
 from mdp.grown import FARTHEST_MM, Grown
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import threshold
@@ -26,6 +26,7 @@ from mdp.zone import Painted
 from profiles.errors import PlanError
 
 EQUAL_MM2 = 1e-6
+OUT_OF_REACH = "what it stands on is out of reach"
 MOST_SHOWN = 8  # colours in a message
 
 
@@ -85,9 +86,18 @@ class Refusal:
 
 def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     """The node after a person's cut, or the reason why it cannot be made."""
-    why = _refusal(problem, node, plane)
+    why = refusal(problem, node, plane)
     following = problem.cut(node, plane) if why is None else None
-    return following if following is not None else why or Refusal(_find_hindrance(problem, node, plane))
+    return following if following is not None else why or Refusal(OUT_OF_REACH)
+
+
+def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
+    """Why a person's plane cannot cut a node, None: it can. Nothing is cut."""
+    why = _refusal(problem, node, plane)
+    if why is not None or not problem.settings.clearance:
+        return why
+    hindrance = _find_hindrance(problem, node, plane)
+    return None if hindrance is None else Refusal(hindrance)
 
 
 def _check_offset(problem: Problem, planned: PlannedPart, label: str) -> None:
@@ -155,13 +165,15 @@ def _explain(problem: Problem, plane: Plane, limits: Bounds, reason: Reason, fra
     return REASONS[reason]
 
 
-def _find_hindrance(problem: Problem, node: Node, plane: Plane) -> str:
-    """Why no pose serves a part that the sweep found nothing against."""
-    points, machine = mesh_of(above(node.solid, plane)).vertices, problem.machine
+def _find_hindrance(problem: Problem, node: Node, plane: Plane) -> str | None:
+    """Why no pose serves a part that the sweep found nothing against; None: one does."""
+    points, machine = corners_above(node.remainder.mesh, plane), problem.machine
     if len(points) == 0:
         return "nothing lies above its plane"
     obstacles = [find_obstacle(machine, pose, points) for pose in poses(machine, plane.normal)]
-    return "; the other way round ".join(obstacle for obstacle in obstacles if obstacle) or "what it stands on is out of reach"
+    if any(obstacle is None for obstacle in obstacles):
+        return None
+    return "; the other way round ".join(obstacle for obstacle in obstacles if obstacle) or OUT_OF_REACH
 
 
 def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) -> Plane:

@@ -1,19 +1,17 @@
 """Trial: a person's planes tried one after the other, quickly enough to be moved by hand: figures of every cut, or why not.
 
-What planes have in common with those tried before is not cut again: of a plane that is dragged only it and the parts printed
-before it are.
+The figures of all parts are summed over the model's surface without a cut. Whether a plane may cut what those cut before it
+have left is asked of what they have left, so all but the last are cut for that: at leisure, one after the other, and those that a
+trial has in common with the one before not again. Of a plane that is dragged what was cut before it is the same.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import acos, degrees
+from math import inf
 
-import numpy as np
-
-from mdp.mesh import Mesh, dot
+from mdp.cost.part_forecast import ModelForecast, PartForecast
 from mdp.plane import Plane
-from mdp.search.by_hand import Refusal, cut_or_refuse
-from mdp.search.front import front_row
+from mdp.search.by_hand import Refusal, cut_or_refuse, refusal
 from mdp.search.neck import find_neck
 from mdp.search.node import Node
 from mdp.search.obstacle import Obstacle, find_refused
@@ -23,27 +21,18 @@ Key = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
-class TriedPart:
-    """A part cut off: its volume, the length of its rim where it is seen, the smallest angle of an edge that the cut makes
-    (of the part or of what it is cut off), and what its cut leaves to support for ever and scars, mm2."""
-
-    volume_mm3: float
-    rim_mm: float
-    edge_deg: float
-    cost_mm2: float
-
-
-@dataclass(frozen=True)
 class Trial:
     """parts: those that could be cut off, from the second in print order on, None for the others. refused: why the part of this
-    number cannot be, "" where all can, and obstacle: where; support_area_mm2, seam_mm: of all parts, where all can."""
+    number cannot be, "" where all can, and obstacle: where; support_area_mm2, seam_mm: of all parts, where all can. unchecked: how
+    many parts, from the second on, have not been looked at yet: they may still be refused, the figures stand."""
 
-    parts: tuple[TriedPart | None, ...]
+    parts: tuple[PartForecast | None, ...]
     refused_part: int = 0
     refused: str = ""
     support_area_mm2: float | None = None
     seam_mm: float | None = None
     obstacle: Obstacle | None = None
+    unchecked: int = 0
 
 
 class Trials:
@@ -51,56 +40,63 @@ class Trials:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
+        root = problem.root
+        self._forecast = ModelForecast.of(root.remainder, root.seam_weights, problem.terms)
         self._cut: list[tuple[Key, Node]] = []  # of the last trial, in the order of its cuts
 
-    def attempt(self, planes: Sequence[Plane]) -> Trial:
-        """Cut by the base planes of the parts from the second on, in print order."""
-        keys = [_key(plane) for plane in reversed(planes)]
-        alike = 0
-        while alike < min(len(keys), len(self._cut)) and self._cut[alike][0] == keys[alike]:
-            alike += 1
-        del self._cut[alike:]
-        for done in range(alike, len(keys)):
-            node = self._cut[-1][1] if self._cut else self._problem.root
-            plane = planes[len(planes) - 1 - done]
-            following = cut_or_refuse(self._problem, node, plane)
-            if isinstance(following, Refusal):
-                obstacle = find_refused(self._problem, node, plane, following)
-                return Trial(self._parts(len(planes)), len(planes) + 1 - done, following.text, obstacle=obstacle)
-            self._cut.append((keys[done], following))
-        last = self._cut[-1][1] if self._cut else self._problem.root
-        row = front_row(last, self._problem.terms)
-        return Trial(self._parts(len(planes)), 0, "", row.support_area_mm2, row.seam_mm)
+    def attempt(self, planes: Sequence[Plane], most_cuts: float = inf) -> Trial:
+        """Try the base planes of the parts from the second on, in print order. most_cuts: so many cuts are made at most; where
+        more are needed, parts are left unchecked."""
+        order = planes[::-1]
+        self._keep_alike(order)
+        for done in range(len(self._cut), len(order)):
+            whole = done < len(order) - 1 and most_cuts > 0
+            refused = self._cut_off(order[done]) if whole else refusal(self._problem, self._node, order[done])
+            if refused is not None:
+                return self._refused(order, done, refused)
+            if not whole:
+                return self._allowed(order, len(order) - 1 - done)
+            most_cuts -= 1
+        return self._allowed(order, 0)
 
     def neck(self, planes: Sequence[Plane], number: int, reach_mm: float) -> Plane | None:
         """The neck near the plane of the part of a number, of what the parts printed after it leave; None: there is none, or
         those cannot be cut off. planes as in attempt."""
-        later = planes[number - 1 :]
-        if self.attempt(later).refused:
+        later = planes[number - 1 :][::-1]
+        self._keep_alike(later)
+        if any(self._cut_off(plane) is not None for plane in later[len(self._cut) :]):
             return None
-        node = self._cut[-1][1] if self._cut else self._problem.root
-        return find_neck(node.remainder.mesh, node.seam_weights, planes[number - 2], reach_mm)
+        return find_neck(self._node.remainder.mesh, self._node.seam_weights, planes[number - 2], reach_mm)
 
-    def _parts(self, count: int) -> tuple[TriedPart | None, ...]:
-        tried = [_measure(node) for _, node in self._cut]
-        return (*[None] * (count - len(tried)), *reversed(tried))
+    @property
+    def _node(self) -> Node:
+        return self._cut[-1][1] if self._cut else self._problem.root
 
+    def _keep_alike(self, order: Sequence[Plane]) -> None:
+        """Forget the cuts from the first on that is not one of these."""
+        alike = 0
+        while alike < min(len(order), len(self._cut)) and self._cut[alike][0] == _key(order[alike]):
+            alike += 1
+        del self._cut[alike:]
 
-def _measure(node: Node) -> TriedPart:
-    before = node.parent
-    assert before is not None
-    plane = node.cuts[-1].base
-    volume_mm3 = float(before.solid.volume() - node.solid.volume())
-    edge_deg = smallest_edge_deg(before.remainder.mesh, plane)
-    return TriedPart(volume_mm3, node.seams[-1].length_mm, edge_deg, node.cuts[-1].residual_mm2)
+    def _cut_off(self, plane: Plane) -> Refusal | None:
+        """Make one more cut, or say why it cannot be made."""
+        following = cut_or_refuse(self._problem, self._node, plane)
+        if isinstance(following, Refusal):
+            return following
+        self._cut.append((_key(plane), following))
+        return None
 
+    def _allowed(self, order: Sequence[Plane], unchecked: int) -> Trial:
+        parts, left_mm2 = self._forecast.parts(order)
+        support_mm2, seam_mm = left_mm2 + sum(part.support_mm2 for part in parts), sum(part.rim_mm for part in parts)
+        return Trial(parts[::-1], 0, "", support_mm2, seam_mm, unchecked=unchecked)
 
-def smallest_edge_deg(mesh: Mesh, plane: Plane) -> float:
-    """The smallest angle between a plane and the faces that it passes through, on either side of it; 90 where it meets none."""
-    heights = plane.heights_mm(mesh.vertices)[mesh.faces]
-    crossed = (heights.min(axis=1) < 0.0) & (heights.max(axis=1) > 0.0)
-    cosines = np.abs(dot(mesh.normals[crossed], plane.normal))
-    return degrees(acos(min(float(cosines.max(initial=0.0)), 1.0)))
+    def _refused(self, order: Sequence[Plane], done: int, why: Refusal) -> Trial:
+        """What is known where the plane after so many cannot be cut."""
+        parts, _ = self._forecast.parts(order[:done])
+        obstacle = find_refused(self._problem, self._node, order[done], why)
+        return Trial((*[None] * (len(order) - done), *parts[::-1]), len(order) + 1 - done, why.text, obstacle=obstacle)
 
 
 def _key(plane: Plane) -> Key:

@@ -8,7 +8,7 @@ from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.problem import Problem
 from mdp.search.search import cut_by_plan
-from mdp.search.trial import Trials, smallest_edge_deg
+from mdp.search.trial import Trials
 from profiles.profile import load
 from tests.shapes import box, tee
 
@@ -55,7 +55,9 @@ def test_no_plane_at_all_is_the_model_in_one_piece() -> None:
 def test_the_edge_of_a_cut_is_as_sharp_as_it_leans_against_the_wall(lean_deg: float, edge_deg: float) -> None:
     lean = np.radians(lean_deg)
     plane = Plane(np.array([np.sin(lean), 0.0, np.cos(lean)]), 50.0 * float(np.cos(lean)))
-    assert smallest_edge_deg(box(10.0, 10.0, 100.0), plane) == pytest.approx(edge_deg)
+    part = trials(box(10.0, 10.0, 100.0)).attempt([plane]).parts[0]
+    assert part is not None
+    assert part.edge_deg == pytest.approx(edge_deg)
 
 
 def test_where_the_head_would_meet_the_table_it_is_shown_at_the_lowest_place_of_the_part() -> None:

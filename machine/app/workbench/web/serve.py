@@ -35,7 +35,7 @@ class Server(uvicorn.Server):
 
 def listen(port: int) -> socket.socket:
     """A socket at a port of this computer, 0: any free one. Raises OutputError for one that cannot be had."""
-    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
         own.bind((HOST, port))
     except (OSError, OverflowError) as error:
