@@ -54,7 +54,7 @@ def below(solid: Solid, plane: Plane) -> Solid:
 
 
 def corners_above(mesh: Mesh, plane: Plane) -> Floats:
-    """(n, 3) the corners of what of a mesh lies above a plane, some of them twice: its vertices, and where its edges pass through.
+    """(n, 3) the corners of what of a mesh lies above a plane, some of them twice: its vertices, and where its edges pass.
     Nothing is cut."""
     heights = plane.heights_mm(mesh.vertices)
     upper = heights > 0.0

@@ -78,8 +78,8 @@ def rim_per_mm(cosine: float, feather: float) -> float:
 
 @part
 def find_chord(polygon: Floats, heights: Floats, size: int, ends: Floats) -> float:
-    """Put the ends (2, 3) of a convex polygon's chord at height 0 into `ends`, first where its outline rises through it; its length,
-    mm. The polygon reaches to both sides."""
+    """Put the ends (2, 3) of a convex polygon's chord at height 0 into `ends`, first where its outline rises through it; its
+    length, mm. The polygon reaches to both sides."""
     for i in range(size):
         j = i + 1 if i + 1 < size else 0
         if (heights[i] > 0.0) != (heights[j] > 0.0):

@@ -17,8 +17,8 @@ from mdp.cost.clipping import along, clip_below, find_chord, flat_area_mm2, rim_
 from mdp.cost.cost import CostTerms
 from mdp.cost.forecast import Faces, counts_of, weight_along
 from mdp.kernels.arrays import floats, ints, table
-from mdp.kernels.kernel import kernel, part
-from mdp.mesh import Floats
+from mdp.kernels.kernel import inlined, kernel, part
+from mdp.mesh import Floats, Ints
 from mdp.overhang import threshold
 from mdp.plane import Plane
 from mdp.support_need.patches import Classes
@@ -43,7 +43,7 @@ class PartForecast:
 
 @dataclass(frozen=True, eq=False)
 class ModelForecast:
-    """A whole model laid out for forecasts of its parts. middle: a point in it; weights: how much a mm of rim counts on its faces."""
+    """A whole model laid out for forecasts of its parts. middle: a point in it; weights: how much a mm of rim counts on it."""
 
     remainder: Remainder
     terms: CostTerms
@@ -64,8 +64,8 @@ class ModelForecast:
         return cls(remainder, terms, faces, mesh.bounds_mm.mean(axis=0))
 
     def parts(self, planes: Sequence[Plane]) -> tuple[tuple[PartForecast, ...], float]:
-        """The parts that planes cut off, in the order of the cuts, and the area of what remains that needs support printed straight
-        up, mm2."""
+        """The parts that planes cut off, in the order of the cuts, and the area of what remains that needs support printed
+        straight up, mm2."""
         directions = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
         offsets = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
         apexes = self.middle - (directions @ self.middle - offsets)[:, None] * directions
@@ -92,66 +92,89 @@ class Planes(NamedTuple):
     apexes: Floats
 
 
+class Room(NamedTuple):
+    """Triangles that wait to be cut: (3 n, 3) corners, (n,) the cut whose fan each belongs to, below 0: it is a face of the
+    model, and the plane that is next; two polygons, their heights above a plane, and the ends of a chord."""
+
+    corners: Floats
+    fans: Ints
+    cuts: Ints
+    polygon: Floats
+    spare: Floats
+    heights: Floats
+    ends: Floats
+
+
 @kernel
 def _sum_parts(surface: Faces, planes: Planes, classes: Classes, meeting: Floats) -> Floats:
-    """(k + 1, COLUMNS) sums over the parts in the order of the cuts, the last one what remains; meeting (k, k) is given the signed
-    length of the line in which a plane (row) meets the cut of one before (column)."""
+    """(k + 1, COLUMNS) sums over the parts in the order of the cuts, the last one what remains; meeting (k, k) is given the
+    signed length of the line in which a plane (row) meets the cut of one before (column)."""
     count = len(planes.offsets_mm)
-    sums = table(count + 1, COLUMNS)
-    room = (count + 1) * (count + 2) // 2
-    corners, own, stage = table(3 * room, 3), ints(room, 0), ints(room, 0)
-    polygons, heights = (table(count + 4, 3), table(count + 4, 3)), floats(count + 4, 0.0)
-    ends = table(2, 3)
+    sums, most = table(count + 1, COLUMNS), (count + 1) * (count + 2) // 2
+    polygon, spare, heights = table(count + 4, 3), table(count + 4, 3), floats(count + 4, 0.0)
+    room = Room(table(3 * most, 3), ints(most, 0), ints(most, 0), polygon, spare, heights, table(2, 3))
     for face in range(len(surface.areas_mm2)):
-        waiting = 1
-        own[0], stage[0] = -1, 0
+        room.fans[0], room.cuts[0], waiting = -1, 0, 1
         for corner in range(3):
             for axis in range(3):
-                corners[corner, axis] = surface.corners[face, corner, axis]
+                room.corners[corner, axis] = surface.corners[face, corner, axis]
         while waiting > 0:
-            waiting -= 1
-            fan, cut = own[waiting], stage[waiting]
-            polygon, spare = polygons
-            size = 3
-            for corner in range(3):
-                for axis in range(3):
-                    polygon[corner, axis] = corners[3 * waiting + corner, axis]
-            normals, row = (surface.normals, face) if fan < 0 else (planes.directions, fan)
-            area = flat_area_mm2(polygon, size, normals, row)
-            while cut < count and size > 0:
-                lowest, highest = np.inf, -np.inf
-                for i in range(size):
-                    heights[i] = along(polygon, i, planes.directions, cut) - planes.offsets_mm[cut]
-                    lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
-                if highest > 0.0:
-                    height, left = along(polygon, 0, normals, row) - along(planes.apexes, cut, normals, row), 0.0
-                    if lowest < 0.0:
-                        length = find_chord(polygon, heights, size, ends)
-                        if fan >= 0:
-                            meeting[cut, fan] += _signed(ends, planes.directions, fan, cut)
-                        elif highest > ROUNDING_MM and lowest < -ROUNDING_MM:
-                            _add_rim(surface, face, along(normals, row, planes.directions, cut), length, sums[cut])
-                        own[waiting], stage[waiting] = cut, cut + 1
-                        for axis in range(3):
-                            corners[3 * waiting, axis] = planes.apexes[cut, axis]
-                            corners[3 * waiting + 1, axis] = ends[1, axis]
-                            corners[3 * waiting + 2, axis] = ends[0, axis]
-                        waiting += 1
-                        size = clip_below(polygon, spare, heights, size)
-                        polygon, spare = spare, polygon
-                        left = flat_area_mm2(polygon, size, normals, row)
-                    else:
-                        size = 0
-                    sums[cut, VOLUME] += (area - left) * height / 3.0
-                    if along(normals, row, planes.directions, cut) < surface.risky_below:
-                        many = 1.0 if fan >= 0 else weight_along(surface, classes, cut, face)
-                        sums[cut, NEEDED] += (area - left) * min(many, 1.0)
-                        sums[cut, WEIGHTED] += (area - left) * many * (1.0 if fan >= 0 else surface.counts[face])
-                    area = left
-                cut += 1
-            if size > 0 and (surface.risky[face] if fan < 0 else planes.directions[fan, 2] < surface.risky_below):
-                sums[count, NEEDED] += area
+            waiting = _divide(surface, planes, classes, room, face, waiting - 1, sums, meeting)
     return sums
+
+
+@inlined
+def _divide(
+    surface: Faces, planes: Planes, classes: Classes, room: Room, face: int, waiting: int, sums: Floats, meeting: Floats
+) -> int:
+    """Divide the last triangle that waits among the parts; how many wait afterwards."""
+    fan, cut, count, size = room.fans[waiting], room.cuts[waiting], len(planes.offsets_mm), 3
+    polygon, spare, heights, ends = room.polygon, room.spare, room.heights, room.ends
+    normals, row = (surface.normals, face) if fan < 0 else (planes.directions, int(fan))
+    for corner in range(3):
+        for axis in range(3):
+            polygon[corner, axis] = room.corners[3 * waiting + corner, axis]
+    area = flat_area_mm2(polygon, size, normals, row)
+    while cut < count and size > 0:
+        lowest, highest = np.inf, -np.inf
+        for i in range(size):
+            heights[i] = along(polygon, i, planes.directions, cut) - planes.offsets_mm[cut]
+            lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
+        if highest > 0.0:
+            height, left = along(polygon, 0, normals, row) - along(planes.apexes, cut, normals, row), 0.0
+            if lowest < 0.0:
+                length = find_chord(polygon, heights, size, ends)
+                if fan >= 0:
+                    meeting[cut, fan] += _signed(ends, planes.directions, fan, cut)
+                elif highest > ROUNDING_MM and lowest < -ROUNDING_MM:
+                    _add_rim(surface, face, along(normals, row, planes.directions, cut), length, sums[cut])
+                _add_fan(room, waiting, planes.apexes[cut], cut)
+                waiting += 1
+                size = clip_below(polygon, spare, heights, size)
+                polygon, spare = spare, polygon
+                left = flat_area_mm2(polygon, size, normals, row)
+            else:
+                size = 0
+            sums[cut, VOLUME] += (area - left) * height / 3.0
+            if along(normals, row, planes.directions, cut) < surface.risky_below:
+                times = 1.0 if fan >= 0 else weight_along(surface, classes, cut, face)
+                sums[cut, NEEDED] += (area - left) * min(times, 1.0)
+                sums[cut, WEIGHTED] += (area - left) * times * (1.0 if fan >= 0 else surface.counts[face])
+            area = left
+        cut += 1
+    if size > 0 and (surface.risky[face] if fan < 0 else planes.directions[fan, 2] < surface.risky_below):
+        sums[count, NEEDED] += area
+    return waiting
+
+
+@part
+def _add_fan(room: Room, waiting: int, apex: Floats, cut: int) -> None:
+    """Have the triangle of a chord and a point of its plane wait: it closes what remains below the plane."""
+    room.fans[waiting], room.cuts[waiting] = cut, cut + 1
+    for axis in range(3):
+        room.corners[3 * waiting, axis] = apex[axis]
+        room.corners[3 * waiting + 1, axis] = room.ends[1, axis]
+        room.corners[3 * waiting + 2, axis] = room.ends[0, axis]
 
 
 @part

@@ -30,6 +30,25 @@ def test_figures_are_those_of_the_cuts_themselves() -> None:
     assert tried.support_area_mm2 == pytest.approx(cut.chosen.support_area_mm2)
 
 
+def test_cuts_that_meet_each_other_have_their_own_figures_too() -> None:
+    leaning = [((1.0, 0.0, 0.5), 12.0), ((-1.0, 0.0, 0.8), 16.0), ((0.0, 0.3, 1.0), 24.0)]
+    planes = [Plane(np.array(normal) / np.linalg.norm(normal), offset_mm) for normal, offset_mm in leaning]
+    tried = trials(tee()).attempt(planes)
+    plan = PlanFile("", parts=tuple(PlannedPart(tuple(plane.normal.tolist()), plane.offset_mm) for plane in planes))
+    cut = cut_by_plan(tee(), "tee", PROFILE, plan)
+    assert [part.volume_mm3 for part in tried.parts if part] == pytest.approx([part.volume_mm3 for part in cut.parts[1:]])
+    assert [part.support_mm2 for part in tried.parts if part] == pytest.approx([part.risky_area_mm2 for part in cut.parts[1:]])
+    assert (tried.support_area_mm2, tried.seam_mm) == pytest.approx((cut.residual_area_mm2, cut.seam_mm))
+
+
+def test_figures_come_at_once_and_what_a_later_cut_may_forbid_when_there_is_time() -> None:
+    floating = Plane(np.array([0.0, 0.0, 1.0]), 12.0)
+    moved = trials(tee())
+    at_once = moved.attempt((floating, ARMS[1]), most_cuts=0)
+    assert (at_once.unchecked, at_once.refused, moved.attempt((floating, ARMS[1])).unchecked) == (1, "", 0)
+    assert at_once.parts == moved.attempt((floating, ARMS[1])).parts
+
+
 def test_what_was_tried_before_changes_nothing() -> None:
     moving, moved = trials(tee()), [(Plane(ARMS[0].normal, 8.0 + 0.25 * k), ARMS[1]) for k in (3, 1, 4, 1, 5)]
     assert [moving.attempt(planes) for planes in moved] == [trials(tee()).attempt(planes) for planes in moved]
