@@ -24,6 +24,7 @@ from machine.planning.plan import plan
 from mdp.cost.cost import CostTerms, measure_seam
 from mdp.cost.forecast import Surface
 from mdp.cost.hidden import hidden_shares
+from mdp.cost.part_forecast import ModelForecast
 from mdp.cut import cut, mesh_of
 from mdp.decomposition import Decomposition, Part
 from mdp.kernels.cache import trouble
@@ -85,7 +86,9 @@ def _search() -> None:
     hopeless_faces(remainder.facets, Savers(LEANING[None], np.zeros(1), threshold(45.0)))
     remainder.thin_mm(PLANE)
     measure_seam(remainder.mesh, remainder.mesh.areas_mm2, PLANE, 0.0)
-    Surface.of(remainder, CostTerms(45.0, False)).left_mm2([PLANE])
+    terms = CostTerms(45.0, False)
+    Surface.of(remainder, terms).left_mm2([PLANE])
+    ModelForecast.of(remainder, remainder.mesh.areas_mm2, terms).parts([PLANE])
 
 
 def _slice() -> None:
