@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.clearance import lowest_place
-from mdp.cut import Solid, above, below, mesh_of
+from mdp.cut import Solid, above, below, corners_above, mesh_of
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.plane import Plane
@@ -60,7 +60,7 @@ def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -
             section = _section(node.remainder.mesh, plane)
             return Obstacle((_vector(0.5 * (section.min(axis=0) + section.max(axis=0))),))
         case Reason.FEASIBLE:
-            return _outside(problem, mesh_of(above(node.solid, plane)).vertices, plane)
+            return _outside(problem, corners_above(node.remainder.mesh, plane), plane)
     return None
 
 
