@@ -23,8 +23,8 @@ Key = tuple[float, float, float, float]
 @dataclass(frozen=True)
 class Trial:
     """parts: those that could be cut off, from the second in print order on, None for the others. refused: why the part of this
-    number cannot be, "" where all can, and obstacle: where; support_area_mm2, seam_mm: of all parts, where all can. unchecked: how
-    many parts, from the second on, have not been looked at yet: they may still be refused, the figures stand."""
+    number cannot be, "" where all can, and obstacle: where; support_area_mm2, seam_mm: of all parts, where all can. unchecked:
+    how many parts, from the second on, have not been looked at yet: they may still be refused, the figures stand."""
 
     parts: tuple[PartForecast | None, ...]
     refused_part: int = 0
