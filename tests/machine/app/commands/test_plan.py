@@ -104,11 +104,14 @@ def test_planes_that_cannot_be_cut_end_in_one_sentence(
     assert not Path("parts").exists()
 
 
+COARSE = ("--set", "process.layer_height_mm=0.4", "--set", "process.line_width_mm=0.8", "--set", "search.directions=60")
+
+
 @pytest.mark.parametrize("orient", [[], ["--orient"]])
 def test_export_by_a_plan_gives_the_g_code_of_the_search_byte_by_byte(folder: Path, orient: list[str]) -> None:
-    _run("export", "demo:tree", "-o", "searched.gcode", *orient)
-    _run("decompose", "demo:tree", "--plan", "tree.toml", *orient)
-    _run("export", "demo:tree", "-o", "planned.gcode", "--plan", "tree.toml")
+    _run("export", "demo:tree", "-o", "searched.gcode", *COARSE, *orient)
+    _run("decompose", "demo:tree", "--plan", "tree.toml", *COARSE, *orient)
+    _run("export", "demo:tree", "-o", "planned.gcode", *COARSE, "--plan", "tree.toml")
     assert Path("planned.gcode").read_bytes() == Path("searched.gcode").read_bytes()
 
 
