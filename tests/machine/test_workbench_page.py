@@ -10,6 +10,7 @@ import pytest
 from machine.app.cli import main
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.firefox import Firefox
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import ball, tee
 
@@ -32,7 +33,7 @@ def bench() -> Iterator[Running]:
         yield running
 
 
-def choose(browser: Browser, name: str, content: bytes) -> None:
+def choose(browser: "Browser | Firefox", name: str, content: bytes) -> None:
     """A file chosen as a person does, and shown."""
     browser.value(
         f"""{{ const bytes = Uint8Array.from({list(content)}), chosen = new DataTransfer();

@@ -1,0 +1,58 @@
+"""The workbench in Firefox: the same journey as in Chromium, shorter."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from mdp.save import stl
+from tests.machine.firefox import FIREFOX, XVFB, Firefox
+from tests.machine.test_workbench_page import FOUND, choose
+from tests.machine.workbench import QUICK, Running, workbench
+from tests.shapes import tee
+
+pytestmark = pytest.mark.skipif(FIREFOX is None, reason="Firefox is not installed: the workbench is not tried in it")
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Running]:
+    with workbench(*QUICK) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def firefox(bench: Running) -> Iterator[Firefox]:
+    with Firefox((900, 560)) as running:
+        running.open(bench.address)
+        running.wait("document.documentElement.dataset.line === 'open' && document.documentElement.dataset.busy === ''")
+        choose(running, "tee.stl", stl(tee()))
+        running.wait("document.documentElement.dataset.shown && $('title').textContent === 'tee.stl'")
+        yield running
+
+
+def test_firefox_draws_the_model_where_it_has_a_display(firefox: Firefox) -> None:
+    drawn = "document.documentElement.dataset.state === 'ready'"
+    assert firefox.value(drawn) is (XVFB is not None)
+    assert "40.0 × 10.0 × 40.0 mm" in firefox.value("$('model-told').textContent")
+    assert "mm²" in firefox.value("$('overhang').textContent")
+
+
+def test_firefox_finds_parts_drags_a_plane_and_undoes_it(firefox: Firefox) -> None:
+    firefox.click("#tab-parts")
+    firefox.click("#find")
+    firefox.wait(FOUND)
+    assert "recommended" in firefox.value("$('front-told').textContent")
+    firefox.click("#undo")
+    firefox.wait("document.body.classList.contains('no-cuts')")
+    firefox.click("[data-view=front]")
+    firefox.click("#add")
+    firefox.wait("!$('plane').hidden && $('plane-told').textContent")
+    assert firefox.value("$('plane-offset').value") == "20.00"
+    if XVFB is not None:
+        firefox.wait("!$('handles').hidden")
+        x, y = firefox.value(
+            "(() => { const b = $('hand-along').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
+        )
+        firefox.drag((x, y), (x, y - 20))
+        firefox.wait("$('undo').getAttribute('aria-label') === 'undo: move a plane'")
+        assert 20.0 < float(firefox.value("$('plane-offset').value")) < 35.0
+    assert firefox.complaints == []
