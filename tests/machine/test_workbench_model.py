@@ -106,6 +106,20 @@ def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser:
     assert browser.value("$('planes').querySelector(':checked').value") == "2"
 
 
+def test_another_bench_has_a_page_of_its_own_and_is_closed_in_the_list(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "here.stl", stl(tee()))
+    browser.click("#tab-model")
+    browser.click("#another")
+    browser.wait("!$('benches').hidden && $('benches-list').children.length === 2")
+    assert browser.value("[...$('benches-list').children].map((row) => row.firstChild.textContent)") == [
+        "here.stl (this page)",
+        "nothing yet",
+    ]
+    browser.click("#benches-list li:last-child button")
+    browser.wait("$('benches').hidden")
+    assert browser.value("document.documentElement.dataset.line") == "open"
+
+
 def part_at(browser: Browser, x: float, y: float) -> str | None:
     """The part that is chosen after a click."""
     browser.press(x, y)

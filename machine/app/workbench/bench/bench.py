@@ -98,9 +98,14 @@ class History:
         return History(self.undone[-1], (*self.before, self.now), self.undone[:-1])
 
 
+def emptied(bench: Bench) -> Bench:
+    """The bench without its model."""
+    return Bench(bench.profile.of_all_parts, given=bench.given)
+
+
 def with_model(bench: Bench, model: Model) -> Bench:
     """Another model on the bench, as it is read and uncut."""
-    return Bench(bench.profile.of_all_parts, model, given=bench.given)
+    return replace(emptied(bench), model=model)
 
 
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:

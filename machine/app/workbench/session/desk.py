@@ -31,6 +31,7 @@ class Desk:
         self.problem = ""
         self.busy = ""
         self.version = 0
+        self.closed = False
         self.quick, self.long, self.hand = Lane(), Lane(), Lane()
         self.followers: list[Callable[[], None]] = []
         self._changed = asyncio.Event()
@@ -44,12 +45,14 @@ class Desk:
         return self.history.now.bench
 
     def close(self) -> None:
-        """End all work; its files go."""
+        """End all work; its files go, and its pages are told."""
+        self.closed = True
         for task in self._tasks:
             task.cancel()
         for lane in (self.quick, self.long, self.hand):
             lane.stop()
         self._folder.cleanup()
+        self.tell()
 
     def tell(self) -> None:
         """Let the pages know that something has changed."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from machine.app.workbench.bench.bench import History, Step, emptied
 from machine.app.workbench.session.session import Session
 from profiles.errors import PlanError
 
@@ -16,12 +17,15 @@ class Workbench:
         self._make = make
         self._last = 0
 
-    def open(self) -> int:
-        """The number of a new session with an empty bench. Raises PlanError where there are too many."""
+    def open(self, like: Session | None = None) -> int:
+        """The number of a new session with an empty bench, its machine and settings those of another. Raises PlanError where
+        there are too many."""
         if len(self.sessions) >= MOST_SESSIONS:
             raise PlanError(f"{MOST_SESSIONS} benches are open, which is the most: close one first")
         self._last += 1
         self.sessions[self._last] = session = self._make()
+        if like is not None:
+            session.history = History(Step("", emptied(like.bench)))
         session.warm()
         return self._last
 

@@ -11,6 +11,8 @@ from machine.app.workbench.web.snapshot import snapshot
 from profiles.errors import PlanError
 
 MOST_COMMAND = 100_000  # characters
+CLOSED = "this bench is not open any more"
+CLOSED_CODE = 4404  # of a websocket that is closed for that
 
 
 async def talk(session: Session, socket: WebSocket) -> None:
@@ -28,10 +30,11 @@ async def talk(session: Session, socket: WebSocket) -> None:
 
 async def _tell(session: Session, socket: WebSocket) -> None:
     """The newest state whenever there is one; what came in between while a slow page was reading is left out."""
-    while True:
+    while not session.closed:
         seen = session.version
         await socket.send_text(json.dumps(snapshot(session)))
         await session.changed(seen)
+    await socket.close(CLOSED_CODE, CLOSED)
 
 
 async def _hear(session: Session, socket: WebSocket) -> None:

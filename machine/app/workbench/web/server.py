@@ -14,9 +14,10 @@ from starlette.websockets import WebSocket
 from machine.app.workbench.bench.settings import settings_list
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
+from machine.app.workbench.web.benches import bench_routes
 from machine.app.workbench.web.downloads import folder, gcode, plan, print_page, shared_page
 from machine.app.workbench.web.guard import Guard
-from machine.app.workbench.web.line import talk
+from machine.app.workbench.web.line import CLOSED, CLOSED_CODE, talk
 from machine.app.workbench.web.page import workbench_page
 from machine.app.workbench.web.snapshot import model_key, triangles
 from mdp.read import MOST_BYTES
@@ -24,8 +25,6 @@ from profiles.errors import PlanError
 from profiles.places import KINDS, known
 
 PLAN_SUFFIX = ".toml"
-NO_SESSION = "this bench is not open any more\n"
-NO_SESSION_CODE = 4404  # of a websocket that is closed for that
 Answer = Callable[[Request], Awaitable[Response]]
 
 
@@ -49,7 +48,7 @@ def application(workbench: Workbench, token: str, port: int) -> ASGIApp:
         route("settings.json", _settings),
         WebSocketRoute(below + "line", _line(workbench)),
     ]
-    return Guard(Starlette(routes=routes), token, port)
+    return Guard(Starlette(routes=[*bench_routes(workbench), *routes]), token, port)
 
 
 def _page(port: int) -> Callable[[Session, Request], Awaitable[Response]]:
@@ -65,7 +64,7 @@ def _answering(workbench: Workbench, act: Callable[[Session, Request], Awaitable
     async def answer(request: Request) -> Response:
         session = workbench.sessions.get(request.path_params["session"])
         if session is None:
-            return Response(NO_SESSION, 404)
+            return Response(f"{CLOSED}\n", 404)
         try:
             return await act(session, request)
         except ClientDisconnect:  # the page has gone while it sent a file
@@ -81,7 +80,7 @@ def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
         session = workbench.sessions.get(socket.path_params["session"])
         if session is None:
             await socket.accept()
-            await socket.close(NO_SESSION_CODE, NO_SESSION.strip())
+            await socket.close(CLOSED_CODE, CLOSED)
         else:
             await talk(session, socket)
 

@@ -1,17 +1,19 @@
-"""Lane: tasks one after the other in a process that stays warm; stopping one ends the process, the next one starts another."""
+"""Lane: tasks one after the other in a process that stays warm for a while; stopping one ends the process, the next one starts
+another."""
 
 import asyncio
 import os
 import pickle
 import signal
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 from machine.app.workbench.work.worker import DONE, LENGTH, TELLS, frame
 from profiles.errors import UserError
 
+REST_AFTER_S = 300.0  # without a task, after which the process goes: each holds some 200 MB
 COMMAND = (sys.executable, "-m", "machine.app.workbench.work.worker")
 
 
@@ -21,16 +23,16 @@ class Lane:
     def __init__(self) -> None:
         self._process: asyncio.subprocess.Process | None = None
         self._free = asyncio.Lock()
+        self._resting: asyncio.TimerHandle | None = None
 
     async def warm(self) -> None:
         """Start the process before it is needed."""
-        async with self._free:
-            await self._ready()
+        async with self._held():
+            pass
 
     async def run(self, task: str, *given: Any, tell: Callable[[Any], None] = lambda value: None) -> Any:
         """What a task gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
-        async with self._free:
-            process = await self._ready()
+        async with self._held() as process:
             try:
                 return await self._ask(process, (task, given), tell)
             except (asyncio.IncompleteReadError, ConnectionError):
@@ -50,6 +52,17 @@ class Lane:
                 os.killpg(process.pid, signal.SIGKILL)
             else:
                 process.kill()
+
+    @asynccontextmanager
+    async def _held(self) -> AsyncIterator[asyncio.subprocess.Process]:
+        """The process for one task; when none has followed for a while, it goes."""
+        async with self._free:
+            if self._resting is not None:
+                self._resting.cancel()
+            try:
+                yield await self._ready()
+            finally:
+                self._resting = asyncio.get_running_loop().call_later(REST_AFTER_S, self.stop)
 
     async def _ready(self) -> asyncio.subprocess.Process:
         if self._process is None or self._process.returncode is not None:

@@ -2,21 +2,26 @@
 
 const AGAIN_MS = 1000;
 
-/** {send(command)}: follow(state) is called with every new state, lost(whether) when the line goes and comes. */
-function lineTo(follow, lost) {
+/** {send(command)}: follow(state) is called with every new state, lost(whether) when the line goes and comes, closed() when the
+ * bench has been closed. */
+function lineTo(follow, lost, closed) {
   let socket = null;
   const open = () => {
     socket = new WebSocket(new URL("line", location.href.replace(/^http/, "ws")));
     socket.onopen = () => lost(false);
     socket.onmessage = (event) => follow(JSON.parse(event.data));
-    socket.onclose = () => { lost(true); setTimeout(open, AGAIN_MS); };
+    socket.onclose = ({ code }) => {
+      if (code === CLOSED_CODE) return closed();
+      lost(true);
+      setTimeout(open, AGAIN_MS);
+    };
   };
   open();
   return { send: (command) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command)); } };
 }
 
-/** Sends a file of the person's; what is wrong with it comes back by the line. */
-const sendFile = (file) => fetch(`file?${new URLSearchParams({ name: file.name })}`, { method: "POST", body: file });
+/** Sends a file of the person's to a bench; what is wrong with it comes back by the line. */
+const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name })}`, { method: "POST", body: file });
 
 /** Has the browser save what the server makes at an address. */
 async function save(address) {

@@ -5,7 +5,7 @@ const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
 
 /** {told(state)}; bench: {state, send, preview(rotation or null), laying}. */
 function modelPanel(bench) {
-  $("file").addEventListener("change", () => { for (const file of $("file").files) sendFile(file); $("file").value = ""; });
+  $("file").addEventListener("change", () => { takeFiles([...$("file").files]); $("file").value = ""; });
   $("demo").addEventListener("change", () => { if ($("demo").value) bench.send({ do: "demo", name: $("demo").value }); });
   const by = () => TURNS.map((axis) => Number($(`turn-${axis}`).value));
   const tellTurn = () => TURNS.forEach((axis, k) => { $(`turn-${axis}-told`).textContent = `${by()[k]}°`; });
@@ -60,6 +60,6 @@ function dropping() {
   addEventListener("drop", (event) => {
     event.preventDefault();
     over(false);
-    for (const file of event.dataTransfer.files) sendFile(file);
+    takeFiles([...event.dataTransfer.files]);
   });
 }

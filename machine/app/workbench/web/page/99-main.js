@@ -7,6 +7,9 @@ function main() {
   const line = lineTo((state) => follow(state), (gone) => {
     root.dataset.line = gone ? "lost" : "open";
     notice(gone ? "The line to tiltprint is lost; trying again." : "");
+  }, () => {
+    root.dataset.line = "closed";
+    notice("This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.");
   });
   bench.send = line.send;
   bench.lay = (whether) => {
@@ -41,7 +44,7 @@ function main() {
     legend(cut ? colours.slice(0, planes.length + 1) : null);
   };
   bench.picture = picture;
-  const panels = [modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), apartPanel(bench), slicesPanel(bench), settingsPanel(bench)];
+  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), apartPanel(bench), slicesPanel(bench), settingsPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;

@@ -1,0 +1,59 @@
+// Benches: several models at once, each on a bench and in a page of its own; a page that is closed leaves its bench as it is.
+
+const CLOSED_CODE = 4404; // of a line whose bench is not open any more
+const HERE = Number(location.pathname.split("/").at(-2));
+
+/** A further bench with the settings of this one, in a page of its own; files: opened there, a model before a plan. */
+async function openBench(files = []) {
+  const page = window.open("", "_blank"); // at once, while the browser still knows that a person has asked for it
+  const answer = await fetch(`../benches?like=${HERE}`, { method: "POST" }), told = await answer.json();
+  if (!answer.ok) {
+    page?.close();
+    return notice(told.problem);
+  }
+  const address = new URL(`../${told.number}/`, location.href).href;
+  if (page) page.location.replace(address);
+  else notice("The browser opens no further page by itself: the new bench is in the list.");
+  await sendFiles(files, `../${told.number}/`);
+  showBenches();
+}
+
+/** Files sent to a bench one after the other, models before plans, which are for them. */
+async function sendFiles(files, to = "") {
+  const plans = files.filter(({ name }) => name.toLowerCase().endsWith(".toml")), models = files.filter((file) => !plans.includes(file));
+  for (const file of [...models, ...plans]) await sendFile(file, to);
+}
+
+/** What a person has dropped or chosen: the first model, and plans, for this bench; every further model on a bench of its own. */
+async function takeFiles(files) {
+  const models = files.filter(({ name }) => !name.toLowerCase().endsWith(".toml")), [, ...further] = models;
+  further.forEach((model) => openBench([model]));
+  await sendFiles(files.filter((file) => !further.includes(file)));
+}
+
+async function closeBench(number) {
+  await fetch(`../benches/${number}`, { method: "DELETE" });
+  if (number !== HERE) showBenches();
+}
+
+/** The list of the open benches, where there are several. */
+async function showBenches() {
+  const answer = await fetch("../benches").catch(() => null);
+  if (!answer || !answer.ok) return;
+  const benches = await answer.json();
+  $("benches").hidden = benches.length < 2;
+  $("benches-list").replaceChildren(...benches.map(({ number, name, parts, work }) => {
+    const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
+    const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
+    const close = made("button", { type: "button", text: "×", title: "Close this bench and end its work", ariaLabel: `Close the bench of ${text}` });
+    close.addEventListener("click", () => closeBench(number));
+    return made("li", {}, label, close);
+  }));
+}
+
+function benchesPanel() {
+  $("another").addEventListener("click", () => openBench());
+  addEventListener("focus", showBenches);
+  showBenches();
+  return { told: ({ model, parts }, before) => { if (model?.key !== before?.model?.key || parts !== before?.parts) showBenches(); } };
+}
