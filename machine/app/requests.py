@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port that stands for the simulated printer
+FORCE_GOES_ON = "--force goes on"  # in a sentence: what it refuses is done all the same when it is forced
 
 
 @dataclass(frozen=True)

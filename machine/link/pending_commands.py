@@ -50,14 +50,15 @@ class PendingCommand:
 
 
 class Control:
-    """Requests in the order they were made. ask() from any thread, take() from the stream's."""
+    """Requests in the order they were made, an emergency stop before them. ask() from any thread, take() from the stream's."""
 
     def __init__(self) -> None:
         self._waiting: deque[PendingCommand] = deque()
 
     def ask(self, command: Command, value: float = 100.0, text: str = "") -> None:
         """Add a request."""
-        self._waiting.append(PendingCommand(command, value, text))
+        add = self._waiting.appendleft if command is Command.EMERGENCY_STOP else self._waiting.append
+        add(PendingCommand(command, value, text))
 
     def take(self) -> PendingCommand | None:
         """The oldest request, None when there is none."""

@@ -7,7 +7,7 @@ from machine.app.embedded_profile import in_words, read_embedded_profile
 from machine.app.pipeline import compilers
 from machine.app.pipeline.given_plan import refuse_cuts
 from machine.app.pipeline.pipeline import build, decompose_model
-from machine.app.requests import ModelRequest
+from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.view.program import Program
@@ -65,5 +65,5 @@ def refuse_errors(program: Program, force: bool) -> None:
         say(f"the dry run found {len(errors)} errors; going on because of --force")
         return
     raise MoveError(
-        f"the dry run found {len(errors)} errors, the first: {errors[0].message} (simulate lists all, --force goes on)"
+        f"the dry run found {len(errors)} errors, the first: {errors[0].message} (simulate lists all, {FORCE_GOES_ON})"
     )

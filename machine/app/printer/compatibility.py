@@ -5,7 +5,7 @@ from math import isfinite
 from pathlib import Path
 
 from machine.app.embedded_profile import read_embedded_profile
-from machine.app.requests import SIMULATED
+from machine.app.requests import FORCE_GOES_ON, SIMULATED
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import summary
 from machine.firmware import dialect_of, dialects, firmware_of, identify
@@ -148,7 +148,7 @@ def check_program(answer: Answer | None, program: Program, profile: Profile, fil
 
 def refuse(sentence: str, force: bool) -> None:
     if sentence and not force:
-        raise PrinterError(f"{sentence} (--force goes on)")
+        raise PrinterError(f"{sentence} ({FORCE_GOES_ON})")
     if sentence:
         say(f"{sentence}; going on because of --force")
 

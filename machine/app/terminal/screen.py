@@ -34,7 +34,7 @@ class Course:
     def __init__(self, run: DryRun) -> None:
         program = run.program
         self.letters = run.letters
-        self._line, self._angles = program.line, program.end[:, 3:5]
+        self._line, self._ends = program.line, program.end
         self._done_s = np.concatenate([[0.0], np.cumsum(run.times_s)])
         self._waits = [(event.line, event.value) for event in program.events if event.code == "G4"]
         laying = program.kind == MoveKind.EXTRUDE  # the way to a part still counts to the layer before it
@@ -43,7 +43,12 @@ class Course:
     def pose_deg(self, file_line: int) -> tuple[float, float] | None:
         """Tilt and turn after a line of the program; None before the first move."""
         row = self._rows(file_line) - 1
-        return None if row < 0 else (float(self._angles[row, 0]), float(self._angles[row, 1]))
+        return None if row < 0 else (float(self._ends[row, 3]), float(self._ends[row, 4]))
+
+    def at(self, file_line: int) -> dict[str, float]:
+        """Where the axes stand after a line of the program, by their letters, mm and deg; {} before the first move."""
+        row = self._rows(file_line) - 1
+        return {} if row < 0 else dict(zip(self.letters, self._ends[row].tolist(), strict=False))
 
     def remaining_s(self, file_line: int) -> float:
         """How long moves and dwells after a line of the program take; heating and homing are not counted."""
@@ -74,8 +79,8 @@ class ScreenState:
 class Words:
     """The last things a printer has said that are no mere answers; hear() takes chunks of bytes in the thread of the port."""
 
-    def __init__(self) -> None:
-        self.last: deque[str] = deque(maxlen=WORDS_KEPT)
+    def __init__(self, kept: int = WORDS_KEPT) -> None:
+        self.last: deque[str] = deque(maxlen=kept)
         self._half, self._message = b"", ""
         self._newest, self._times = "", 0
 

@@ -36,6 +36,8 @@ class Slicing:
     def needed(self) -> Sliced:
         """The same. Raises PlanError where there are none."""
         sliced = self.shown()
+        if sliced is None and self.done is not None and self.done[0].model is self._desk.bench.model:
+            raise PlanError("what is on the workbench has changed since it was sliced: slice it again")
         if sliced is None:
             raise PlanError("what is on the workbench is not sliced yet: slice it first")
         return sliced

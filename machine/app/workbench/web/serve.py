@@ -9,6 +9,8 @@ from contextlib import contextmanager
 import uvicorn
 
 from machine.app.terminal.interrupts import calling
+from machine.app.terminal.progress import say
+from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.guard import HOST
@@ -59,10 +61,10 @@ async def _serve(
     make: Callable[[], Session], begin: Callable[[Session], None], announce: Callable[[str], None], own: socket.socket, token: str
 ) -> None:
     number = own.getsockname()[1]
-    workbench = Workbench(make)
+    workbench, prints, loop = Workbench(make), Prints(), asyncio.get_running_loop()
     first = workbench.open()
     settings = uvicorn.Config(
-        application(workbench, token, number),
+        application(workbench, prints, token, number),
         log_config=None,
         lifespan="off",
         ws="websockets-sansio",
@@ -71,10 +73,21 @@ async def _serve(
         server_header=False,
         proxy_headers=False,
     )
-    server = Server(settings)
+    server, ending = Server(settings), list[asyncio.Task[None]]()
+
+    def end() -> None:
+        """First the prints end, heaters off; asked again, the workbench goes at once, and they end by themselves."""
+        if ending or not prints.running:
+            server.stop()
+        else:
+            ending.append(loop.create_task(_end_prints(prints, server.stop)))
+
+    def interrupt() -> None:
+        loop.call_soon_threadsafe(end)
+
     try:
         begin(workbench.sessions[first])
-        with calling(server.stop):
+        with calling(interrupt):
             answering = asyncio.create_task(server.serve(sockets=[own]))
             while not server.started and not answering.done():
                 await asyncio.sleep(0.01)
@@ -82,3 +95,14 @@ async def _serve(
             await answering
     finally:
         workbench.close_all()
+        prints.close()
+
+
+async def _end_prints(prints: Prints, then: Callable[[], None]) -> None:
+    ports = " and ".join(each.state["port"] for each in prints.running)
+    say(f"the print at {ports} is stopped and its heaters go off, wait for that; Ctrl-C again does not wait for it")
+    try:
+        for line in await prints.end_all():
+            say(line)
+    finally:
+        then()

@@ -12,6 +12,8 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from machine.app.workbench.bench.settings import settings_list
+from machine.app.workbench.printing.pages import print_log, prints_line
+from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.benches import bench_routes
@@ -28,7 +30,7 @@ PLAN_SUFFIX = ".toml"
 Answer = Callable[[Request], Awaitable[Response]]
 
 
-def application(workbench: Workbench, token: str, port: int) -> ASGIApp:
+def application(workbench: Workbench, prints: Prints, token: str, port: int) -> ASGIApp:
     """The whole server, below `/TOKEN/`; the number of a session follows."""
     below = "/{token}/{session:int}/"
 
@@ -46,7 +48,9 @@ def application(workbench: Workbench, token: str, port: int) -> ASGIApp:
         route("print.html", shared_page),
         route("print.gcode", gcode),
         route("settings.json", _settings),
-        WebSocketRoute(below + "line", _line(workbench)),
+        Route(below + "prints/{print:int}/log", print_log(prints)),
+        WebSocketRoute(below + "line", _connecting(workbench, talk)),
+        WebSocketRoute(below + "prints", _connecting(workbench, prints_line(prints))),
     ]
     return Guard(Starlette(routes=[*bench_routes(workbench), *routes]), token, port)
 
@@ -75,7 +79,9 @@ def _answering(workbench: Workbench, act: Callable[[Session, Request], Awaitable
     return answer
 
 
-def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
+def _connecting(
+    workbench: Workbench, talk: Callable[[Session, WebSocket], Awaitable[None]]
+) -> Callable[[WebSocket], Awaitable[None]]:
     async def connect(socket: WebSocket) -> None:
         session = workbench.sessions.get(socket.path_params["session"])
         if session is None:

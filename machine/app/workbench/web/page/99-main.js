@@ -44,7 +44,7 @@ function main() {
     legend(cut ? colours.slice(0, planes.length + 1) : null);
   };
   bench.picture = picture;
-  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), apartPanel(bench), slicesPanel(bench), settingsPanel(bench)];
+  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), apartPanel(bench), slicesPanel(bench), settingsPanel(bench), printPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;

@@ -1,0 +1,111 @@
+"""Pages: the line of a page to the prints. It is one of its own, so that a print's news, five a second, carry nothing else."""
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from functools import lru_cache
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from machine.app.crash import log_bug
+from machine.app.requests import PrintRequest
+from machine.app.workbench.printing.ordering import order_of
+from machine.app.workbench.printing.prints import Prints
+from machine.app.workbench.session.session import Session
+from machine.network.address import is_server_address
+from profiles.errors import PrinterError, UserError
+
+MOST_COMMAND = 10_000  # characters
+LONGEST_PORT = 300
+
+
+def prints_line(prints: Prints) -> Callable[[Session, WebSocket], Awaitable[None]]:
+    """What answers the websocket of a page of a session: state out, commands in. `?page=` names the page, so that a line that
+    comes back is known.
+
+    Each line has a task of its own that sends the newest state: one that reads nothing holds up itself alone.
+    """
+
+    async def talk(session: Session, socket: WebSocket) -> None:
+        page = socket.query_params.get("page", "")[:40]
+        await socket.accept()
+        with prints.page(page):
+            told, heard = asyncio.create_task(_tell(prints, socket)), asyncio.create_task(_hear(prints, session, socket, page))
+            done, left = await asyncio.wait((told, heard), return_when=asyncio.FIRST_COMPLETED)
+            for task in left:
+                task.cancel()
+        for task in done:
+            if not isinstance(task.exception(), WebSocketDisconnect | RuntimeError | None):
+                task.result()
+
+    return talk
+
+
+def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
+    """What answers a request for the log of a print, as far as it is written."""
+
+    async def answer(request: Request) -> Response:
+        for each in prints.prints:
+            log = each.state["log"]
+            if str(each.number) == str(request.path_params["print"]) and log and Path(log).is_file():
+                return FileResponse(log, media_type="text/plain")
+        return Response("there is no log of this print\n", 404)
+
+    return answer
+
+
+async def _tell(prints: Prints, socket: WebSocket) -> None:
+    while True:
+        seen = prints.version
+        await socket.send_text(_text(prints, seen))
+        await prints.changed(seen)
+
+
+@lru_cache(maxsize=1)
+def _text(prints: Prints, version: int) -> str:
+    """The state as all pages get it: put into words once a version."""
+    return json.dumps(prints.snapshot())
+
+
+async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) -> None:
+    while True:
+        text = await socket.receive_text()
+        try:
+            asked = _parsed(text)
+            prints.command(page, asked, lambda given: order_of(session, _printing(given), given.get("force") is True))
+        except UserError as error:
+            await socket.send_text(json.dumps({"problem": str(error)}))
+        except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
+            log = log_bug(error, ())
+            told = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"
+            await socket.send_text(json.dumps({"problem": told}))
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    try:
+        asked = json.loads(text) if len(text) <= MOST_COMMAND else None
+    except (ValueError, RecursionError):
+        asked = None
+    if not isinstance(asked, dict):
+        raise PrinterError("what the page has sent is no command of a print")
+    return asked
+
+
+def _printing(asked: dict[str, Any]) -> PrintRequest:
+    """Where to print, as the options --port, --baud and --sim-speed say. Raises PrinterError."""
+    port = str(asked.get("port") or "").strip()
+    if not port or len(port) > LONGEST_PORT:
+        raise PrinterError("no printer is chosen: choose a port, or sim for the simulated one")
+    if is_server_address(port):
+        kind = port.partition(":")[0]
+        raise PrinterError(f"{kind} is a print server, which takes whole files: tiltprint print --port {kind}:HOST prints on it")
+    baud, speed = asked.get("baud", 115200), asked.get("sim_speed", 0.0)
+    numbers = all(isinstance(value, int | float) and isfinite(value) for value in (baud, speed))
+    if not numbers or baud != int(baud):
+        raise PrinterError(f"baud {str(baud)[:40]}, sim_speed {str(speed)[:40]}: numbers are expected, a whole one for the rate")
+    return PrintRequest(port, int(baud), float(speed))

@@ -1,0 +1,187 @@
+"""Prints: all that a workbench prints, one at a port, and which page commands which.
+
+Only one page commands a print, the one that has started it; the others see it, and may take the command over by asking for it.
+The emergency stop alone is every page's: who sees that something goes wrong must not look for another window first.
+"""
+
+import asyncio
+import itertools
+from collections import Counter
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from threading import Event as Flag
+from typing import Any
+
+from machine.app.printer.port_reports import PortReport, answer_words, ask_ports, known_ports, port_json
+from machine.app.workbench.printing.order import PrintOrder
+from machine.app.workbench.printing.running_print import RunningPrint
+from machine.link.medium import stable_name
+from machine.link.port import check_baud
+from profiles.errors import PrinterError
+
+MOST_OVER = 5  # prints that are over stay to be looked at, the newest ones
+WORDS = ("begin", "pause", "resume", "feed", "flow")  # what goes to the print as it is
+PERCENTS = ("feed", "flow")
+
+
+class Prints:
+    """All from the event loop; pages wait for `changed`."""
+
+    def __init__(self) -> None:
+        self.prints: list[RunningPrint] = []
+        self.version = 0
+        self._changed = asyncio.Event()
+        self._numbers = itertools.count(1)
+        self._pages: Counter[str] = Counter()
+        self._ports: list[dict[str, Any]] | None = None
+        self._over: Flag | None = None  # ends the asking of ports that is under way
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def running(self) -> list[RunningPrint]:
+        """Those of which something goes on."""
+        return [each for each in self.prints if not each.over]
+
+    def snapshot(self) -> dict[str, Any]:
+        """What every page is told."""
+        return {
+            "version": self.version,
+            "ports": self._ports,
+            "asking": self._over is not None,
+            "prints": [
+                {**each.state, "number": each.number, "holder": each.holder, "held": bool(self._pages[each.holder])}
+                for each in self.prints
+            ],
+        }
+
+    async def changed(self, seen: int) -> None:
+        """Return when there is something newer than the version that was seen."""
+        while self.version == seen:
+            await self._changed.wait()
+
+    @contextmanager
+    def page(self, page: str) -> Iterator[None]:
+        """A page that is there; one that goes leaves its prints alone, and their command to whoever takes it."""
+        self._pages[page] += 1
+        self._tell()
+        try:
+            yield
+        finally:
+            self._pages[page] -= 1
+            self._tell()
+
+    def command(self, page: str, asked: dict[str, Any], order: Callable[[dict[str, Any]], PrintOrder]) -> None:
+        """Do what a page asks for; order: makes one of what lies on its workbench. Raises UserError for what cannot be done."""
+        word = asked.get("do")
+        if word == "ports":
+            self._look_for_ports(_whole(asked, "baud", 115200))
+        elif word == "check":
+            self._begin(page, order(asked))
+        elif word == "emergency":
+            self._stop_at_once(asked.get("print"))
+        else:
+            self._command_one(page, self._named(asked.get("print")), asked)
+        self._tell()
+
+    def close(self) -> None:
+        """End the asking; the prints end by themselves, heaters off, for their pipes end with this process."""
+        if self._over is not None:
+            self._over.set()
+
+    async def end_all(self) -> list[str]:
+        """End every print as a cancel does, and wait for it; the last words of each."""
+        running = self.running
+        for each in running:
+            each.cancel()
+        while any(not each.over for each in running):
+            await self.changed(self.version)
+        return [
+            line for each in running for line in (*each.state["said"][-2:], f"{each.state['port']}: {each.state['sentence']}")
+        ]
+
+    def _begin(self, page: str, order: PrintOrder) -> None:
+        port = order.printing.port
+        if any(_same(each.state["port"], port) for each in self.running):
+            raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
+        self.prints = [each for each in self.prints if not each.over or not _same(each.state["port"], port)][-MOST_OVER:]
+        begun = RunningPrint(next(self._numbers), order, page, self._tell)
+        self.prints.append(begun)
+        self._start(self._print(begun))
+
+    async def _print(self, begun: RunningPrint) -> None:
+        try:
+            await begun.run()
+        except Exception as error:  # noqa: BLE001 - the print is told to be over, whatever it was
+            begun.fail(error)
+
+    def _stop_at_once(self, number: object) -> None:
+        """The one that was named, all when none was or it is not known: when in doubt everything stops."""
+        named = [each for each in self.running if each.number == number]
+        for each in named or self.running:
+            each.stop_at_once()
+
+    def _command_one(self, page: str, named: RunningPrint, asked: dict[str, Any]) -> None:
+        word = asked.get("do")
+        if word == "take":
+            named.holder = page
+            return
+        if named.holder != page:
+            raise PrinterError("another page commands this print: take the command over first")
+        if word == "cancel":
+            named.cancel()
+        elif word == "forget" and named.over:
+            self.prints.remove(named)
+        elif word in PERCENTS:
+            named.say((word, float(_whole(asked, "percent", 100))))
+        elif word in WORDS:
+            named.say((word,))
+        else:
+            raise PrinterError("what the page has sent is no command of a print")
+
+    def _named(self, number: object) -> RunningPrint:
+        for each in self.prints:
+            if each.number == number:
+                return each
+        raise PrinterError("this print is not there any more")
+
+    def _look_for_ports(self, baud: int) -> None:
+        check_baud(baud)
+        if self._over is None:
+            self._over = Flag()
+            self._start(self._ask_ports(baud, self._over))
+
+    async def _ask_ports(self, baud: int, over: Flag) -> None:
+        try:
+            used = [each.state["port"] for each in self.running]
+            devices = await asyncio.to_thread(known_ports)
+            reports = await asyncio.to_thread(ask_ports, devices, baud, over, [*used, *map(stable_name, used)])
+            self._ports = [_port(each) for each in reports]
+        finally:
+            self._over = None
+            self._tell()
+
+    def _start(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def _tell(self) -> None:
+        self.version += 1
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+
+def _port(report: PortReport) -> dict[str, Any]:
+    return {**port_json(report), "words": answer_words(report)}
+
+
+def _same(one: str, other: str) -> bool:
+    """Whether two names are those of one port."""
+    return stable_name(one) == stable_name(other)
+
+
+def _whole(asked: dict[str, Any], key: str, otherwise: int) -> int:
+    value = asked.get(key, otherwise)
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value):
+        raise PrinterError(f"{key} is {str(value)[:40]!r}: a whole number is expected")
+    return int(value)

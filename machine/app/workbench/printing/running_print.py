@@ -1,0 +1,118 @@
+"""Running print: the server's end of a print: its process, its newest state, and what is done when the process dies."""
+
+import asyncio
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+from machine.app.crash import log_bug
+from machine.app.printer.rescue import rescue
+from machine.app.requests import SIMULATED
+from machine.app.workbench.printing.order import PrintOrder, State, first_state
+from machine.app.workbench.work.worker import LENGTH, frame
+
+COMMAND = (sys.executable, "-m", "machine.app.workbench.printing.process")
+EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
+DIED = "the process that printed has ended before the print was done"
+
+
+class RunningPrint:
+    """run() once, all else from the event loop too. number: its name among the prints of a workbench; holder: the page that
+    commands it, "" for none."""
+
+    def __init__(self, number: int, order: PrintOrder, holder: str, changed: Callable[[], None]) -> None:
+        self.number, self.holder, self.state = number, holder, first_state(order)
+        self._order, self._changed = order, changed
+        self._process: asyncio.subprocess.Process | None = None
+        self._emergency = self._given_up = False
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing of it goes on."""
+        return bool(self.state["phase"] == "over")
+
+    @property
+    def asking(self) -> bool:
+        """Whether nothing has moved yet."""
+        return self.state["phase"] in ("checking", "ready")
+
+    async def run(self) -> None:
+        """Have it printed by a process of its own, to the end."""
+        pipe, nowhere = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
+        process = await asyncio.create_subprocess_exec(*COMMAND, stdin=pipe, stdout=pipe, stderr=nowhere, start_new_session=True)
+        self._process = process
+        self.say(self._order)
+        if self._given_up or self._emergency:
+            self._kill()
+        assert process.stdout is not None
+        with suppress(asyncio.IncompleteReadError, ConnectionError):
+            while True:
+                (length,) = LENGTH.unpack(await process.stdout.readexactly(LENGTH.size))
+                state: State = pickle.loads(await process.stdout.readexactly(length))
+                self._become(**state)
+        await process.wait()
+        if not self.over:
+            await self._end_without_process()
+
+    def say(self, value: object) -> None:
+        """Something to the process; what it does not hear any more is not missed."""
+        process = self._process
+        if process is not None and process.stdin is not None and process.returncode is None:
+            process.stdin.write(frame(value))
+
+    def fail(self, error: Exception) -> None:
+        """It could not be printed at all, by a fault of this program."""
+        log = log_bug(error, sys.argv)
+        self._kill()
+        sentence = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}; look at the printer"
+        self._become(phase="over", end="failed", sentence=sentence)
+
+    def cancel(self) -> None:
+        """End it, heaters off; before it has begun at once."""
+        if self.asking:
+            self._given_up = True
+            self._kill()
+        else:
+            self.say(("cancel",))
+
+    def stop_at_once(self) -> None:
+        """The emergency stop, by the print's own process; where that does not do it, without that."""
+        if self.over:
+            return
+        self._emergency = True
+        if self.asking:
+            self._kill()
+        else:
+            self.say(("emergency",))
+            asyncio.get_running_loop().call_later(EMERGENCY_S, self._kill)
+
+    def _kill(self) -> None:
+        process = self._process
+        if process is None or process.returncode is not None:
+            return
+        with suppress(ProcessLookupError, PermissionError):
+            if hasattr(os, "killpg"):
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+
+    async def _end_without_process(self) -> None:
+        """The process has died. What it printed on is told to be safe; nothing has been sent to a printer it only asked."""
+        printing, moved = self._order.printing, not self.asking
+        if self._given_up and not self._emergency:
+            self._become(phase="over", end="left", sentence="nothing was printed")
+        elif printing.port == SIMULATED:
+            self._become(phase="over", end="failed", sentence=f"{DIED}; the simulated printer has ended with it")
+        elif moved or self._emergency:
+            self._become(phase="leaving")
+            sentence = await asyncio.to_thread(rescue, printing.port, printing.baud, self._emergency)
+            self._become(phase="over", end="failed", sentence=f"{DIED}; {sentence}" if moved else sentence)
+        else:
+            self._become(phase="over", end="failed", sentence=f"{DIED}; nothing had moved yet")
+
+    def _become(self, **values: object) -> None:
+        self.state = {**self.state, **values}
+        self._changed()

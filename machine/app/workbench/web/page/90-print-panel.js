@@ -1,0 +1,183 @@
+// Print panel: where to print, what is asked before, and the print while it runs. It has a line of its own to the prints, which go on
+// whatever becomes of this page.
+
+const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
+const STOP_KEY = "e";
+const FEW = 8;
+
+function printPanel(bench) {
+  let state = { ports: null, asking: false, prints: [] }, chosen = 0, mine = new Set();
+  const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem);
+  const send = (command) => { problem(""); socket.send(command); };
+  const print = () => state.prints.find((each) => each.number === chosen) || null;
+  const command = (word, more = {}) => { const one = print(); if (one) send({ do: word, print: one.number, ...more }); };
+
+  function show(before) {
+    const running = state.prints.filter((each) => each.phase !== "over");
+    const known = before.prints.map((each) => each.number), fresh = state.prints.find((each) => !known.includes(each.number));
+    if (fresh) chosen = fresh.number;
+    else if (!print()) chosen = (running.at(-1) || state.prints.at(-1) || { number: 0 }).number;
+    for (const each of state.prints) {
+      if (mine.has(each.number) && each.holder !== OWN_PAGE) notice(`Another page has taken over the command of the print of ${each.name}.`);
+    }
+    mine = new Set(state.prints.filter((each) => each.holder === OWN_PAGE).map((each) => each.number));
+    showPorts(state, before);
+    showWhich(state.prints, chosen);
+    showPrint(print(), print()?.holder === OWN_PAGE);
+    showBar(running, print());
+    document.documentElement.dataset.printing = print() ? print().progress?.state && print().phase === "printing" ? print().progress.state : print().phase : "";
+  }
+
+  $("ask-ports").addEventListener("click", () => send({ do: "ports", baud: Number($("baud").value) }));
+  $("ports").addEventListener("change", () => { $("sim-speed-line").hidden = port() !== "sim"; $("baud-line").hidden = port() === "sim"; unforce(); });
+  $("port-typed").addEventListener("focus", () => { $("port-other").checked = true; $("ports").dispatchEvent(new Event("change")); });
+  $("check").addEventListener("click", () => {
+    send({ do: "check", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value), force: $("force").checked });
+    unforce();
+  });
+  $("which").addEventListener("change", () => { chosen = Number($("which").value); sure(false); show(state); });
+  $("begin").addEventListener("click", () => command("begin"));
+  $("leave").addEventListener("click", () => command("cancel"));
+  $("pause").addEventListener("click", () => command($("pause").dataset.does));
+  $("cancel").addEventListener("click", () => { sure(true); $("go-on").focus(); });
+  $("go-on").addEventListener("click", () => sure(false));
+  $("cancel-surely").addEventListener("click", () => { sure(false); command("cancel"); });
+  $("take").addEventListener("click", () => command("take"));
+  $("forget").addEventListener("click", () => command("forget"));
+  for (const id of ["feed", "flow"]) {
+    $(id).addEventListener("input", () => { $(id).dataset.held = true; $(`${id}-told`).textContent = `${$(id).value} %`; });
+    $(id).addEventListener("change", () => { delete $(id).dataset.held; command(id, { percent: Number($(id).value) }); });
+  }
+  $("emergency").addEventListener("click", () => send({ do: "emergency", print: Number($("emergency").dataset.print) }));
+  const byKey = (event) => {
+    if (event.key.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || event.repeat || typedInto(event.target)) return;
+    if (!state.prints.some((each) => each.phase !== "over")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    send({ do: "emergency", print: null });
+  };
+  addEventListener("keydown", byKey, true);
+  $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
+  return { told: ({ sliced, model }) => { $("check").disabled = !model; $("unsliced").hidden = Boolean(sliced); } };
+}
+
+/** Where a letter that is pressed is written, so that it is no command. */
+const typedInto = (target) => target.tagName === "TEXTAREA" || (target.tagName === "INPUT" && !["range", "checkbox", "radio", "button", "file"].includes(target.type));
+
+function problem(text) {
+  $("print-problem").textContent = text;
+  $("print-problem").hidden = !text;
+}
+
+/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. */
+function printsLine(follow, refused) {
+  let socket = null;
+  const open = () => {
+    socket = new WebSocket(new URL(`prints?page=${OWN_PAGE}`, location.href.replace(/^http/, "ws")));
+    socket.onmessage = (event) => { const told = JSON.parse(event.data); if (told.problem) refused(told.problem); else follow(told); };
+    socket.onclose = () => setTimeout(open, AGAIN_MS);
+  };
+  open();
+  return { send: (command) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command)); } };
+}
+
+const port = () => {
+  const value = document.querySelector("#ports input[name=port]:checked")?.value ?? "";
+  return value || $("port-typed").value.trim();
+};
+
+function unforce() {
+  $("force").checked = false;
+  $("force-line").hidden = true;
+}
+
+function sure(whether) {
+  $("sure").hidden = !whether;
+}
+
+function showPorts({ ports, asking }, before) {
+  $("ask-ports").disabled = asking;
+  $("ports-told").textContent = asking ? "asking every port who answers: this takes some seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "";
+  if (JSON.stringify(ports) === JSON.stringify(before.ports) && $("ports-found").children.length) return;
+  const now = port();
+  $("ports-found").replaceChildren(...(ports || []).map((each) => made("label", { className: "port" },
+    made("input", { type: "radio", name: "port", value: each.port, checked: each.port === now }),
+    made("span", {}, made("b", { text: each.port }), made("small", { text: [each.description, each.words].filter(Boolean).join(": ") })))));
+}
+
+function showWhich(prints, chosen) {
+  $("which-line").hidden = prints.length < 2;
+  const told = prints.map((each) => `${each.name} at ${each.port}: ${each.phase === "over" ? each.end : each.phase}`);
+  if ([...$("which").options].map((option) => option.text).join("\n") !== told.join("\n")) {
+    $("which").replaceChildren(...prints.map((each, k) => made("option", { value: each.number, text: told[k] })));
+  }
+  $("which").value = chosen;
+}
+
+function showPrint(print, commands) {
+  $("run").hidden = !print;
+  if (!print) return;
+  const { phase, progress, figures, end } = print, over = phase === "over", runs = phase === "printing" || phase === "leaving";
+  $("run-title").textContent = `${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`;
+  $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(progress) : { checking: "checking …", ready: "ready to print", printing: "starting", leaving: "ending" }[phase];
+  $("run-state").className = over ? end : "";
+  const news = `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`; // a reader need not hear every per cent
+  if ($("run-news").textContent !== news) $("run-news").textContent = news;
+  listIn("run-checks", runs || end === "done" ? [] : [...print.checks, ...(figures && !over ? [figuresTold(figures)] : [])]);
+  listIn("run-findings", runs || !figures ? [] : figures.findings);
+  $("run-ask").hidden = phase !== "ready" || !commands;
+  $("run-live").hidden = !progress;
+  if (progress) showProgress(progress);
+  const paused = progress && ["paused", "pausing"].includes(progress.state);
+  $("pause").textContent = paused ? "Resume" : "Pause";
+  $("pause").dataset.does = paused ? "resume" : "pause";
+  $("run-commands").hidden = phase !== "printing" || !commands;
+  if (phase !== "printing" || !commands) sure(false);
+  $("held").hidden = over || commands;
+  $("held-told").textContent = print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.";
+  $("words-line").hidden = !print.words.length;
+  listIn("run-words", print.words.slice(-FEW));
+  listIn("run-said", runs || over ? print.said.slice(-FEW) : []);
+  tellIn("run-files", [["journal", print.journal], ["log", print.log]].filter(([, path]) => path));
+  $("run-log").hidden = !print.log;
+  $("run-log").href = `prints/${print.number}/log`;
+  $("forget").hidden = !over || !commands;
+  if (over && print.forcible && commands) $("force-line").hidden = false;
+}
+
+const stateTold = ({ state, share, left_s: left, message }) => [
+  share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message,
+].filter(Boolean).join(" · ");
+
+const figuresTold = ({ lines, time_s: time, filament_mm: filament, errors }) =>
+  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m of filament${errors ? `, ${errors} errors in the dry run` : ""}`;
+
+function showProgress(progress) {
+  const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
+  const heat = (now, target) => `${now.toFixed(1)}${target == null ? "" : ` of ${target.toFixed(0)}`} °C`;
+  $("run-progress").value = progress.share || 0;
+  tellIn("run-told", [
+    progress.part != null && ["part", of(progress.part, progress.parts)],
+    progress.layer != null && ["layer", of(progress.layer, progress.layers)],
+    progress.nozzle_c != null && ["nozzle", heat(progress.nozzle_c, progress.nozzle_target_c)],
+    progress.bed_c != null && ["bed", heat(progress.bed_c, progress.bed_target_c)],
+    Object.keys(progress.at).length && ["position", Object.entries(progress.at).map(([letter, value]) => `${letter} ${value.toFixed(1)}`).join("  ")],
+    ["line", of(progress.acknowledged, progress.total)],
+    ["so far", duration(progress.elapsed_s)],
+    progress.left_s != null && ["done at", new Date(Date.now() + 1000 * progress.left_s).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" })],
+  ].filter(Boolean));
+  for (const [id, percent] of [["feed", progress.feed_percent], ["flow", progress.flow_percent]]) {
+    if ($(id).dataset.held) continue;
+    $(id).value = percent;
+    $(`${id}-told`).textContent = `${Math.round(percent)} %`;
+  }
+}
+
+/** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
+function showBar(running, looked) {
+  const shown = running.includes(looked) ? looked : running.at(-1);
+  $("print-bar").hidden = !running.length;
+  if (!shown) return;
+  $("bar-told").textContent = `${shown.name} at ${shown.port}: ${shown.progress ? stateTold(shown.progress) : shown.phase}`;
+  $("emergency").dataset.print = shown.number;
+}

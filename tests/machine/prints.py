@@ -1,0 +1,74 @@
+"""A page's line to the prints of a workbench that runs, and what a print has sent, by its log."""
+
+import json
+import re
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+from tests.machine.workbench import PATIENCE_S, Running
+
+ASKS = ("M105", "M114")  # sent when a moment has come, not at a place of the program
+
+
+class PrintPage:
+    """What a page named `name` hears of the prints and says; the newest state of the newest print is `print`."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self._socket = socket
+        self.state: dict[str, Any] = {"prints": []}
+        self.problem = ""
+
+    @property
+    def print(self) -> dict[str, Any]:
+        return self.state["prints"][-1] if self.state["prints"] else {"phase": "", "progress": None}
+
+    def do(self, command: str, **given: Any) -> None:
+        self.problem = ""
+        self._socket.send(json.dumps({"do": command, **given}))
+
+    def command(self, command: str, **given: Any) -> None:
+        """The same of the newest print."""
+        self.do(command, print=self.print["number"], **given)
+
+    def hear(self, end_s: float) -> None:
+        told = json.loads(self._socket.recv(max(0.0, end_s - time.monotonic())))
+        if "problem" in told:
+            self.problem = told["problem"]
+        else:
+            self.state = told
+
+    def until(self, condition: Any) -> dict[str, Any]:
+        """The first state of the newest print that fulfils a condition."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not condition(self.print):
+            try:
+                self.hear(end_s)
+            except TimeoutError:
+                raise AssertionError(f"that never came, only {self.print}") from None
+        return self.print
+
+    def refused(self) -> str:
+        """The sentence with which what was asked last is refused."""
+        end_s = time.monotonic() + PATIENCE_S
+        while not self.problem:
+            self.hear(end_s)
+        return self.problem
+
+
+@contextmanager
+def prints_line(running: Running, page: str) -> Iterator[PrintPage]:
+    """The line of a page of a workbench's first session."""
+    address = f"ws://127.0.0.1:{running.port}{running.place}prints?page={page}"
+    with connect(address, origin=f"http://127.0.0.1:{running.port}", max_size=None, proxy=None) as socket:  # type: ignore[arg-type]
+        yield PrintPage(socket)
+
+
+def commands_sent(log: Path) -> list[str]:
+    """The commands of a log, without the numbers and checksums that they were sent with."""
+    sent = re.findall(r"^\S+ > (?:N\d+ )?([^*\n]*)", log.read_text(), re.MULTILINE)
+    return [command.strip() for command in sent if command.strip() and not command.startswith(ASKS)]
