@@ -25,7 +25,8 @@ class PrintPage:
 
     @property
     def print(self) -> dict[str, Any]:
-        return self.state["prints"][-1] if self.state["prints"] else {"phase": "", "progress": None}
+        newest = self.state["prints"][-1] if self.state["prints"] else {"phase": "", "progress": None}
+        return {**newest, "progress": newest["progress"] or {}}
 
     def do(self, command: str, **given: Any) -> None:
         self.problem = ""

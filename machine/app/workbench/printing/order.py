@@ -13,13 +13,14 @@ State = dict[str, Any]  # of a print, as JSON: order, phase and all that process
 
 @dataclass(frozen=True, eq=False)
 class PrintOrder:
-    """gcode: the file that `export` writes of the same parts; force: go on as `print --force` does."""
+    """gcode: the file that `export` writes of the same parts; force: go on as `print --force` does; key: of the slices."""
 
     name: str
     gcode: bytes
     profile: Profile
     printing: PrintRequest
     force: bool = False
+    key: str = ""
 
 
 def first_state(order: PrintOrder) -> State:
@@ -27,6 +28,7 @@ def first_state(order: PrintOrder) -> State:
     printing = order.printing
     return {
         "phase": "checking",
+        "key": order.key,
         "name": order.name,
         "port": printing.port,
         "baud": printing.baud,

@@ -11,4 +11,5 @@ def order_of(session: Session, printing: PrintRequest, force: bool) -> PrintOrde
     bench = session.bench
     if bench.model is None:
         raise PlanError("there is no model on the workbench yet: choose a file first")
-    return PrintOrder(bench.model.name, session.slicing.needed().gcode, bench.profile, printing, force)
+    sliced = session.slicing.needed()
+    return PrintOrder(bench.model.name, sliced.gcode, bench.profile, printing, force, sliced.key)

@@ -102,7 +102,7 @@ def _sliced(session: Session) -> dict[str, Any] | None:
     if sliced is None:
         return None
     return {
-        "key": f"{id(sliced):x}",
+        "key": sliced.key,
         "time_s": sliced.time_s,
         "filament_mm": sliced.filament_mm,
         "findings": sliced.findings[:MOST_FINDINGS],

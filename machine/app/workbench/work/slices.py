@@ -1,6 +1,8 @@
 """Slices: what lies on the bench sliced, written and dry-run, as a task of the workbench."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
 
 from machine.app.pipeline.pipeline import build
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
@@ -21,6 +23,11 @@ class Sliced:
     filament_mm: float
     findings: tuple[str, ...]
     errors: int
+
+    @cached_property
+    def key(self) -> str:
+        """What tells these slices from others."""
+        return sha256(self.page + self.gcode).hexdigest()[:16]
 
 
 def slice_bench(tell: Tell, bench: Bench) -> Sliced:

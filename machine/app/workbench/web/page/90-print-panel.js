@@ -4,10 +4,12 @@
 const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
 const STOP_KEY = "e";
 const FEW = 8;
+let shownPhase = "";
 
 function printPanel(bench) {
   let state = { ports: null, asking: false, prints: [] }, chosen = 0, mine = new Set();
   const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem);
+  const follow = followIn(bench, () => print());
   const send = (command) => { problem(""); socket.send(command); };
   const print = () => state.prints.find((each) => each.number === chosen) || null;
   const command = (word, more = {}) => { const one = print(); if (one) send({ do: word, print: one.number, ...more }); };
@@ -24,6 +26,7 @@ function printPanel(bench) {
     showPorts(state, before);
     showWhich(state.prints, chosen);
     showPrint(print(), print()?.holder === OWN_PAGE);
+    follow.told();
     showBar(running, print());
     document.documentElement.dataset.printing = print() ? print().progress?.state && print().phase === "printing" ? print().progress.state : print().phase : "";
   }
@@ -58,7 +61,7 @@ function printPanel(bench) {
   };
   addEventListener("keydown", byKey, true);
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
-  return { told: ({ sliced, model }) => { $("check").disabled = !model; $("unsliced").hidden = Boolean(sliced); } };
+  return { told: ({ sliced, model }) => { $("check").disabled = !model; $("unsliced").hidden = Boolean(sliced); follow.told(); } };
 }
 
 /** Where a letter that is pressed is written, so that it is no command. */
@@ -69,16 +72,52 @@ function problem(text) {
   $("print-problem").hidden = !text;
 }
 
-/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. */
+/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. An emergency
+ * stop that finds no line is sent as soon as there is one, and told. */
 function printsLine(follow, refused) {
-  let socket = null;
+  let socket = null, owed = null;
   const open = () => {
     socket = new WebSocket(new URL(`prints?page=${OWN_PAGE}`, location.href.replace(/^http/, "ws")));
+    socket.onopen = () => { if (owed) socket.send(owed); owed = null; };
     socket.onmessage = (event) => { const told = JSON.parse(event.data); if (told.problem) refused(told.problem); else follow(told); };
-    socket.onclose = () => setTimeout(open, AGAIN_MS);
+    socket.onclose = ({ code }) => { if (code !== CLOSED_CODE) setTimeout(open, AGAIN_MS); };
   };
   open();
-  return { send: (command) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command)); } };
+  return {
+    send: (command) => {
+      const text = JSON.stringify(command);
+      if (socket.readyState === WebSocket.OPEN) return socket.send(text);
+      if (command.do === "emergency") owed = text;
+      notice(command.do === "emergency" ? "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch." : "The line to tiltprint is lost; nothing was sent.");
+    },
+  };
+}
+
+/** The page of the print follows in the picture's place, where what lies here is what is printed. */
+function followIn(bench, print) {
+  let on = false, shown = 0;
+  const same = () => print()?.key && print().key === bench.state?.sliced?.key;
+  const tell = () => {
+    const line = print()?.progress?.line;
+    if (!on || !same() || !line || line === shown) return;
+    shown = line;
+    $("print-page").contentWindow.postMessage({ tiltprint: "line", line }, location.origin);
+  };
+  const set = (whether) => {
+    on = whether;
+    shown = 0;
+    $("follow").setAttribute("aria-pressed", whether);
+    if (whether === ($("look").getAttribute("aria-pressed") !== "true")) $("look").click();
+  };
+  $("follow").addEventListener("click", () => set(!on));
+  addEventListener("message", ({ data, origin }) => { if (origin === location.origin && data?.tiltprint === "ready") { shown = 0; tell(); } });
+  return {
+    told: () => {
+      $("follow").hidden = !same() || !print().progress;
+      if (on && ($("look").getAttribute("aria-pressed") !== "true" || !same())) { on = false; $("follow").setAttribute("aria-pressed", false); }
+      tell();
+    },
+  };
 }
 
 const port = () => {
@@ -116,15 +155,16 @@ function showWhich(prints, chosen) {
 
 function showPrint(print, commands) {
   $("run").hidden = !print;
-  if (!print) return;
+  if (!print) return void ($("printer-field").open = true);
   const { phase, progress, figures, end } = print, over = phase === "over", runs = phase === "printing" || phase === "leaving";
   $("run-title").textContent = `${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`;
   $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(progress) : { checking: "checking …", ready: "ready to print", printing: "starting", leaving: "ending" }[phase];
   $("run-state").className = over ? end : "";
   const news = `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`; // a reader need not hear every per cent
   if ($("run-news").textContent !== news) $("run-news").textContent = news;
-  listIn("run-checks", runs || end === "done" ? [] : [...print.checks, ...(figures && !over ? [figuresTold(figures)] : [])]);
-  listIn("run-findings", runs || !figures ? [] : figures.findings);
+  const asking = !runs && (!over || end === "refused");
+  listIn("run-checks", asking ? [...print.checks, ...(figures && !over ? [figuresTold(figures)] : [])] : []);
+  listIn("run-findings", asking && figures ? figures.findings : []);
   $("run-ask").hidden = phase !== "ready" || !commands;
   $("run-live").hidden = !progress;
   if (progress) showProgress(progress);
@@ -137,11 +177,13 @@ function showPrint(print, commands) {
   $("held-told").textContent = print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.";
   $("words-line").hidden = !print.words.length;
   listIn("run-words", print.words.slice(-FEW));
-  listIn("run-said", runs || over ? print.said.slice(-FEW) : []);
+  listIn("run-said", runs || over ? print.said.filter((line) => !print.log || !line.includes(print.log)).slice(-FEW) : []);
   tellIn("run-files", [["journal", print.journal], ["log", print.log]].filter(([, path]) => path));
   $("run-log").hidden = !print.log;
   $("run-log").href = `prints/${print.number}/log`;
   $("forget").hidden = !over || !commands;
+  if (shownPhase !== `${print.number} ${phase}`) $("printer-field").open = over;
+  shownPhase = `${print.number} ${phase}`;
   if (over && print.forcible && commands) $("force-line").hidden = false;
 }
 

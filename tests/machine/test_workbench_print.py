@@ -1,0 +1,147 @@
+"""The workbench prints: what is refused, who commands, and what is sent, on the simulated printer."""
+
+import json
+import signal
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from machine.app.cli import main
+from machine.simulator.simulator import SimulatedPrinter
+from mdp.save import stl
+from profiles.profile import load
+from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.prints import commands_sent, prints_line
+from tests.machine.workbench import QUICK, Running, workbench
+from tests.shapes import box
+
+PRINTING = "document.documentElement.dataset.printing"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("box")
+    (made / "box.stl").write_bytes(stl(box(12.0, 12.0, 8.0)))
+    return made
+
+
+@pytest.fixture(scope="module")
+def sliced(folder: Path) -> Iterator[Running]:
+    """A workbench on which a little box is sliced in one piece."""
+    with workbench(*QUICK) as running:
+        with running.line() as page, prints_line(running, "first") as printing:
+            printing.do("check", port="sim")
+            assert printing.refused() == "there is no model on the workbench yet: choose a file first"
+            assert running.send(folder / "box.stl")[0] == 200
+            page.until(lambda state: state["model"])
+            printing.do("check", port="sim")
+            assert printing.refused() == "what is on the workbench is not sliced yet: slice it first"
+            page.do("slice")
+            page.until(lambda state: state["sliced"])
+            page.do("turn", axis="z", deg=30)
+            page.until(lambda state: not state["sliced"])
+            printing.do("check", port="sim")
+            assert printing.refused() == "what is on the workbench has changed since it was sliced: slice it again"
+            page.do("undo")
+            page.until(lambda state: state["sliced"])
+        yield running
+
+
+@pytest.mark.parametrize(("port", "sentence"), [
+    ("", "no printer is chosen: choose a port, or sim for the simulated one"),
+    ("octoprint:host", "octoprint is a print server, which takes whole files: tiltprint print --port octoprint:HOST"),
+])  # fmt: skip
+def test_what_is_no_port_of_a_printer_is_told(sliced: Running, port: str, sentence: str) -> None:
+    with prints_line(sliced, "first") as page:
+        page.do("check", port=port)
+        assert page.refused().startswith(sentence)
+
+
+def listen_to_nothing(running: Running) -> socket.socket:
+    """A page's line to the prints that is opened and never read."""
+    own = socket.create_connection(("127.0.0.1", running.port))
+    own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+    own.sendall(
+        f"GET {running.place}prints?page=deaf HTTP/1.1\r\nHost: 127.0.0.1:{running.port}\r\n"
+        f"Origin: http://127.0.0.1:{running.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+    )
+    return own
+
+
+def test_fifty_pages_that_read_nothing_leave_the_print_what_the_command_line_sends(sliced: Running, folder: Path) -> None:
+    by_hand = ("print", str(folder / "box.stl"), *QUICK, "--parts", "1", "--port", "sim", "--log", str(folder / "own.log"))
+    assert main(by_hand) == 0
+    with ExitStack() as stack, prints_line(sliced, "first") as page:
+        for _ in range(50):
+            stack.enter_context(listen_to_nothing(sliced))
+        page.do("check", port="sim")
+        page.until(lambda one: one["phase"] == "ready")
+        page.command("begin")
+        done = page.until(lambda one: one["phase"] == "over")
+        page.command("forget")
+        page.until(lambda one: not one["phase"])
+    assert done["sentence"] == "the print is done"
+    assert commands_sent(Path(done["log"])) == commands_sent(folder / "own.log")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
+def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_machine(sliced: Running) -> None:
+    with Browser((1000, 700)) as browser, prints_line(sliced, "other") as other:
+        browser.open(sliced.address)
+        browser.click("#tab-printing")
+        browser.wait("document.documentElement.dataset.line === 'open' && $('unsliced').hidden")
+        browser.value("$('sim-speed').value = '60'")
+        browser.click("#check")
+        browser.wait("!$('run-ask').hidden")
+        assert "no error" in browser.value("$('run-checks').textContent")
+        other.do("check", port="sim")
+        assert other.refused() == "port sim prints already: wait until that is done, or cancel it"
+        other.until(lambda one: one["phase"] == "ready")
+        other.command("begin")
+        assert other.refused() == "another page commands this print: take the command over first"
+
+        browser.click("#begin")
+        browser.wait(f"{PRINTING} === 'printing' && $('run-told').textContent.includes('layer')")
+        browser.value("{ $('feed').value = 20; $('feed').dispatchEvent(new Event('change')); }")
+        assert other.until(lambda one: one["progress"].get("feed_percent") == 20.0)["holder"] != "other"
+        browser.click("#pause")
+        browser.wait(f"{PRINTING} === 'paused' && $('pause').textContent === 'Resume'")
+        browser.click("#pause")
+        browser.wait(f"{PRINTING} === 'printing'")
+
+        other.command("take")
+        browser.wait("!$('held').hidden && $('run-commands').hidden")
+        assert "Another page has taken over" in browser.value("$('notice').textContent")
+        browser.open(sliced.address)  # the page that has begun it is gone, the print is not
+        browser.wait(f"{PRINTING} === 'printing' && !$('print-bar').hidden")
+        assert json.loads(browser.value("JSON.stringify([$('run-commands').hidden, $('held').hidden])")) == [True, False]
+        browser.click("#tab-printing")
+        browser.value("{ $('printer-field').open = true; $('port-typed').focus(); }")
+        browser.key("e")  # a letter of the port's name
+        assert browser.value("$('port-typed').value") == "e"
+        assert browser.value(PRINTING) == "printing"
+        browser.value("$('tab-model').focus()")
+        browser.key("e")
+        browser.wait(f"{PRINTING} === 'over' && $('print-bar').hidden")
+        assert browser.value("$('run-state').textContent").startswith("emergency stop: the printer has halted")
+        assert "M112" in commands_sent(Path(other.until(lambda one: one["phase"] == "over")["log"]))
+        assert browser.complaints == []
+
+
+def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced: Running) -> None:
+    """The last one: it ends the workbench of the others."""
+    with SimulatedPrinter(load().machine, speed=20.0) as printer, prints_line(sliced, "first") as page:
+        page.do("check", port=printer.path)
+        page.until(lambda one: one["phase"] == "ready")
+        page.command("begin")
+        page.until(lambda one: one["progress"].get("nozzle_target_c"))
+        sliced.process.send_signal(signal.SIGINT)
+        ended = page.until(lambda one: one["phase"] == "over")
+        assert sliced.process.wait(60.0) == 0
+        assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
+    assert ended["said"][-2].endswith("; heaters off")
+    assert ended["said"][-1] == f"tiltprint resume {ended['journal']} goes on with it"
