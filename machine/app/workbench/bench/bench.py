@@ -62,7 +62,7 @@ class Bench:
     @property
     def printed(self) -> tuple[object, ...]:
         """What of it decides what is printed."""
-        return self.model, self.rotation, self.cuts, self.profile
+        return self.model, self.rotation, self.cuts, self.profile, self.zones
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +123,11 @@ def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
 def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:
     """Other planes; what is locked of them stays so."""
     return replace(bench, cuts=cuts, locked=bench.locked & frozenset(cuts))
+
+
+def with_zones(bench: Bench, zones: Zones) -> Bench:
+    """Other zones: the figures of the front were for those before."""
+    return replace(bench, zones=zones, rows=(), recommended=0)
 
 
 def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:

@@ -4,6 +4,7 @@ from math import hypot, isfinite
 from typing import Any, TypeGuard
 
 from machine.app.workbench.bench.bench import Bench
+from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.part_settings import MOST_PARTS
@@ -29,16 +30,30 @@ def edited(bench: Bench, asked: dict[str, Any]) -> tuple[str, Cuts]:
                 raise PlanError(f"there are {len(cuts) + 1} parts: {MOST_PARTS} are allowed")
             return "add a plane", (*cuts[:place], _plane(asked), *cuts[place:])
         case "move":
-            place = _free(bench, asked.get("part"))
+            place = free_place(bench, asked.get("part"))
             return "move a plane", (*cuts[:place], _plane(asked), *cuts[place + 1 :])
         case "remove":
-            place = _free(bench, asked.get("part"))
+            place = free_place(bench, asked.get("part"))
             return "remove a plane", (*cuts[:place], *cuts[place + 1 :])
         case _:
             moved = planned_part(bench, asked.get("part"))
             others = [part for part in cuts if part is not moved]
             others.insert(_number(asked.get("to"), "to", 2, len(cuts) + 1) - 2, moved)
             return "print a part at another time", tuple(others)
+
+
+def instead_of(asked: dict[str, Any]) -> str:
+    """How the reason begins why a command cannot be done, where the planes alone do not say it."""
+    if asked.get("do") != "reorder":
+        return ""
+    return f"part {asked.get('part')} cannot be printed as number {asked.get('to')}, for then "
+
+
+def moved_to(bench: Bench, number: Any, plane: Plane) -> Cuts:
+    """The cuts with another plane for the part of a number. Raises PlanError."""
+    x, y, z = (float(value) for value in plane.normal)
+    place, cuts = free_place(bench, number), bench.cuts or ()
+    return (*cuts[:place], PlannedPart((x, y, z), float(plane.offset_mm)), *cuts[place + 1 :])
 
 
 EDITS = ("add", "move", "remove", "reorder")
@@ -49,7 +64,7 @@ def planned_part(bench: Bench, number: Any) -> PlannedPart:
     return (bench.cuts or ())[_number(number, "part", 2, bench.parts) - 2]
 
 
-def _free(bench: Bench, number: Any) -> int:
+def free_place(bench: Bench, number: Any) -> int:
     """The place among the cuts of a part whose plane is not locked."""
     if planned_part(bench, number) in bench.locked:
         raise PlanError(f"the plane of part {number} is locked: unlock it first")

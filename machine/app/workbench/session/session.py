@@ -8,10 +8,12 @@ from machine.app.pipeline.given_plan import with_plan_settings
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench, Model, with_model, with_plan, with_profile
 from machine.app.workbench.bench.commands import obey
-from machine.app.workbench.bench.planes import EDITS, edited
+from machine.app.workbench.bench.marks import MARKS
+from machine.app.workbench.bench.planes import EDITS, edited, instead_of
 from machine.app.workbench.bench.settings import profile_as_given, with_name, with_setting
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
+from machine.app.workbench.session.marking import Marking
 from machine.app.workbench.session.pieces import Pieces
 from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.trying import Trying
@@ -31,6 +33,7 @@ class Session(Desk):
         super().__init__(Bench(profile, given=given))
         self.finding, self.slicing, self.trying = Finding(self), Slicing(self), Trying(self)
         self.pieces = Pieces(self)
+        self.marking = Marking(self, self.trying)
         self.resting: tuple[Model, tuple[Resting, ...]] | None = None
 
     def warm(self) -> None:
@@ -92,7 +95,11 @@ class Session(Desk):
             case "try":
                 self.trying.move(edited(self.bench, {**asked, "do": "move"})[1])
             case name if name in EDITS:
-                self.start(self.trying.take(*edited(self.bench, asked)))
+                self.start(self.trying.take(*edited(self.bench, asked), instead_of(asked)))
+            case "neck":
+                self.start(self.trying.take_neck(asked.get("part")))
+            case name if name in MARKS:
+                self.start(self.marking.take(asked))
             case "demo":
                 self.start(self.open_demo(str(asked.get("name"))))
             case _:

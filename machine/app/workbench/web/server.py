@@ -21,7 +21,7 @@ from machine.app.workbench.web.downloads import folder, gcode, plan, print_page,
 from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, CLOSED_CODE, talk
 from machine.app.workbench.web.page import workbench_page
-from machine.app.workbench.web.snapshot import model_key, triangles
+from machine.app.workbench.web.snapshot import marks, marks_key, model_key, triangles
 from mdp.read import MOST_BYTES
 from profiles.errors import PlanError
 from profiles.places import KINDS, known
@@ -40,6 +40,7 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int) -> 
     routes = [
         route("", _page(port)),
         route("model/{key}", _model),
+        route("marks/{key}", _marks),
         route("file", _take_file, "POST"),
         route("plan.toml", plan),
         route("pieces", _pieces),
@@ -102,6 +103,13 @@ async def _model(session: Session, request: Request) -> Response:
 
 async def _pieces(session: Session, request: Request) -> Response:
     return Response(await session.pieces.block(), media_type="application/octet-stream")
+
+
+async def _marks(session: Session, request: Request) -> Response:
+    bench = session.bench
+    if not request.path_params["key"] or marks_key(bench) != request.path_params["key"]:
+        return Response(status_code=204)  # there are others by now, which the page asks for next
+    return Response(await asyncio.to_thread(marks, bench), media_type="application/octet-stream")
 
 
 async def _take_file(session: Session, request: Request) -> Response:

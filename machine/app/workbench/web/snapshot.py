@@ -2,12 +2,14 @@
 
 from dataclasses import asdict
 from functools import lru_cache
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
 
 from machine.app.workbench.bench.bench import Bench, Model, overhang_mm2
 from machine.app.workbench.bench.fit import standing
+from machine.app.workbench.bench.marks import named_faces
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.session.session import Session
 from machine.view.parts import page_colours
@@ -15,6 +17,8 @@ from machine.view.scene import machine_bodies
 from mdp.decomposition import FrontRow
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.plane import Plane
+from mdp.plans.plan_file import ZONE_KINDS
+from mdp.zone import Zone
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # that a page draws
@@ -51,6 +55,9 @@ def snapshot(session: Session) -> dict[str, Any]:
         "cuts": _cuts(bench.cuts or ()),
         "locked": [part in bench.locked for part in bench.cuts or ()],
         "trial": _trial(session),
+        "zones": _zones(bench),
+        "marks": marks_key(bench),
+        "refused": asdict(session.trying.refused) if session.problem and session.trying.refused else None,
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
         "given": asdict(bench.given),
@@ -58,6 +65,28 @@ def snapshot(session: Session) -> dict[str, Any]:
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }
+
+
+def marks_key(bench: Bench) -> str:
+    """What tells the faces that zones name from others: the page asks for them by it; "": they name none."""
+    kinds = [[zone for zone in getattr(bench.zones, kind) if not isinstance(zone, Zone)] for kind in ZONE_KINDS]
+    if bench.model is None or not any(kinds):
+        return ""
+    return sha256(repr((model_key(bench.model), bench.rotation, kinds)).encode()).hexdigest()[:16]
+
+
+def marks(bench: Bench) -> bytes:
+    """(m,) of each face of the model in which kinds of zones that are no boxes it is: a bit each, in their order."""
+    bits = np.packbits(named_faces(bench), axis=0, bitorder="little")[0]
+    return bytes(bits)
+
+
+def _zones(bench: Bench) -> list[dict[str, Any]]:
+    return [
+        {"kind": kind, "number": number, **asdict(zone)}
+        for kind in ZONE_KINDS
+        for number, zone in enumerate(getattr(bench.zones, kind), start=1)
+    ]
 
 
 def triangles(model: Model) -> bytes:

@@ -68,13 +68,29 @@ _trials: tuple[int, Trials] | None = None  # of the bench that this process has 
 
 def try_cuts(tell: Tell, number: int, bench: Bench | None, cuts: tuple[PlannedPart, ...]) -> Trial | None:
     """Planes tried on a bench, which has a number so that it is sent once; None: this process has not heard of it, send it."""
+    trials = _known(number, bench)
+    return None if trials is None else trials.attempt(_planes(cuts))
+
+
+def near_neck(
+    tell: Tell, number: int, bench: Bench | None, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float
+) -> tuple[Plane | None] | None:
+    """The neck near the plane of a part, as `Trials.neck` finds it; number and bench as in try_cuts."""
+    trials = _known(number, bench)
+    return None if trials is None else (trials.neck(_planes(cuts), part, reach_mm),)
+
+
+def _known(number: int, bench: Bench | None) -> Trials | None:
+    """The trials of the bench of a number; None: this process has not heard of it."""
     global _trials
     if bench is not None:
         compilers.wait_for(compilers.JUDGE)
         _trials = number, Trials(Problem(_standing(bench)[0], bench.profile, bench.zones))
-    if _trials is None or _trials[0] != number:
-        return None
-    return _trials[1].attempt([plane for part in cuts if (plane := part.plane) is not None])
+    return None if _trials is None or _trials[0] != number else _trials[1]
+
+
+def _planes(cuts: tuple[PlannedPart, ...]) -> list[Plane]:
+    return [plane for part in cuts if (plane := part.plane) is not None]
 
 
 def make_files(tell: Tell, bench: Bench) -> Files:

@@ -9,17 +9,18 @@ const PLANE_COLOUR = [30, 120, 190];
 function pictureOf(canvas, camera, drawn) {
   const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
   if (!gl) return null;
-  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], plane: null, machine: null, dark: false };
+  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], plane: null, machine: null, dark: false, marks: null, extras: {} };
   let card = null, asked = false, count = 0;
   const build = () => {
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    card = { frame: frameOf(gl, 4), table: null, solid: null };
+    card = { frame: frameOf(gl, 4), table: null, solid: null, extras: {} };
     table();
     solid();
     plane();
     pieces();
+    Object.keys(scene.extras).forEach(extra);
   };
   const table = () => {
     if (!scene.machine) return;
@@ -29,7 +30,7 @@ function pictureOf(canvas, camera, drawn) {
   const solid = () => {
     if (!scene.model) return;
     const colours = new Uint8Array(12 * scene.model.count);
-    card.colours = paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours);
+    card.colours = markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours));
     card.solid = solidOf(gl, { places: scene.model.corners, colours });
   };
   const draw = () => {
@@ -50,6 +51,7 @@ function pictureOf(canvas, camera, drawn) {
       card.plane.rim.draw(flat.toClip, { lift: 1e-4 });
       card.plane.disc.draw(flat, { strength: 0.3 });
     }
+    for (const things of Object.values(card.extras)) for (const thing of things) paintExtra(thing, seenAs(thing.matrix));
     card.frame.show();
     scene.toClip = flat.toClip;
     drawn();
@@ -61,6 +63,21 @@ function pictureOf(canvas, camera, drawn) {
     card.plane = { disc: solidOf(gl, discs), rim: linesOf(gl, rims) };
   };
   const pieces = () => { card.pieces = scene.pieces && piecesOn(gl, scene.pieces, scene.chosen); };
+  const extra = (name) => {
+    card.extras[name] = scene.extras[name].map(({ solid, lines, matrix = IDENTITY, strength = 1, over = false }) => ({
+      solid: solid && solidOf(gl, solid), lines: lines && linesOf(gl, lines), matrix, strength, over,
+    }));
+  };
+  const paintExtra = ({ solid, lines, strength, over }, seen) => {
+    if (over) gl.depthFunc(gl.ALWAYS);
+    if (solid) solid.draw(seen, { strength });
+    if (lines) lines.draw(seen.toClip, { lift: 1e-4 });
+    gl.depthFunc(gl.LEQUAL);
+  };
+  const repaint = () => {
+    if (card.solid) card.solid.paint(markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, card.colours)));
+    ask();
+  };
   const paintPlate = (seen, look = {}) => {
     card.table.solid.draw(seen, look);
     card.table.lines.draw(seen.toClip, { lift: 1e-5 });
@@ -76,13 +93,16 @@ function pictureOf(canvas, camera, drawn) {
   return {
     ask,
     machine: (machine, dark) => { Object.assign(scene, { machine, dark }); table(); ask(); },
-    show: (model) => { scene.model = model; scene.red = null; card.solid = null; solid(); ask(); },
+    show: (model) => { scene.model = model; scene.red = scene.marks = null; card.solid = null; solid(); ask(); },
     stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
     red: (marks) => {
       scene.red = marks;
-      if (card.solid) card.solid.paint(paintedRed(scene.model.count, marks, MODEL_COLOUR, card.colours));
-      ask();
+      repaint();
     },
+    /** A byte of each face: the kinds of zones it is marked for. */
+    marks: (bits) => { scene.marks = bits; repaint(); },
+    /** More to draw under a name: [{solid, lines, matrix, strength, over: before all else}]. */
+    extra: (name, things) => { scene.extras[name] = things; extra(name); ask(); },
     cut: (planes, colours) => {
       const drawable = planes && planes.length <= MOST_CUTS;
       scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;

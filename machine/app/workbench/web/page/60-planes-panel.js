@@ -57,6 +57,8 @@ function planesPanel(bench) {
   };
   const bySelected = (id, act) => $(id).addEventListener("click", () => { if (bench.plane()) act(bench.selected); });
   bySelected("remove", (part) => bench.send({ do: "remove", part }));
+  bySelected("neck", (part) => bench.send({ do: "neck", part }));
+  $("find-others").addEventListener("click", () => bench.send({ do: "search" }));
   bySelected("earlier", (part) => { if (part > 2) reorder(bench, part, part - 1); });
   bySelected("later", (part) => { if (part < bench.state.parts) reorder(bench, part, part + 1); });
   $("snap").addEventListener("click", () => bench.snap(!bench.snapping));
@@ -100,6 +102,7 @@ function addPlane(bench) {
 }
 
 function tellPlanes(bench) {
+  $("find-others").disabled = Boolean(bench.state.search) || !bench.state.locked.some(Boolean);
   const { cuts, locked, trial } = bench.state, known = trial && alike(trial.cuts, bench.planes()) ? trial.parts : [];
   const rows = cuts.map((_, k) => {
     const figures = known[k], told = (of) => (figures ? of(figures) : "–"), number = k + 2;

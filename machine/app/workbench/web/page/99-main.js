@@ -1,8 +1,8 @@
 // Main: the line to the server, the picture and the panels put together.
 
 function main() {
-  const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => { bench.placeHandles(); bench.placeRings(); }), root = document.documentElement;
-  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, placeHandles: () => {}, placeRings: () => {} };
+  const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => { bench.placeHandles(); bench.placeRings(); bench.placeMarks(); }), root = document.documentElement;
+  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, placeHandles: () => {}, placeRings: () => {}, placeMarks: () => {} };
   const dark = themeOf((now) => { if (picture && bench.state) picture.machine(bench.state.machine, now); });
   const line = lineTo((state) => follow(state), (gone) => {
     root.dataset.line = gone ? "lost" : "open";
@@ -42,9 +42,12 @@ function main() {
     bench.showApart();
     picture.red(cut ? null : bench.red);
     legend(cut ? colours.slice(0, planes.length + 1) : null);
+    bench.showMarks();
+    bench.showObstacle();
   };
   bench.picture = picture;
-  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), apartPanel(bench), slicesPanel(bench), settingsPanel(bench), printPanel(bench)];
+  obstacleOf(bench);
+  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), marksPanel(bench), apartPanel(bench), slicesPanel(bench), settingsPanel(bench), printPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;
@@ -96,6 +99,7 @@ function press(event, bench, picture) {
     bench.lay(false);
     bench.send({ do: "lay", face });
   } else if (bench.snapping) bench.snapTo(face);
+  else if (bench.marking) bench.markAt(picture.carried(placeMet(bench.triangles, face, from, along)));
   else if (bench.tab === "parts" && bench.state.parts > 1) bench.choosePartAt(placeMet(bench.triangles, face, from, along));
 }
 
@@ -179,7 +183,7 @@ function keysOf(bench, camera, picture) {
   const keys = {
     ArrowLeft: arrow(-1, 0), ArrowRight: arrow(1, 0), ArrowUp: arrow(0, 1), ArrowDown: arrow(0, -1),
     "+": () => camera.zoom(0.85), "=": () => camera.zoom(0.85), "-": () => camera.zoom(1 / 0.85),
-    f: () => $("fit").click(), d: () => $("theme").click(), r: () => $("show-rings").click(), Escape: () => { bench.lay(false); bench.snap(false); bench.select(0); },
+    f: () => $("fit").click(), d: () => $("theme").click(), r: () => $("show-rings").click(), n: () => $("neck").click(), Escape: () => { bench.mark(""); bench.lay(false); bench.snap(false); bench.select(0); },
   };
   ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
   addEventListener("keydown", (event) => {

@@ -1,0 +1,215 @@
+"""Planes by hand on the workbench's page: the neck nearby, the head that would touch, what is left alone, the others found, and a
+page that goes while a plane is in its hand."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from machine.app.cli import main
+from mdp.save import stl
+from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.workbench import QUICK, Running, workbench
+from tests.mdp.search.test_neck import hourglass
+from tests.shapes import tee
+
+LEVEL = {"normal": [0, 0, 1]}
+FREE = "document.documentElement.dataset.busy === ''"
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Running]:
+    with workbench(*QUICK) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    if CHROMIUM is None:
+        pytest.skip("Chromium is not installed: the page is not tried in a browser")
+    with Browser((900, 560)) as running:
+        yield running
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("tee.stl").write_bytes(stl(tee()))
+    Path("glass.stl").write_bytes(stl(hourglass()))
+    return tmp_path
+
+
+def opened(page: Any, bench: Running, name: str) -> None:
+    before = page.state["version"]
+    bench.send(Path(name))
+    page.until(lambda state: state["version"] > before and state["undo"] == f"open {name}" and not state["busy"])
+
+
+def added(page: Any, *offsets_mm: float) -> None:
+    for offset_mm in offsets_mm:
+        parts = page.state["parts"] or 1
+        page.do("add", **LEVEL, offset_mm=offset_mm)
+        page.until(lambda state, want=parts + 1: state["parts"] == want)
+
+
+def looked_at(browser: Browser, bench: Running, name: str) -> None:
+    browser.open(bench.address)
+    browser.wait(f"document.documentElement.dataset.shown && $('title').textContent === {json.dumps(name)} && {FREE}")
+    browser.click("#tab-parts")
+
+
+def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "glass.stl")
+        added(page, 35.0)
+        page.do("neck", part=2)
+        state = page.until(lambda state: state["undo"] == "snap to the neck")
+        assert state["cuts"][0]["offset_mm"] == pytest.approx(30.0, abs=0.05)
+        page.do("move", part=2, **LEVEL, offset_mm=5.0)
+        page.until(lambda state: state["undo"] == "move a plane")
+        page.do("neck", part=2)
+        told = page.until(lambda state: state["problem"])["problem"]
+        assert (
+            told == "there is no neck near the plane of part 2: within 10 mm and 25 degrees no rim is shorter than all around it"
+        )
+
+
+def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_away(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0, 35.0)
+        page.do("mark", kind="no_seam", point_mm=[0.0, 5.0, 10.0], angle_deg=10)
+        page.do("mark", kind="no_support", min_mm=[5, -6, 25], max_mm=[21, 6, 31])
+        state = page.until(lambda state: len(state["zones"]) == 2)
+        assert [zone["kind"] for zone in state["zones"]] == ["no_seam", "no_support"]
+        assert sum(byte == 2 for byte in bench.ask(f"marks/{state['marks']}")[1]) == 6  # the flat back of the T
+        page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
+        state = page.until(lambda state: state["problem"])
+        assert "a plane was taken away: its plane would pass through zone 1 of [[keep]]" in state["problem"]
+        assert [cut["offset_mm"] for cut in state["cuts"]] == [20.0]
+        page.do("lock", part=2, locked=True)
+        page.do("mark", kind="keep", min_mm=[-2, -2, 19], max_mm=[2, 2, 21])
+        told = page.until(lambda state: "locked" in state["problem"])["problem"]
+        assert told.startswith("the plane of part 2 is locked and would be in the way: its plane would pass through zone 2")
+        Path("plan.toml").write_bytes(bench.ask("plan.toml")[1])
+        plan = Path("plan.toml").read_text()
+        assert all(
+            text in plan for text in ("[[no_support]]", "point_mm = [0.0, 5.0, 10.0]", "[[keep]]", "max_mm = [2.0, 2.0, 37.0]")
+        )
+        assert main(["decompose", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "parts"]) == 0
+        page.do("undo")
+        page.do("undo")
+        assert len(page.until(lambda state: len(state["cuts"]) == 2)["zones"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"kind": "seam"}, "kind is 'seam': keep, no_seam, no_support are allowed"),
+        ({"kind": "keep", "point_mm": [0, 0, 52], "angle_deg": 5}, "12 mm from the model: up to 1 is allowed"),
+        ({"kind": "keep", "point_mm": [0, 0, 40], "angle_deg": 190}, "angle_deg is 190: 0 to 180 is allowed"),
+        ({"kind": "keep", "min_mm": [0, 0, 0], "max_mm": [1, 0, 1]}, "each number of min_mm must be less"),
+        ({"kind": "keep", "number": 1, "min_mm": [0, 0, 0], "max_mm": [1, 1, 1]}, "number is 1: there is none yet"),
+    ],
+)
+def test_a_mark_that_makes_no_sense_is_one_sentence(bench: Running, folder: Path, asked: dict[str, Any], said: str) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        page.do("mark", **asked)
+        assert said in page.until(lambda state: state["problem"])["problem"]
+
+
+def test_an_order_that_cannot_be_is_refused_with_what_comes_in_the_way(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0, 35.0)
+        page.do("reorder", part=2, to=3)
+        told = page.until(lambda state: state["problem"])["problem"]
+        assert told.startswith("part 2 cannot be printed as number 3, for then part 2 cannot be cut off: nothing is left above")
+        assert [cut["offset_mm"] for cut in page.state["cuts"]] == [20.0, 35.0]
+
+
+def test_a_page_that_goes_with_a_plane_in_its_hand_leaves_the_plan_as_it_was(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 35.0)
+    before = bench.ask("plan.toml")[1]
+    with bench.line() as page:
+        for offset_mm in (36.0, 60.0, 36.5):
+            page.do("try", part=2, **LEVEL, offset_mm=offset_mm)
+    assert bench.ask("plan.toml")[1] == before
+    with bench.line() as page:
+        assert page.state["cuts"] == [{"normal": [0.0, 0.0, 1.0], "offset_mm": 35.0}]
+        page.do("move", part=2, **LEVEL, offset_mm=36.0)
+        assert page.until(lambda state: state["undo"] == "move a plane")["cuts"][0]["offset_mm"] == 36.0
+
+
+def test_the_head_is_drawn_where_it_would_touch_and_goes_with_the_plane(browser: Browser, bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        page.do("add", normal=[0, 0, 1], offset_mm=10.0)
+        page.until(lambda state: state["parts"] == 2)
+        looked_at(browser, bench, "tee.stl")
+        browser.click("#planes input[type=radio]")
+        page.do("move", part=2, normal=[0.6, 0, 0.8], offset_mm=5.0)
+        browser.wait("document.documentElement.dataset.obstacle")
+        assert page.until(lambda state: state["refused"])["refused"]["touch"] is not None
+        assert browser.value("document.documentElement.dataset.obstacle") == "head"
+        page.do("move", part=2, normal=[0, 0, 1], offset_mm=11.0)
+        browser.wait("document.documentElement.dataset.obstacle === ''")
+
+
+def test_faces_and_boxes_are_marked_by_clicks_moved_and_taken_away(browser: Browser, bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        looked_at(browser, bench, "tee.stl")
+        browser.click("[data-view=front]")
+        browser.click("#fit")
+        browser.value("{ $('mark-kind').value = 'no_seam'; }")
+        browser.click("#mark-faces")
+        middle = "(() => { const b = $('canvas').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
+        browser.press(*browser.value(middle))
+        browser.wait("document.querySelectorAll('#marks tr').length === 1 && document.documentElement.dataset.marks")
+        assert "faces up to 20°" in browser.value("$('marks').textContent")
+        browser.key("Escape")
+        assert browser.value("$('mark-faces').getAttribute('aria-pressed')") == "false"
+        browser.click("#mark-middle")
+        browser.wait(
+            "document.querySelectorAll('#marks tr').length === 2 && !$('mark-numbers').hidden && !$('mark-handles').hidden"
+        )
+        before = browser.value("document.querySelector('#mark-numbers [data-side=\"max_mm 2\"]').value")
+        browser.value("document.querySelector('#mark-handles [data-side=\"max_mm 2\"]').focus()")
+        browser.key("ArrowUp")
+        browser.wait(f"document.querySelector('#mark-numbers [data-side=\"max_mm 2\"]').value - {before} > 0.4 && {FREE}")
+        zone = page.until(
+            lambda state: any(abs(z.get("max_mm", [0, 0, 0])[2] - float(before) - 0.5) < 0.01 for z in state["zones"])
+        )["zones"][1]
+        assert zone["kind"] == "no_seam"
+        browser.click("#marks button")
+        browser.wait("document.querySelectorAll('#marks tr').length === 1")
+        browser.click("#undo")
+        browser.wait("document.querySelectorAll('#marks tr').length === 2")
+        assert browser.complaints == []
+
+
+def test_the_others_are_found_beside_a_locked_plane_and_keep_out_of_what_is_marked(
+    browser: Browser, bench: Running, folder: Path
+) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 35.0)
+        page.do("mark", kind="keep", min_mm=[5.5, -4, 25], max_mm=[12, 4, 32])
+        looked_at(browser, bench, "tee.stl")
+        assert browser.value("$('find-others').disabled")
+        page.do("lock", part=2, locked=True)
+        browser.wait("!$('find-others').disabled")
+        browser.click("#find-others")
+        state = page.until(lambda state: state["front"] and not state["search"])
+        assert {"normal": [0.0, 0.0, 1.0], "offset_mm": 35.0} in state["cuts"]
+        assert len(state["cuts"]) > 1
+        for cut in state["cuts"]:
+            x, y, z = cut["normal"]
+            heights = [x * a + y * b + z * c - cut["offset_mm"] for a in (5.5, 12) for b in (-4, 4) for c in (25, 32)]
+            assert not min(heights) < -1e-6 < 1e-6 < max(heights)
