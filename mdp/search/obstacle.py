@@ -14,6 +14,7 @@ from mdp.ranking.candidates import COPLANAR_MM, Reason
 from mdp.search.by_hand import Refusal
 from mdp.search.node import Node
 from mdp.search.problem import Problem
+from mdp.sweep.slivers import SLIVER_COSINE
 from mdp.zone import Zone
 from profiles.frozen import Vector
 
@@ -52,6 +53,8 @@ def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -
             return _lowest(below(node.solid, plane), np.array([0.0, 0.0, 1.0]), PLATFORM_TOLERANCE_MM)
         case Reason.INTERFACE:
             return _lowest(above(node.solid, plane), plane.normal, plane.offset_mm + COPLANAR_MM)
+        case Reason.FRAGILE:
+            return _sliver(node.remainder.mesh, plane)
         case Reason.KEEP:
             zone = problem.zones.keep[(problem.zones.crossed(plane) or 1) - 1]
             corners = np.array([zone.min_mm, zone.max_mm]) if isinstance(zone, Zone) else zone.points
@@ -75,6 +78,15 @@ def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
     tip, turned = printed[int(np.argmin(printed[:, 2]))], rotation(machine, pose)
     x, y, _ = tip + np.array(place) @ turned
     return Touch(body, _vector(tip), tuple(_vector(row) for row in turned), (float(x), float(y), 0.0))
+
+
+def _sliver(mesh: Mesh, plane: Plane) -> Obstacle | None:
+    """The place of the surface nearly level with a plane that it comes nearest to on the solid's side: there a sliver is left."""
+    cosines, heights = mesh.normals @ plane.normal, plane.heights_mm(mesh.vertices)[mesh.faces]
+    outward = np.where(cosines > 0.0, 1.0, -1.0)[:, None] * heights
+    outward[(np.abs(cosines) <= SLIVER_COSINE)[:, None] | (outward < 0.0)] = np.inf
+    face, corner = np.unravel_index(int(np.argmin(outward)), outward.shape)
+    return Obstacle((_vector(mesh.vertices[mesh.faces[face, corner]]),)) if np.isfinite(outward[face, corner]) else None
 
 
 def _section(mesh: Mesh, plane: Plane) -> Floats:

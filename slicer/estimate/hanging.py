@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.support_need.need import needs_support
@@ -15,6 +16,7 @@ from slicer.heights import Heights
 from slicer.section import sections
 from slicer.support.overhang import detect_overhangs
 from slicer.support.support import generate_supports
+from slicer.support.unwanted import shut_areas, without_unwanted
 
 LAYERS = 50  # thick layers at most: on thin limbs 40 lost up to 0.3 of the support that 60 find
 COARSE_MM = 0.05  # sections are simplified by this
@@ -43,8 +45,9 @@ class ThickSupport:
 NONE = ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons())
 
 
-def thick_support(mesh: Mesh, heights: Heights, process: Process, on_platform: bool, floor: Polygons) -> ThickSupport:
-    """The support of a mesh in its part frame; parts printed later are not looked at."""
+def thick_support(part: Part, heights: Heights, process: Process, floor: Polygons) -> ThickSupport:
+    """The support of a part; parts printed later are not looked at."""
+    mesh, on_platform = part.in_part_frame(), part.index == 1
     risky = _hanging(mesh, process, on_platform)
     hanging_mm2 = -float((mesh.normals[risky, 2] * mesh.areas_mm2[risky]).sum())
     if process.support == "none" or hanging_mm2 <= process.support_least_mm2:
@@ -53,11 +56,13 @@ def thick_support(mesh: Mesh, heights: Heights, process: Process, on_platform: b
     thick = _thick_layers(float(heights.tip_mm[0]), min(top_mm + LEAST_MM, float(heights.tip_mm[-1])))
     outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in sections(mesh, thick.cut_mm)]
     below = None if on_platform else outlines[0]
-    hanging = [overhang.hanging for overhang in detect_overhangs(mesh, outlines, thick.cut_mm, process, below)]
+    overhangs = without_unwanted(detect_overhangs(mesh, outlines, thick.cut_mm, process, below), part, thick.cut_mm)
+    hanging = [overhang.hanging for overhang in overhangs]
+    shut = shut_areas(part, thick, process) if part.no_support.anywhere else [Polygons()] * len(outlines)
     single = with_line_width(process, process.support_line_width_mm).model_copy(
         update={"support_interface_layers": 1, "support_bottom_interface_layers": 1}
     )
-    supports = generate_supports(hanging, outlines, thick, single, below, [Polygons()] * len(outlines), floor)
+    supports = generate_supports(hanging, outlines, thick, single, below, shut, floor)
     areas, contacts = tuple(map(extent_of, supports.areas)), tuple(map(extent_of, supports.dense))
     walls = tuple(tuple(contours(offset(area, -0.5 * single.line_width_mm))) for area in supports.areas)
     return ThickSupport(thick.tip_mm, thick.height_mm, areas, contacts, walls, supports.areas[0])

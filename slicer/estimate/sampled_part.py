@@ -93,7 +93,7 @@ def sample_part(part: Part, profile: Profile, later: Sequence[Part] = ()) -> Sam
     if on_platform:
         processes[0] = first_layer_process(process)
     floor = plate_outline(profile.machine.table)
-    support = thick_support(mesh, heights, process, on_platform, floor)
+    support = thick_support(part, heights, process, floor)
     looked_at = _with_neighbours(choice, process)
     own = [layer for layer in looked_at if layer < count]
     loops = sections(mesh, heights.cut_mm[own])

@@ -9,6 +9,8 @@ from mdp.decomposition import Part
 from mdp.grown import Grown
 from mdp.mesh import Floats
 from mdp.zone import AnyZone, Marked, Zone
+from slicer.estimate.sampled_part import sample_part
+from slicer.estimate.shell import NOTHING
 from slicer.parts import slice_parts
 from slicer.paths import Kind, SlicedPart
 from slicer.slice import slice_part
@@ -24,6 +26,11 @@ RIGHT_ARM = Zone((4.5, -10.0, -1.0), (25.0, 10.0, 35.0))
 
 def without_seam(part: Part, *zones: AnyZone) -> Part:
     return replace(part, no_seam=Marked.of(part.mesh, zones))
+
+
+def bare(part: Part) -> Part:
+    """One that is supported nowhere."""
+    return replace(part, no_support=Marked((Zone((-99.0, -99.0, -1.0), (99.0, 99.0, 99.0)),)))
 
 
 def begins(sliced: SlicedPart) -> Floats:
@@ -78,4 +85,6 @@ def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zon
     assert support_x_mm(kept).max() < 6.0
     assert support_x_mm(kept).min() == pytest.approx(support_x_mm(free).min(), abs=0.5)
     assert kept.unsupported == ()
+    counted = [sum(area is not NOTHING for area in sample_part(each, SUPPORTED).support.areas) for each in (part, bare(part))]
+    assert (counted[0] > 0, counted[1]) == (True, 0)
     assert volume_mm3(kept, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)

@@ -105,3 +105,10 @@ def test_the_neck_is_that_of_what_the_parts_printed_later_leave() -> None:
     tried, thick = trials(tee()), Plane(np.array([0.0, 0.0, 1.0]), 29.0)
     assert tried.neck((thick, ARMS[0], ARMS[1]), 2, 5.0) is None
     assert tried.neck((Plane(np.array([1.0, 0.0, 0.0]), 50.0), thick), 2, 5.0) is None
+
+
+def test_a_sliver_is_marked_on_the_surface_that_it_would_be_cut_off() -> None:
+    tried = trials(tee()).attempt((Plane(np.array([0.0, 0.0, 1.0]), 39.8),))
+    assert "a sliver 0.2 mm thin" in tried.refused
+    assert tried.obstacle is not None
+    assert tried.obstacle.places_mm[0][2] == 40.0

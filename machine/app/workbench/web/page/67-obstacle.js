@@ -1,6 +1,7 @@
 // Obstacle: what a refused plane is in the way of: the head where it would touch the table, or the places that are meant.
 
 const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked
+const TOUCH_COLOUR = [255, 221, 70, 255]; // seen on the red body and on the table
 const RING_SHARES = [1, 0.5]; // of that mark's size: rings on the table where the head would touch it
 
 function obstacleOf(bench) {
@@ -34,7 +35,7 @@ function headDrawn({ body, tip_mm: tip, rotation }, head) {
 /** Rings on the table where the head would touch it. */
 function touchDrawn({ touched_mm: [x, y, z] }, size) {
   const rings = RING_SHARES.flatMap((share) => chained(circle(share * size, z, 32)).map(([a, b, c]) => [a + x, b + y, c]));
-  return [{ lines: trianglesOf([{ corners: rings, colour: [...RED, 255] }]), over: true }];
+  return [{ lines: trianglesOf([{ corners: rings, colour: TOUCH_COLOUR }]), over: true }];
 }
 
 /** A small octahedron that nothing hides. */
