@@ -10,12 +10,16 @@ from dataclasses import dataclass
 from math import inf
 
 from mdp.cost.part_forecast import ModelForecast, PartForecast
+from mdp.decomposition import FrontRow
+from mdp.overhang import UP
 from mdp.plane import Plane
 from mdp.search.by_hand import Refusal, cut_or_refuse, refusal
+from mdp.search.front import front_row
 from mdp.search.neck import find_neck
 from mdp.search.node import Node
 from mdp.search.obstacle import Obstacle, find_refused
 from mdp.search.problem import Problem
+from profiles.errors import PlanError
 
 Key = tuple[float, float, float, float]
 
@@ -58,6 +62,21 @@ class Trials:
                 return self._allowed(order, len(order) - 1 - done)
             most_cuts -= 1
         return self._allowed(order, 0)
+
+    def warm(self) -> None:
+        """Have ready what the first trial needs of the whole model."""
+        low, high = (float(z) for z in self._problem.mesh.bounds_mm[:, 2])
+        self.attempt((Plane(UP, 0.5 * (low + high)),), 0)
+
+    def row(self, planes: Sequence[Plane]) -> FrontRow:
+        """What the parts of base planes cost, as a front has it. Raises PlanError for a plane that cannot be cut."""
+        order = planes[::-1]
+        self._keep_alike(order)
+        for done in range(len(self._cut), len(order)):
+            refused = self._cut_off(order[done])
+            if refused is not None:
+                raise PlanError(f"part {len(order) + 1 - done} cannot be cut off: {refused.text}")
+        return front_row(self._node, self._problem.terms)
 
     def neck(self, planes: Sequence[Plane], number: int, reach_mm: float) -> Plane | None:
         """The neck near the plane of the part of a number, of what the parts printed after it leave; None: there is none, or

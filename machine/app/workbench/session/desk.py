@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +101,11 @@ class Desk:
         """Take a further step, which can be undone."""
         self.problem = ""
         self.become(self.history.do(word, bench))
+
+    def amend(self, bench: Bench, better: Bench) -> None:
+        """What lies on the bench, if it is still this, known better; no step of its own."""
+        if self.bench is bench:
+            self.history = replace(self.history, now=Step(self.history.now.word, better))
 
     def become(self, history: History) -> None:
         """Go on with another history."""

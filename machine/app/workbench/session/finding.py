@@ -1,13 +1,13 @@
 """Finding: the search for parts that a session has under way, and what it takes of one that is stopped."""
 
 import asyncio
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from machine.app.workbench.bench.bench import Bench, parts_of, with_front
+from machine.app.workbench.bench.bench import Bench, parts_of, plan_of_bench, with_front
 from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.trying import Trying
 from machine.app.workbench.work.cutting import Searched
 from mdp.decomposition import FrontRow
-from mdp.plans.plan_file import PlanFile
 from profiles.errors import PlanError
 
 
@@ -22,11 +22,12 @@ class Search:
 class Finding:
     """search: the one under way; notes: of the last one."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, trying: Trying) -> None:
         self.search: Search | None = None
         self.notes: tuple[str, ...] = ()
-        self._desk = desk
+        self._desk, self._trying = desk, trying
         self._task: asyncio.Task[None] | None = None
+        self._pricing: asyncio.Task[None] | None = None  # of the best of a search that was stopped
         desk.followers.append(self._follow)
 
     def begin(self) -> None:
@@ -35,6 +36,8 @@ class Finding:
         if bench.model is None:
             raise PlanError("there is no model on the workbench yet: choose a file first")
         if self.search is None:
+            if self._pricing is not None:
+                self._pricing.cancel()
             self.search = Search(bench, Searched("beginning"))
             self._task = self._desk.start(self._find(bench))
 
@@ -46,7 +49,7 @@ class Finding:
         self._task.cancel()
         self._desk.start(self._desk.long.warm())
         if search.searched.planes:
-            self._desk.start(self._take_best(search))
+            self._pricing = self._desk.start(self._take_best(search))
 
     async def _find(self, bench: Bench) -> None:
         def follow(searched: Searched) -> None:
@@ -62,12 +65,14 @@ class Finding:
                 self.search = None
 
     async def _take_best(self, search: Search) -> None:
-        planes = FrontRow(search.searched.planes, 0.0, 0.0, 0.0)
-        orientation = None if search.bench.turned is None else search.bench.rotation
-        plan = PlanFile("the search", "", "", orientation, parts_of(planes), search.bench.zones)
+        """Its parts at once, what they take to print when that is known."""
+        cuts = parts_of(FrontRow(search.searched.planes, 0.0, 0.0, 0.0))
         with self._desk.waiting("cutting the best so far"):
-            rows = await self._desk.quick.run("measure_plan", search.bench, plan)
-            self._desk.do("stop the search", with_front(search.bench, rows))
+            row = replace(await self._trying.measure(search.bench, cuts), chosen=True)
+            taken = with_front(search.bench, [row])
+            self._desk.do("stop the search", taken)
+        rows = await self._desk.long.run("measure_plan", taken, plan_of_bench(taken, "the search"))
+        self._desk.amend(taken, replace(taken, rows=tuple(rows)))
 
     def _follow(self) -> None:
         """A search for a model that is not there any more, or lies otherwise, ends."""

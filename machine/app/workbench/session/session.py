@@ -15,6 +15,7 @@ from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.marking import Marking
 from machine.app.workbench.session.pieces import Pieces
+from machine.app.workbench.session.readiness import Readiness
 from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.trying import Trying
 from machine.app.workbench.work.cutting import Files
@@ -31,18 +32,21 @@ class Session(Desk):
 
     def __init__(self, profile: Profile, given: Given) -> None:
         super().__init__(Bench(profile, given=given))
-        self.finding, self.slicing, self.trying = Finding(self), Slicing(self), Trying(self)
+        self.slicing, self.readiness = Slicing(self), Readiness(self)
+        self.trying = Trying(self, self.readiness)
+        self.finding = Finding(self, self.trying)
         self.pieces = Pieces(self)
         self.marking = Marking(self, self.trying)
         self.resting: tuple[Model, tuple[Resting, ...]] | None = None
 
     def warm(self) -> None:
         """Load the program's heavy parts while nobody waits."""
-        self.start(self.quick.warm())
-        self.start(self.long.warm())
+        for lane in (self.quick, self.hand, self.long):
+            self.start(lane.warm())
 
     async def open_model(self, path: Path, name: str) -> None:
         """Put the model of a file on the bench. Raises UserError as the command line tells it."""
+        self.readiness.load()
         with self.waiting(f"reading {name}"):
             model = await self.quick.run("read_model", path, name, self.bench.profile.of_all_parts)
             self.do(f"open {name}", with_model(self.bench, model))
@@ -136,5 +140,6 @@ class Session(Desk):
         self.problem = refused
 
     async def _rank(self, model: Model) -> None:
+        await self.readiness.wait()
         resting = await self.quick.run("rank_resting", model.mesh, self.bench.profile.of_all_parts)
         self.resting = model, resting

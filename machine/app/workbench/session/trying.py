@@ -1,31 +1,33 @@
 """Trying: planes in a person's hand, tried as they move, and taken when they can be cut."""
 
 import asyncio
-from math import hypot
+from math import hypot, inf
 from typing import Any
 
 from machine.app.workbench.bench.bench import Bench, with_cuts
 from machine.app.workbench.bench.planes import Cuts, free_place, moved_to
 from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.readiness import Readiness
+from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.neck import REACH_DEG, REACH_SHARE
 from mdp.search.obstacle import Obstacle
 from mdp.search.trial import Trial
 from profiles.errors import PlanError
 
+REST_S = 0.1  # of a hand, until what it holds is looked at more closely
+
 
 class Trying:
     """trial: of the planes that were tried last, and the bench that they were tried on. refused: where those that were refused
     last are in the way."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, readiness: Readiness) -> None:
         self.trial: tuple[Bench, Cuts, Trial] | None = None
         self.refused: Obstacle | None = None
-        self._desk = desk
+        self._desk, self._readiness = desk, readiness
         self._one = asyncio.Lock()
         self._wanted: Cuts | None = None  # tried next, whatever else was wanted meanwhile
-        self._known: tuple[object, ...] = ()  # what the numbered bench of the trials is made of
-        self._known_number = 0
         desk.followers.append(self._follow)
 
     def move(self, cuts: Cuts) -> None:
@@ -54,7 +56,7 @@ class Trying:
         reach_mm = REACH_SHARE * hypot(*(high - low))
         with self._desk.waiting(f"looking for a neck near the plane of part {number}"):
             async with self._one:
-                neck: Plane | None = (await self._run(bench, "near_neck", bench.cuts, number, reach_mm))[0]
+                neck: Plane | None = (await self._readiness.ask("near_neck", bench, bench.cuts, number, reach_mm))[0]
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
             raise PlanError(f"there is no neck near the plane of part {number}: {where}")
@@ -62,29 +64,35 @@ class Trying:
             instead = f"the neck near the plane of part {number} is no place for a cut: "
             await self.take("snap to the neck", moved_to(bench, number, neck), instead)
 
-    async def attempt(self, bench: Bench, cuts: Cuts) -> Trial:
-        """The figures of planes."""
+    async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
+        """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
         async with self._one:
-            return await self._attempt(bench, cuts)
+            trial: Trial = await self._readiness.ask("try_cuts", bench, cuts, most_cuts)
+            return trial
+
+    async def measure(self, bench: Bench, cuts: Cuts) -> FrontRow:
+        """The row of the front that planes make, without its time. Raises PlanError for a plane that cannot be cut."""
+        async with self._one:
+            row: FrontRow = await self._readiness.ask("measure_cuts", bench, cuts)
+            return row
 
     async def _try_newest(self) -> None:
+        """Figures at once; where parts are not looked at yet, one after the other as soon as the hand rests."""
         async with self._one:
             cuts, self._wanted = self._wanted, None
             bench = self._desk.bench
-            if cuts is not None and bench.model is not None:
-                self.trial = bench, cuts, await self._attempt(bench, cuts)
-
-    async def _attempt(self, bench: Bench, cuts: Cuts) -> Trial:
-        trial: Trial = await self._run(bench, "try_cuts", cuts)
-        return trial
-
-    async def _run(self, bench: Bench, task: str, *given: Any) -> Any:
-        """What a task says of a bench, which goes to the process once, not with every move of a hand."""
-        made_of = (bench.model, bench.rotation, bench.profile, bench.zones)
-        if any(one is not other for one, other in zip(made_of, self._known or (None,) * 4, strict=True)):
-            self._known, self._known_number = made_of, self._known_number + 1
-        answer = await self._desk.hand.run(task, self._known_number, None, *given)
-        return answer if answer is not None else await self._desk.hand.run(task, self._known_number, bench, *given)
+            if cuts is None or bench.model is None:
+                return
+            self.trial = tried = bench, cuts, await self._readiness.ask("try_cuts", bench, cuts, 0)
+        while tried[2].unchecked:
+            self._desk.tell()
+            await asyncio.sleep(REST_S)
+            if self._wanted is not None or self.trial is not tried or self._desk.bench is not bench:
+                return
+            trial = await self.attempt(bench, cuts, 1)
+            if self.trial is not tried:
+                return
+            self.trial = tried = bench, cuts, trial
 
     def _follow(self) -> None:
         cuts = self._desk.bench.cuts

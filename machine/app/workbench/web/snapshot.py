@@ -33,6 +33,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "version": session.version,
         "problem": session.problem,
         "busy": session.busy,
+        "preparing": session.readiness.preparing > 0,
         "undo": history.now.word if history.before else "",
         "redo": history.undone[-1].word if history.undone else "",
         "model": None if bench.model is None else _model(bench.model),

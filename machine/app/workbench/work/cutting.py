@@ -13,13 +13,11 @@ from machine.app.workbench.work.worker import Tell
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
 from mdp.plane import Plane
-from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
+from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
 from mdp.search.orientation import standing_still
-from mdp.search.problem import Problem
 from mdp.search.search import Progress, cut_by_plan, decompose
-from mdp.search.trial import Trial, Trials
 
 PLAN_NAME = "plan.toml"
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
@@ -51,7 +49,7 @@ def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[st
         left = f"{100 * progress.best_share:.1f} % of the risky area left"
         tell(Searched(f"stage {progress.stage}, {progress.beam} in the beam, {left}", progress.planes))
 
-    mesh, name = _standing(bench)
+    mesh, name = standing_mesh(bench), _name(bench)
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
     locked, price = locked_plan(bench), pricing(bench.profile.of_all_parts)
     found = decompose(mesh, name, bench.profile, on_stage=show, by_hand=locked, price=price)
@@ -61,36 +59,6 @@ def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[st
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
     """The front of a plan for the model on the bench, measured; PlanError where it cannot be cut."""
     return cut_bench(bench, plan, prices=True).front
-
-
-_trials: tuple[int, Trials] | None = None  # of the bench that this process has heard of last
-
-
-def try_cuts(tell: Tell, number: int, bench: Bench | None, cuts: tuple[PlannedPart, ...]) -> Trial | None:
-    """Planes tried on a bench, which has a number so that it is sent once; None: this process has not heard of it, send it."""
-    trials = _known(number, bench)
-    return None if trials is None else trials.attempt(_planes(cuts))
-
-
-def near_neck(
-    tell: Tell, number: int, bench: Bench | None, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float
-) -> tuple[Plane | None] | None:
-    """The neck near the plane of a part, as `Trials.neck` finds it; number and bench as in try_cuts."""
-    trials = _known(number, bench)
-    return None if trials is None else (trials.neck(_planes(cuts), part, reach_mm),)
-
-
-def _known(number: int, bench: Bench | None) -> Trials | None:
-    """The trials of the bench of a number; None: this process has not heard of it."""
-    global _trials
-    if bench is not None:
-        compilers.wait_for(compilers.JUDGE)
-        _trials = number, Trials(Problem(_standing(bench)[0], bench.profile, bench.zones))
-    return None if _trials is None or _trials[0] != number else _trials[1]
-
-
-def _planes(cuts: tuple[PlannedPart, ...]) -> list[Plane]:
-    return [plane for part in cuts if (plane := part.plane) is not None]
 
 
 def make_files(tell: Tell, bench: Bench) -> Files:
@@ -109,14 +77,17 @@ def make_files(tell: Tell, bench: Bench) -> Files:
 
 def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
     """The model on the bench cut by a plan; prices: the rows of its front measured, too."""
-    mesh, name = _standing(bench, plan)
+    mesh, name = standing_mesh(bench, plan), _name(bench)
     compilers.wait_for(compilers.JUDGE)
     return cut_by_plan(mesh, name, bench.profile, plan, price=pricing(bench.profile.of_all_parts) if prices else None)
 
 
-def _standing(bench: Bench, plan: PlanFile | None = None) -> tuple[Mesh, str]:
-    """The mesh as it is cut, turned as the plan says or else as the bench does, and the model's name."""
+def standing_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
+    """The mesh as it is cut, turned as the plan says or else as the bench does."""
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
-    mesh = bench.model.mesh
-    return (mesh if turned is None else standing_still(mesh, turned)), bench.model.name
+    return bench.model.mesh if turned is None else standing_still(bench.model.mesh, turned)
+
+
+def _name(bench: Bench) -> str:
+    return "" if bench.model is None else bench.model.name

@@ -4,12 +4,26 @@ pickled."""
 from collections.abc import Callable
 from typing import Any
 
-from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan, near_neck, try_cuts
+from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan
 from machine.app.workbench.work.models import rank_resting, read_model
 from machine.app.workbench.work.pieces import draw_pieces
 from machine.app.workbench.work.slices import slice_bench
+from machine.app.workbench.work.trials import load_kernels, make_ready, measure_cuts, near_neck, try_cuts
 
 TASKS: dict[str, Callable[..., Any]] = {
     task.__name__: task
-    for task in (read_model, rank_resting, find_parts, measure_plan, try_cuts, near_neck, make_files, draw_pieces, slice_bench)
+    for task in (
+        read_model,
+        rank_resting,
+        find_parts,
+        measure_plan,
+        make_files,
+        draw_pieces,
+        slice_bench,
+        load_kernels,
+        make_ready,
+        try_cuts,
+        measure_cuts,
+        near_neck,
+    )
 }

@@ -10,6 +10,12 @@ const normalOf = (tilt, towards) => {
   return [across * Math.cos(towards * RAD), across * Math.sin(towards * RAD), Math.cos(tilt * RAD)];
 };
 const alike = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+const alikePlanes = (a, b) => [a.offset_mm - b.offset_mm, ...a.normal.map((x, k) => x - b.normal[k])].every((difference) => Math.abs(difference) < 1e-9);
+/** The figures of the planes as they are looked at, those of a moment ago while a hand moves one. */
+function trialOf({ state: { trial }, hand, planes }) {
+  const looked = planes(), moved = hand ? hand.part - 2 : -1;
+  return trial && trial.cuts.length === looked.length && looked.every((plane, k) => k === moved || alikePlanes(plane, trial.cuts[k])) ? trial : null;
+}
 
 function planesPanel(bench) {
   /** The planes as they are looked at: those of the state, the one in hand where the hand has it. */
@@ -74,7 +80,7 @@ function planesPanel(bench) {
       if (bench.hand && (!alike(state.cuts, before?.cuts) || (state.problem && state.problem !== before?.problem))) bench.hand = null;
       if (bench.wanted && state.parts > (before?.parts || 1)) [bench.selected, bench.wanted] = [bench.wanted, 0];
       if (bench.selected > state.parts || !state.model) bench.selected = 0;
-      if (bench.held && state.trial && alike(state.trial.cuts, bench.planes())) {
+      if (bench.held && bench.hand && trialOf(bench) && alikePlanes(state.trial.cuts[bench.hand.part - 2], bench.hand.plane)) {
         document.documentElement.dataset.triedMs = (performance.now() - bench.held).toFixed(1);
         bench.held = 0;
       }
@@ -103,7 +109,7 @@ function addPlane(bench) {
 
 function tellPlanes(bench) {
   $("find-others").disabled = Boolean(bench.state.search) || !bench.state.locked.some(Boolean);
-  const { cuts, locked, trial } = bench.state, known = trial && alike(trial.cuts, bench.planes()) ? trial.parts : [];
+  const { cuts, locked } = bench.state, known = trialOf(bench)?.parts || [];
   const rows = cuts.map((_, k) => {
     const figures = known[k], told = (of) => (figures ? of(figures) : "–"), number = k + 2;
     const mark = made("input", { type: "radio", name: "plane", value: number, checked: number === bench.selected });
@@ -127,7 +133,7 @@ function tellPlanes(bench) {
 }
 
 function tellPlane(bench) {
-  const plane = bench.plane(), { trial } = bench.state, known = trial && alike(trial.cuts, bench.planes()) ? trial : null;
+  const plane = bench.plane(), known = trialOf(bench);
   $("plane").hidden = !plane;
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal), fill = (id, value) => { if (document.activeElement !== $(id)) $(id).value = value; };
@@ -138,5 +144,5 @@ function tellPlane(bench) {
   }
   $("plane-told").classList.toggle("refused", Boolean(known && known.refused));
   $("plane-told").textContent = !known || !bench.state.cuts.length ? "" : known.refused ? `Part ${known.refused_part} cannot be cut off: ${known.refused}.`
-    : `${mm2(known.support_area_mm2)} to support, ${known.seam_mm.toFixed(0)} mm of seams`;
+    : `${mm2(known.support_area_mm2)} to support, ${known.seam_mm.toFixed(0)} mm of seams${known.unchecked ? "; looking at the parts printed before it …" : ""}`;
 }

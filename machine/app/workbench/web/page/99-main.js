@@ -103,11 +103,11 @@ function press(event, bench, picture) {
   else if (bench.tab === "parts" && bench.state.parts > 1) bench.choosePartAt(placeMet(bench.triangles, face, from, along));
 }
 
-function tellState({ model, problem, busy, undo, redo, search, slicing, machine, material, process }) {
+function tellState({ model, problem, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
   const root = document.documentElement;
   document.title = model ? `${model.name} – tiltprint` : "tiltprint";
   $("title").textContent = model ? model.name : "tiltprint";
-  $("summary").textContent = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : `${machine.name} · ${material} · ${process}`;
+  $("summary").textContent = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`;
   root.dataset.busy = busy;
   root.toggleAttribute("data-searching", Boolean(search));
   document.body.classList.toggle("no-model", !model);

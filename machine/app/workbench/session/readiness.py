@@ -1,0 +1,68 @@
+"""Readiness: what planes on a bench need, worked out in a process of its own as soon as there is a model."""
+
+import asyncio
+from typing import Any
+
+from machine.app.workbench.bench.bench import Bench, Model
+from machine.app.workbench.session.desk import Desk
+
+MOST_FACES = 500_000  # that are made ready; for larger models that waits for the first plane
+CHANGING_S = 0.2  # of a bench, until it is made ready as it is
+
+
+class Readiness:
+    """preparing: how many benches are made ready now. A bench has a number for the process, which it goes to once."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.preparing = 0
+        self._desk = desk
+        self._made_of: tuple[object, ...] = ()  # the bench of the last number
+        self._number = self._wanted = 0
+        self._model: Model | None = None  # of the bench that was made ready last
+        self._task: asyncio.Task[None] | None = None
+        desk.followers.append(self._follow)
+
+    def load(self) -> None:
+        """Load what all planes need, while the first model is read."""
+        if not self._number:
+            self._desk.start(self._desk.hand.run("load_kernels"))
+
+    async def wait(self) -> None:
+        """Return when nothing is made ready any more: what a person waits for less comes then."""
+        while self._task is not None and not self._task.done():
+            await asyncio.wait((self._task,))
+
+    async def ask(self, task: str, bench: Bench, *given: Any) -> Any:
+        """What a task of work.trials says of a bench, made ready for it where it is not."""
+        number = self._number_of(bench)
+        answer = await self._desk.hand.run(task, number, *given)
+        if answer is None:
+            await self._desk.hand.run("make_ready", number, bench)
+            answer = await self._desk.hand.run(task, number, *given)
+        return answer
+
+    def _number_of(self, bench: Bench) -> int:
+        made_of = (bench.model, bench.rotation, bench.profile, bench.zones)
+        if any(one is not other for one, other in zip(made_of, self._made_of or (None,) * 4, strict=True)):
+            self._made_of, self._number = made_of, self._number + 1
+        return self._number
+
+    def _follow(self) -> None:
+        bench = self._desk.bench
+        if bench.model is None or len(bench.model.mesh.faces) > MOST_FACES or self._number_of(bench) == self._wanted:
+            return
+        wait_s = CHANGING_S if bench.model is self._model else 0.0
+        self._wanted, self._model = self._number_of(bench), bench.model
+        self._task = self._desk.start(self._prepare(bench, self._wanted, wait_s))
+
+    async def _prepare(self, bench: Bench, number: int, wait_s: float) -> None:
+        """Make a bench ready, unless it changes while it is waited for that."""
+        await asyncio.sleep(wait_s)
+        if self._wanted != number:
+            return
+        self.preparing += 1
+        self._desk.tell()
+        try:
+            await self._desk.hand.run("make_ready", number, bench)
+        finally:
+            self.preparing -= 1
