@@ -9,14 +9,16 @@ import numpy as np
 from machine.app.requests import Given
 from machine.app.workbench.bench.settings import USUAL
 from mdp.decomposition import FrontRow
+from mdp.grown import Grown
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
-from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow
-from mdp.zone import NO_ZONES, Zones
+from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.zone import NO_ZONES, AnyZone, Zone, Zones
 from profiles.frozen import Vector
 from profiles.profile import Profile
 
 MOST_STEPS = 200  # that can be undone
+POINT_DIGITS = 3  # of the mm of a mark's place
 STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
 
 
@@ -109,9 +111,38 @@ def with_model(bench: Bench, model: Model) -> Bench:
 
 
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
-    """The model turned otherwise; its cuts were for the way that it stood before."""
+    """The model turned otherwise; its cuts were for the way that it stood before, and so were boxes. Marked faces stay marked."""
     rows = tuple(_vector(row) for row in rotation)
-    return bench if rows == bench.rotation else Bench(bench.profile.of_all_parts, bench.model, rows, given=bench.given)
+    if rows == bench.rotation:
+        return bench
+    return Bench(bench.profile.of_all_parts, bench.model, rows, zones=_turned_zones(bench, rows), given=bench.given)
+
+
+def _turned_zones(bench: Bench, rows: tuple[Vector, ...]) -> Zones:
+    """The zones that are no boxes, on the model as it stands when it is turned so."""
+    if bench.model is None or bench.zones == NO_ZONES:
+        return NO_ZONES
+    (before, was_mm), (after, is_mm) = (_placing(bench.model.mesh, rotation) for rotation in (bench.rotation, rows))
+
+    def turned(zone: AnyZone) -> AnyZone:
+        if not isinstance(zone, Grown):
+            return zone
+        return replace(
+            zone, point_mm=_vector(np.round(after @ before.T @ (np.array(zone.point_mm) - was_mm) + is_mm, POINT_DIGITS))
+        )
+
+    kept = {kind: tuple(turned(zone) for zone in getattr(bench.zones, kind) if not isinstance(zone, Zone)) for kind in ZONE_KINDS}
+    return Zones(**kept)
+
+
+def _placing(mesh: Mesh, rows: tuple[Vector, ...]) -> tuple[Floats, Floats]:
+    """What turns a model as it is read, and what shifts it then onto the platform, mm."""
+    rotation = np.array(rows)
+    if rows == STANDING:
+        return rotation, np.zeros(3)
+    turned = mesh.vertices @ rotation.T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    return rotation, np.array([-0.5 * (low[0] + high[0]), -0.5 * (low[1] + high[1]), -low[2]])
 
 
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:

@@ -69,7 +69,7 @@ function marksPanel(bench) {
     addBox([-x / 6, -y / 6, z / 3], [x / 6, y / 6, (2 * z) / 3]);
   });
   const knobs = BOX_SIDES.map((side) => {
-    const knob = made("button", { type: "button", text: "xyz"[side.axis], ariaLabel: `${side.name} of the box: drag, or arrow keys` });
+    const knob = made("button", { type: "button", text: "xyz"[side.axis] + (side.end === "min_mm" ? "−" : "+"), ariaLabel: `${side.name} of the box: drag, or arrow keys` });
     knob.dataset.side = `${side.end} ${side.axis}`;
     const move = (zone) => { hand = zone; bench.showMarks(); tellMarks(); };
     gripOf(knob, {
@@ -159,7 +159,7 @@ function markRow(zone, chosen, choose, bench) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
   const mark = made("input", { type: "radio", name: "mark", value: `${zone.kind} ${zone.number}`, checked: chosen, ariaLabel: name });
   mark.addEventListener("change", choose);
-  const remove = made("button", { type: "button", text: "Remove", ariaLabel: `remove ${name}` });
+  const remove = made("button", { type: "button", text: "×", title: `Remove ${name}`, ariaLabel: `remove ${name}` });
   remove.addEventListener("click", () => bench.send({ do: "unmark", kind: zone.kind, number: zone.number }));
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm`
     : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
