@@ -46,7 +46,7 @@ def choose(browser: "Browser | Firefox", name: str, content: bytes) -> None:
 
 def open_model(browser: Browser, bench: Running, name: str, content: bytes) -> None:
     browser.open(bench.address)
-    browser.wait(f"document.documentElement.dataset.line === 'open' && {IDLE}")
+    browser.wait(f"document.documentElement.dataset.version && {IDLE}")  # all of what lies there is shown
     choose(browser, name, content)
     browser.wait(f"document.documentElement.dataset.shown && $('title').textContent === {json.dumps(name)} && {IDLE}")
 

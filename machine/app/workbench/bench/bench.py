@@ -1,18 +1,21 @@
 """Bench: what lies on the workbench, as one value. Every command gives a new one, so undo and redo are values too."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from machine.app.requests import Given
+from machine.app.workbench.bench.effect import Effect, effect_of_change
+from machine.app.workbench.bench.part_settings import following
 from machine.app.workbench.bench.settings import USUAL
 from mdp.decomposition import FrontRow
 from mdp.grown import Grown
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.search.front import choose, pays, price_of_second_mm2
 from mdp.zone import NO_ZONES, AnyZone, Zone, Zones
 from profiles.frozen import Vector
 from profiles.profile import Profile
@@ -38,7 +41,8 @@ class Bench:
 
     rotation: rows of what turns the model as it is read. cuts: the base planes of the parts from the second on, in print order;
     None: nobody has cut it yet. rows: the front that the cuts were chosen from, ever more parts; recommended: how many parts the
-    search would take, 0: no search has been. locked: those of the cuts that a search begins with and nobody moves.
+    search would take, 0: no search has been; priced: times and plastic of the rows are for this profile, as far as there are any.
+    locked: those of the cuts that a search begins with and nobody moves.
     """
 
     profile: Profile
@@ -50,6 +54,7 @@ class Bench:
     recommended: int = 0
     locked: frozenset[PlannedPart] = frozenset()
     given: Given = USUAL
+    priced: bool = True
 
     @property
     def parts(self) -> int:
@@ -92,6 +97,10 @@ class History:
         if not self.before:
             return self
         return History(self.before[-1], self.before[:-1], (*self.undone, self.now))
+
+    def amended(self, bench: Bench) -> "History":
+        """The same step with more known of its bench."""
+        return replace(self, now=replace(self.now, bench=bench))
 
     def redo(self) -> "History":
         """One step forth again, or the same where there is none."""
@@ -152,8 +161,9 @@ def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
 
 
 def with_cuts(bench: Bench, cuts: tuple[PlannedPart, ...]) -> Bench:
-    """Other planes; what is locked of them stays so."""
-    return replace(bench, cuts=cuts, locked=bench.locked & frozenset(cuts))
+    """Other planes; what is locked of them stays so, and settings of single parts go with their planes."""
+    profile = following(bench.profile, bench.cuts or (), cuts)
+    return replace(bench, cuts=cuts, locked=bench.locked & frozenset(cuts), profile=profile)
 
 
 def with_zones(bench: Bench, zones: Zones) -> Bench:
@@ -162,8 +172,36 @@ def with_zones(bench: Bench, zones: Zones) -> Bench:
 
 
 def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
-    """Another profile: the figures of the front were for the one before, the planes may serve all the same."""
-    return replace(bench, given=given, profile=profile, rows=(), recommended=0)
+    """Another profile. The front goes where a search may find another one now, its times and plastic where they may be others;
+    the planes may serve all the same."""
+    changed = replace(bench, given=given, profile=profile)
+    effect = effect_of_change(bench.profile, profile)
+    if effect == Effect.NONE or not bench.rows:
+        return changed
+    if effect == Effect.FRONT:
+        return replace(changed, rows=(), recommended=0, priced=True)
+    return replace(changed, rows=tuple(replace(row, time_s=None, filament_mm=None) for row in bench.rows), priced=False)
+
+
+def places_to_price(bench: Bench) -> list[int]:
+    """The rows of the front, by their places, whose time and plastic a person is told."""
+    return [place for place, good in enumerate(pays(bench.rows)) if good]
+
+
+def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
+    """The front with times and plastic of the rows that were measured, by their places, and what is recommended by them."""
+    rows = [
+        replace(row, time_s=prices[place].time_s, filament_mm=prices[place].filament_mm) if place in prices else row
+        for place, row in enumerate(bench.rows)
+    ]
+    if not bench.recommended:
+        return replace(bench, rows=tuple(rows), priced=True)
+    choice = choose(rows, price_of_second_mm2(bench.profile), bench.profile.search.most_longer)
+    marked = [
+        replace(row, chosen=place == choice.place, reason=choice.reason if place == choice.place else "")
+        for place, row in enumerate(rows)
+    ]
+    return replace(bench, rows=tuple(marked), recommended=rows[choice.place].parts, priced=True)
 
 
 def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: Profile) -> Bench:

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from machine.app.workbench.bench.bench import Bench, History, Model, laid_down, with_parts, with_rotation
+from machine.app.workbench.bench.part_settings import check_part, with_part_setting, without_part_settings
 from machine.app.workbench.bench.planes import is_number, planned_part
 from mdp.mesh import Floats
 from mdp.pose import about
 from profiles.errors import PlanError
+from profiles.profile import Profile
 
 AXES = {"x": 0, "y": 1, "z": 2}
 TURN_DIGITS = 15  # so that quarter turns are exact
@@ -88,11 +90,29 @@ def _lock(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
     return bench if locked == bench.locked else replace(bench, locked=locked)
 
 
+def _set_part(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
+    """Give `part` alone another `value` of a `key` of the process; null: as all parts have it."""
+    part, value = check_part(asked.get("part"), bench.parts), asked.get("value")
+    text = None if value is None else str(value)
+    return _with_settings(bench, with_part_setting(bench.profile, part, str(asked.get("key")), text))
+
+
+def _reset_part(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
+    """Have `part` as all parts are."""
+    return _with_settings(bench, without_part_settings(bench.profile, check_part(asked.get("part"), bench.parts)))
+
+
+def _with_settings(bench: Bench, profile: Profile) -> Bench:
+    return bench if profile.parts == bench.profile.parts else replace(bench, profile=profile)
+
+
 COMMANDS: dict[str, tuple[str, Callable[[Bench, Model, dict[str, Any]], Bench]]] = {
     "turn": ("turn the model", _turn),
     "stand": ("lay the model down", _stand),
     "lay": ("lay a face down", _lay),
     "take": ("take another number of parts", _take),
+    "set_part": ("set a part", _set_part),
+    "reset_part": ("take a part's changes back", _reset_part),
     "lock": ("lock a plane", _lock),
 }
 

@@ -5,11 +5,14 @@ from dataclasses import replace
 from typing import Any
 
 from machine.app.requests import Given
+from machine.app.workbench.bench.part_settings import own_values
 from profiles.errors import ProfileError
+from profiles.frozen import Frozen
+from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
 from profiles.places import KINDS, known
 from profiles.profile import SECTIONS, Profile, load, with_part_settings
 
-SHOWN = ("number", "integer", "boolean", "choice")  # kinds of values that a page changes; others are for a profile's file
+SHOWN = ("number", "integer", "boolean", "choice")  # kinds of values that a schema tells as a page has them
 BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
 
 
@@ -42,24 +45,65 @@ def profile_as_given(given: Given, before: Profile) -> Profile:
     return with_part_settings(profile, before.parts)
 
 
-def settings_list(profile: Profile, given: Given) -> list[dict[str, Any]]:
-    """Every key that a page changes: its meaning, kind, range or choices, value, and whether the person has changed it."""
-    changed = {setting.partition("=")[0].strip() for setting in given.settings}
-    rows = []
-    for section, model in SECTIONS.items():
-        values = getattr(profile, section).model_dump(mode="json")
-        for name, told in _fields(model.model_json_schema()):
-            key = f"{section}.{name}"
-            rows.append({"key": key, **told, "value": values[name], "changed": key in changed})
-    return rows
+def allowed_keys(part: int) -> set[str]:
+    """The keys of the process that a part may have of its own."""
+    return set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
 
 
-def _fields(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    for name, field in schema["properties"].items():
-        ways = [way for way in field.get("anyOf", [field]) if way.get("type") != "null"]
-        kind = "choice" if "enum" in ways[0] else ways[0].get("type")
-        if len(ways) > 1 or kind not in SHOWN:
+def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[str, Any]]:
+    """Every key in its group (a matter, or a table of a machine): its meaning, kind, range or choices, value, and whether a
+    person has changed it. part: of this part alone, what it may have of its own; 0: of all."""
+    if part == 0:
+        changed = {setting.partition("=")[0].strip() for setting in given.settings}
+        return [
+            {**row, "changed": row["key"] in changed}
+            for section, model in SECTIONS.items()
+            for row in _rows(section, model, getattr(profile, section).model_dump(mode="json"))
+        ]
+    own, allowed = own_values(profile, part), allowed_keys(part)
+    values = profile.of_part(part).process.model_dump(mode="json")
+    rows = [(row["key"].removeprefix("process."), row) for row in _rows("process", SECTIONS["process"], values)]
+    return [{**row, "changed": name in own} for name, row in rows if name in allowed]
+
+
+def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str = "", about: str = "") -> Iterator[dict[str, Any]]:
+    """group, about: of the table that the model is, "" for the section itself, whose keys are in groups by their matters."""
+    schema = model.model_json_schema()["properties"]
+    for name, field in model.model_fields.items():
+        if name == "name":
             continue
-        least, most = (next((ways[0][word] for word in words if word in ways[0]), None) for words in BOUNDS)
-        meaning, choices = field.get("description", ""), ways[0].get("enum", [])
-        yield name, {"meaning": meaning, "kind": kind, "least": least, "most": most, "choices": choices}
+        table = field.annotation
+        if isinstance(table, type) and issubclass(table, Frozen):
+            yield from _rows(f"{prefix}.{name}", table, values[name], f"{prefix}.{name}", field.description or _sentence(table))
+            continue
+        matter = next(kind for kind in reversed(model.__mro__) if issubclass(kind, Frozen) and name in kind.model_fields)
+        own = f"{prefix}: {matter.__name__.lower()}" if matter is not model else prefix
+        yield {
+            "key": f"{prefix}.{name}",
+            "group": group or own,
+            "about": about or _sentence(matter),
+            "meaning": field.description or "",
+            **_kind(schema[name], values[name]),
+        }
+
+
+def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
+    """How a page has a value typed or chosen. kind: of SHOWN; `numbers`: so many with commas between; `text`: a line of it;
+    `fixed`: not at all, it stays in the profile's file."""
+    ways = [way for way in schema.get("anyOf", [schema]) if way.get("type") != "null"]
+    way = ways[0]
+    kind = "choice" if "enum" in way else str(way.get("type"))
+    numbers = kind == "array" and all(each.get("type") in ("number", "integer") for each in way.get("prefixItems", [{}]))
+    if kind == "string" and "pattern" in way:
+        kind = "text"
+    elif numbers:
+        kind, value = "numbers", None if value is None else ", ".join(f"{number:.12g}" for number in value)
+    elif len(ways) > 1 or kind not in SHOWN:
+        kind, value = "fixed", None
+    least, most = (next((way[word] for word in words if word in way), None) for words in BOUNDS)
+    return {"kind": kind, "least": least, "most": most, "choices": way.get("enum", []), "value": value}
+
+
+def _sentence(model: type[Frozen]) -> str:
+    """The first sentence of what a table says of itself."""
+    return (model.__doc__ or "").strip().partition("\n\n")[0].replace("\n    ", " ").rstrip(".")

@@ -4,7 +4,9 @@ import asyncio
 from typing import Any
 
 from machine.app.workbench.bench.bench import Bench, Model
+from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.session.desk import Desk
+from profiles.profile import Profile
 
 MOST_FACES = 500_000  # that are made ready; for larger models that waits for the first plane
 CHANGING_S = 0.2  # of a bench, until it is made ready as it is
@@ -16,7 +18,8 @@ class Readiness:
     def __init__(self, desk: Desk) -> None:
         self.preparing = 0
         self._desk = desk
-        self._made_of: tuple[object, ...] = ()  # the bench of the last number
+        self._made_of: tuple[object, ...] = (None, None, None)  # the bench of the last number
+        self._profile: Profile | None = None
         self._number = self._wanted = 0
         self._model: Model | None = None  # of the bench that was made ready last
         self._task: asyncio.Task[None] | None = None
@@ -42,10 +45,19 @@ class Readiness:
         return answer
 
     def _number_of(self, bench: Bench) -> int:
-        made_of = (bench.model, bench.rotation, bench.profile, bench.zones)
-        if any(one is not other for one, other in zip(made_of, self._made_of or (None,) * 4, strict=True)):
-            self._made_of, self._number = made_of, self._number + 1
+        made_of = (bench.model, bench.rotation, bench.zones)
+        if any(one is not other for one, other in zip(made_of, self._made_of, strict=True)) or not self._serves(bench.profile):
+            self._made_of, self._profile, self._number = made_of, bench.profile, self._number + 1
         return self._number
+
+    def _serves(self, profile: Profile) -> bool:
+        """Whether what was made ready serves another profile: planes read of it what a search does."""
+        if profile is self._profile:
+            return True
+        serves = self._profile is not None and effect_of_change(self._profile, profile) < Effect.FRONT
+        if serves:
+            self._profile = profile
+        return serves
 
     def _follow(self) -> None:
         bench = self._desk.bench

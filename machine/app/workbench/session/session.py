@@ -1,13 +1,16 @@
 """Session: one bench, the work under way for it, and what its pages may ask for."""
 
+import asyncio
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from machine.app.pipeline.given_plan import with_plan_settings
 from machine.app.requests import Given
-from machine.app.workbench.bench.bench import Bench, Model, with_model, with_plan, with_profile
+from machine.app.workbench.bench.bench import Bench, Model, with_cuts, with_model, with_plan, with_profile
 from machine.app.workbench.bench.commands import obey
+from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.marks import MARKS
 from machine.app.workbench.bench.planes import EDITS, edited, instead_of
 from machine.app.workbench.bench.settings import profile_as_given, with_name, with_setting
@@ -15,6 +18,7 @@ from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.marking import Marking
 from machine.app.workbench.session.pieces import Pieces
+from machine.app.workbench.session.pricing import Pricing
 from machine.app.workbench.session.readiness import Readiness
 from machine.app.workbench.session.slicing import Slicing
 from machine.app.workbench.session.trying import Trying
@@ -35,7 +39,8 @@ class Session(Desk):
         self.slicing, self.readiness = Slicing(self), Readiness(self)
         self.trying = Trying(self, self.readiness)
         self.finding = Finding(self, self.trying)
-        self.pieces = Pieces(self)
+        self.pieces, self._pricing = Pieces(self), Pricing(self)
+        self._settling = asyncio.Lock()
         self.marking = Marking(self, self.trying)
         self.resting: tuple[Model, tuple[Resting, ...]] | None = None
 
@@ -92,10 +97,14 @@ class Session(Desk):
             case "set":
                 value = asked.get("value")
                 key = str(asked.get("key"))
-                self._take_given(f"set {key}", with_setting(self.bench.given, key, None if value is None else str(value)))
+                text = None if value is None else str(value)
+                self._take_given(f"set {key}", lambda given: with_setting(given, key, text))
+            case "reset":
+                self._take_given("take all changes back", lambda given: replace(given, settings=()))
             case "profile":
                 name = str(asked.get("name"))
-                self._take_given(f"take {name}", with_name(self.bench.given, str(asked.get("kind")), name))
+                kind = str(asked.get("kind"))
+                self._take_given(f"take {name}", lambda given: with_name(given, kind, name))
             case "try":
                 self.trying.move(edited(self.bench, {**asked, "do": "move"})[1])
             case name if name in EDITS:
@@ -118,26 +127,38 @@ class Session(Desk):
             files: Files = await self.quick.run("make_files", self.bench)
         return files
 
-    def _take_given(self, word: str, given: Given) -> None:
-        profile = profile_as_given(given, self.bench.profile)
-        self.start(self._change_profile(word, with_profile(self.bench, given, profile)))
+    def _take_given(self, word: str, change: Callable[[Given], Given]) -> None:
+        """Take other names and settings; those of the bench by then, for several may be asked for at once."""
+        profile_as_given(change(self.bench.given), self.bench.profile)  # refused at once
+        self.start(self._settle(word, change))
 
-    async def _change_profile(self, word: str, bench: Bench) -> None:
-        """Take another profile; planes that it forbids go, and a model that it scales or turns otherwise is read again."""
-        refused, before, model = "", self.bench, self.bench.model
+    async def _settle(self, word: str, change: Callable[[Given], Given]) -> None:
+        async with self._settling:
+            before = None
+            while before is not self.bench:
+                before = self.bench
+                given = change(before.given)
+                bench, refused = await self._with_profile(word, before, given)
+            if given != before.given:
+                self.do(word, bench)
+                self.problem = refused
+
+    async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
+        """A bench with another profile; planes that it forbids go, with the reason, and a model that it scales or turns otherwise
+        is read again."""
+        bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
         new, old = bench.profile.process, before.profile.process
         if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
             with self.waiting(f"reading {model.name}"):
                 model = await self.quick.run("read_model", model.path, model.name, bench.profile.of_all_parts)
-            bench = replace(with_model(bench, model), rotation=bench.rotation)
             self.start(self._rank(model))
-        elif bench.cuts is not None:
+            return replace(with_model(bench, model), rotation=bench.rotation), ""
+        if bench.cuts is not None and effect_of_change(before.profile, bench.profile) == Effect.FRONT:
             trial = await self.trying.attempt(bench, bench.cuts)
             if trial.refused:
-                refused = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
-                bench = replace(bench, cuts=None, locked=frozenset())
-        self.do(word, bench)
-        self.problem = refused
+                why = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
+                return replace(with_cuts(bench, ()), cuts=None), why
+        return bench, ""
 
     async def _rank(self, model: Model) -> None:
         await self.readiness.wait()

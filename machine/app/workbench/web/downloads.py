@@ -1,10 +1,9 @@
 """Downloads: what a page saves and looks at: the plan, the parts, the G-code and the page of the print."""
 
-from pathlib import Path
-
 from starlette.requests import Request
 from starlette.responses import Response
 
+from machine.app.workbench.bench.command_line import file_stem
 from machine.app.workbench.session.session import Session
 from profiles.errors import PlanError
 
@@ -12,13 +11,13 @@ from profiles.errors import PlanError
 async def plan(session: Session, request: Request) -> Response:
     """The plan's file."""
     files = await session.files()
-    return _download(files.plan.encode(), "application/toml", f"{_stem(session)}-plan.toml")
+    return _download(files.plan.encode(), "application/toml", f"{file_stem(session.bench)}-plan.toml")
 
 
 async def folder(session: Session, request: Request) -> Response:
     """The folder of the parts as a zip."""
     files = await session.files()
-    return _download(files.folder, "application/zip", f"{_stem(session)}-parts.zip")
+    return _download(files.folder, "application/zip", f"{file_stem(session.bench)}-parts.zip")
 
 
 async def print_page(session: Session, request: Request) -> Response:
@@ -28,7 +27,7 @@ async def print_page(session: Session, request: Request) -> Response:
 
 async def shared_page(session: Session, request: Request) -> Response:
     """The same as a file to save."""
-    return _download(session.slicing.needed().page, "text/html", f"{_stem(session)}.html")
+    return _download(session.slicing.needed().page, "text/html", f"{file_stem(session.bench)}.html")
 
 
 async def gcode(session: Session, request: Request) -> Response:
@@ -38,14 +37,8 @@ async def gcode(session: Session, request: Request) -> Response:
         raise PlanError(
             f"the dry run found {sliced.errors} errors: no G-code is saved; tiltprint export --force does so all the same"
         )
-    return _download(sliced.gcode, "text/plain", f"{_stem(session)}.gcode")
+    return _download(sliced.gcode, "text/plain", f"{file_stem(session.bench)}.gcode")
 
 
 def _download(content: bytes, kind: str, name: str) -> Response:
     return Response(content, media_type=kind, headers={"content-disposition": f'attachment; filename="{name}"'})
-
-
-def _stem(session: Session) -> str:
-    """The model's name for a file's: plain letters only, for it goes into a header."""
-    name = "" if session.bench.model is None else Path(session.bench.model.name.removeprefix("demo:")).stem
-    return "".join(letter if letter.isascii() and (letter.isalnum() or letter in "-_.") else "_" for letter in name) or "model"

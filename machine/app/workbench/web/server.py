@@ -11,6 +11,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import settings_list
 from machine.app.workbench.printing.pages import print_log, prints_line
 from machine.app.workbench.printing.prints import Prints
@@ -141,4 +142,6 @@ async def _settings(session: Session, request: Request) -> Response:
     names = {
         kind: {"names": sorted({*known(kind), getattr(bench.given, kind)}), "name": getattr(bench.given, kind)} for kind in KINDS
     }
-    return JSONResponse({"profiles": names, "settings": settings_list(bench.profile, bench.given)})
+    part = request.query_params.get("part", "")
+    rows = settings_list(bench.profile, bench.given, int(part) if part.isascii() and part.isdigit() and len(part) < 6 else 0)
+    return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})

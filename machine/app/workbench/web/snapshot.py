@@ -62,6 +62,8 @@ def snapshot(session: Session) -> dict[str, Any]:
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
         "given": asdict(bench.given),
+        "part_settings": [{"part": each.part, "keys": list(each.process)} for each in bench.profile.parts],
+        "priced": bench.priced,
         "machine": machine_bodies(bench.profile.machine, known=True),
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,

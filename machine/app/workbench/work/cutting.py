@@ -2,13 +2,14 @@
 
 import io
 import zipfile
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from machine.app.pipeline import compilers
 from machine.app.pipeline.pricing import pricing
-from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench
+from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.worker import Tell
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
@@ -18,6 +19,7 @@ from mdp.plans.writing import plan_text
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
 from mdp.search.orientation import standing_still
 from mdp.search.search import Progress, cut_by_plan, decompose
+from profiles.errors import PlanError
 
 PLAN_NAME = "plan.toml"
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
@@ -59,6 +61,14 @@ def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[st
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
     """The front of a plan for the model on the bench, measured; PlanError where it cannot be cut."""
     return cut_bench(bench, plan, prices=True).front
+
+
+def price_row(tell: Tell, bench: Bench, place: int) -> FrontRow:
+    """A row of the front on the bench with its time and plastic; as it is where it cannot be cut any more."""
+    row = bench.rows[place]
+    with suppress(PlanError):
+        return cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts_of(row), front=()), prices=True).front[0]
+    return row
 
 
 def make_files(tell: Tell, bench: Bench) -> Files:

@@ -4,7 +4,7 @@ pickled."""
 from collections.abc import Callable
 from typing import Any
 
-from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan
+from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan, price_row
 from machine.app.workbench.work.models import rank_resting, read_model
 from machine.app.workbench.work.pieces import draw_pieces
 from machine.app.workbench.work.slices import slice_bench
@@ -17,6 +17,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         rank_resting,
         find_parts,
         measure_plan,
+        price_row,
         make_files,
         draw_pieces,
         slice_bench,

@@ -1,6 +1,7 @@
 // Benches: several models at once, each on a bench and in a page of its own; a page that is closed leaves its bench as it is.
 
 const CLOSED_CODE = 4404; // of a line whose bench is not open any more
+const TOLD_MS = 8000;
 const HERE = Number(location.pathname.split("/").at(-2));
 
 /** A further bench with the settings of this one, in a page of its own; files: opened there, a model before a plan. */
@@ -13,7 +14,10 @@ async function openBench(files = []) {
   }
   const address = new URL(`../${told.number}/`, location.href).href;
   if (page) page.location.replace(address);
-  else notice("The browser opens no further page by itself: the new bench is in the list.");
+  else {
+    notice("The browser opens no further page by itself: the new bench is in the list.");
+    setTimeout(() => notice(""), TOLD_MS);
+  }
   await sendFiles(files, `../${told.number}/`);
   showBenches();
 }

@@ -20,7 +20,7 @@ function partsPanel(bench) {
       document.body.classList.toggle("no-cuts", !parts);
       $("front-field").hidden = !front.length;
       if (!front.length) return;
-      const told = ({ front, parts, recommended, cuts } = {}) => JSON.stringify([front, parts, recommended, cuts]);
+      const told = ({ front, parts, recommended, cuts, priced } = {}) => JSON.stringify([front, parts, recommended, cuts, priced]);
       const fresh = told(state) !== told(before || undefined);
       if (!fresh) return; // a finger may be on the slider
       const place = front.findIndex((row) => row.parts === parts);
@@ -44,9 +44,9 @@ function marksUnder(front, recommended) {
   }));
 }
 
-function tellRow(row, { recommended, parts, cuts }) {
+function tellRow(row, { recommended, parts, cuts, priced }) {
   const byHand = row.parts === parts && JSON.stringify(row.planes) !== JSON.stringify(cuts);
-  const orDash = (value, told) => (value === null ? "–" : told(value)), best = row.parts === recommended;
+  const orDash = (value, told) => (value !== null ? told(value) : priced ? "–" : "worked out anew …"), best = row.parts === recommended;
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [

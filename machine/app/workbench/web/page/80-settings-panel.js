@@ -1,44 +1,139 @@
-// Settings panel: the profile's own keys with their meanings and ranges, searched by a word; what is changed is marked.
+// Settings panel: the profile's own keys in groups, searched by a word; of all parts or of one; what is changed is marked.
+
+const FIXED = "This stays in the profile's file.";
 
 function settingsPanel(bench) {
-  let settings = [];
-  const shown = ({ key, meaning, changed }) => {
-    const words = $("search-settings").value.toLowerCase().split(/\s+/), text = `${key} ${meaning}`.toLowerCase();
-    return words.every((word) => text.includes(word)) && (changed || !$("only-changed").checked);
+  const wrongs = new Map(); // key -> {text, value}: what was refused last, told beside its field
+  let settings = [], pending = null;
+  const part = () => Number($("settings-part").value) || 0;
+  const send = (key, value) => {
+    pending = { key, value };
+    bench.send(part() ? { do: "set_part", part: part(), key, value } : { do: "set", key, value });
+  };
+  const shown = ({ key, meaning, about, changed }) => {
+    const words = $("search-settings").value.toLowerCase().split(/\s+/), text = `${key} ${meaning} ${about}`.toLowerCase();
+    return words.every((word) => text.includes(word)) && (changed || wrongs.has(key) || !$("only-changed").checked);
   };
   const list = () => {
-    const rows = settings.filter(shown);
-    $("settings-count").textContent = `${rows.length} of ${settings.length}`;
-    $("settings-list").replaceChildren(...rows.map((setting) => settingRow(setting, bench)));
+    const rows = settings.filter(shown), changed = settings.filter((setting) => setting.changed).length;
+    $("settings-count").textContent = `${rows.length} of ${settings.length}, ${changed} changed`;
+    $("reset-settings").disabled = !changed;
+    putRows(rows.flatMap((setting, k) => {
+      const wrong = wrongs.get(setting.key), title = rows[k - 1]?.group === setting.group ? [] : [groupTitle(setting)];
+      return [...title, { id: setting.key, told: JSON.stringify([setting, wrong]), make: () => settingRow(setting, wrong, send) }];
+    }));
   };
   const fetchAll = async () => {
-    const answer = await fetch("settings.json");
-    if (!answer.ok) return;
-    const told = await answer.json(), held = document.activeElement?.closest?.("[data-key]")?.dataset.key;
+    const asked = part(), answer = await fetch(`settings.json?part=${asked}`);
+    if (!answer.ok || asked !== part()) return;
+    const told = await answer.json();
     settings = told.settings;
-    $("profiles").replaceChildren($("profiles").querySelector("legend"), ...Object.entries(told.profiles).map(([kind, { names, name }]) => {
-      const select = made("select", {}, ...names.map((text) => made("option", { text, value: text, selected: text === name })));
-      select.addEventListener("change", () => bench.send({ do: "profile", kind, name: select.value }));
-      return made("label", {}, kind, select);
-    }));
+    showProfiles(told.profiles, bench);
+    $("command-line").replaceChildren(...told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
+    $("command-field").hidden = !told.command;
     list();
-    if (held) document.querySelector(`[data-key="${held}"] input, [data-key="${held}"] select`)?.focus();
+  };
+  const partsToChoose = ({ parts, part_settings: own, model }) => {
+    const names = ["all parts", ...Array.from({ length: model ? Math.max(parts, 1) : 0 }, (_, k) => {
+      const keys = own.find((each) => each.part === k + 1)?.keys.length || 0;
+      return `part ${k + 1}${keys ? ` (${keys} of its own)` : ""}`;
+    })];
+    const chosen = part() < names.length ? part() : 0;
+    $("settings-part").replaceChildren(...names.map((text, k) => made("option", { text, value: k, selected: k === chosen })));
   };
   $("search-settings").addEventListener("input", list);
   $("only-changed").addEventListener("change", list);
-  return { told: (state, before) => { if (!alike(state.given, before?.given) || state.problem !== (before?.problem || "")) fetchAll(); } };
+  $("settings-part").addEventListener("change", () => { wrongs.clear(); fetchAll(); });
+  $("reset-settings").addEventListener("click", () => bench.send(part() ? { do: "reset_part", part: part() } : { do: "reset" }));
+  $("copy-command").addEventListener("click", () => copyText($("command-line"), $("copy-command")));
+  const ofSettings = ({ given, part_settings: own, parts, model, rotation } = {}) => [given, own, parts, model?.name, rotation];
+  return {
+    told: (state, before) => {
+      const fresh = !before || !alike(ofSettings(state), ofSettings(before));
+      if (fresh) partsToChoose(state);
+      const refused = pending && state.problem;
+      if (refused) wrongs.set(pending.key, { text: state.problem, value: pending.value });
+      else if (fresh && pending) wrongs.delete(pending.key);
+      if (refused || fresh) pending = null;
+      if (refused && bench.tab === "settings") $("problem").hidden = true; // it stands beside its field
+      if (fresh) fetchAll();
+      else if (refused) list();
+    },
+  };
 }
 
-function settingRow(setting, bench) {
-  const { key, meaning, kind, least, most, choices, value, changed } = setting;
-  const input = kind === "choice" ? made("select", {}, ...choices.map((text) => made("option", { text, value: text, selected: text === value })))
-    : kind === "boolean" ? made("input", { type: "checkbox", checked: value })
-      : made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: value ?? "", ...(least === null ? {} : { min: least }), ...(most === null ? {} : { max: most }) });
-  input.addEventListener("change", () => bench.send({ do: "set", key, value: kind === "boolean" ? `${input.checked}` : input.value || null }));
+function showProfiles(profiles, bench) {
+  const rows = Object.entries(profiles).map(([kind, { names, name }]) => {
+    const select = made("select", {}, ...names.map((text) => made("option", { text, value: text, selected: text === name })));
+    select.addEventListener("change", () => bench.send({ do: "profile", kind, name: select.value }));
+    return { id: kind, told: JSON.stringify([names, name]), make: () => made("label", {}, kind, select) };
+  });
+  putRows(rows, $("profiles-list"));
+}
+
+/** Rows {id, told, make()} put into a list: those that tell the same as before stay, so that the keyboard keeps its place. */
+function putRows(rows, into = $("settings-list")) {
+  const here = [...into.children], same = here.length === rows.length && rows.every(({ id }, k) => here[k].dataset.id === id);
+  const known = new Map(here.map((element) => [element.dataset.id, element])), held = document.activeElement?.closest("[data-id]")?.dataset.id;
+  const elements = rows.map(({ id, told, make }) => {
+    const old = known.get(id);
+    if (old?.dataset.told === told) return old;
+    const element = make();
+    Object.assign(element.dataset, { id, told });
+    if (same) old.replaceWith(element);
+    return element;
+  });
+  if (!same) into.replaceChildren(...elements);
+  if (held && document.activeElement === document.body) into.querySelector(`[data-id="${held}"] :is(input, select)`)?.focus();
+}
+
+function groupTitle({ group, about }) {
+  const text = `${group.split(":")[0]}: ${about[0].toLowerCase()}${about.slice(1)}`;
+  return { id: `group ${group}`, told: text, make: () => made("h3", { text }) };
+}
+
+function settingRow(setting, wrong, send) {
+  const { key, meaning, kind, least, most, value, changed } = setting, now = wrong && kind !== "boolean" ? wrong.value : value;
+  const input = inputOf(setting, now);
   const range = kind === "number" || kind === "integer" ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
-  const back = made("button", { type: "button", text: "↺", title: "As the profile has it", ariaLabel: `${key} as the profile has it`, hidden: !changed });
-  back.addEventListener("click", () => bench.send({ do: "set", key, value: null }));
-  const row = made("div", { className: changed ? "setting changed" : "setting" }, made("label", {}, made("span", { text: key }), input, back), made("small", { text: meaning + range }));
+  const told = made("small", { text: meaning + range, id: `meaning-${key}` }), refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
+  if (kind === "fixed") return settingBox(setting, [made("label", {}, made("span", { text: key })), told, made("small", { text: FIXED })]);
+  input.setAttribute("aria-describedby", told.id);
+  input.setAttribute("aria-invalid", Boolean(wrong));
+  input.addEventListener("change", () => send(key, typedIn(input, kind)));
+  const back = made("button", { type: "button", text: "↺", title: "As it was", ariaLabel: `${key} as it was`, hidden: !changed && !wrong });
+  back.addEventListener("click", () => send(key, null));
+  return settingBox(setting, [made("label", {}, made("span", { text: key }), input, back), refused, told]);
+}
+
+function settingBox({ key, changed }, children) {
+  const row = made("div", { className: changed ? "setting changed" : "setting" }, ...children);
   row.dataset.key = key;
   return row;
+}
+
+function inputOf({ kind, choices, least, most }, value) {
+  if (kind === "choice") return made("select", {}, ...choices.map((text) => made("option", { text, value: text, selected: String(text) === String(value) })));
+  if (kind === "boolean") return made("input", { type: "checkbox", checked: value });
+  if (kind === "numbers" || kind === "text") return made("input", { type: "text", value: value === null ? "" : String(value).replace(/^\[|\]$/g, "") });
+  const limits = { ...(least === null ? {} : { min: least }), ...(most === null ? {} : { max: most }) };
+  return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: value ?? "", ...limits });
+}
+
+/** What a person has typed or chosen, as --set takes it; null, for nothing: as the profile has it. */
+function typedIn(input, kind) {
+  if (kind === "boolean") return `${input.checked}`;
+  const text = input.value.trim();
+  return text && kind === "numbers" ? `[${text}]` : text || null;
+}
+
+/** A text into the clipboard, or marked for the person to take where the browser allows no more. */
+async function copyText(element, button) {
+  const range = document.createRange();
+  range.selectNodeContents(element);
+  getSelection().removeAllRanges();
+  getSelection().addRange(range);
+  const copied = await navigator.clipboard?.writeText(element.textContent).then(() => true, () => false);
+  button.textContent = copied ? "Copied" : "Marked: copy it by Ctrl+C";
+  setTimeout(() => { button.textContent = "Copy"; }, 3000);
 }

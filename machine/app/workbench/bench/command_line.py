@@ -1,0 +1,65 @@
+"""Command line: what a person types to get the G-code of what lies on the bench."""
+
+from math import asin, atan2, degrees
+from pathlib import Path
+from shlex import join
+
+import numpy as np
+
+from machine.app.workbench.bench.bench import Bench
+from mdp.mesh import Floats
+from mdp.pose import about
+from profiles.profile import DEFAULTS
+
+LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and z are one
+
+
+def file_stem(bench: Bench) -> str:
+    """The model's name for that of a file: plain letters only."""
+    name = "" if bench.model is None else Path(bench.model.name.removeprefix("demo:")).stem
+    return "".join(letter if letter.isascii() and (letter.isalnum() or letter in "-_.") else "_" for letter in name) or "model"
+
+
+def export_command(bench: Bench) -> str:
+    """The line for a shell; "" without a model. A plan, as the workbench saves it, holds how the model is cut and turned and what
+    single parts have of their own."""
+    if bench.model is None:
+        return ""
+    given, stem = bench.given, file_stem(bench)
+    named = [(kind, getattr(given, kind)) for kind in DEFAULTS if getattr(given, kind) != DEFAULTS[kind]]
+    words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
+    settings = list(given.settings)
+    if bench.cuts is None and bench.turned is not None:
+        settings = [each for each in settings if each.partition("=")[0].strip() != "process.rotate_deg"]
+        settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.9g}' for angle in turns_deg(bench))}]")
+    words += [word for setting in settings for word in ("--set", setting)]
+    if bench.cuts is not None:
+        words += ["--plan", f"{stem}-plan.toml"]
+    else:
+        words += ["--parts", "1"]
+        for each in bench.profile.parts:
+            words += ["--part", f"{each.part}:{','.join(f'{key}={_typed(value)}' for key, value in each.process.items())}"]
+    return join([*words, "-o", f"{stem}.gcode"])
+
+
+def _typed(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def turns_deg(bench: Bench) -> tuple[float, float, float]:
+    """The turns about x, then y, then z that `process.rotate_deg` needs for the model to stand as it does on the bench."""
+    read = turned_by(bench.profile.process.rotate_deg)
+    rotation = np.array(bench.rotation) @ read
+    sine = min(max(-float(rotation[2, 0]), -1.0), 1.0)
+    if abs(sine) > LEVEL:
+        return 0.0, degrees(asin(sine)), degrees(atan2(-rotation[0, 1], rotation[1, 1])) + 0.0
+    x, z = atan2(rotation[2, 1], rotation[2, 2]), atan2(rotation[1, 0], rotation[0, 0])
+    return degrees(x) + 0.0, degrees(asin(sine)) + 0.0, degrees(z) + 0.0
+
+
+def turned_by(angles_deg: tuple[float, float, float]) -> Floats:
+    """(3, 3) the rotation of turns about x, then y, then z."""
+    whole = np.eye(3)
+    for axis, angle in zip(np.eye(3), np.radians(angles_deg), strict=True):
+        whole = about(axis, float(angle)) @ whole
+    return whole

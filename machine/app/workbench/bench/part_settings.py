@@ -1,0 +1,54 @@
+"""Part settings: what a person sets for one part alone, and which part it is for when planes come, go or change their order."""
+
+from collections.abc import Sequence
+
+from mdp.plans.plan_file import PlannedPart
+from profiles.errors import PlanError
+from profiles.part_settings import PartSettings
+from profiles.profile import Profile, with_part_settings
+from profiles.toml_text import read_value
+
+
+def with_part_setting(profile: Profile, part: int, key: str, value: str | None) -> Profile:
+    """The profile with another value of a key of the process for one part; None: as all parts have it. Raises ProfileError."""
+    name = key.removeprefix("process.")
+    kept = own_values(profile, part)
+    kept.pop(name, None)
+    changed = kept if value is None else {**kept, name: read_value(value.strip())}
+    others = [each for each in profile.parts if each.part != part]
+    return with_part_settings(profile.of_all_parts, [*others, *([PartSettings(part=part, process=changed)] if changed else [])])
+
+
+def without_part_settings(profile: Profile, part: int) -> Profile:
+    """The profile with that part as all parts are."""
+    others = [each for each in profile.parts if each.part != part]
+    return profile.model_copy(update={"parts": others})
+
+
+def own_values(profile: Profile, part: int) -> dict[str, object]:
+    """What a part has of its own, by the keys of the process."""
+    return next((dict(each.process) for each in profile.parts if each.part == part), {})
+
+
+def check_part(part: object, parts: int) -> int:
+    """The number of a part. Raises PlanError for one that is not there; an uncut model is part 1."""
+    most = max(parts, 1)
+    if not isinstance(part, int) or isinstance(part, bool) or not 1 <= part <= most:
+        raise PlanError(f"part is {part!r}: {'1 is' if most == 1 else f'1 to {most} are'} allowed")
+    return part
+
+
+def following(profile: Profile, before: Sequence[PlannedPart], after: Sequence[PlannedPart]) -> Profile:
+    """The profile with settings for the parts that they were made for, among other planes: a part goes with its plane, also where
+    that was moved alone; what a part that is gone had goes with it."""
+    kept = []
+    for each in profile.parts:
+        place = each.part - 2
+        if place < 0:
+            kept.append(each)
+        elif place < len(before) and before[place] in after:
+            kept.append(each.model_copy(update={"part": after.index(before[place]) + 2}))
+        elif place < len(before) == len(after) and after[place] not in before:
+            kept.append(each)
+    kept.sort(key=lambda each: each.part)
+    return profile if kept == profile.parts else profile.model_copy(update={"parts": kept})

@@ -1,0 +1,34 @@
+"""Pricing: times and plastic of a front worked out anew, a row at a time, where a setting that no search reads has changed."""
+
+from machine.app.workbench.bench.bench import Bench, places_to_price, with_prices
+from machine.app.workbench.session.desk import Desk
+
+
+class Pricing:
+    """Work in the background; slices and searches go between two rows."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._at_work = False
+        desk.followers.append(self._follow)
+
+    def _follow(self) -> None:
+        if not self._desk.bench.priced and not self._at_work:
+            self._at_work = True
+            self._desk.start(self._price_all())
+
+    async def _price_all(self) -> None:
+        """Until nothing on the bench is without a price, whatever is changed meanwhile."""
+        try:
+            while not self._desk.bench.priced:
+                await self._price(self._desk.bench)
+        finally:
+            self._at_work = False
+
+    async def _price(self, bench: Bench) -> None:
+        prices = {}
+        for place in places_to_price(bench):
+            prices[place] = await self._desk.long.run("price_row", bench, place)
+            if self._desk.bench is not bench:
+                return
+        self._desk.become(self._desk.history.amended(with_prices(bench, prices)))

@@ -1,0 +1,83 @@
+"""Settings of single parts on the workbench, and the command line that does what lies on the bench."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from machine.app.requests import Given
+from machine.app.workbench.bench.bench import Bench, History, Model, Step, with_cuts
+from machine.app.workbench.bench.command_line import export_command, turned_by, turns_deg
+from machine.app.workbench.bench.commands import obey
+from machine.app.workbench.bench.settings import settings_list
+from mdp.plans.plan_file import PlannedPart
+from profiles.errors import PlanError, ProfileError
+from profiles.profile import load
+from tests.shapes import tee
+
+LOW, MIDDLE, HIGH = (PlannedPart((0.0, 0.0, 1.0), offset) for offset in (10.0, 20.0, 30.0))
+BENCH = Bench(load(), Model("tee.stl", Path("tee.stl"), tee()), cuts=(LOW, MIDDLE))
+
+
+def obeyed(bench: Bench, **asked: object) -> Bench:
+    return obey(History(Step("", bench)), asked).now.bench
+
+
+def own(bench: Bench) -> dict[int, dict[str, object]]:
+    return {each.part: each.process for each in bench.profile.parts}
+
+
+def test_a_part_has_values_of_its_own_that_are_marked_and_go_back() -> None:
+    bench = obeyed(
+        obeyed(BENCH, do="set_part", part=2, key="process.walls", value="5"), do="set_part", part=2, key="seam", value="rear"
+    )
+    assert own(bench) == {2: {"walls": 5, "seam": "rear"}}
+    row = next(row for row in settings_list(bench.profile, Given(), 2) if row["key"] == "process.walls")
+    assert (row["value"], row["changed"]) == (5, True)
+    assert own(obeyed(bench, do="set_part", part=2, key="process.walls", value=None)) == {2: {"seam": "rear"}}
+    assert own(obeyed(bench, do="reset_part", part=2)) == {}
+
+
+def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
+    first, second = ({row["key"] for row in settings_list(load(), Given(), part)} for part in (1, 2))
+    assert "process.scale" not in first | second
+    assert second - first == {key for key in second if key.startswith("process.interface_")} - first
+    assert "process.interface_fan" in second - first
+
+
+def test_settings_follow_the_plane_of_their_part_and_go_with_it() -> None:
+    bench = obeyed(BENCH, do="set_part", part=3, key="process.walls", value="5")
+    assert own(with_cuts(bench, (LOW, HIGH, MIDDLE))) == {4: {"walls": 5}}
+    assert own(with_cuts(bench, (MIDDLE,))) == {2: {"walls": 5}}
+    assert own(with_cuts(bench, (LOW, HIGH))) == {3: {"walls": 5}}
+    assert own(with_cuts(bench, (LOW,))) == {}
+
+
+@pytest.mark.parametrize(
+    ("asked", "sentence"),
+    [
+        ({"part": 4, "key": "process.walls", "value": "5"}, "part is 4: 1 to 3 are allowed"),
+        ({"part": 2, "key": "process.scale", "value": "2"}, "part 2: process.scale holds for the whole print"),
+        ({"part": 2, "key": "process.walls", "value": "-1"}, r"part 2: process\.walls"),
+    ],
+)
+def test_what_a_part_cannot_have_is_told(asked: dict[str, object], sentence: str) -> None:
+    with pytest.raises((PlanError, ProfileError), match=sentence):
+        obeyed(BENCH, do="set_part", **asked)
+
+
+def test_the_command_line_names_what_differs_from_the_usual() -> None:
+    given = Given(machine="fractal5pro", settings=("process.walls=4",))
+    start = "tiltprint export tee.stl --machine fractal5pro --set process.walls=4"
+    assert export_command(replace(BENCH, given=given)) == f"{start} --plan tee-plan.toml -o tee.gcode"
+    uncut = obeyed(replace(BENCH, given=given, cuts=None), do="set_part", part=1, key="process.ironing", value="true")
+    assert export_command(uncut) == f"{start} --parts 1 --part 1:ironing=true -o tee.gcode"
+
+
+@pytest.mark.parametrize("angles_deg", [(20.0, -50.0, 130.0), (0.0, 90.0, 30.0), (0.0, 0.0, 0.0)])
+def test_the_turns_of_the_command_line_stand_the_model_as_it_is(angles_deg: tuple[float, float, float]) -> None:
+    profile = load(settings=["process.rotate_deg=[10, 0, 0]"])
+    turned = obeyed(Bench(profile, BENCH.model), do="stand", rotation=turned_by(angles_deg).tolist())
+    assert turned_by(turns_deg(turned)) == pytest.approx(turned_by(angles_deg) @ turned_by((10.0, 0.0, 0.0)), abs=1e-9)
+    assert np.linalg.det(turned_by(turns_deg(turned))) == pytest.approx(1.0)

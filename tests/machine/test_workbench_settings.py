@@ -1,0 +1,92 @@
+"""Settings on the workbench in a real browser: of all parts and of one, refused beside their field, and what a front bears."""
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from mdp.save import stl
+from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.test_workbench_page import FOUND, IDLE, WINDOW, open_model
+from tests.machine.workbench import QUICK, Running, workbench
+from tests.shapes import tee
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with Browser(WINDOW) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Running]:
+    with workbench(*QUICK) as running:
+        yield running
+
+
+def put(browser: Browser, key: str, value: object) -> None:
+    """A value typed into a setting's field."""
+    field = f"document.querySelector('[data-key=\"{key}\"] input')"
+    browser.wait(field)
+    browser.value(f"{{ const input = {field}; input.value = {json.dumps(value)}; input.dispatchEvent(new Event('change')); }}")
+
+
+def changed(key: str) -> str:
+    return f"document.querySelector('[data-key=\"{key}\"].changed')"
+
+
+def choose_part(browser: Browser, part: int) -> None:
+    browser.value(f"{{ $('settings-part').value = {part}; $('settings-part').dispatchEvent(new Event('change')); }}")
+
+
+def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "settings.stl", stl(tee()))
+    browser.click("#tab-settings")
+    put(browser, "machine.tilt.limits_deg", "-45, 45")
+    browser.wait(changed("machine.tilt.limits_deg"))
+    put(browser, "process.walls", -3)
+    wrong = "document.querySelector('[data-key=\"process.walls\"] .wrong')"
+    browser.wait(f"{wrong} && {wrong}.textContent")
+    assert browser.value(f"{wrong}.textContent").startswith("process.walls is -3")
+    assert browser.value("$('problem').hidden")
+    choose_part(browser, 1)
+    browser.wait("!document.querySelector('[data-key=\"machine.tilt.limits_deg\"]')")
+    put(browser, "process.walls", 5)
+    browser.wait(changed("process.walls"))
+    assert browser.value("$('settings-part').selectedOptions[0].text") == "part 1 (1 of its own)"
+    told = browser.value("$('command-line').textContent")
+    assert "--set 'machine.tilt.limits_deg=[-45, 45]' --parts 1 --part 1:walls=5 -o settings.gcode" in told
+    browser.click("#reset-settings")
+    browser.wait("$('reset-settings').disabled && $('settings-part').selectedOptions[0].text === 'part 1'")
+    choose_part(browser, 0)
+    browser.wait(changed("machine.tilt.limits_deg"))
+    browser.click("#undo")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: set a part'")
+
+
+def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_and_it_goes_with_the_angle(
+    browser: Browser, bench: Running
+) -> None:
+    open_model(browser, bench, "front.stl", stl(tee()))
+    browser.click("#tab-parts")
+    browser.click("#find")
+    browser.wait(FOUND)
+    row = "[...$('front-told').querySelectorAll('dd')].map((cell) => cell.textContent)"
+    before = browser.value(row)
+    browser.click("#tab-settings")
+    put(browser, "material.nozzle_c", 222)
+    browser.wait(changed("material.nozzle_c"))
+    assert browser.value(row) == before
+    put(browser, "process.infill_density", 1)
+    browser.wait(f"{changed('process.infill_density')} && !$('front-told').textContent.includes('worked out anew')")
+    after = browser.value(row)
+    assert after[:3] == before[:3]
+    assert float(after[4].split()[0]) > float(before[4].split()[0])  # metres of filament
+    put(browser, "process.self_supporting_angle_deg", 40)
+    browser.wait(f"{changed('process.self_supporting_angle_deg')} && $('front-field').hidden && {IDLE}")
+    browser.click("#undo")
+    browser.wait("!$('front-field').hidden")
+    assert browser.value(row) == after
+    assert browser.complaints == []
