@@ -15,12 +15,15 @@ from mdp.overhang import UP
 from mdp.plane import Plane
 from mdp.pose import about
 from mdp.sweep.rims import measure_rim
+from mdp.sweep.sweep import Remainder, gains
 
 REACH_SHARE, REACH_DEG = 0.15, 25.0  # how far a neck is looked for: of the diagonal of what is cut, and tilted by so much
 RISE = 0.02  # share by which a rim must grow on either side
 OFFSETS, RINGS = 48, 3  # of the first look: planes along each direction, and rings of directions around the first
-MOST_TRIED = 4  # of the necks of the first look that are refined
+MOST_TRIED, APART = 3, 0.3  # of the necks of the first look that are refined; how far apart those are, a share of the reach
 LEAST_MM, LEAST_DEG = 0.005, 0.02  # finer, nobody cuts
+MOST_STEPS, LEAST_GAIN = 60, 1e-6  # of the refinement; by what share a rim must be shorter to be gone to
+NOTHING_RISKY = -2.0  # below the cosine of any face
 NEAR_MM = 1e-6  # corners nearer to a plane count as above it, or rims along edges would be lost
 
 
@@ -67,8 +70,9 @@ def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float, reach_deg
     if surface.rim_mm(plane) <= 0.0:
         return None
     centre = surface.centre_mm(plane)
-    found = sorted(_first_look(surface, plane.normal, centre, reach_mm, reach_deg), key=lambda each: each[0])
-    necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS, reach_deg / RINGS) for _, begin in found[:MOST_TRIED]]
+    found = sorted(_first_look(mesh, seen, plane.normal, centre, (reach_mm, reach_deg)), key=lambda each: each[0])
+    begins = _apart(surface, [begin for _, begin in found], APART * reach_mm)
+    necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS, reach_deg / RINGS) for begin in begins]
     allowed = [neck for neck in necks if _is_neck(surface, neck, plane, centre, (reach_mm, reach_deg))]
     return min(allowed, key=surface.rim_mm, default=None)
 
@@ -84,16 +88,34 @@ def _near(mesh: Mesh, seen: Floats, heights: Floats, reach_mm: float, reach_deg:
 
 
 def _first_look(
-    surface: _Surface, normal: Floats, centre: Floats, reach_mm: float, reach_deg: float
+    mesh: Mesh, seen: Floats, normal: Floats, centre: Floats, reach: tuple[float, float]
 ) -> Iterator[tuple[float, Plane]]:
-    """Planes whose rim is shorter than those of their neighbours along their normal, with their rims."""
-    steps = np.linspace(-reach_mm, reach_mm, OFFSETS + 1)
-    for direction in _directions(normal, reach_deg):
-        planes = [Plane(direction, float(direction @ centre) + float(step)) for step in steps]
-        rims = np.array([surface.rim_mm(each) for each in planes])
-        for k in range(1, OFFSETS):
-            if 0.0 < rims[k] <= min(rims[k - 1], rims[k + 1]) and rims[k] < max(rims[k - 1], rims[k + 1]):
-                yield float(rims[k]), planes[k]
+    """Planes whose rim is shorter than those of their neighbours along their normal, with their rims: a sweep along each
+    direction."""
+    reach_mm, reach_deg = reach
+    step_mm, directions = 2.0 * reach_mm / OFFSETS, np.array(list(_directions(normal, reach_deg)))
+    remainder = Remainder(mesh, np.zeros(len(mesh.faces), dtype=np.bool_), np.where(seen > 0.0, 1.0, 0.0))
+    swept = gains(remainder, directions, step_mm, NOTHING_RISKY)
+    for row, direction in enumerate(directions):
+        offsets_mm = (swept.first[row] + np.arange(swept.columns[row])) * step_mm
+        rims = swept.rim_mm[row, : swept.columns[row]]
+        near = np.abs(offsets_mm - direction @ centre) <= reach_mm
+        before, here, after = rims[:-2], rims[1:-1], rims[2:]
+        low = near[1:-1] & (here > 0.0) & (here <= np.minimum(before, after)) & (here < np.maximum(before, after))
+        for k in np.flatnonzero(low) + 1:
+            yield float(rims[k]), Plane(direction, float(offsets_mm[k]))
+
+
+def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plane]:
+    """The first planes whose rims have their middles so far from each other: neighbouring directions find the same neck."""
+    taken: list[tuple[Floats, Plane]] = []
+    for plane in planes:
+        centre = surface.centre_mm(plane)
+        if all(float(np.linalg.norm(centre - other)) > apart_mm for other, _ in taken):
+            taken.append((centre, plane))
+        if len(taken) == MOST_TRIED:
+            break
+    return [plane for _, plane in taken]
 
 
 def _directions(normal: Floats, reach_deg: float) -> Iterator[Floats]:
@@ -115,14 +137,18 @@ def _beside(normal: Floats) -> tuple[Floats, Floats]:
 
 
 def _refined(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -> Plane:
-    """The plane of the shortest rim that is reached downhill: moved, or tilted about the middle of its rim, ever less."""
+    """The plane of the shortest rim that is reached downhill: moved, or tilted about the middle of its rim, ever less.
+
+    What goes on downhill for long is on its way to an end of the model: it is left where it is, and is no neck.
+    """
     least = surface.rim_mm(plane)
-    while step_mm > LEAST_MM or step_deg > LEAST_DEG:
-        tried = [
-            (rim, each) for each in _around(surface, plane, step_mm, step_deg) if 0.0 < (rim := surface.rim_mm(each)) < least
-        ]
-        if tried:
-            least, plane = min(tried, key=lambda each: each[0])
+    for _ in range(MOST_STEPS):
+        tried = [(rim, each) for each in _around(surface, plane, step_mm, step_deg) if (rim := surface.rim_mm(each)) > 0.0]
+        rim, best = min(tried, key=lambda each: each[0], default=(least, plane))
+        if rim < (1.0 - LEAST_GAIN) * least:
+            least, plane = rim, best
+        elif step_mm <= LEAST_MM and step_deg <= LEAST_DEG:
+            break
         else:
             step_mm, step_deg = 0.5 * step_mm, 0.5 * step_deg
     return plane
