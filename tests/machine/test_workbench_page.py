@@ -54,7 +54,8 @@ def open_model(browser: Browser, bench: Running, name: str, content: bytes) -> N
 def saved(browser: Browser, button: str) -> str:
     """The text that a button saves."""
     browser.value(
-        "{ const make = URL.createObjectURL; URL.createObjectURL = (blob) => { window.saved = blob; return make(blob); }; }"
+        "{ window.saved = null; const make = URL.createObjectURL; "
+        "URL.createObjectURL = (blob) => { window.saved = blob; return make(blob); }; }"
     )
     browser.click(button)
     browser.wait("window.saved")

@@ -167,7 +167,7 @@ function showPrint(print, commands) {
   listIn("run-findings", asking && figures ? figures.findings : []);
   $("run-ask").hidden = phase !== "ready" || !commands;
   $("run-live").hidden = !progress;
-  if (progress) showProgress(progress);
+  if (progress) showProgress(progress, over);
   const paused = progress && ["paused", "pausing"].includes(progress.state);
   $("pause").textContent = paused ? "Resume" : "Pause";
   $("pause").dataset.does = paused ? "resume" : "pause";
@@ -194,7 +194,7 @@ const stateTold = ({ state, share, left_s: left, message }) => [
 const figuresTold = ({ lines, time_s: time, filament_mm: filament, errors }) =>
   `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m of filament${errors ? `, ${errors} errors in the dry run` : ""}`;
 
-function showProgress(progress) {
+function showProgress(progress, over) {
   const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
   const heat = (now, target) => `${now.toFixed(1)}${target == null ? "" : ` of ${target.toFixed(0)}`} °C`;
   $("run-progress").value = progress.share || 0;
@@ -205,8 +205,8 @@ function showProgress(progress) {
     progress.bed_c != null && ["bed", heat(progress.bed_c, progress.bed_target_c)],
     Object.keys(progress.at).length && ["position", Object.entries(progress.at).map(([letter, value]) => `${letter} ${value.toFixed(1)}`).join("  ")],
     ["line", of(progress.acknowledged, progress.total)],
-    ["so far", duration(progress.elapsed_s)],
-    progress.left_s != null && ["done at", new Date(Date.now() + 1000 * progress.left_s).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" })],
+    [over ? "took" : "so far", duration(progress.elapsed_s)],
+    !over && progress.left_s != null && ["done at", new Date(Date.now() + 1000 * progress.left_s).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" })],
   ].filter(Boolean));
   for (const [id, percent] of [["feed", progress.feed_percent], ["flow", progress.flow_percent]]) {
     if ($(id).dataset.held) continue;
