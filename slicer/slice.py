@@ -89,7 +89,7 @@ def slice_site(site: Site, supports: Supports, on_layer: Callable[[int, int], No
 def _unsupported(site: Site, supports: Supports, layers: Sequence[Layer]) -> tuple[Unsupported, ...]:
     """The places that got no support, with the numbers of the layers that print anything."""
     tops = np.array([layer.z_mm for layer in layers])
-    places = explain(site, supports) if supports.unsupported_mm2 > 0.0 else ()
+    places = explain(site, supports) if supports.unsupported_mm2 > 0.0 or site.left_out else ()
     count = np.searchsorted(tops, site.heights.tip_mm, side="right")
     return tuple(replace(place, layer=int(count[place.layer])) for place in places)
 

@@ -1,5 +1,7 @@
 """Reason: why a hanging place could be given no support, one sentence each."""
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from mdp.clearance import least_tip_height_mm
@@ -12,19 +14,25 @@ from slicer.support.missed import seen_from_above
 from slicer.support.reachable import EVEN_MM
 from slicer.support.support import Supports
 
+UNWANTED = "no support is wanted there"
 MOST = 0.5  # share of a place that one reason has to hold for
 
 
 def explain(site: Site, supports: Supports) -> tuple[Unsupported, ...]:
     """Every place that got no support, the largest first; layers are counted from 0."""
-    told = []
-    for island in islands(seen_from_above(supports.missed)):
-        places = {k: place ^ island for k, place in enumerate(supports.missed) if not place.is_empty()}
+    told = [Unsupported(mm2, layer, _reason(layer, place, site)) for mm2, layer, place in _places(supports.missed)]
+    told += [Unsupported(mm2, layer, UNWANTED) for mm2, layer, _ in _places(site.left_out)]
+    return tuple(sorted(told, key=lambda place: (-place.mm2, place.layer)))
+
+
+def _places(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, Polygons]]:
+    """What hangs, seen from above as connected places: the area of each, the layer with most of it and what of it is there."""
+    for island in islands(seen_from_above(hanging)):
+        places = {k: place ^ island for k, place in enumerate(hanging) if not place.is_empty()}
         areas = {k: place.area() for k, place in places.items()}
         worst = max(areas, key=lambda k: areas[k], default=-1)
         if worst >= 0 and areas[worst] > 0.0:
-            told.append(Unsupported(sum(areas.values()), worst, _reason(worst, places[worst], site)))
-    return tuple(sorted(told, key=lambda place: (-place.mm2, place.layer)))
+            yield sum(areas.values()), worst, places[worst]
 
 
 def _reason(layer: int, place: Polygons, site: Site) -> str:

@@ -19,6 +19,7 @@ from slicer.interface.interlock import cut_grooves
 from slicer.plate import compensate_elephant_foot, plate_outline
 from slicer.section import sections
 from slicer.support.blocker import blocked_areas, far_mm
+from slicer.support.missed import drop_small
 from slicer.support.overhang import Overhang, detect_overhangs
 from slicer.support.pedestal import pedestal_layers, without_pedestal
 from slicer.support.support import Supports, generate_supports
@@ -31,7 +32,8 @@ class Site:
 
     outlines: whole sections; own: without the pedestal; uncut: own without the grooves for later parts; overhangs: what hangs
     and what bridges; beneath: the plastic under the first layer, None on the platform; floor: the plate's outline, of use to
-    part 1; pedestal_layers: how many of the lowest layers the pedestal takes. profile: the part's own.
+    part 1; pedestal_layers: how many of the lowest layers the pedestal takes. profile: the part's own. left_out: of each layer
+    what hangs and is not to be held up; empty: nothing does.
     """
 
     part: Part
@@ -47,6 +49,7 @@ class Site:
     floor: Polygons
     pedestal_layers: int
     far_mm: float
+    left_out: Sequence[Polygons] = ()
 
     @property
     def process(self) -> Process:
@@ -107,6 +110,8 @@ def survey(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequenc
     own = cut_grooves(uncut, part, later, heights.cut_mm, process)
     outlines = cut_grooves(outlines, part, later, heights.cut_mm, process) if pedestal_count else own
     below = plastic_beneath(part, earlier, outlines[0])
+    hanging = detect_overhangs(mesh, outlines, heights.cut_mm, process, below)
+    overhangs = without_unwanted(hanging, part, heights.cut_mm)
     return Site(
         part=part,
         earlier=earlier,
@@ -116,9 +121,19 @@ def survey(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequenc
         outlines=outlines,
         own=own,
         uncut=uncut,
-        overhangs=without_unwanted(detect_overhangs(mesh, outlines, heights.cut_mm, process, below), part, heights.cut_mm),
+        overhangs=overhangs,
         beneath=below,
         floor=plate_outline(profile.machine.table),
         pedestal_layers=pedestal_count,
         far_mm=far_mm(mesh),
+        left_out=_left_out(hanging, overhangs, process) if part.no_support.anywhere else (),
+    )
+
+
+def _left_out(hanging: Sequence[Overhang], overhangs: Sequence[Overhang], process: Process) -> Sequence[Polygons]:
+    """What hangs in each layer and would have got support, were it wanted; specks not."""
+    if process.support == "none":
+        return ()
+    return drop_small(
+        [whole.hanging - kept.hanging for whole, kept in zip(hanging, overhangs, strict=True)], process.support_least_mm2
     )

@@ -84,7 +84,8 @@ def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zon
     assert support_x_mm(free).max() > 15.0
     assert support_x_mm(kept).max() < 6.0
     assert support_x_mm(kept).min() == pytest.approx(support_x_mm(free).min(), abs=0.5)
-    assert kept.unsupported == ()
+    ((mm2, why),) = [(place.mm2, place.reason) for place in kept.unsupported]
+    assert (why, mm2) == ("no support is wanted there", pytest.approx(150.0, rel=0.05))
     counted = [sum(area is not NOTHING for area in sample_part(each, SUPPORTED).support.areas) for each in (part, bare(part))]
     assert (counted[0] > 0, counted[1]) == (True, 0)
     assert volume_mm3(kept, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)

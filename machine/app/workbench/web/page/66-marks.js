@@ -62,6 +62,7 @@ function marksPanel(bench) {
   };
   const sidePlace = (zone, { axis, end }) => [0, 1, 2].map((k) => (k === axis ? zone[end][k] : (zone.min_mm[k] + zone.max_mm[k]) / 2));
   const choose = (zone) => { chosen = zone && { kind: zone.kind, number: zone.number }; hand = null; tellMarks(); bench.showMarks(); };
+  $("mark-faces").disabled = $("mark-box").disabled = !bench.picture;
   for (const what of ["faces", "box"]) $(`mark-${what}`).addEventListener("click", () => bench.mark(bench.marking === what ? "" : what));
   $("mark-kind").addEventListener("change", () => bench.mark(bench.marking || ""));
   $("mark-middle").addEventListener("click", () => {
