@@ -3,6 +3,7 @@
 import asyncio
 import json
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
@@ -11,6 +12,7 @@ from machine.app.workbench.web.snapshot import snapshot
 from profiles.errors import PlanError
 
 MOST_COMMAND = 100_000  # characters
+_states: WeakKeyDictionary[Session, tuple[int, str]] = WeakKeyDictionary()
 CLOSED = "this bench is not open any more"
 CLOSED_CODE = 4404  # of a websocket that is closed for that
 
@@ -32,9 +34,18 @@ async def _tell(session: Session, socket: WebSocket) -> None:
     """The newest state whenever there is one; what came in between while a slow page was reading is left out."""
     while not session.closed:
         seen = session.version
-        await socket.send_text(json.dumps(snapshot(session)))
+        await socket.send_text(_state(session))
         await session.changed(seen)
     await socket.close(CLOSED_CODE, CLOSED)
+
+
+def _state(session: Session) -> str:
+    """The state as it goes over the line, made once for all pages."""
+    version, text = _states.get(session, (-1, ""))
+    if version != session.version:
+        text = json.dumps(snapshot(session))
+        _states[session] = session.version, text
+    return text
 
 
 async def _hear(session: Session, socket: WebSocket) -> None:

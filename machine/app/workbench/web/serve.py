@@ -69,6 +69,7 @@ async def _serve(
         lifespan="off",
         ws="websockets-sansio",
         ws_max_size=MOST_SENT,
+        ws_per_message_deflate=False,  # nothing goes further than this computer
         timeout_graceful_shutdown=GRACE_S,
         server_header=False,
         proxy_headers=False,

@@ -96,9 +96,11 @@ function planeBefore({ normal, offset_mm: offset }, matrix) {
  * All in the frame of the platform, in which `matrix` puts the triangles. */
 function sectionOf({ corners, count }, plane, later, matrix) {
   const heights = (place, { normal, offset_mm: offset }) => dot(normal, place) - offset, found = [];
-  const own = planeBefore(plane, matrix);
-  for (let face = 0; face < count; face++) {
-    const around = cornersAt(corners, face), high = around.map((place) => heights(place, own));
+  const own = planeBefore(plane, matrix), [x, y, z] = own.normal, high = [0, 0, 0];
+  for (let face = 0, at = 0; face < count; face++, at += 9) { // most faces lie on one side, so nothing is made for them
+    for (let k = 0, i = at; k < 3; k++, i += 3) high[k] = corners[i] * x + corners[i + 1] * y + corners[i + 2] * z - own.offset_mm;
+    if (high[0] > 0 === high[1] > 0 && high[1] > 0 === high[2] > 0) continue;
+    const around = cornersAt(corners, face);
     for (let k = 0; k < 3; k++) {
       const n = (k + 1) % 3;
       if (high[k] > 0 === high[n] > 0) continue;

@@ -96,6 +96,7 @@ function pictureOf(canvas, camera, drawn) {
     show: (model) => { scene.model = model; scene.red = scene.marks = null; card.solid = null; solid(); ask(); },
     stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
     red: (marks) => {
+      if (marks === scene.red) return;
       scene.red = marks;
       repaint();
     },

@@ -8,7 +8,7 @@ function obstacleOf(bench) {
   let drawn = "";
   bench.showObstacle = () => {
     if (!bench.picture || !bench.triangles || !bench.state.model) return;
-    const { trial, refused } = bench.state, tried = trial && trial.refused && alike(trial.cuts, bench.planes());
+    const trial = trialOf(bench), { refused } = bench.state, tried = trial && trial.refused;
     const found = bench.tab === "parts" ? (tried ? trial.obstacle : refused) : null, fresh = JSON.stringify([found, bench.state.machine.name]);
     if (fresh === drawn) return;
     drawn = fresh;

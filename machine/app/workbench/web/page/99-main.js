@@ -18,12 +18,15 @@ function main() {
     notice(whether ? "Click the face that is to lie on the platform." : "");
     if (picture) picture.ask(); // the rings give way
   };
+  let stood = ""; // as it is in the picture
+  const standingOf = (rotation) => JSON.stringify([rotation, bench.state.limit, bench.state.platform_mm, bench.key]);
   /** Where the model stands now, and red what overhangs: the figure is the server's as soon as nothing moves. */
   const stand = (rotation, live) => {
     if (!bench.triangles) return;
     const began = performance.now(), { limit, platform_mm: platform } = bench.state;
     const found = overhanging(bench.triangles, rotation[2], limit, platform);
     bench.red = found.red;
+    stood = standingOf(rotation);
     if (live) $("overhang").textContent = mm2(found.area);
     if (picture) {
       picture.stand(standingBy(rotation, bench.triangles.vertices));
@@ -56,7 +59,8 @@ function main() {
     if (picture && !before) picture.machine(state.machine, dark());
     const key = state.model ? state.model.key : "";
     if (key !== bench.key) await fetchModel(key);
-    else stand(state.rotation, false);
+    else if (standingOf(state.rotation) !== stood) stand(state.rotation, false);
+    else bench.look();
     bench.showPlane();
     if (bench.state.version === state.version) root.dataset.version = state.version;
   };
