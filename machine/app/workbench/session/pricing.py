@@ -1,7 +1,10 @@
 """Pricing: times and plastic of a front worked out anew, a row at a time, where a setting that no search reads has changed."""
 
+from contextlib import suppress
+
 from machine.app.workbench.bench.bench import Bench, places_to_price, with_prices
 from machine.app.workbench.session.desk import Desk
+from profiles.errors import UserError
 
 
 class Pricing:
@@ -28,7 +31,8 @@ class Pricing:
     async def _price(self, bench: Bench) -> None:
         prices = {}
         for place in places_to_price(bench):
-            prices[place] = await self._desk.long.run("price_row", bench, place)
+            with suppress(UserError):  # then it has none
+                prices[place] = await self._desk.long.run("price_row", bench, place)
             if self._desk.bench is not bench:
                 return
         self._desk.become(self._desk.history.amended(with_prices(bench, prices)))

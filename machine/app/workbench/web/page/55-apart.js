@@ -47,6 +47,7 @@ function apartPanel(bench) {
     document.documentElement.dataset.pieces = pieces ? pieces.parts.length : "";
   };
   bench.fetchPieces = fetchPieces;
+  $("apart").disabled = !bench.picture;
   $("apart").addEventListener("input", () => { bench.look(); bench.showPlane(); });
   return {
     told: (state) => {

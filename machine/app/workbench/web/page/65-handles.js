@@ -36,37 +36,22 @@ function handlesOf(bench) {
     return { normal, offset_mm: dot(normal, section.centre_mm) };
   };
   const taken = (knob) => ({ plane: bench.plane(), section: bench.section, tilts: knob.tilts });
-  knobs.forEach((knob) => {
-    const button = $(knob.id);
-    let grip = null;
-    button.addEventListener("pointerdown", (event) => {
+  const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * bench.section.radius_mm);
+  const putHeld = () => { if (bench.hand) bench.put(bench.hand.plane); };
+  knobs.forEach((knob) => gripOf($(knob.id), {
+    take: (event) => {
       const place = placeOf(knob), from = bench.picture.placeOf(place), to = bench.picture.placeOf(add(place, bench.plane().normal));
-      if (!from || !to) return;
+      if (!from || !to) return null;
       const way = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...way), LEAST_PIXELS);
-      grip = { ...taken(knob), start: [event.clientX, event.clientY], way: way.map((x) => x / pixels), pixels };
-      button.setPointerCapture(event.pointerId);
-    });
-    button.addEventListener("pointermove", (event) => {
-      if (!grip) return;
-      const along = (event.clientX - grip.start[0]) * grip.way[0] + (event.clientY - grip.start[1]) * grip.way[1];
-      bench.hold(moved(grip, along / grip.pixels));
-    });
-    const lift = (event) => {
-      if (!grip) return;
-      const hand = bench.hand;
-      grip = null;
-      if (hand && event.type === "pointerup") bench.put(hand.plane);
-      else bench.select(bench.selected);
-    };
-    button.addEventListener("pointerup", lift);
-    button.addEventListener("pointercancel", lift);
-    button.addEventListener("keydown", (event) => {
-      const step = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 }[event.key];
-      if (!step) return;
-      event.preventDefault();
-      event.stopPropagation();
-      const mm = knob.tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * bench.section.radius_mm;
-      bench.put(moved(taken(knob), step * mm));
-    });
-  });
+      return { ...taken(knob), start: [event.clientX, event.clientY], way: way.map((x) => x / pixels), pixels };
+    },
+    move: (held, event) => {
+      const along = (event.clientX - held.start[0]) * held.way[0] + (event.clientY - held.start[1]) * held.way[1];
+      bench.hold(moved(held, along / held.pixels));
+    },
+    put: putHeld,
+    drop: () => bench.select(bench.selected),
+    step: (sign) => bench.hold(moved(taken(knob), sign * stepOf(knob))),
+    stepped: putHeld,
+  }));
 }
