@@ -18,7 +18,7 @@ from tests.machine.prints import commands_sent, prints_line
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import box
 
-PRINTING = "document.documentElement.dataset.printing"
+PRINTING, VIEW = "document.documentElement.dataset.printing", "$('print-page').contentDocument"
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +124,9 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.key("e")  # a letter of the port's name
         assert browser.value("$('port-typed').value") == "e"
         assert browser.value(PRINTING) == "printing"
-        browser.value("$('tab-model').focus()")
+        browser.click("#follow")
+        browser.wait(f"['ready', 'failed'].includes({VIEW}.documentElement.dataset.state)")
+        browser.value(f"{VIEW}.querySelector('button').focus()")
         browser.key("e")
         browser.wait(f"{PRINTING} === 'over' && $('print-bar').hidden")
         assert browser.value("$('run-state').textContent").startswith("emergency stop: the printer has halted")

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import secrets
 from collections.abc import Awaitable, Callable
 from functools import lru_cache
 from math import isfinite
@@ -32,7 +33,7 @@ def prints_line(prints: Prints) -> Callable[[Session, WebSocket], Awaitable[None
     """
 
     async def talk(session: Session, socket: WebSocket) -> None:
-        page = socket.query_params.get("page", "")[:40]
+        page = socket.query_params.get("page", "")[:40] or secrets.token_urlsafe(9)
         await socket.accept()
         with prints.page(page):
             told, heard = asyncio.create_task(_tell(prints, socket)), asyncio.create_task(_hear(prints, session, socket, page))

@@ -9,6 +9,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
+from math import isfinite
 from threading import Event as Flag
 from typing import Any
 
@@ -20,8 +21,7 @@ from machine.link.port import check_baud
 from profiles.errors import PrinterError
 
 MOST_OVER = 5  # prints that are over stay to be looked at, the newest ones
-WORDS = ("begin", "pause", "resume", "feed", "flow")  # what goes to the print as it is
-PERCENTS = ("feed", "flow")
+WORDS, PERCENTS = ("pause", "resume"), ("feed", "flow")  # what goes to the print as it is
 
 
 class Prints:
@@ -127,7 +127,9 @@ class Prints:
             return
         if named.holder != page:
             raise PrinterError("another page commands this print: take the command over first")
-        if word == "cancel":
+        if word == "begin":
+            named.begin()
+        elif word == "cancel":
             named.cancel()
         elif word == "forget" and named.over:
             self.prints.remove(named)
@@ -182,6 +184,6 @@ def _same(one: str, other: str) -> bool:
 
 def _whole(asked: dict[str, Any], key: str, otherwise: int) -> int:
     value = asked.get(key, otherwise)
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value) or value != int(value):
         raise PrinterError(f"{key} is {str(value)[:40]!r}: a whole number is expected")
     return int(value)

@@ -13,6 +13,7 @@ from machine.app.printer.rescue import rescue
 from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.order import PrintOrder, State, first_state
 from machine.app.workbench.work.worker import LENGTH, frame
+from profiles.errors import PrinterError
 
 COMMAND = (sys.executable, "-m", "machine.app.workbench.printing.process")
 EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
@@ -27,7 +28,7 @@ class RunningPrint:
         self.number, self.holder, self.state = number, holder, first_state(order)
         self._order, self._changed = order, changed
         self._process: asyncio.subprocess.Process | None = None
-        self._emergency = self._given_up = False
+        self._begun = self._emergency = self._given_up = False
 
     @property
     def over(self) -> bool:
@@ -36,8 +37,8 @@ class RunningPrint:
 
     @property
     def asking(self) -> bool:
-        """Whether nothing has moved yet."""
-        return self.state["phase"] in ("checking", "ready")
+        """Whether nothing has moved yet, and nothing will: once it is told to begin, its process alone knows how far it is."""
+        return not self._begun and self.state["phase"] in ("checking", "ready")
 
     async def run(self) -> None:
         """Have it printed by a process of its own, to the end."""
@@ -62,6 +63,13 @@ class RunningPrint:
         process = self._process
         if process is not None and process.stdin is not None and process.returncode is None:
             process.stdin.write(frame(value))
+
+    def begin(self) -> None:
+        """A person agrees to what was found. Raises PrinterError as long as that is not known."""
+        if self.state["phase"] != "ready":
+            raise PrinterError("this print cannot begin now: it is not ready, or has begun")
+        self._begun = True
+        self.say(("begin",))
 
     def fail(self, error: Exception) -> None:
         """It could not be printed at all, by a fault of this program."""

@@ -10,12 +10,15 @@ from typing import Any
 import pytest
 
 from machine.app.requests import PrintRequest
+from machine.app.workbench.printing import running_print
 from machine.app.workbench.printing.order import PrintOrder
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.printing.teller import Said
+from machine.link.pending_commands import Command, Control
 from machine.simulator.simulator import SimulatedPrinter
+from profiles.errors import PrinterError
 from profiles.profile import load
 
 PROFILE = load()
@@ -62,11 +65,25 @@ def hang_up(prints: Prints, one: RunningPrint) -> None:
     one._process.stdin.close()
 
 
+def freeze(prints: Prints, one: RunningPrint) -> None:
+    """Its process does nothing any more, also not what it is told; then a person presses the emergency stop."""
+    assert one._process is not None
+    os.kill(one._process.pid, signal.SIGSTOP)
+    prints.command("anybody", {"do": "emergency"}, lambda asked: order(""))
+
+
+DIED = "the process that printed has ended before the print was done"
+
+
 @pytest.mark.parametrize(("end", "told"), [
-    (kill, "the process that printed has ended before the print was done; the printer reports its heaters off"),
+    (kill, f"{DIED}; the printer reports its heaters off"),
+    (freeze, f"{DIED}; emergency stop: the printer has halted"),
     (hang_up, "the print was stopped"),
 ])  # fmt: skip
-def test_whoever_dies_the_heaters_go_off(end: Callable[[Prints, RunningPrint], None], told: str) -> None:
+def test_whoever_dies_the_heaters_go_off(
+    end: Callable[[Prints, RunningPrint], None], told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(running_print, "EMERGENCY_S", 0.2)
     with SimulatedPrinter(PROFILE.machine, speed=20.0) as printer:
         state = print_until(printer, end)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
@@ -100,3 +117,21 @@ def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintOrder, sen
     end = carry_out(wanted, Agreeing(), Checks(heard, Said(heard)))  # type: ignore[arg-type]
     assert end["sentence"].startswith(sentence)
     assert (end["end"], end["forcible"]) == ("refused", forcible)
+
+
+@pytest.mark.parametrize("percent", [float("inf"), float("nan"), "fast", True, 99.5, [1]])
+def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
+    async def run() -> None:
+        prints = Prints()
+        prints.prints.append(RunningPrint(1, order("sim"), "me", lambda: None))
+        prints.command("me", {"do": "feed", "print": 1, "percent": percent}, lambda asked: order(""))
+
+    with pytest.raises(PrinterError, match=r"percent is .*: a whole number is expected"):
+        asyncio.run(run())
+
+
+def test_an_emergency_stop_goes_before_all_that_was_asked_earlier() -> None:
+    control = Control()
+    control.ask(Command.PAUSE)
+    control.ask(Command.EMERGENCY_STOP)
+    assert [asked.command for asked in iter(control.take, None)] == [Command.EMERGENCY_STOP, Command.PAUSE]
