@@ -104,6 +104,15 @@ def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_aw
         assert len(page.until(lambda state: len(state["cuts"]) == 2)["zones"]) == 2
 
 
+def test_a_mark_ends_the_search_that_knew_nothing_of_it(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        page.do("search")
+        page.do("mark", kind="no_seam", min_mm=[0, 0, 0], max_mm=[1, 1, 1])
+        state = page.until(lambda state: state["undo"] == "mark: no seam here" and not state["search"])
+        assert (len(state["zones"]), state["front"]) == (1, [])
+
+
 @pytest.mark.parametrize(
     ("asked", "said"),
     [

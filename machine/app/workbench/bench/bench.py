@@ -67,6 +67,11 @@ class Bench:
         return None if self.rotation == STANDING else np.array(self.rotation)
 
     @property
+    def sought(self) -> tuple[object, ...]:
+        """What of it decides what a search finds, beside the locked planes."""
+        return self.model, self.rotation, self.profile, self.zones
+
+    @property
     def printed(self) -> tuple[object, ...]:
         """What of it decides what is printed."""
         return self.model, self.rotation, self.cuts, self.profile, self.zones

@@ -59,7 +59,7 @@ class Finding:
 
         try:
             rows, self.notes = await self._desk.long.run("find_parts", bench, tell=follow)
-            self._desk.do("find parts", with_front(bench, rows))
+            self._desk.do("find parts", with_front(self._desk.bench, rows))
         finally:
             if self.search is not None and self.search.bench is bench:
                 self.search = None
@@ -75,9 +75,10 @@ class Finding:
         self._desk.amend(taken, replace(taken, rows=tuple(rows)))
 
     def _follow(self) -> None:
-        """A search for a model that is not there any more, or lies otherwise, ends."""
+        """A search ends whose model is not there any more or lies otherwise, or whose settings or marks are others now."""
         search, bench = self.search, self._desk.bench
-        if search is not None and (search.bench.model, search.bench.rotation) != (bench.model, bench.rotation):
+        if search is not None and search.bench.sought != bench.sought:
             self.search = None
             if self._task is not None:
                 self._task.cancel()
+                self._desk.start(self._desk.long.warm())

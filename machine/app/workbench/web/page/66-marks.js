@@ -149,11 +149,11 @@ function marksPanel(bench) {
   };
 }
 
-/** What a box looks like: its sides let the light through. */
+/** What a box looks like: its sides let the light through; the edges of the chosen one are seen through all. */
 function boxDrawn({ kind, min_mm: least, max_mm: most }, chosen) {
   const ink = [...MARK_KINDS[kind].colour, 255];
   const sides = trianglesOf([{ corners: boxCorners(least, most), colour: [...MARK_KINDS[kind].colour, 200] }]);
-  return [{ solid: sides, strength: chosen ? 0.4 : 0.22, lines: trianglesOf([{ corners: boxEdges(least, most), colour: ink }]) }];
+  return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: boxEdges(least, most), colour: ink }]), over: chosen }];
 }
 
 function markRow(zone, chosen, choose, bench) {
