@@ -72,8 +72,12 @@ def test_arrow_keys_turn_a_ring_and_shift_takes_15_degrees_at_once(browser: Brow
 
 def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_is_told(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "sized.stl", stl(tee()))
+    browser.click("#tab-parts")
+    browser.click("#add")
+    browser.wait("$('plane-offset').value === '20.00'")
     drag_slider(browser, "size-x", 60, "change")
     browser.wait("$('scale').value === '150' && $('size-y').value === '15.00'")
+    assert browser.value("$('plane-offset').value") == "30.00"
     assert "reaches all of it" in browser.value("$('fit-told').textContent")
     drag_slider(browser, "scale", 2000, "change")
     browser.wait("$('fit-told').classList.contains('refused')")

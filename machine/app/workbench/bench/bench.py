@@ -124,6 +124,16 @@ def with_model(bench: Bench, model: Model) -> Bench:
     return replace(emptied(bench), model=model)
 
 
+def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
+    """The same model so many times as large, its planes in proportion; its front and its zones were for the size before."""
+    planes = {
+        part: replace(part, offset_mm=None if part.offset_mm is None else part.offset_mm * factor) for part in bench.cuts or ()
+    }
+    cuts = None if bench.cuts is None else tuple(planes[part] for part in bench.cuts)
+    locked = frozenset(planes[part] for part in bench.locked)
+    return Bench(bench.profile, model, bench.rotation, cuts, locked=locked, given=bench.given)
+
+
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
     """The model turned otherwise; its cuts were for the way that it stood before, and so were boxes. Marked faces stay marked."""
     rows = tuple(_vector(row) for row in rotation)
