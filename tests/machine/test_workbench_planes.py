@@ -42,9 +42,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def opened(page: Any, bench: Running, name: str) -> None:
-    before = page.state["version"]
+    before = page.state["model"] and page.state["model"]["key"]
     bench.send(Path(name))
-    page.until(lambda state: state["version"] > before and state["undo"] == f"open {name}" and not state["busy"])
+    page.until(lambda state: state["model"] and state["model"]["key"] != before and not state["busy"])
 
 
 def added(page: Any, *offsets_mm: float) -> None:
