@@ -10,8 +10,9 @@ import os
 import signal
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from multiprocessing import active_children, get_all_start_methods, get_context
 from multiprocessing.sharedctypes import RawArray
 from threading import Thread
@@ -30,7 +31,28 @@ FEWEST_LAYERS = 250  # fewer are sliced sooner than processes are forked and the
 LOOK_S = 0.2
 
 Planned = Sequence[tuple[Site, Supports]]
-OnProgress = Callable[[int, int, int, int], None]  # parts begun, parts, layers done, layers of all parts (an estimate)
+
+
+@dataclass(frozen=True, eq=False)
+class SlicingProgress:
+    """How far slicing is, part by part in print order: layers done, how many are expected, and the parts that are sliced."""
+
+    layers: tuple[int, ...]
+    expected: tuple[int, ...]
+    ready: tuple[SlicedPart | None, ...]
+
+    @property
+    def begun(self) -> int:
+        """How many parts are sliced or being sliced."""
+        return sum(count > 0 for count in self.layers)
+
+    @property
+    def share(self) -> float:
+        """What of all layers is done, 0 to 1, an estimate."""
+        return min(1.0, sum(self.layers) / max(sum(self.expected), 1))
+
+
+OnProgress = Callable[[SlicingProgress], None]
 
 
 def slice_parts(
@@ -62,15 +84,16 @@ def _process_count(parts: int, layers: int) -> int:
 
 def _slice_in_turn(planned: Planned, expected: Sequence[int], on_progress: OnProgress | None) -> tuple[SlicedPart, ...]:
     sliced: list[SlicedPart] = []
-    done = 0
-    for k, (site, supports) in enumerate(planned):
 
-        def on_layer(layer: int, of: int, before: int = done, begun: int = k + 1) -> None:
-            if on_progress is not None:
-                on_progress(begun, len(planned), before + layer, sum(expected))
+    def show(layer: int, of: int) -> None:
+        if on_progress is not None:
+            left = len(planned) - len(sliced)
+            layers = (*(len(piece.layers) for piece in sliced), layer, *[0] * left)[: len(planned)]
+            on_progress(SlicingProgress(layers, tuple(expected), (*sliced, *[None] * left)))
 
-        sliced.append(slice_site(site, supports, on_layer))
-        done += len(sliced[-1].layers)
+    for site, supports in planned:
+        sliced.append(slice_site(site, supports, show))
+    show(0, 0)
     return tuple(sliced)
 
 
@@ -116,7 +139,8 @@ def _slice_side_by_side(
         while waiting:
             waiting = wait(waiting, LOOK_S, FIRST_COMPLETED).not_done
             if on_progress is not None:
-                on_progress(sum(count > 0 for count in counts), len(planned), sum(counts), sum(expected))
+                ready = tuple(_result(futures[k]) for k in range(len(planned)))
+                on_progress(SlicingProgress(tuple(counts), tuple(expected), ready))
         return tuple(futures[k].result() for k in range(len(planned)))
     except BaseException:
         for process in active_children():  # nobody waits for what they slice
@@ -124,3 +148,8 @@ def _slice_side_by_side(
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _result(future: "Future[SlicedPart]") -> SlicedPart | None:
+    """What a process has sliced, if it has."""
+    return future.result() if future.done() and not future.cancelled() and future.exception() is None else None

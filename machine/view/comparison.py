@@ -13,7 +13,7 @@ from mdp.decomposition import Decomposition
 class Alternative:
     """One way to print a model. risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm:
     length of the seams between parts; interface_mm3: plastic that one piece would not have, by the part that stands
-    there; message: why it cannot be printed so, or ""."""
+    there; findings: how many its dry run has; message: why it cannot be printed so, or ""."""
 
     name: str
     orientation: str
@@ -27,6 +27,7 @@ class Alternative:
     unsupported_mm2: float | None = None
     seam_mm: float = 0.0
     interface_mm3: Mapping[int, float] = field(default_factory=dict)
+    findings: int = 0
 
 
 def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:

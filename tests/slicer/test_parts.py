@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from profiles.errors import SliceError
-from slicer.parts import _process_count, slice_parts
+from slicer.parts import SlicingProgress, _process_count, slice_parts
 from tests.shapes import box
 from tests.slicer.hand import content, cut, profile
 
@@ -24,12 +24,22 @@ def test_processes_side_by_side_give_the_same_bytes_as_one_after_the_other() -> 
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_progress_rises_to_all_layers(processes: int) -> None:
-    reports: list[tuple[int, int, int, int]] = []
-    sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), lambda *each: reports.append(each), processes)
-    layers = [each[2] for each in reports]
+    reports: list[SlicingProgress] = []
+    sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), reports.append, processes)
+    layers = [sum(each.layers) for each in reports]
     assert layers == sorted(layers)
-    assert reports[-1][:3] == (3, 3, sum(len(piece.layers) for piece in sliced))
-    assert reports[-1][3] == pytest.approx(layers[-1], abs=3)
+    assert reports[-1].layers == tuple(len(piece.layers) for piece in sliced)
+    assert (reports[-1].begun, reports[-1].share) == (3, pytest.approx(1.0, abs=0.1))
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_part_is_handed_over_as_soon_as_it_is_sliced(processes: int) -> None:
+    reports: list[SlicingProgress] = []
+    sliced = slice_parts(cut(box(10, 10, 24), *PLANES), profile(), reports.append, processes)
+    ready = [sum(piece is not None for piece in each.ready) for each in reports]
+    assert ready == sorted(ready)
+    assert ready[-1] == 3
+    assert [piece and piece.index for piece in reports[-1].ready] == [piece.index for piece in sliced]
 
 
 @pytest.mark.parametrize("processes", [1, 2])

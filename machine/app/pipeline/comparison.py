@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from machine.app.pipeline.pipeline import build
-from machine.app.terminal.progress import say
+from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
 from machine.view.comparison import Alternative
 from machine.view.program import Program
@@ -27,19 +27,26 @@ SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 
 
 def compare_with_one_part(program: Program, profile: Profile) -> tuple[Alternative, ...]:
-    """This print, then the two in one part, which get support whatever the process says: without it they would fail.
-
-    An alternative that the machine cannot print stays in the list, with the reason.
-    """
+    """This print, then the two in one part."""
     if program.decomposition is None:
         return ()
-    mesh = program.decomposition.mesh
-    say("comparing: straight up")
-    up = straight_up(program.decomposition, profile)
-    if np.allclose(_best(mesh, profile).rotation, np.eye(3), atol=1e-9):
-        return in_parts(program, profile), up, replace(up, name=BEST)
-    say(f"comparing: {BEST}")
-    return in_parts(program, profile), up, best_lying(mesh, profile)
+    return in_parts(program, profile), *in_one_part(program.decomposition, profile)
+
+
+def in_one_part(ours: Decomposition, profile: Profile, report: Report | None = None) -> tuple[Alternative, Alternative]:
+    """The model of a decomposition in one part, straight up and laid down; both get support whatever the process says: without it
+    they would fail.
+
+    An alternative that the machine cannot print stays in the list, with the reason. report: where progress is shown; None: on the
+    terminal.
+    """
+    tell = say if report is None else report
+    tell("comparing: straight up")
+    up = straight_up(ours, profile, report)
+    if np.allclose(_best(ours.mesh, profile).rotation, np.eye(3), atol=1e-9):
+        return up, replace(up, name=BEST)
+    tell(f"comparing: {BEST}")
+    return up, best_lying(ours.mesh, profile, report)
 
 
 def in_parts(program: Program, profile: Profile) -> Alternative:
@@ -50,17 +57,17 @@ def in_parts(program: Program, profile: Profile) -> Alternative:
     return _figures(f"in {count} part{'s' * (count > 1)}", "", count, program, ours.residual_area_mm2, profile)
 
 
-def straight_up(ours: Decomposition, profile: Profile) -> Alternative:
+def straight_up(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
     """The model of a decomposition in one part as it stands."""
-    return _in_one_part("straight up", "as it stands", ours.mesh, ours.risky_area_mm2, _with_support(profile))
+    return _in_one_part("straight up", "as it stands", ours.mesh, ours.risky_area_mm2, _with_support(profile), report)
 
 
-def best_lying(mesh: Mesh, profile: Profile) -> Alternative:
+def best_lying(mesh: Mesh, profile: Profile, report: Report | None = None) -> Alternative:
     """A model in one part, laid down so that least needs support."""
     best = _best(mesh, profile)
     turned = standing_still(mesh, best.rotation)
     risky = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
-    return _in_one_part(BEST, in_words(best), turned, risky, _with_support(profile))
+    return _in_one_part(BEST, in_words(best), turned, risky, _with_support(profile), report)
 
 
 def _best(mesh: Mesh, profile: Profile) -> Orientation:
@@ -72,13 +79,15 @@ def _with_support(profile: Profile) -> Profile:
     return bare.model_copy(update={"process": bare.process.model_copy(update={"support": "auto"})})
 
 
-def _in_one_part(name: str, orientation: str, mesh: Mesh, risky_mm2: float, profile: Profile) -> Alternative:
+def _in_one_part(
+    name: str, orientation: str, mesh: Mesh, risky_mm2: float, profile: Profile, report: Report | None
+) -> Alternative:
     """A model in one part as it stands."""
     pose = level(profile.machine)
     part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, risky_mm2)
     whole = Decomposition(name, mesh, (part,), 1, "classic", risky_mm2, risky_mm2, 0, 0, 0.0)
     try:
-        program = build(whole, profile)
+        program = build(whole, profile, report=report)
     except UserError as error:  # the others can still be compared
         return Alternative(name, orientation, 1, None, None, None, None, risky_mm2, str(error))
     return _figures(name, orientation, 1, program, risky_mm2, profile)
@@ -103,6 +112,7 @@ def _figures(name: str, orientation: str, parts: int, program: Program, risky_mm
         unsupported_mm2=sum(place.mm2 for place in run.program.unsupported),
         seam_mm=seam_mm,
         interface_mm3=program.interface_mm3,
+        findings=len(run.findings),
     )
 
 
@@ -119,6 +129,7 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
             "support_area_mm2": each.risky_mm2,
             "unsupported_area_mm2": each.unsupported_mm2,
             "seam_mm": each.seam_mm,
+            "findings": each.findings,
             "interfaces": [{"part": part, "plastic_mm3": mm3} for part, mm3 in each.interface_mm3.items()],
             "message": each.message,
         }

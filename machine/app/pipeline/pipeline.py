@@ -36,7 +36,7 @@ from mdp.search.orientation import in_words, side_in_words, standing_still
 from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
-from slicer.parts import slice_parts
+from slicer.parts import OnProgress, SlicingProgress, slice_parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,20 +158,23 @@ def build(
     pictures: bool = False,
     stops: Sequence[Stop] = (),
     report: Report | None = None,
+    on_slices: OnProgress | None = None,
 ) -> Program:
     """Slice, plan, write and dry-run a decomposition. Raises MoveError, before slicing, for a part outside the axes' ranges.
 
     pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show. stops: where the print waits
-    for a person. report: where progress is shown; None: on the terminal.
+    for a person. report: where progress is shown; None: on the terminal. on_slices: is shown the parts while they are sliced.
     """
     parts = decomposition.parts
     check_parts(parts, profile)
     compilers.wait_for(compilers.PROGRAM, report)
     with reporting() if report is None else nullcontext(report) as told:
 
-        def show(begun: int, of: int, layers: int, all_layers: int) -> None:
-            percent = min(100, 100 * layers // max(all_layers, 1))
-            told(f"slicing part {max(begun, 1)} of {of}: {percent} % of all layers", percent / 100)
+        def show(slicing: SlicingProgress) -> None:
+            if on_slices is not None:
+                on_slices(slicing)
+            begun, share = max(slicing.begun, 1), slicing.share
+            told(f"slicing part {begun} of {len(parts)}: {int(100 * share)} % of all layers", share)
 
         sliced = slice_parts(parts, profile, show)
         told("planning moves")
