@@ -42,11 +42,11 @@ def sliced(folder: Path) -> Iterator[Running]:
             page.do("slice")
             page.until(lambda state: state["sliced"])
             page.do("turn", axis="z", deg=30)
-            page.until(lambda state: not state["sliced"])
+            page.until(lambda state: state["sliced"]["stale"])
             printing.do("check", port="sim")
             assert printing.refused() == "what is on the workbench has changed since it was sliced: slice it again"
             page.do("undo")
-            page.until(lambda state: state["sliced"])
+            page.until(lambda state: not state["sliced"]["stale"])
         yield running
 
 

@@ -14,6 +14,7 @@ from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.marks import MARKS
 from machine.app.workbench.bench.planes import EDITS, edited, instead_of
 from machine.app.workbench.bench.settings import profile_as_given, with_name, with_setting
+from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.marking import Marking
@@ -39,6 +40,7 @@ class Session(Desk):
         self.slicing, self.readiness = Slicing(self), Readiness(self)
         self.trying = Trying(self, self.readiness)
         self.finding = Finding(self, self.trying)
+        self.comparing = Comparing(self, self.slicing)
         self.pieces, self._pricing = Pieces(self), Pricing(self)
         self._settling = asyncio.Lock()
         self.marking = Marking(self, self.trying)
@@ -92,8 +94,11 @@ class Session(Desk):
             case "stop":
                 self.finding.stop()
                 self.slicing.stop()
+                self.comparing.stop()
             case "slice":
                 self.slicing.begin()
+            case "compare":
+                self.comparing.begin()
             case "set":
                 value = asked.get("value")
                 key = str(asked.get("key"))

@@ -1,46 +1,75 @@
 """Slicing: the slices that a session has or makes, and whether they are of what lies on the bench now."""
 
 import asyncio
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.session.desk import Desk
-from machine.app.workbench.work.slices import Sliced
+from machine.app.workbench.work.slices import Sliced, SlicesSoFar
 from profiles.errors import PlanError
 
 
 @dataclass(frozen=True, eq=False)
 class SlicingUnderWay:
-    """The bench that is sliced, and how far it is."""
+    """The bench that is sliced, the number of the slices, how far they are, and what is seen of the parts that are ready."""
 
     bench: Bench
+    number: int
     text: str
+    shares: tuple[float, ...] = ()
+    walls: Mapping[int, bytes] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Slices:
+    """Finished slices: what they are of, their number, and what is seen of each part."""
+
+    bench: Bench
+    number: int
+    sliced: Sliced
+    walls: Mapping[int, bytes]
 
 
 class Slicing:
-    """under_way: what is sliced now; done: the last slices, and the bench that they are of."""
+    """under_way: what is sliced now; done: the last slices."""
 
     def __init__(self, desk: Desk) -> None:
         self.under_way: SlicingUnderWay | None = None
-        self.done: tuple[Bench, Sliced] | None = None
+        self.done: Slices | None = None
         self._desk = desk
+        self._count = 0
         self._task: asyncio.Task[None] | None = None
         desk.followers.append(self._follow)
 
+    def latest(self) -> Slices | None:
+        """The last slices of the model on the bench, though it may have been turned, cut or set otherwise since."""
+        return self.done if self.done is not None and self.done.bench.model is self._desk.bench.model else None
+
+    @property
+    def out_of_date(self) -> bool:
+        """Whether the last slices are of something else than what lies on the bench now."""
+        return self.done is not None and self.done.bench.printed != self._desk.bench.printed
+
     def shown(self) -> Sliced | None:
         """The slices of what lies on the bench now; None where they are of something else."""
-        if self.done is None or self.done[0].printed != self._desk.bench.printed:
-            return None
-        return self.done[1]
+        return None if self.done is None or self.out_of_date else self.done.sliced
 
     def needed(self) -> Sliced:
         """The same. Raises PlanError where there are none."""
         sliced = self.shown()
-        if sliced is None and self.done is not None and self.done[0].model is self._desk.bench.model:
+        if sliced is None and self.latest() is not None:
             raise PlanError("what is on the workbench has changed since it was sliced: slice it again")
         if sliced is None:
             raise PlanError("what is on the workbench is not sliced yet: slice it first")
         return sliced
+
+    def walls_of(self, number: int, part: int) -> bytes | None:
+        """What is seen of a part of the slices of a number; None where it is not there, or not there yet."""
+        for slices in (self.under_way, self.done):
+            if slices is not None and slices.number == number:
+                return slices.walls.get(part)
+        return None
 
     def begin(self) -> None:
         """Slice what lies on the bench, if nothing is being sliced. Raises PlanError without a model."""
@@ -48,21 +77,26 @@ class Slicing:
         if bench.model is None:
             raise PlanError("there is no model on the workbench yet: choose a file first")
         if self.under_way is None:
-            self.under_way = SlicingUnderWay(bench, "cutting the parts")
-            self._task = self._desk.start(self._slice(bench))
+            self._count += 1
+            self.under_way = SlicingUnderWay(bench, self._count, "cutting the parts")
+            self._task = self._desk.start(self._slice(self.under_way))
 
     def stop(self) -> None:
         """End the slicing."""
         if self._task is not None:
             self._task.cancel()
 
-    async def _slice(self, bench: Bench) -> None:
-        def follow(text: str) -> None:
-            self.under_way = SlicingUnderWay(bench, text)
+    async def _slice(self, begun: SlicingUnderWay) -> None:
+        walls: dict[int, bytes] = {}
+
+        def follow(so_far: SlicesSoFar) -> None:
+            walls.update(so_far.walls)
+            self.under_way = SlicingUnderWay(begun.bench, begun.number, so_far.text, so_far.shares, walls)
             self._desk.tell()
 
         try:
-            self.done = bench, await self._desk.long.run("slice_bench", bench, tell=follow)
+            sliced = await self._desk.long.run("slice_bench", begun.bench, tell=follow)
+            self.done = Slices(begun.bench, begun.number, sliced, walls)
         finally:
             self.under_way = None
 

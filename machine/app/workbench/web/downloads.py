@@ -5,6 +5,7 @@ from starlette.responses import Response
 
 from machine.app.workbench.bench.command_line import file_stem
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.session.slicing import Slices
 from profiles.errors import PlanError
 
 
@@ -21,8 +22,21 @@ async def folder(session: Session, request: Request) -> Response:
 
 
 async def print_page(session: Session, request: Request) -> Response:
-    """The page of the print as `view` writes it, with its own content security policy in it."""
-    return Response(session.slicing.needed().page, media_type="text/html")
+    """The page of the last slices as `view` writes it, with its own content security policy in it."""
+    slices = _slices(session, request)
+    return _gone() if slices is None else Response(slices.sliced.page, media_type="text/html")
+
+
+async def print_text(session: Session, request: Request) -> Response:
+    """The G-code of the last slices to look at, whatever the dry run found."""
+    slices = _slices(session, request)
+    return _gone() if slices is None else Response(slices.sliced.gcode, media_type="text/plain")
+
+
+async def print_walls(session: Session, request: Request) -> Response:
+    """What is seen of a part that is sliced, as `work.walls` gives it."""
+    drawn = session.slicing.walls_of(request.path_params["number"], request.path_params["part"])
+    return _gone() if drawn is None else Response(drawn, media_type="application/octet-stream")
 
 
 async def shared_page(session: Session, request: Request) -> Response:
@@ -31,13 +45,24 @@ async def shared_page(session: Session, request: Request) -> Response:
 
 
 async def gcode(session: Session, request: Request) -> Response:
-    """The G-code, unless the dry run found errors."""
+    """The G-code; with errors only for who has said that he wants it all the same, as with `export --force`."""
     sliced = session.slicing.needed()
-    if sliced.errors:
+    if sliced.errors and request.query_params.get("force") != "yes":
         raise PlanError(
-            f"the dry run found {sliced.errors} errors: no G-code is saved; tiltprint export --force does so all the same"
+            f"the dry run found {len(sliced.errors)} errors, the first: {sliced.errors[0]}: no G-code is saved unless you say"
+            " that you want it all the same (--force)"
         )
     return _download(sliced.gcode, "text/plain", f"{file_stem(session.bench)}.gcode")
+
+
+def _slices(session: Session, request: Request) -> Slices | None:
+    """The last slices, where they are those that are asked for."""
+    slices = session.slicing.latest()
+    return slices if slices is not None and slices.sliced.key == request.path_params["key"] else None
+
+
+def _gone() -> Response:
+    return Response("these slices are not there any more\n", 404)
 
 
 def _download(content: bytes, kind: str, name: str) -> Response:

@@ -18,7 +18,7 @@ from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.benches import bench_routes
-from machine.app.workbench.web.downloads import folder, gcode, plan, print_page, shared_page
+from machine.app.workbench.web.downloads import folder, gcode, plan, print_page, print_text, print_walls, shared_page
 from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, CLOSED_CODE, talk
 from machine.app.workbench.web.page import workbench_page
@@ -47,6 +47,8 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int) -> 
         route("pieces", _pieces),
         route("parts.zip", folder),
         route("print/{key}", print_page),
+        route("print/{key}/text", print_text),
+        route("walls/{number:int}/{part:int}", print_walls),
         route("print.html", shared_page),
         route("print.gcode", gcode),
         route("settings.json", _settings),

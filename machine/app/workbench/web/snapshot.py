@@ -12,6 +12,7 @@ from machine.app.workbench.bench.fit import standing
 from machine.app.workbench.bench.marks import named_faces
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.web.slices import slices_told
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
 from mdp.decomposition import FrontRow
@@ -20,7 +21,6 @@ from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS
 from mdp.zone import Zone
 
-MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # that a page draws
 
 
@@ -48,8 +48,7 @@ def snapshot(session: Session) -> dict[str, Any]:
             for each in resting
         ],
         "search": None if search is None else {"text": search.searched.text, "planes": planes},
-        "slicing": None if session.slicing.under_way is None else {"text": session.slicing.under_way.text},
-        "sliced": _sliced(session),
+        **slices_told(session),
         "front": [_row(row) for row in bench.rows],
         "parts": bench.parts,
         "recommended": bench.recommended,
@@ -126,19 +125,6 @@ def _row(row: FrontRow) -> dict[str, Any]:
         "filament_mm": row.filament_mm,
         "reason": row.reason,
         "planes": [_plane(plane) for plane in reversed(row.planes)],
-    }
-
-
-def _sliced(session: Session) -> dict[str, Any] | None:
-    sliced = session.slicing.shown()
-    if sliced is None:
-        return None
-    return {
-        "key": sliced.key,
-        "time_s": sliced.time_s,
-        "filament_mm": sliced.filament_mm,
-        "findings": sliced.findings[:MOST_FINDINGS],
-        "errors": sliced.errors,
     }
 
 

@@ -1,28 +1,48 @@
-"""Slices: what lies on the bench sliced, written and dry-run, as a task of the workbench."""
+"""Slices: what lies on the bench sliced, written and dry-run, and the same model in one piece, as tasks of the workbench."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 
+from machine.app.pipeline.comparison import in_one_part, in_parts
 from machine.app.pipeline.pipeline import build
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
+from machine.app.workbench.work.walls import walls
 from machine.app.workbench.work.worker import Tell
 from machine.dryrun.dryrun import summary
+from machine.dryrun.findings import Finding
+from machine.view.comparison import Alternative
 from machine.view.page import print_page
+from slicer.parts import SlicingProgress
+
+
+@dataclass(frozen=True, eq=False)
+class SlicesSoFar:
+    """How far slicing is: a sentence, the share of each part that is sliced, 0 to 1, and what is seen of the parts that have
+    become ready since the last word, by their numbers."""
+
+    text: str
+    shares: tuple[float, ...] = ()
+    walls: Mapping[int, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Sliced:
-    """A sliced bench: the page of the print and its G-code, what it takes, and what its dry run complains of. errors: how many of
-    the findings are errors, with which the command line writes no file without --force."""
+    """A sliced bench: the page of the print and its G-code, what it takes, what its dry run complains of, and what it costs."""
 
     page: bytes
     gcode: bytes
     time_s: float
     filament_mm: float
-    findings: tuple[str, ...]
-    errors: int
+    findings: tuple[Finding, ...]
+    cost: Alternative
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """The findings that are errors, with which the command line writes no file without --force."""
+        return tuple(each.message for each in self.findings if each.severity == "error")
 
     @cached_property
     def key(self) -> str:
@@ -34,14 +54,42 @@ def slice_bench(tell: Tell, bench: Bench) -> Sliced:
     """The parts on the bench sliced, planned, written and dry-run, as `export --plan` does; uncut, the model in one piece."""
     profile = bench.profile
     made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
-    program = build(made, profile, pictures=True, report=lambda text, share=None: tell(text))
-    tell("drawing the page")
-    found, values = program.run.findings, summary(program.run)
+    shares: tuple[float, ...] = ()
+    ready: set[int] = set()
+    told = ""
+
+    def follow(slicing: SlicingProgress) -> None:
+        nonlocal shares
+        fresh = {k + 1: piece for k, piece in enumerate(slicing.ready) if piece is not None and k + 1 not in ready}
+        shares = tuple(
+            1.0 if piece else min(0.99, done / max(of, 1))
+            for piece, done, of in zip(slicing.ready, slicing.layers, slicing.expected, strict=True)
+        )
+        ready.update(fresh)
+        if fresh:
+            drawn = {number: walls(made.parts[number - 1], piece) for number, piece in fresh.items()}
+            tell(SlicesSoFar(told or "slicing", shares, drawn))
+
+    def report(text: str, share: float | None = None) -> None:
+        nonlocal told
+        if text != told:
+            told = text
+            tell(SlicesSoFar(text, shares))
+
+    program = build(made, profile, pictures=True, report=report, on_slices=follow)
+    report("drawing the page")
+    values = summary(program.run)
     return Sliced(
         print_page(made.name, program, profile),
         ("\n".join(program.lines) + "\n").encode(),
         values["time_s"],
         values["filament_mm"],
-        tuple(f"{each.severity}: {each.message}" for each in found),
-        sum(each.severity == "error" for each in found),
+        tuple(program.run.findings),
+        in_parts(program, profile),
     )
+
+
+def compare_bench(tell: Tell, bench: Bench) -> tuple[Alternative, ...]:
+    """What the model on the bench costs in one piece, as it stands and laid down, as `export --compare` tells it."""
+    made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    return in_one_part(made, bench.profile, lambda text, share=None: tell(text))

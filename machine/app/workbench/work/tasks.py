@@ -7,7 +7,7 @@ from typing import Any
 from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan, price_row
 from machine.app.workbench.work.models import rank_resting, read_model
 from machine.app.workbench.work.pieces import draw_pieces
-from machine.app.workbench.work.slices import slice_bench
+from machine.app.workbench.work.slices import compare_bench, slice_bench
 from machine.app.workbench.work.trials import load_kernels, make_ready, measure_cuts, near_neck, try_cuts
 
 TASKS: dict[str, Callable[..., Any]] = {
@@ -21,6 +21,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         make_files,
         draw_pieces,
         slice_bench,
+        compare_bench,
         load_kernels,
         make_ready,
         try_cuts,

@@ -8,6 +8,7 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 
@@ -142,7 +143,7 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
     assert all(made.read(name) == (folder / "parts" / name).read_bytes() for name in names)
 
 
-def test_slices_are_the_g_code_of_the_command_line_and_go_when_the_model_turns(bench: Running, folder: Path) -> None:
+def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_model_turns(bench: Running, folder: Path) -> None:
     (folder / "tee.stl").write_bytes(stl(tee()))
     assert bench.ask("print.gcode")[0] == 422
     with bench.line() as page:
@@ -156,9 +157,19 @@ def test_slices_are_the_g_code_of_the_command_line_and_go_when_the_model_turns(b
         assert main(["export", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "tee.gcode", "--html", "tee.html"]) == 0
         assert bench.ask("print.gcode")[1] == (folder / "tee.gcode").read_bytes()
         assert bench.ask(f"print/{sliced['key']}")[1] == bench.ask("print.html")[1] == (folder / "tee.html").read_bytes()
+        assert bench.ask(f"print/{sliced['key']}/text")[1] == bench.ask("print.gcode")[1]
+        direction = np.frombuffer(bench.ask(f"walls/{sliced['number']}/2")[1], "<f4", 3)
+        assert (sliced["ready"], direction.tolist()) == ([1, 2], [1.0, 0.0, 0.0])
+        page.do("compare")
+        parts, upright, _ = page.until(lambda state: state["compared"])["compared"]
+        assert (parts["name"], parts["time_s"], parts["findings"]) == ("in 2 parts", sliced["time_s"], len(sliced["findings"]))
+        assert upright["support_mm3"] > parts["support_mm3"]
+        assert parts["seam_mm"] > upright["seam_mm"] == 0.0
         page.do("turn", axis="z", deg=30)
-        page.until(lambda state: not state["sliced"])
-    assert bench.ask("print.gcode")[0] == 422
+        assert page.until(lambda state: state["sliced"]["stale"])["sliced"]["key"] == sliced["key"]
+        assert bench.ask("print.gcode")[0] == 422
+        bench.send(folder / "tee.stl")
+        assert page.until(lambda state: not state["sliced"])["compared"] == []
 
 
 def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbids(bench: Running, folder: Path) -> None:

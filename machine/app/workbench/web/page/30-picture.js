@@ -2,6 +2,8 @@
 
 const MODEL_COLOUR = [176, 184, 194];
 
+const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
+
 const PLANE_COLOUR = [30, 120, 190];
 
 /** {show(model), stand, red(marks), cut(planes, colours), plane, fit, ask, ray, placeOf}: drawn when the browser next draws;
@@ -9,7 +11,7 @@ const PLANE_COLOUR = [30, 120, 190];
 function pictureOf(canvas, camera, drawn) {
   const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
   if (!gl) return null;
-  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], plane: null, machine: null, dark: false, marks: null, extras: {} };
+  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, machine: null, dark: false, marks: null, extras: {} };
   let card = null, asked = false, count = 0;
   const build = () => {
     gl.enable(gl.DEPTH_TEST);
@@ -21,6 +23,7 @@ function pictureOf(canvas, camera, drawn) {
     plane();
     pieces();
     Object.keys(scene.extras).forEach(extra);
+    walls();
   };
   const table = () => {
     if (!scene.machine) return;
@@ -45,7 +48,10 @@ function pictureOf(canvas, camera, drawn) {
     card.frame.begin(width, height);
     if (card.table && !below) paintPlate(flat);
     if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
-    else if (card.solid) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts });
+    else if (card.solid) {
+      (card.walls || []).forEach((each) => each.draw(flat));
+      card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts, ghost: card.walls ? FAINT : 0 });
+    }
     if (card.table && below) paintPlate(flat, { strength: 0.18 });
     if (card.plane) {
       card.plane.rim.draw(flat.toClip, { lift: 1e-4 });
@@ -78,6 +84,7 @@ function pictureOf(canvas, camera, drawn) {
     if (card.solid) card.solid.paint(markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, card.colours)));
     ask();
   };
+  const walls = () => { card.walls = scene.walls && scene.walls.map((each) => solidOf(gl, each)); };
   const paintPlate = (seen, look = {}) => {
     card.table.solid.draw(seen, look);
     card.table.lines.draw(seen.toClip, { lift: 1e-5 });
@@ -115,6 +122,14 @@ function pictureOf(canvas, camera, drawn) {
       Object.assign(scene, { pieces: found, shifts, chosen });
       if (!same) pieces();
       else if (found && repainted) card.pieces.paint(chosen);
+      ask();
+    },
+    /** The walls of what is sliced, triangles of each part, with the model as a ghost about them; null: none. */
+    walls: (found) => {
+      const same = (scene.walls || []).length === (found || []).length && (found || []).every((each, k) => each === scene.walls[k]);
+      if (same && Boolean(found) === Boolean(scene.walls)) return;
+      scene.walls = found;
+      walls();
       ask();
     },
     /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */

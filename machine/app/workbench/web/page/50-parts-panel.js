@@ -1,4 +1,4 @@
-// Parts panel: the search, its front as a slider, and what is saved.
+// Parts panel: the search, and its front as a slider.
 
 const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
 const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
@@ -9,8 +9,6 @@ function partsPanel(bench) {
   $("front").addEventListener("input", () => { const row = bench.state.front[$("front").value]; tellRow(row, bench.state); bench.look(row); });
   $("front").addEventListener("change", () => bench.send({ do: "take", parts: bench.state.front[$("front").value].parts }));
   $("recommended").addEventListener("click", () => bench.send({ do: "take", parts: bench.state.recommended }));
-  $("save-plan").addEventListener("click", () => save("plan.toml"));
-  $("save-parts").addEventListener("click", () => save("parts.zip"));
   return {
     told: (state, before) => {
       const { front, search, parts, recommended } = state;

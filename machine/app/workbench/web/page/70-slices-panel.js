@@ -1,28 +1,52 @@
-// Slices panel: the parts sliced and dry-run, the page of the print over the picture, and its G-code.
+// Slices panel: the parts sliced, how far each is, what the print takes, and what the dry run complains of.
 
 function slicesPanel(bench) {
-  const look = (whether) => {
-    const { sliced } = bench.state, address = sliced ? `print/${sliced.key}` : "";
-    $("look").setAttribute("aria-pressed", whether);
-    $("print-page").hidden = !whether;
-    if (whether && $("print-page").getAttribute("src") !== address) $("print-page").src = address;
-  };
   $("slice").addEventListener("click", () => bench.send({ do: "slice" }));
+  $("again").addEventListener("click", () => { bench.lookAtPrint(false); $("tab-slices").click(); bench.send({ do: "slice" }); });
   $("stop-slicing").addEventListener("click", () => bench.send({ do: "stop" }));
-  $("look").addEventListener("click", () => look($("look").getAttribute("aria-pressed") !== "true"));
-  $("save-gcode").addEventListener("click", () => save("print.gcode"));
-  $("save-page").addEventListener("click", () => save("print.html"));
+  $("look").addEventListener("click", () => bench.lookAtPrint($("look").getAttribute("aria-pressed") !== "true"));
+  $("leave-print").addEventListener("click", () => { bench.lookAtPrint(false); $("look").focus(); });
   return {
-    told: ({ slicing, sliced }, before) => {
+    told: (state, before) => {
+      const { slicing, sliced } = state, stale = Boolean(sliced && sliced.stale);
       $("slice").disabled = Boolean(slicing);
       $("stop-slicing").hidden = !slicing;
       $("slicing-told").textContent = slicing ? slicing.text : "";
+      showShares(slicing, state.colours);
       document.body.classList.toggle("no-slices", !sliced);
-      if (JSON.stringify(sliced) === JSON.stringify(before?.sliced)) return;
-      look(false);
+      document.body.classList.toggle("stale", stale);
+      if (alike(sliced, before?.sliced)) return;
+      if (!sliced) bench.lookAtPrint(false);
       tellIn("sliced-told", sliced ? [["takes", duration(sliced.time_s)], ["filament", `${(sliced.filament_mm / 1000).toFixed(2)} m`]] : []);
-      listIn("sliced-findings", sliced ? sliced.findings : []);
-      $("save-gcode").disabled = Boolean(sliced && sliced.errors);
+      showFindings(sliced, bench);
     },
   };
+}
+
+/** Of every part how much is sliced; the whole as one bar where there is one part. */
+function showShares(slicing, colours) {
+  const shares = slicing ? slicing.shares : [], ready = shares.filter((share) => share === 1).length;
+  $("slicing-bar").hidden = !slicing;
+  if (shares.length) $("slicing-bar").value = shares.reduce((sum, share) => sum + share, 0) / shares.length;
+  else $("slicing-bar").removeAttribute("value");
+  $("slicing-ready").textContent = shares.length > 1 ? `${ready} of ${shares.length} parts sliced` : "";
+  $("slicing-parts").replaceChildren(...(shares.length > 1 ? shares : []).map((share, k) => {
+    const bar = made("progress", { max: 1, value: share });
+    bar.setAttribute("aria-label", `part ${k + 1}`);
+    return made("li", { className: share === 1 ? "ready" : "" }, swatch(colours[k]), `part ${k + 1}`, bar);
+  }));
+}
+
+function showFindings(sliced, bench) {
+  const { findings = [], more_findings: more = 0 } = sliced || {};
+  $("no-findings").hidden = !sliced || findings.length > 0;
+  const rows = findings.map((finding, k) => {
+    const { severity, code, message, part, layer, line } = finding;
+    const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
+    const button = made("button", { type: "button", className: severity },
+      made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? `${where}: show it` : "the whole print" }));
+    button.addEventListener("click", () => bench.showFinding(k));
+    return made("li", {}, button);
+  });
+  $("sliced-findings").replaceChildren(...rows, ...(more ? [made("li", { text: `and ${more} more, in the page of the print` })] : []));
 }

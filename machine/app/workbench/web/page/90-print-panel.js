@@ -61,7 +61,7 @@ function printPanel(bench) {
   };
   addEventListener("keydown", byKey, true);
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
-  return { told: ({ sliced, model }) => { $("check").disabled = !model; $("unsliced").hidden = Boolean(sliced); follow.told(); } };
+  return { told: ({ sliced, model }) => { $("check").disabled = !model; $("unsliced").hidden = Boolean(sliced && !sliced.stale); follow.told(); } };
 }
 
 /** Where a letter that is pressed is written, so that it is no command. */

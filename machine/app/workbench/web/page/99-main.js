@@ -3,7 +3,7 @@
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => { bench.placeHandles(); bench.placeRings(); bench.placeMarks(); }), root = document.documentElement;
   const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, placeHandles: () => {}, placeRings: () => {}, placeMarks: () => {} };
-  const dark = themeOf((now) => { if (picture && bench.state) picture.machine(bench.state.machine, now); });
+  const dark = themeOf((now) => { bench.themed?.(now); if (picture && bench.state) picture.machine(bench.state.machine, now); });
   const line = lineTo((state) => follow(state), (gone) => {
     root.dataset.line = gone ? "lost" : "open";
     notice(gone ? "The line to tiltprint is lost; trying again." : "");
@@ -43,6 +43,7 @@ function main() {
     const cut = bench.tab !== "model" && planes;
     picture.cut(cut ? planes : null, colours);
     bench.showApart();
+    bench.showWalls();
     picture.red(cut ? null : bench.red);
     legend(cut ? colours.slice(0, planes.length + 1) : null);
     bench.showMarks();
@@ -50,7 +51,9 @@ function main() {
   };
   bench.picture = picture;
   obstacleOf(bench);
-  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), marksPanel(bench), apartPanel(bench), slicesPanel(bench), settingsPanel(bench), printPanel(bench)];
+  printFrame(bench, dark);
+  wallsOf(bench);
+  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), marksPanel(bench), apartPanel(bench), slicesPanel(bench), comparePanel(bench), saveMenu(bench), settingsPanel(bench), printPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;

@@ -1,0 +1,47 @@
+"""Comparing: what the sliced print costs beside the same model in one piece."""
+
+import asyncio
+
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.slicing import Slicing
+from machine.view.comparison import Alternative
+
+
+class Comparing:
+    """text: how far the comparison under way is, "" where there is none."""
+
+    def __init__(self, desk: Desk, slicing: Slicing) -> None:
+        self.text = ""
+        self._done: tuple[Bench, tuple[Alternative, ...]] | None = None
+        self._desk, self._slicing = desk, slicing
+        self._task: asyncio.Task[None] | None = None
+
+    def rows(self) -> tuple[Alternative, ...]:
+        """The last slices, then their model in one piece; none where these slices have not been compared."""
+        slices = self._slicing.latest()
+        if slices is None or self._done is None or self._done[0].printed != slices.bench.printed:
+            return ()
+        return slices.sliced.cost, *self._done[1]
+
+    def begin(self) -> None:
+        """Compare, if that is not done yet. Raises PlanError where what lies on the bench is not sliced."""
+        self._slicing.needed()
+        if not self.text and not self.rows():
+            self.text = "comparing"
+            self._task = self._desk.start(self._compare(self._desk.bench))
+
+    def stop(self) -> None:
+        """End the comparison."""
+        if self._task is not None:
+            self._task.cancel()
+
+    async def _compare(self, bench: Bench) -> None:
+        def follow(text: str) -> None:
+            self.text = text
+            self._desk.tell()
+
+        try:
+            self._done = bench, await self._desk.long.run("compare_bench", bench, tell=follow)
+        finally:
+            self.text = ""

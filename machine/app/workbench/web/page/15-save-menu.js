@@ -1,0 +1,41 @@
+// Save menu: all that is saved of a bench, in one place; what is not there yet says why.
+
+function saveMenu(bench) {
+  const button = $("save"), menu = $("save-menu"), dialog = $("save-anyway");
+  const show = (whether) => {
+    menu.hidden = !whether;
+    button.setAttribute("aria-expanded", whether);
+    if (whether) menu.querySelector("button:not(:disabled)")?.focus();
+  };
+  const close = () => { if (!menu.hidden) { show(false); button.focus(); } };
+  const saving = (address) => () => { close(); save(address); };
+  const confirm = () => {
+    const { errors } = bench.state.sliced;
+    $("errors-title").textContent = `The dry run found ${errors.length} error${errors.length === 1 ? "" : "s"}`;
+    listIn("errors-list", errors.slice(0, 3));
+    dialog.showModal();
+  };
+  button.addEventListener("click", () => show(menu.hidden));
+  menu.addEventListener("keydown", (event) => { if (event.key === "Escape") { event.stopPropagation(); close(); } });
+  addEventListener("pointerdown", (event) => { if (!menu.hidden && !menu.contains(event.target) && event.target !== button) show(false); });
+  $("save-plan").addEventListener("click", saving("plan.toml"));
+  $("save-parts").addEventListener("click", saving("parts.zip"));
+  $("save-page").addEventListener("click", saving("print.html"));
+  $("save-gcode").addEventListener("click", () => { close(); if (bench.state.sliced.errors.length) confirm(); else save("print.gcode"); });
+  $("save-errors").addEventListener("click", () => { dialog.close(); save("print.gcode?force=yes"); });
+  $("save-not").addEventListener("click", () => dialog.close());
+  const tell = (id, why, otherwise) => {
+    $(id).disabled = Boolean(why);
+    $(id).querySelector("small").textContent = why || otherwise;
+  };
+  return {
+    told: ({ model, parts, sliced }) => {
+      const uncut = !model ? "no model yet" : parts ? "" : "no parts yet: find them, or add a plane";
+      const unsliced = !model ? "no model yet" : !sliced ? "not sliced yet" : sliced.stale ? "out of date: slice again" : "";
+      tell("save-plan", uncut, "the command line takes it with --plan");
+      tell("save-parts", uncut, "zip of an STL each, a coloured 3MF and the plan");
+      tell("save-gcode", unsliced, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
+      tell("save-page", unsliced, "one HTML file to open anywhere, as view writes it");
+    },
+  };
+}

@@ -1,0 +1,36 @@
+"""Walls: what is seen of a sliced part from outside, as the page draws it while the other parts are still being sliced."""
+
+import numpy as np
+
+from mdp.decomposition import Part
+from mdp.mesh import Floats
+from slicer.paths import Kind, Layer, SlicedPart
+
+SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.SUPPORT)
+MOST_PIECES = 60_000  # of a part: with more, only every second layer is drawn, or every third, as high as so many
+
+
+def walls(part: Part, sliced: SlicedPart, most: int = MOST_PIECES) -> bytes:
+    """The straight pieces of its outer paths: 3 float32, the direction of printing, then 7 a piece: where it begins and ends, mm
+    in the workpiece frame, in the middle of its height, and its height; all little-endian."""
+    step = 1 + sum(_count(layer) for layer in sliced.layers) // most
+    rows = [_pieces(layer, step) for layer in sliced.layers[step - 1 :: step]]
+    flat = np.concatenate([np.zeros((0, 7)), *rows])
+    back = part.rotation
+    for ends in (slice(0, 3), slice(3, 6)):
+        flat[:, ends] = (flat[:, ends] + (0.0, 0.0, part.base.offset_mm)) @ back
+    return np.asarray(part.direction, "<f4").tobytes() + flat.astype("<f4").tobytes()
+
+
+def _count(layer: Layer) -> int:
+    return sum(len(path.points) - 1 for path in layer.paths if path.kind in SEEN)
+
+
+def _pieces(layer: Layer, step: int) -> Floats:
+    """(n, 7) in the part frame: two ends and the height, which is that of so many layers."""
+    rows, high = [np.zeros((0, 7))], layer.height_mm * step
+    for path in layer.paths:
+        if path.kind in SEEN:
+            points = np.column_stack([path.points, layer.z_mm + path.z_mm - high / 2.0])
+            rows.append(np.column_stack([points[:-1], points[1:], np.full(len(points) - 1, high)]))
+    return np.concatenate(rows)
