@@ -1,7 +1,7 @@
 // Marks: boxes and faces that are left alone: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
 const MARK_KINDS = {
-  keep: { word: "no cut", colour: [142, 68, 205] }, no_seam: { word: "no seam", colour: [0, 128, 122] }, no_support: { word: "no support", colour: [176, 92, 10] },
+  keep: { word: "no cut", colour: [118, 66, 214] }, no_seam: { word: "no seam", colour: [0, 128, 122] }, no_support: { word: "no support", colour: [196, 24, 126] },
 };
 const KIND_NAMES = Object.keys(MARK_KINDS); // their places are the bits of a face's byte
 const BOX_SIDES = [0, 1, 2].flatMap((axis) => [{ axis, end: "min_mm", name: `least ${"xyz"[axis]}` }, { axis, end: "max_mm", name: `greatest ${"xyz"[axis]}` }]);
@@ -61,7 +61,18 @@ function marksPanel(bench) {
     return { ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) };
   };
   const sidePlace = (zone, { axis, end }) => [0, 1, 2].map((k) => (k === axis ? zone[end][k] : (zone.min_mm[k] + zone.max_mm[k]) / 2));
-  const choose = (zone) => { chosen = zone && { kind: zone.kind, number: zone.number }; hand = null; tellMarks(); bench.showMarks(); };
+  const choose = (zone) => {
+    chosen = zone && { kind: zone.kind, number: zone.number };
+    hand = null;
+    const faces = bench.state.zones.find((each) => same(each, chosen) && each.point_mm);
+    if (faces) $("mark-angle").value = faces.angle_deg;
+    tellMarks();
+    bench.showMarks();
+  };
+  $("mark-angle").addEventListener("change", () => {
+    const faces = bench.state.zones.find((each) => same(each, chosen) && each.point_mm);
+    if (faces) bench.send({ do: "mark", ...faces, angle_deg: Number($("mark-angle").value) });
+  });
   $("mark-faces").disabled = $("mark-box").disabled = !bench.picture;
   for (const what of ["faces", "box"]) $(`mark-${what}`).addEventListener("click", () => bench.mark(bench.marking === what ? "" : what));
   $("mark-kind").addEventListener("change", () => bench.mark(bench.marking || ""));
