@@ -205,6 +205,7 @@ def test_without_webgl_the_numbers_and_the_front_are_there(bench: Running) -> No
         open_model(blind, bench, "tee.stl", stl(tee()))
         assert blind.value("document.documentElement.dataset.state") == "failed"
         assert area(blind) > 0.0
+        assert blind.value("$('blind').checkVisibility() && $('undo').checkVisibility() && !$('fit').checkVisibility()")
         blind.click("#tab-parts")
         blind.click("#find")
         blind.wait(FOUND)

@@ -95,7 +95,7 @@ function groupTitle({ group, about }) {
 function settingRow(setting, wrong, send) {
   const { key, meaning, kind, least, most, value, changed } = setting, now = wrong && kind !== "boolean" ? wrong.value : value;
   const input = inputOf(setting, now);
-  const range = kind === "number" || kind === "integer" ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
+  const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
   const told = made("small", { text: meaning + range, id: `meaning-${key}` }), refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
   if (kind === "fixed") return settingBox(setting, [made("label", {}, made("span", { text: key })), told, made("small", { text: FIXED })]);
   input.setAttribute("aria-describedby", told.id);

@@ -90,10 +90,7 @@ function main() {
   ringsOf(bench);
   keysOf(bench, camera, picture);
   root.dataset.state = picture ? "ready" : "failed";
-  if (!picture) {
-    document.body.classList.add("no-picture");
-    notice("This browser shows no WebGL2, so there is no picture; all else works.");
-  }
+  if (!picture) document.body.classList.add("no-picture");
 }
 
 /** A click on the model: the face is laid down or the plane takes its place when that was asked for; else a part is chosen. */
