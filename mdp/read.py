@@ -20,6 +20,7 @@ DEMO = "demo:"
 LEAST_MM, MOST_MM = 1.0, 2000.0  # largest extent of anything that such a printer makes
 OTHER_UNITS = {25.4: "inches", 1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
 TYPICAL_MM = 100.0
+MANY_FACES = 500_000  # more make no better print: at 0.2 mm an edge they are an area of 90 cm2
 MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
 
 
@@ -62,7 +63,19 @@ def read_mesh(path: Path, scale: float = 1.0, rotate_deg: tuple[float, float, fl
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
     mesh = _place_on_platform(solid, rotate_deg)
-    return mesh, (*notes, *floating_pieces(mesh))
+    return mesh, (*notes, *floating_pieces(mesh), *too_fine(mesh))
+
+
+def too_fine(mesh: Mesh) -> tuple[str, ...]:
+    """What to reduce, for a mesh of far more faces than a print shows."""
+    count = len(mesh.faces)
+    if count <= MANY_FACES:
+        return ()
+    edge_mm = float(np.sqrt(4.0 / np.sqrt(3.0) * mesh.areas_mm2.sum() / count))
+    return (
+        f"{count} faces, with edges of about {edge_mm:.2g} mm: search and slices take long; {MANY_FACES} are enough for a print: "
+        "export it with a larger tolerance, or reduce its faces (Decimate in Blender, Simplify in a slicer)",
+    )
 
 
 def floating_pieces(mesh: Mesh) -> tuple[str, ...]:

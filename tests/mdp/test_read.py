@@ -6,11 +6,12 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
-from mdp.read import locate, read_mesh
+from mdp.mesh import Mesh
+from mdp.read import MANY_FACES, locate, read_mesh, too_fine
 from profiles.errors import MeshError
 from tests.mdp import files
 from tests.mdp.files import refusal, save
-from tests.shapes import tee
+from tests.shapes import box, tee
 
 
 def test_the_same_file_gives_the_same_bytes_twice(tmp_path: Path) -> None:
@@ -92,3 +93,11 @@ def test_shared_models_read_as_they_are() -> None:
     assert np.ptp(camel.bounds_mm, axis=0) == pytest.approx([41.89, 80.0, 41.90], abs=0.01)
     solid = m3.Manifold(m3.Mesh64(kitten.vertices.copy(), kitten.faces.astype(np.uint64)))
     assert solid.volume() == pytest.approx(198_875, rel=1e-4)
+
+
+def test_a_mesh_of_far_more_faces_than_a_print_shows_is_told_what_to_reduce() -> None:
+    plane = np.zeros((4, 3)), np.zeros((MANY_FACES + 1, 3), np.int32)
+    assert too_fine(box()) == ()
+    (sentence,) = too_fine(Mesh(*plane))
+    assert sentence.startswith(f"{MANY_FACES + 1} faces")
+    assert "reduce its faces" in sentence

@@ -6,14 +6,15 @@ from typing import Any
 from machine.app.workbench.bench.bench import Bench, Model
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.session.desk import Desk
+from mdp.read import MANY_FACES
 from profiles.profile import Profile
 
-MOST_FACES = 500_000  # that are made ready; for larger models that waits for the first plane
 CHANGING_S = 0.2  # of a bench, until it is made ready as it is
 
 
 class Readiness:
-    """preparing: how many benches are made ready now. A bench has a number for the process, which it goes to once."""
+    """preparing: how many benches are made ready now; very large models wait for the first plane. A bench
+    has a number for the process, which it goes to once."""
 
     def __init__(self, desk: Desk) -> None:
         self.preparing = 0
@@ -61,7 +62,7 @@ class Readiness:
 
     def _follow(self) -> None:
         bench = self._desk.bench
-        if bench.model is None or len(bench.model.mesh.faces) > MOST_FACES or self._number_of(bench) == self._wanted:
+        if bench.model is None or len(bench.model.mesh.faces) > MANY_FACES or self._number_of(bench) == self._wanted:
             return
         wait_s = CHANGING_S if bench.model is self._model else 0.0
         self._wanted, self._model = self._number_of(bench), bench.model

@@ -27,7 +27,7 @@ from machine.app.workbench.work.cutting import Files
 from machine.app.workbench.work.models import Resting
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
-from mdp.read import locate
+from mdp.read import MANY_FACES, locate
 from profiles.errors import PlanError
 from profiles.profile import Profile
 
@@ -44,6 +44,7 @@ class Session(Desk):
         self.pieces, self._pricing = Pieces(self), Pricing(self)
         self._settling = asyncio.Lock()
         self.marking = Marking(self, self.trying)
+        self._ranking: asyncio.Task[None] | None = None
         self.resting: tuple[Model, tuple[Resting, ...]] | None = None
 
     def warm(self) -> None:
@@ -54,10 +55,12 @@ class Session(Desk):
     async def open_model(self, path: Path, name: str) -> None:
         """Put the model of a file on the bench. Raises UserError as the command line tells it."""
         self.readiness.load()
+        if self._ranking is not None and self.bench.model is not None and len(self.bench.model.mesh.faces) > MANY_FACES:
+            self._ranking.cancel()  # it would be waited for
         with self.waiting(f"reading {name}"):
             model = await self.quick.run("read_model", path, name, self.bench.profile.of_all_parts)
             self.do(f"open {name}", with_model(self.bench, model))
-        self.start(self._rank(model))
+        self._begin_ranking(model)
 
     async def open_demo(self, name: str) -> None:
         """Put a model that ships with the program on the bench. Raises UserError for an unknown one."""
@@ -156,7 +159,7 @@ class Session(Desk):
         if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
             with self.waiting(f"reading {model.name}"):
                 model = await self.quick.run("read_model", model.path, model.name, bench.profile.of_all_parts)
-            self.start(self._rank(model))
+            self._begin_ranking(model)
             if new.rotate_deg != old.rotate_deg:
                 return replace(with_model(bench, model), rotation=bench.rotation), ""
             bench = with_scaled_model(bench, model, new.scale / old.scale)
@@ -166,6 +169,10 @@ class Session(Desk):
                 why = f"{word}: the planes were taken away, for part {trial.refused_part} cannot be cut off: {trial.refused}"
                 return replace(with_cuts(bench, ()), cuts=None), why
         return bench, ""
+
+    def _begin_ranking(self, model: Model) -> None:
+        """Rank the ways in which a model rests."""
+        self._ranking = self.start(self._rank(model))
 
     async def _rank(self, model: Model) -> None:
         await self.readiness.wait()
