@@ -16,7 +16,7 @@ function layerTimes(scene, bells) {
     const style = getComputedStyle(canvas), [shown, others] = ["--accent", "--soft"].map((name) => style.getPropertyValue(name));
     const usual = longestUsual(layers);
     const lines = longestAt(layers, (k) => Math.floor(height - (THUMB_PX / 2 + (k / Math.max(layers.length - 1, 1)) * (height / density - THUMB_PX)) * density));
-    const thick = Math.max(Math.ceil((height - THUMB_PX * density) / Math.max(layers.length, 1)) - (layers.length < height / 4 ? 1 : 0), 1);
+    const pitch = (height - THUMB_PX * density) / Math.max(layers.length - 1, 1), thick = pitch < 3 ? Math.ceil(pitch) : Math.floor(pitch) - 1;
     for (const [y, k] of lines) {
       const long = clamp((layers[k].time / usual) * width, 1, width), drawn = scene.low <= k && k <= scene.high;
       pen.globalAlpha = drawn ? 1 : 0.45;
