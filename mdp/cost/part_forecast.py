@@ -1,4 +1,5 @@
-"""Part forecast: what every part of a sequence of planes is and costs, summed over a model's surface without cutting it.
+"""Part forecast: how large every part of a sequence of planes is and what of it needs support, summed over a model's surface
+without cutting it.
 
 As in mdp.cost.forecast a piece of the surface belongs to the first part whose plane it lies above. The faces that cuts lay open
 are counted as fans: the chord of every face in a plane makes a triangle with one point of that plane, and the areas of these
@@ -13,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.cost.clipping import along, clip_below, find_chord, flat_area_mm2, rim_per_mm
+from mdp.cost.clipping import along, clip_below, find_chord, flat_area_mm2
 from mdp.cost.cost import CostTerms
 from mdp.cost.forecast import Faces, counts_of, weight_along
 from mdp.kernels.arrays import floats, ints, table
@@ -25,17 +26,16 @@ from mdp.support_need.patches import Classes
 from mdp.sweep.rims import ROUNDING_MM
 from mdp.sweep.sweep import Remainder
 
-NEEDED, WEIGHTED, RIM, SEAM, COSINE, VOLUME, COLUMNS = range(7)  # of the sums over a part; the others are mm2 and mm
+NEEDED, RIM, COSINE, VOLUME, COLUMNS = range(5)  # of the sums over a part; the others are mm2 and mm
 LEAST_EDGE_MM = 1e-3  # of the line in which two cuts meet; fans leave less than nothing
 
 
 @dataclass(frozen=True)
 class PartForecast:
-    """A part cut off: what of it needs support, mm2, and what its cut leaves to support for ever and scars; the length of its rim
-    where it is seen, the smallest angle of an edge that the cut makes, and its volume."""
+    """A part cut off: what of it needs support, the length of its rim where it is seen, the smallest angle of an edge that the
+    cut makes, and its volume."""
 
     support_mm2: float
-    cost_mm2: float
     rim_mm: float
     edge_deg: float
     volume_mm3: float
@@ -43,10 +43,9 @@ class PartForecast:
 
 @dataclass(frozen=True, eq=False)
 class ModelForecast:
-    """A whole model laid out for forecasts of its parts. middle: a point in it; weights: how much a mm of rim counts on it."""
+    """A whole model laid out for forecasts of its parts. middle: a point in it."""
 
     remainder: Remainder
-    terms: CostTerms
     faces: Faces
     middle: Floats
 
@@ -61,7 +60,7 @@ class ModelForecast:
         faces = Faces(
             corners, normals, areas, remainder.risky, risky_below, weights, terms.feather, sources, weight, counts_of(remainder)
         )
-        return cls(remainder, terms, faces, mesh.bounds_mm.mean(axis=0))
+        return cls(remainder, faces, mesh.bounds_mm.mean(axis=0))
 
     def parts(self, planes: Sequence[Plane]) -> tuple[tuple[PartForecast, ...], float]:
         """The parts that planes cut off, in the order of the cuts, and the area of what remains that needs support printed
@@ -75,13 +74,12 @@ class ModelForecast:
         sums = _sum_parts(self.faces, Planes(directions, offsets, apexes), classes, meeting)
         rows, before = np.nonzero(np.abs(meeting) > LEAST_EDGE_MM)
         np.maximum.at(sums[:, COSINE], rows, np.abs((directions[rows] * directions[before]).sum(axis=1)))
-        return tuple(self._part(row) for row in sums[:-1]), float(sums[-1, NEEDED])
+        return tuple(_part(row) for row in sums[:-1]), float(sums[-1, NEEDED])
 
-    def _part(self, row: Floats) -> PartForecast:
-        terms, values = self.terms, [float(value) for value in row]
-        scar_mm2 = terms.seam_mm * values[SEAM] + terms.cut_mm2 if terms.seam_mm > 0.0 else 0.0
-        edge_deg = degrees(acos(min(values[COSINE], 1.0)))
-        return PartForecast(values[NEEDED], values[WEIGHTED] + scar_mm2, values[RIM], edge_deg, values[VOLUME])
+
+def _part(row: Floats) -> PartForecast:
+    values = [float(value) for value in row]
+    return PartForecast(values[NEEDED], values[RIM], degrees(acos(min(values[COSINE], 1.0))), values[VOLUME])
 
 
 class Planes(NamedTuple):
@@ -157,9 +155,8 @@ def _divide(
                 size = 0
             sums[cut, VOLUME] += (area - left) * height / 3.0
             if along(normals, row, planes.directions, cut) < surface.risky_below:
-                times = 1.0 if fan >= 0 else weight_along(surface, classes, cut, face)
-                sums[cut, NEEDED] += (area - left) * min(times, 1.0)
-                sums[cut, WEIGHTED] += (area - left) * times * (1.0 if fan >= 0 else surface.counts[face])
+                needing = fan >= 0 or weight_along(surface, classes, cut, face) > 0.0
+                sums[cut, NEEDED] += area - left if needing else 0.0
             area = left
         cut += 1
     if size > 0 and (surface.risky[face] if fan < 0 else planes.directions[fan, 2] < surface.risky_below):
@@ -181,10 +178,7 @@ def _add_fan(room: Room, waiting: int, apex: Floats, cut: int) -> None:
 def _add_rim(surface: Faces, face: int, cosine: float, length: float, sums: Floats) -> None:
     """Add the chord of a face of the model to the sums of a part."""
     sums[COSINE] = max(sums[COSINE], abs(cosine))
-    weight = surface.seam_mm[face]
-    if weight > 0.0:
-        sums[RIM] += length
-        sums[SEAM] += length * weight * rim_per_mm(cosine, surface.feather)
+    sums[RIM] += length if surface.seam_mm[face] > 0.0 else 0.0
 
 
 @part

@@ -78,7 +78,7 @@ def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a person's plane cannot cut; reason: what the sweep found against it, FEASIBLE: nothing."""
+    """Why a person's plane cannot cut; reason: what was found against it, FEASIBLE: there is nothing to cut."""
 
     text: str
     reason: Reason = Reason.FEASIBLE
@@ -88,7 +88,7 @@ def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     """The node after a person's cut, or the reason why it cannot be made."""
     why = refusal(problem, node, plane)
     following = problem.cut(node, plane) if why is None else None
-    return following if following is not None else why or Refusal(OUT_OF_REACH)
+    return following if following is not None else why or Refusal(OUT_OF_REACH, Reason.REACH)
 
 
 def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
@@ -97,7 +97,7 @@ def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
     if why is not None or not problem.settings.clearance:
         return why
     hindrance = _find_hindrance(problem, node, plane)
-    return None if hindrance is None else Refusal(hindrance)
+    return None if hindrance is None else Refusal(hindrance, Reason.REACH)
 
 
 def _check_offset(problem: Problem, planned: PlannedPart, label: str) -> None:

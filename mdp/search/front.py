@@ -71,7 +71,7 @@ def front_row(node: Node, terms: CostTerms) -> FrontRow:
     seams = node.seams
     scars_mm2 = sum(terms.seam_mm * seam.weighted_mm + terms.cut_mm2 for seam in seams)
     planes = tuple(cut.base for cut in node.cuts)
-    over_mm2 = 0.0 if terms.need is None else _excess_mm2(node) + node.remainder.risky_mm2 - _plain_mm2(node)
+    over_mm2 = 0.0 if terms.need is None else _excess_mm2(node) + (node.remainder.risky_mm2 - _plain_mm2(node))
     return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2)
 
 

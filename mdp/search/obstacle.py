@@ -62,7 +62,7 @@ def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -
         case Reason.WEAK:
             section = _section(node.remainder.mesh, plane)
             return Obstacle((_vector(0.5 * (section.min(axis=0) + section.max(axis=0))),))
-        case Reason.FEASIBLE:
+        case Reason.REACH:
             return _outside(problem, corners_above(node.remainder.mesh, plane), plane)
     return None
 

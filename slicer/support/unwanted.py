@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from profiles.process import Process
 from slicer.geometry.polygons import Polygons, offset, union
 from slicer.heights import Heights
 from slicer.support.overhang import RIM_MM, Overhang, faces_by_layer
+from slicer.support.reachable import EVEN_MM
 
 EDGES = tuple((a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4))  # of a box, by its corners
 
@@ -31,8 +31,8 @@ def without_unwanted(overhangs: Sequence[Overhang], part: Part, cuts_mm: Floats)
 def shut_areas(part: Part, heights: Heights, process: Process) -> list[Polygons]:
     """For each layer where no support may be: in the boxes, and over the faces as far as what would stand on them."""
     unwanted = _of_layers(part, heights.cut_mm)
-    over = ceil(process.support_bottom_gap_mm / process.layer_height_mm) + 1
-    return [union(unwanted[max(k - over, 0) : k + 1]) for k in range(len(unwanted))]
+    ground = np.searchsorted(heights.tip_mm, heights.bottom_mm - process.support_bottom_gap_mm + EVEN_MM, side="right")
+    return [union(unwanted[max(near - 1, 0) : k + 1]) for k, near in enumerate(ground.tolist())]
 
 
 def _of_layers(part: Part, cuts_mm: Floats) -> list[Polygons]:

@@ -11,9 +11,11 @@ from mdp.mesh import Floats
 from mdp.zone import AnyZone, Marked, Zone
 from slicer.estimate.sampled_part import sample_part
 from slicer.estimate.shell import NOTHING
+from slicer.heights import Heights
 from slicer.parts import slice_parts
 from slicer.paths import Kind, SlicedPart
 from slicer.slice import slice_part
+from slicer.support.unwanted import shut_areas
 from slicer.walls.unwanted_seam import unwanted_segments
 from tests.shapes import box, tee
 from tests.slicer.hand import BARE, cut, of_kind, profile, volume_mm3, whole
@@ -89,3 +91,13 @@ def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zon
     counted = [sum(area is not NOTHING for area in sample_part(each, SUPPORTED).support.areas) for each in (part, bare(part))]
     assert (counted[0] > 0, counted[1]) == (True, 0)
     assert volume_mm3(kept, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)
+
+
+def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> None:
+    block, tips_mm = whole(box(20.0, 20.0, 4.0)), 0.08 * np.arange(1, 101)
+    marked = replace(block, no_support=Marked.of(block.mesh, [Grown((0.0, 0.0, 4.0), 1.0)]))
+    process = profile("process.layer_height_mm=0.3", "process.support_bottom_gap_mm=0.3").process
+    heights = Heights(tips_mm, np.full(100, 0.08), tips_mm - 0.04)
+    stands = int(np.searchsorted(heights.bottom_mm, 4.3))  # the first layer that support on it would have
+    shut = shut_areas(marked, heights, process)
+    assert (shut[stands].area(), shut[-1].area()) == (pytest.approx(400.0, rel=0.01), 0.0)

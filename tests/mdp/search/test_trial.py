@@ -64,6 +64,12 @@ def test_the_plane_that_cannot_be_cut_is_named_with_the_reason() -> None:
     assert tried.parts[1] is not None
 
 
+def test_a_plane_that_misses_a_model_too_tall_for_the_machine_marks_nothing() -> None:
+    below = Plane(np.array([0.0, 0.0, 1.0]), -5.0)
+    tried = trials(box(10.0, 10.0, 900.0)).attempt((below,))
+    assert ("misses the model" in tried.refused, tried.obstacle) == (True, None)
+
+
 def test_no_plane_at_all_is_the_model_in_one_piece() -> None:
     tried = trials(tee()).attempt(())
     assert (tried.parts, tried.refused, tried.seam_mm) == ((), "", 0.0)
