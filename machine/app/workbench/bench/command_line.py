@@ -31,7 +31,7 @@ def export_command(bench: Bench) -> str:
     settings = list(given.settings)
     if bench.cuts is None and bench.turned is not None:
         settings = [each for each in settings if each.partition("=")[0].strip() != "process.rotate_deg"]
-        settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.9g}' for angle in turns_deg(bench))}]")
+        settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.12g}' for angle in turns_deg(bench))}]")
     words += [word for setting in settings for word in ("--set", setting)]
     if bench.cuts is not None:
         words += ["--plan", f"{stem}-plan.toml"]
