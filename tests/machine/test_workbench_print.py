@@ -125,7 +125,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert browser.value("$('port-typed').value") == "e"
         assert browser.value(PRINTING) == "printing"
         browser.click("#follow")
-        browser.wait(f"['ready', 'failed'].includes({VIEW}.documentElement.dataset.state)")
+        browser.wait(f"['ready', 'failed'].includes({VIEW}?.documentElement?.dataset.state)")
         browser.value(f"{VIEW}.querySelector('button').focus()")
         browser.key("e")
         browser.wait(f"{PRINTING} === 'over' && $('print-bar').hidden")

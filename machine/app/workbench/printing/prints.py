@@ -16,6 +16,7 @@ from typing import Any
 from machine.app.printer.port_reports import PortReport, answer_words, ask_ports, known_ports, port_json
 from machine.app.workbench.printing.order import PrintOrder
 from machine.app.workbench.printing.running_print import RunningPrint
+from machine.app.workbench.work.news import News
 from machine.link.medium import stable_name
 from machine.link.port import check_baud
 from profiles.errors import PrinterError
@@ -24,13 +25,12 @@ MOST_OVER = 5  # prints that are over stay to be looked at, the newest ones
 WORDS, PERCENTS = ("pause", "resume"), ("feed", "flow")  # what goes to the print as it is
 
 
-class Prints:
+class Prints(News):
     """All from the event loop; pages wait for `changed`."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.prints: list[RunningPrint] = []
-        self.version = 0
-        self._changed = asyncio.Event()
         self._numbers = itertools.count(1)
         self._pages: Counter[str] = Counter()
         self._ports: list[dict[str, Any]] | None = None
@@ -54,21 +54,16 @@ class Prints:
             ],
         }
 
-    async def changed(self, seen: int) -> None:
-        """Return when there is something newer than the version that was seen."""
-        while self.version == seen:
-            await self._changed.wait()
-
     @contextmanager
     def page(self, page: str) -> Iterator[None]:
         """A page that is there; one that goes leaves its prints alone, and their command to whoever takes it."""
         self._pages[page] += 1
-        self._tell()
+        self.tell()
         try:
             yield
         finally:
             self._pages[page] -= 1
-            self._tell()
+            self.tell()
 
     def command(self, page: str, asked: dict[str, Any], order: Callable[[dict[str, Any]], PrintOrder]) -> None:
         """Do what a page asks for; order: makes one of what lies on its workbench. Raises UserError for what cannot be done."""
@@ -81,7 +76,7 @@ class Prints:
             self._stop_at_once(asked.get("print"))
         else:
             self._command_one(page, self._named(asked.get("print")), asked)
-        self._tell()
+        self.tell()
 
     def close(self) -> None:
         """End the asking; the prints end by themselves, heaters off, for their pipes end with this process."""
@@ -104,7 +99,7 @@ class Prints:
         if any(_same(each.state["port"], port) for each in self.running):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
         self.prints = [each for each in self.prints if not each.over or not _same(each.state["port"], port)][-MOST_OVER:]
-        begun = RunningPrint(next(self._numbers), order, page, self._tell)
+        begun = RunningPrint(next(self._numbers), order, page, self.tell)
         self.prints.append(begun)
         self._start(self._print(begun))
 
@@ -160,17 +155,12 @@ class Prints:
             self._ports = [_port(each) for each in reports]
         finally:
             self._over = None
-            self._tell()
+            self.tell()
 
     def _start(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-
-    def _tell(self) -> None:
-        self.version += 1
-        self._changed.set()
-        self._changed = asyncio.Event()
 
 
 def _port(report: PortReport) -> dict[str, Any]:

@@ -14,13 +14,14 @@ from typing import Any
 from machine.app.crash import log_bug
 from machine.app.workbench.bench.bench import Bench, History, Step
 from machine.app.workbench.work.lane import Lane
+from machine.app.workbench.work.news import News
 from profiles.errors import UserError
 
 UNSAFE = re.compile(r"[^\w .()+-]")
 LONGEST_NAME = 100
 
 
-class Desk:
+class Desk(News):
     """All from the event loop; the pages wait for `changed`.
 
     problem: what could not be done last; busy: what the pages wait for. The lanes: quick for what a person waits for, long for
@@ -28,14 +29,13 @@ class Desk:
     """
 
     def __init__(self, bench: Bench) -> None:
+        super().__init__()
         self.history = History(Step("", bench))
         self.problem = ""
         self.busy = ""
-        self.version = 0
         self.closed = False
         self.quick, self.long, self.hand = Lane(), Lane(), Lane()
         self.followers: list[Callable[[], None]] = []
-        self._changed = asyncio.Event()
         self._folder = tempfile.TemporaryDirectory(prefix="tiltprint-")
         self._numbers = itertools.count(1)
         self._tasks: set[asyncio.Task[None]] = set()
@@ -54,17 +54,6 @@ class Desk:
             lane.stop()
         self._folder.cleanup()
         self.tell()
-
-    def tell(self) -> None:
-        """Let the pages know that something has changed."""
-        self.version += 1
-        self._changed.set()
-        self._changed = asyncio.Event()
-
-    async def changed(self, seen: int) -> None:
-        """Return when there is something newer than the version that was seen."""
-        while self.version == seen:
-            await self._changed.wait()
 
     def start(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
         """Have work done beside the pages; what it is refused becomes the sentence that they show."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from collections.abc import Coroutine
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -20,8 +21,12 @@ CLOSED_CODE = 4404  # of a websocket that is closed for that
 async def talk(session: Session, socket: WebSocket) -> None:
     """State out, commands in, until either side goes. A page that reads nothing holds up nobody but itself."""
     await socket.accept()
-    told = asyncio.create_task(_tell(session, socket))
-    heard = asyncio.create_task(_hear(session, socket))
+    await until_either_ends(_tell(session, socket), _hear(session, socket))
+
+
+async def until_either_ends(tell: Coroutine[Any, Any, None], hear: Coroutine[Any, Any, None]) -> None:
+    """The two directions of a line beside each other; that a page has gone is no fault."""
+    told, heard = asyncio.create_task(tell), asyncio.create_task(hear)
     done, left = await asyncio.wait((told, heard), return_when=asyncio.FIRST_COMPLETED)
     for task in left:
         task.cancel()
@@ -52,14 +57,15 @@ async def _hear(session: Session, socket: WebSocket) -> None:
     while True:
         text = await socket.receive_text()
         try:
-            session.command(_parsed(text))
+            session.command(parsed(text, MOST_COMMAND))
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
             session.refuse(error)
 
 
-def _parsed(text: str) -> dict[str, Any]:
+def parsed(text: str, most: int) -> dict[str, Any]:
+    """A command of a page, of so many characters at most. Raises PlanError for what is none."""
     try:
-        asked = json.loads(text) if len(text) <= MOST_COMMAND else None
+        asked = json.loads(text) if len(text) <= most else None
     except (ValueError, RecursionError):
         asked = None
     if not isinstance(asked, dict):

@@ -13,7 +13,6 @@ from starlette.websockets import WebSocket
 
 from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import settings_list
-from machine.app.workbench.printing.pages import print_log, prints_line
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
@@ -22,6 +21,7 @@ from machine.app.workbench.web.downloads import folder, gcode, plan, print_page,
 from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, CLOSED_CODE, talk
 from machine.app.workbench.web.page import workbench_page
+from machine.app.workbench.web.prints_line import print_log, prints_line
 from machine.app.workbench.web.snapshot import marks, marks_key, model_key, triangles
 from mdp.read import MOST_BYTES
 from profiles.errors import PlanError

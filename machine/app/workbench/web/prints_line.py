@@ -1,6 +1,5 @@
-"""Pages: the line of a page to the prints. It is one of its own, so that a print's news, five a second, carry nothing else."""
+"""Prints line: a page's line to the prints: one of its own, so that a print's news, five a second, carry nothing else."""
 
-import asyncio
 import json
 import secrets
 from collections.abc import Awaitable, Callable
@@ -11,13 +10,14 @@ from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 
 from machine.app.crash import log_bug
 from machine.app.requests import PrintRequest
 from machine.app.workbench.printing.ordering import order_of
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.web.line import parsed, until_either_ends
 from machine.network.address import is_server_address
 from profiles.errors import PrinterError, UserError
 
@@ -36,13 +36,7 @@ def prints_line(prints: Prints) -> Callable[[Session, WebSocket], Awaitable[None
         page = socket.query_params.get("page", "")[:40] or secrets.token_urlsafe(9)
         await socket.accept()
         with prints.page(page):
-            told, heard = asyncio.create_task(_tell(prints, socket)), asyncio.create_task(_hear(prints, session, socket, page))
-            done, left = await asyncio.wait((told, heard), return_when=asyncio.FIRST_COMPLETED)
-            for task in left:
-                task.cancel()
-        for task in done:
-            if not isinstance(task.exception(), WebSocketDisconnect | RuntimeError | None):
-                task.result()
+            await until_either_ends(_tell(prints, socket), _hear(prints, session, socket, page))
 
     return talk
 
@@ -53,7 +47,7 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
     async def answer(request: Request) -> Response:
         for each in prints.prints:
             log = each.state["log"]
-            if str(each.number) == str(request.path_params["print"]) and log and Path(log).is_file():
+            if each.number == request.path_params["print"] and log and Path(log).is_file():
                 return FileResponse(log, media_type="text/plain")
         return Response("there is no log of this print\n", 404)
 
@@ -77,7 +71,7 @@ async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) 
     while True:
         text = await socket.receive_text()
         try:
-            asked = _parsed(text)
+            asked = parsed(text, MOST_COMMAND)
             prints.command(page, asked, lambda given: order_of(session, _printing(given), given.get("force") is True))
         except UserError as error:
             await socket.send_text(json.dumps({"problem": str(error)}))
@@ -85,16 +79,6 @@ async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) 
             log = log_bug(error, ())
             told = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"
             await socket.send_text(json.dumps({"problem": told}))
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    try:
-        asked = json.loads(text) if len(text) <= MOST_COMMAND else None
-    except (ValueError, RecursionError):
-        asked = None
-    if not isinstance(asked, dict):
-        raise PrinterError("what the page has sent is no command of a print")
-    return asked
 
 
 def _printing(asked: dict[str, Any]) -> PrintRequest:
