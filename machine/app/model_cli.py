@@ -239,7 +239,7 @@ def edit(
     process: ProcessName = "standard",
     settings: Settings = None,
 ) -> int:
-    """Open the workbench: a page on this computer to look, lay down, cut and save. Ctrl-C ends it."""
+    """Open the workbench: a page to look, cut, slice and print. It is on this computer alone; Ctrl-C ends it."""
     from machine.app.commands.edit import edit
     from machine.app.requests import EditRequest, Given
 
