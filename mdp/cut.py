@@ -54,18 +54,19 @@ def below(solid: Solid, plane: Plane) -> Solid:
 
 
 def corners_above(mesh: Mesh, plane: Plane) -> Floats:
-    """(n, 3) the corners of what of a mesh lies above a plane, some of them twice: its vertices, and where its edges pass.
-    Nothing is cut."""
+    """(n, 3) the corners of what of a mesh lies above a plane: its vertices, and where its edges pass. Nothing is cut."""
+    return np.concatenate([mesh.vertices[plane.heights_mm(mesh.vertices) > 0.0], passing_places(mesh, plane)])
+
+
+def passing_places(mesh: Mesh, plane: Plane) -> Floats:
+    """(k, 3) where the edges of a closed mesh pass through a plane."""
     heights = plane.heights_mm(mesh.vertices)
-    upper = heights > 0.0
-    crossing = [mesh.vertices[upper]]
-    for k in range(3):
-        starts, ends = mesh.faces[:, k], mesh.faces[:, k - 2]
-        rising = ~upper[starts] & upper[ends]  # every edge rises along one of its two faces
-        low, high = starts[rising], ends[rising]
-        share = (heights[low] / (heights[low] - heights[high]))[:, None]
-        crossing.append(mesh.vertices[low] + share * (mesh.vertices[high] - mesh.vertices[low]))
-    return np.concatenate(crossing)
+    starts, ends = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    rising = (heights[starts] <= 0.0) & (heights[ends] > 0.0)  # every edge rises along one of its two faces
+    low, high = starts[rising], ends[rising]
+    share = (heights[low] / (heights[low] - heights[high]))[:, None]
+    places: Floats = mesh.vertices[low] + share * (mesh.vertices[high] - mesh.vertices[low])
+    return places
 
 
 def convex_hull(points: Floats) -> Mesh:

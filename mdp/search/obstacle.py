@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.clearance import lowest_place
-from mdp.cut import Solid, above, below, corners_above, mesh_of
+from mdp.cut import Solid, above, below, corners_above, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.plane import Plane
@@ -60,7 +60,7 @@ def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -
             corners = np.array([zone.min_mm, zone.max_mm]) if isinstance(zone, Zone) else zone.points
             return Obstacle((_vector(0.5 * (corners.min(axis=0) + corners.max(axis=0))),))
         case Reason.WEAK:
-            section = _section(node.remainder.mesh, plane)
+            section = passing_places(node.remainder.mesh, plane)
             return Obstacle((_vector(0.5 * (section.min(axis=0) + section.max(axis=0))),))
         case Reason.REACH:
             return _outside(problem, corners_above(node.remainder.mesh, plane), plane)
@@ -74,7 +74,7 @@ def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
     if not options:
         return None
     _, body, place, pose = min(options, key=lambda option: option[0])
-    printed = np.vstack([mesh.vertices[plane.heights_mm(mesh.vertices) > 0.0], _section(mesh, plane)])
+    printed = corners_above(mesh, plane)
     tip, turned = printed[int(np.argmin(printed[:, 2]))], rotation(machine, pose)
     x, y, _ = tip + np.array(place) @ turned
     return Touch(body, _vector(tip), tuple(_vector(row) for row in turned), (float(x), float(y), 0.0))
@@ -87,17 +87,6 @@ def _sliver(mesh: Mesh, plane: Plane) -> Obstacle | None:
     outward[(np.abs(cosines) <= SLIVER_COSINE)[:, None] | (outward < 0.0)] = np.inf
     face, corner = np.unravel_index(int(np.argmin(outward)), outward.shape)
     return Obstacle((_vector(mesh.vertices[mesh.faces[face, corner]]),)) if np.isfinite(outward[face, corner]) else None
-
-
-def _section(mesh: Mesh, plane: Plane) -> Floats:
-    """(k, 3) where the edges of a mesh pass through a plane."""
-    heights = plane.heights_mm(mesh.vertices)
-    starts, ends = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    passing = (heights[starts] > 0.0) & (heights[ends] <= 0.0)
-    a, b = starts[passing], ends[passing]
-    share = (heights[a] / (heights[a] - heights[b]))[:, None]
-    places: Floats = mesh.vertices[a] + share * (mesh.vertices[b] - mesh.vertices[a])
-    return places
 
 
 def _lowest(solid: Solid, upward: Floats, ground_mm: float) -> Obstacle | None:

@@ -1,5 +1,7 @@
 """Copies: they stand apart on the plate, are printed together, and what does not fit is refused."""
 
+from dataclasses import replace
+
 import manifold3d as m3
 import numpy as np
 import pytest
@@ -8,10 +10,12 @@ from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
 from machine.planning.arrange import places_on_plate
 from mdp.decomposition import Decomposition, Part
+from mdp.grown import Grown
 from mdp.mesh import Mesh
+from mdp.zone import Marked, Zone
 from profiles.errors import PlanError
 from profiles.profile import Profile, load
-from tests.shapes import box, standing
+from tests.shapes import box, standing, tee
 from tests.slicer.hand import cut, whole
 
 COARSE = ["process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3"]
@@ -46,6 +50,17 @@ def test_every_copy_is_printed_and_a_layer_of_all_comes_before_the_next() -> Non
 
 def _own(run) -> np.ndarray:  # type: ignore[no-untyped-def]
     return np.array([name not in ("Custom", "Skirt/Brim") for name in run.segment_type])
+
+
+def test_marks_go_along_with_every_copy() -> None:
+    part = whole(tee().transform(np.eye(3), (3.0, 1.0, 0.0)))
+    for zone in (Zone((4.0, -9.0, 29.0), (9.0, 9.0, 31.0)), Grown((12.0, 0.0, 30.0), 1.0)):
+        marked = Marked.of(part.mesh, (zone,))
+        (many,) = in_copies(decomposed(replace(part, no_support=marked, no_seam=marked)), 3, plate())[0].parts
+        alone = marked.touched(part.mesh)
+        assert 0 < alone.sum() < len(alone)
+        for copies in (many.no_support, many.no_seam):
+            assert copies.touched(many.mesh).tolist() == 3 * alone.tolist()
 
 
 def test_slender_copies_have_the_brim_that_one_alone_would_have() -> None:
