@@ -40,7 +40,8 @@ STEPS = (
     Step("slicing", ("#tab-slices", "#slice"), "document.getElementById('slice').disabled"),
     Step("sliced", (), SLICED),
     Step("look", ("#look",), "!document.getElementById('print-page').hidden"),
-    Step("print", ("#look",)),
+    Step("checks", ("#look", "#tab-printing", "#check"), "!document.getElementById('run-ask').hidden"),
+    Step("printing", ("#begin",), "document.documentElement.dataset.printing === 'printing'"),
 )
 
 
