@@ -6,7 +6,7 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from slicer.paths import Kind, Layer, SlicedPart
 
-SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.SUPPORT)
+SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN, Kind.SUPPORT)
 MOST_PIECES = 60_000  # of a part: with more, only every second layer is drawn, or every third, as high as so many
 
 

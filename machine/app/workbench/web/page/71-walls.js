@@ -2,14 +2,19 @@
 
 const PIECE = 7; // numbers of a straight piece: two ends and its height
 
-/** Triangles {places, colours} of a part's walls: upright bands along every piece. bytes: as the server gives them. */
+const BROAD = 1.1; // half the width of a bead, by its height
+
+/** Triangles {places, colours} of a part's walls: an upright band along every piece and a level one on it, as broad as a bead, so
+ * that a slope has no gaps. bytes: as the server gives them. */
 function bandsOf(bytes, colour) {
-  const values = new Float32Array(bytes), way = values.subarray(0, 3), count = (values.length - 3) / PIECE;
-  const places = new Float32Array(18 * count), colours = new Uint32Array(6 * count).fill(wordOf(rgb(colour), 254));
+  const values = new Float32Array(bytes), way = [...values.subarray(0, 3)], count = (values.length - 3) / PIECE;
+  const places = new Float32Array(36 * count), colours = new Uint32Array(12 * count).fill(wordOf(rgb(colour), 254));
   for (let k = 0, at = 0; k < count; k++) {
-    const begin = 3 + PIECE * k, half = values[begin + 6] / 2;
-    for (const [end, sign] of [[0, -1], [3, -1], [3, 1], [0, -1], [3, 1], [0, 1]])
-      for (let axis = 0; axis < 3; axis++) places[at++] = values[begin + end + axis] + sign * half * way[axis];
+    const from = 3 + PIECE * k, begin = [...values.subarray(from, from + 3)], end = [...values.subarray(from + 3, from + 6)];
+    const up = scaled(way, values[from + 6] / 2), side = scaled(unit(cross(way, sub(end, begin))), BROAD * values[from + 6]);
+    for (const [middle, half] of [[[0, 0, 0], up], [up, side]])
+      for (const [place, sign] of [[begin, -1], [end, -1], [end, 1], [begin, -1], [end, 1], [begin, 1]])
+        for (let axis = 0; axis < 3; axis++) places[at++] = place[axis] + middle[axis] + sign * half[axis];
   }
   return { places, colours: new Uint8Array(colours.buffer) };
 }
