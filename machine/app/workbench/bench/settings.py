@@ -13,6 +13,7 @@ from profiles.places import KINDS, known
 from profiles.profile import SECTIONS, Profile, load, with_part_settings
 
 SHOWN = ("number", "integer", "boolean", "choice")  # kinds of values that a schema tells as a page has them
+ORDER = ("process", "material", "search", "machine")  # what is changed most comes first
 BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
 
 
@@ -57,8 +58,8 @@ def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[st
         changed = {setting.partition("=")[0].strip() for setting in given.settings}
         return [
             {**row, "changed": row["key"] in changed}
-            for section, model in SECTIONS.items()
-            for row in _rows(section, model, getattr(profile, section).model_dump(mode="json"))
+            for section in ORDER
+            for row in _rows(section, SECTIONS[section], getattr(profile, section).model_dump(mode="json"))
         ]
     own, allowed = own_values(profile, part), allowed_keys(part)
     values = profile.of_part(part).process.model_dump(mode="json")
