@@ -40,7 +40,7 @@ class Readiness:
         """What a task of work.trials says of a bench, made ready for it where it is not."""
         number = self._number_of(bench)
         answer = await self._desk.hand.run(task, number, *given)
-        if answer is None:
+        while answer is None:  # or another bench was made ready in between
             await self._desk.hand.run("make_ready", number, bench)
             answer = await self._desk.hand.run(task, number, *given)
         return answer
