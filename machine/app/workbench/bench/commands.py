@@ -40,7 +40,7 @@ def obey(history: History, asked: dict[str, Any]) -> History:
 def _turn(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
     """Turn the model by `deg` about the axis `axis` of the machine."""
     axis, angle_deg = asked.get("axis"), asked.get("deg")
-    if axis not in AXES:
+    if not isinstance(axis, str) or axis not in AXES:
         raise PlanError(f"axis is {axis!r}: {', '.join(AXES)} are allowed")
     if not is_number(angle_deg) or abs(angle_deg) > 360.0:
         raise PlanError(f"deg is {angle_deg!r}: a number from -360 to 360 is allowed")

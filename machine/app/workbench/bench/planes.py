@@ -1,6 +1,6 @@
 """Planes: cuts that a person moves, adds, takes away and puts into another order; whether they can be cut, a trial says."""
 
-from math import hypot, isfinite
+from math import hypot
 from typing import Any, TypeGuard
 
 from machine.app.workbench.bench.bench import Bench
@@ -11,6 +11,7 @@ from profiles.part_settings import MOST_PARTS
 
 Cuts = tuple[PlannedPart, ...]
 MOST_MM = 1e5
+MOST_NUMBER = 1e300  # an int of a page may be longer than any float
 LEAST_NORMAL, MOST_NORMAL = 1e-6, 1e6
 
 
@@ -92,5 +93,5 @@ def _number(value: Any, key: str, least: int, most: int) -> int:
 
 
 def is_number(value: Any) -> TypeGuard[int | float]:
-    """Whether a value of a page's is a number to reckon with."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    """Whether a value of a page's is a number to reckon with: no more digits than a float has."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MOST_NUMBER

@@ -9,11 +9,11 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
-from math import isfinite
 from threading import Event as Flag
 from typing import Any
 
 from machine.app.printer.port_reports import PortReport, answer_words, ask_ports, known_ports, port_json
+from machine.app.workbench.bench.planes import is_number
 from machine.app.workbench.printing.order import PrintOrder
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.news import News
@@ -174,6 +174,6 @@ def _same(one: str, other: str) -> bool:
 
 def _whole(asked: dict[str, Any], key: str, otherwise: int) -> int:
     value = asked.get(key, otherwise)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value) or value != int(value):
+    if not is_number(value) or value != int(value):
         raise PrinterError(f"{key} is {str(value)[:40]!r}: a whole number is expected")
     return int(value)

@@ -66,7 +66,7 @@ class RunningPrint:
 
     def begin(self) -> None:
         """A person agrees to what was found. Raises PrinterError as long as that is not known."""
-        if self.state["phase"] != "ready":
+        if self.state["phase"] != "ready" or not self.asking:
             raise PrinterError("this print cannot begin now: it is not ready, or has begun")
         self._begun = True
         self.say(("begin",))

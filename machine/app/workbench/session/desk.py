@@ -19,6 +19,7 @@ from profiles.errors import UserError
 
 UNSAFE = re.compile(r"[^\w .()+-]")
 LONGEST_NAME = 100
+LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
 
 
 class Desk(News):
@@ -51,7 +52,7 @@ class Desk(News):
         for task in self._tasks:
             task.cancel()
         for lane in (self.quick, self.long, self.hand):
-            lane.stop()
+            lane.close()
         self._folder.cleanup()
         self.tell()
 
@@ -75,7 +76,8 @@ class Desk(News):
         """A place in the session's own folder for a file that a page sends."""
         folder = Path(self._folder.name) / str(next(self._numbers))
         folder.mkdir()
-        return folder / (UNSAFE.sub("_", name)[-LONGEST_NAME:].strip(". ") or "model")
+        plain = UNSAFE.sub("_", name.encode("ascii", "replace").decode())  # a disk counts bytes, so letters have one each
+        return folder / (plain[-LONGEST_NAME:].strip(". ") or "model")
 
     def refuse(self, error: Exception) -> str:
         """Tell the pages what could not be done, a bug with the log that it got; the sentence."""
@@ -83,6 +85,8 @@ class Desk(News):
             self.problem = str(error)
         else:
             self.problem = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, sys.argv)}"
+        if len(self.problem) > LONGEST_SENTENCE:
+            self.problem = f"{self.problem[:LONGEST_SENTENCE]} ..."
         self.tell()
         return self.problem
 

@@ -3,7 +3,7 @@
 import asyncio
 from dataclasses import dataclass, replace
 
-from machine.app.workbench.bench.bench import Bench, parts_of, plan_of_bench, with_front
+from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench, with_front
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.trying import Trying
 from machine.app.workbench.work.cutting import Searched
@@ -69,16 +69,24 @@ class Finding:
         cuts = parts_of(FrontRow(search.searched.planes, 0.0, 0.0, 0.0))
         with self._desk.waiting("cutting the best so far"):
             row = replace(await self._trying.measure(search.bench, cuts), chosen=True)
-            taken = with_front(search.bench, [row])
+            if _other(search.bench, self._desk.bench):
+                return  # they are planes of another model, or of one that stood otherwise
+            taken = with_front(self._desk.bench, [row])
             self._desk.do("stop the search", taken)
         rows = await self._desk.long.run("measure_plan", taken, plan_of_bench(taken, "the search"))
         self._desk.amend(taken, replace(taken, rows=tuple(rows)))
 
     def _follow(self) -> None:
-        """A search ends whose model is not there any more or lies otherwise, or whose settings or marks are others now."""
+        """A search ends whose model is not there any more or lies otherwise, or whose settings, marks or locked planes are others
+        now."""
         search, bench = self.search, self._desk.bench
-        if search is not None and search.bench.sought != bench.sought:
+        if search is not None and _other(search.bench, bench):
             self.search = None
             if self._task is not None:
                 self._task.cancel()
                 self._desk.start(self._desk.long.warm())
+
+
+def _other(begun: Bench, now: Bench) -> bool:
+    """Whether a search that has begun with a bench is not one for that of now."""
+    return begun.sought != now.sought or locked_plan(begun).parts != locked_plan(now).parts

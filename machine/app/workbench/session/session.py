@@ -58,7 +58,10 @@ class Session(Desk):
         if self._ranking is not None and self.bench.model is not None and len(self.bench.model.mesh.faces) > MANY_FACES:
             self._ranking.cancel()  # it would be waited for
         with self.waiting(f"reading {name}"):
-            model = await self.quick.run("read_model", path, name, self.bench.profile.of_all_parts)
+            read_for, model = None, None
+            while model is None or _reads(self.bench.profile) != read_for:  # another scale may be set meanwhile
+                read_for = _reads(self.bench.profile)
+                model = await self.quick.run("read_model", path, name, self.bench.profile.of_all_parts)
             self.do(f"open {name}", with_model(self.bench, model))
         self._begin_ranking(model)
 
@@ -78,14 +81,15 @@ class Session(Desk):
 
     async def take_plan(self, plan: PlanFile) -> None:
         """The same for a plan that is read already."""
-        if self.bench.model is None:
-            raise PlanError(
-                f"plan {plan.name}: there is no model on the workbench to cut by it: open {plan.model or 'its model'} first"
-            )
         with self.waiting(f"cutting by {plan.name}"):
-            bench = self.bench
-            profile = with_plan_settings(bench.profile.of_all_parts, plan)
-            rows = await self.quick.run("measure_plan", bench, plan)
+            bench = None
+            while bench is not self.bench:  # another model or setting may be there meanwhile
+                bench = self.bench
+                if bench.model is None:
+                    wanted = plan.model or "its model"
+                    raise PlanError(f"plan {plan.name}: there is no model on the workbench to cut by it: open {wanted} first")
+                profile = with_plan_settings(bench.profile.of_all_parts, plan)
+                rows = await self.quick.run("measure_plan", bench, plan)
             self.do(f"open {plan.name}", with_plan(bench, plan, rows, profile))
 
     def command(self, asked: dict[str, Any]) -> None:
@@ -116,7 +120,7 @@ class Session(Desk):
             case "try":
                 self.trying.move(edited(self.bench, {**asked, "do": "move"})[1])
             case name if name in EDITS:
-                self.start(self.trying.take(*edited(self.bench, asked), instead_of(asked)))
+                self.start(self.trying.take(lambda bench: edited(bench, asked), instead_of(asked)))
             case "neck":
                 self.start(self.trying.take_neck(asked.get("part")))
             case name if name in MARKS:
@@ -156,7 +160,7 @@ class Session(Desk):
         is read again."""
         bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
         new, old = bench.profile.process, before.profile.process
-        if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
+        if model is not None and _reads(bench.profile) != _reads(before.profile):
             with self.waiting(f"reading {model.name}"):
                 model = await self.quick.run("read_model", model.path, model.name, bench.profile.of_all_parts)
             self._begin_ranking(model)
@@ -178,3 +182,8 @@ class Session(Desk):
         await self.readiness.wait()
         resting = await self.quick.run("rank_resting", model.mesh, self.bench.profile.of_all_parts)
         self.resting = model, resting
+
+
+def _reads(profile: Profile) -> tuple[object, ...]:
+    """What of a profile decides how a model is read."""
+    return profile.process.scale, profile.process.rotate_deg

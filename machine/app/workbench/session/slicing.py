@@ -83,6 +83,7 @@ class Slicing:
 
     def stop(self) -> None:
         """End the slicing."""
+        self.under_way = None
         if self._task is not None:
             self._task.cancel()
 
@@ -91,6 +92,8 @@ class Slicing:
 
         def follow(so_far: SlicesSoFar) -> None:
             walls.update(so_far.walls)
+            if self.under_way is None or self.under_way.number != begun.number:
+                return
             self.under_way = SlicingUnderWay(begun.bench, begun.number, so_far.text, so_far.shares, walls)
             self._desk.tell()
 
@@ -98,7 +101,8 @@ class Slicing:
             sliced = await self._desk.long.run("slice_bench", begun.bench, tell=follow)
             self.done = Slices(begun.bench, begun.number, sliced, walls)
         finally:
-            self.under_way = None
+            if self.under_way is not None and self.under_way.number == begun.number:
+                self.under_way = None
 
     def _follow(self) -> None:
         if self.under_way is not None and self.under_way.bench.printed != self._desk.bench.printed:

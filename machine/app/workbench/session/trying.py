@@ -1,6 +1,7 @@
 """Trying: planes in a person's hand, tried as they move, and taken when they can be cut."""
 
 import asyncio
+from collections.abc import Callable
 from math import hypot, inf
 from typing import Any
 
@@ -26,7 +27,7 @@ class Trying:
         self.trial: tuple[Bench, Cuts, Trial] | None = None
         self.refused: Obstacle | None = None
         self._desk, self._readiness = desk, readiness
-        self._one = asyncio.Lock()
+        self._one, self._edits = asyncio.Lock(), asyncio.Lock()
         self._wanted: Cuts | None = None  # tried next, whatever else was wanted meanwhile
         desk.followers.append(self._follow)
 
@@ -36,16 +37,22 @@ class Trying:
         if not waiting:
             self._desk.start(self._try_newest())
 
-    async def take(self, word: str, cuts: Cuts, instead: str = "") -> None:
-        """Take planes that can be cut. Raises PlanError with the reason for those that cannot be; instead: how that begins."""
-        bench, self.refused = self._desk.bench, None
-        trial = await self.attempt(bench, cuts)
-        if trial.refused:
-            self.refused = trial.obstacle
-            raise PlanError(f"{instead}part {trial.refused_part} cannot be cut off: {trial.refused}")
-        if self._desk.bench is bench:
-            self.trial = bench, cuts, trial
-            self._desk.do(word, with_cuts(bench, cuts))
+    async def take(self, edit: Callable[[Bench], tuple[str, Cuts]], instead: str = "") -> None:
+        """Take planes that can be cut; each of several edits begins with what the one before has left. edit: a word for what it
+        does to a bench, and the planes after it; instead: how the reason begins. Raises PlanError for planes that cannot be cut.
+        """
+        async with self._edits:
+            bench, self.refused = self._desk.bench, None
+            word, cuts = edit(bench)
+            trial = await self.attempt(bench, cuts)
+            if trial.refused:
+                self.refused = trial.obstacle
+                raise PlanError(f"{instead}part {trial.refused_part} cannot be cut off: {trial.refused}")
+            now = self._desk.bench
+            if now.printed != bench.printed:
+                raise PlanError(f"{word}: what lies on the workbench has changed meanwhile, so it was not done")
+            self.trial = now, cuts, trial
+            self._desk.do(word, with_cuts(now, cuts))
 
     async def take_neck(self, number: Any) -> None:
         """Take the neck near the plane of the part of a number. Raises PlanError where there is none, or it cannot be cut."""
@@ -60,9 +67,9 @@ class Trying:
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
             raise PlanError(f"there is no neck near the plane of part {number}: {where}")
-        if self._desk.bench is bench:
+        if self._desk.bench.printed == bench.printed:
             instead = f"the neck near the plane of part {number} is no place for a cut: "
-            await self.take("snap to the neck", moved_to(bench, number, neck), instead)
+            await self.take(lambda now: ("snap to the neck", moved_to(now, number, neck)), instead)
 
     async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
         """The figures of planes, every one of them looked at; most_cuts: see mdp.search.trial."""
@@ -87,7 +94,7 @@ class Trying:
         while tried[2].unchecked:
             self._desk.tell()
             await asyncio.sleep(REST_S)
-            if self._wanted is not None or self.trial is not tried or self._desk.bench is not bench:
+            if self._wanted is not None or self.trial is not tried or self._desk.bench.sought != bench.sought:
                 return
             trial = await self.attempt(bench, cuts, 1)
             if self.trial is not tried:
@@ -95,6 +102,6 @@ class Trying:
             self.trial = tried = bench, cuts, trial
 
     def _follow(self) -> None:
-        cuts = self._desk.bench.cuts
-        if cuts is not None and (self.trial is None or self.trial[1] != cuts):
-            self.move(cuts)
+        bench, tried = self._desk.bench, self.trial
+        if bench.cuts is not None and (tried is None or tried[1] != bench.cuts or tried[0].sought != bench.sought):
+            self.move(bench.cuts)

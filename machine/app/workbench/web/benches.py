@@ -25,7 +25,9 @@ def bench_routes(workbench: Workbench) -> list[Route]:
     async def opened(request: Request) -> Response:
         like = request.query_params.get("like", "")
         try:
-            number = workbench.open(workbench.sessions.get(int(like)) if like.isascii() and like.isdigit() else None)
+            number = workbench.open(
+                workbench.sessions.get(int(like)) if like.isascii() and like.isdigit() and len(like) < 6 else None
+            )
         except PlanError as error:
             return JSONResponse({"problem": str(error)}, status_code=422)
         return JSONResponse({"number": number})

@@ -4,6 +4,7 @@ Other users of this computer reach its ports too, so the address is secret. A pa
 person's own browser: its Origin is refused, and a name of its own that points here (DNS rebinding) is no name of this computer.
 """
 
+import re
 import secrets
 from collections.abc import Iterable
 
@@ -21,6 +22,7 @@ HEADERS = {
 SAFE = ("GET", "HEAD")
 REFUSED_SOCKET = 1008  # policy violation, RFC 6455
 FOREIGN = "this page is for this computer only\n"
+LONG_NUMBER = re.compile(r"/\d{10}\d*(/|$)")  # nothing here has such a one
 UNKNOWN = "the workbench is at the address that tiltprint edit has told\n"
 
 
@@ -34,7 +36,7 @@ def refusal(headers: Iterable[tuple[bytes, bytes]], method: str, path: str, toke
     if (origins or method not in SAFE) and origins != [f"http://{hosts[0].lower()}"]:
         return 403, FOREIGN
     first = path.removeprefix("/").partition("/")[0]
-    if not secrets.compare_digest(first.encode(), token.encode()):
+    if not secrets.compare_digest(first.encode(), token.encode()) or LONG_NUMBER.search(path):
         return 404, UNKNOWN
     return None
 

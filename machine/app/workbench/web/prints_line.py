@@ -4,7 +4,6 @@ import json
 import secrets
 from collections.abc import Awaitable, Callable
 from functools import lru_cache
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from starlette.websockets import WebSocket
 
 from machine.app.crash import log_bug
 from machine.app.requests import PrintRequest
+from machine.app.workbench.bench.planes import is_number
 from machine.app.workbench.printing.ordering import order_of
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
@@ -90,7 +90,6 @@ def _printing(asked: dict[str, Any]) -> PrintRequest:
         kind = port.partition(":")[0]
         raise PrinterError(f"{kind} is a print server, which takes whole files: tiltprint print --port {kind}:HOST prints on it")
     baud, speed = asked.get("baud", 115200), asked.get("sim_speed", 0.0)
-    numbers = all(isinstance(value, int | float) and isfinite(value) for value in (baud, speed))
-    if not numbers or baud != int(baud):
+    if not is_number(baud) or not is_number(speed) or baud != int(baud):
         raise PrinterError(f"baud {str(baud)[:40]}, sim_speed {str(speed)[:40]}: numbers are expected, a whole one for the rate")
     return PrintRequest(port, int(baud), float(speed))

@@ -130,7 +130,7 @@ def _row(row: FrontRow) -> dict[str, Any]:
 
 def _trial(session: Session) -> dict[str, Any] | None:
     """The figures of the planes that were tried last, or why they cannot be cut."""
-    if session.trying.trial is None or session.trying.trial[0].model is not session.bench.model:
+    if session.trying.trial is None or session.trying.trial[0].sought != session.bench.sought:
         return None
     _, cuts, trial = session.trying.trial
     return {"cuts": _cuts(cuts), **asdict(trial)}

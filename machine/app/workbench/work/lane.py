@@ -24,6 +24,7 @@ class Lane:
         self._process: asyncio.subprocess.Process | None = None
         self._free = asyncio.Lock()
         self._resting: asyncio.TimerHandle | None = None
+        self._closed = False
 
     async def warm(self) -> None:
         """Start the process before it is needed."""
@@ -41,6 +42,13 @@ class Lane:
             except asyncio.CancelledError:
                 self.stop()
                 raise
+
+    def close(self) -> None:
+        """End the process for good: whatever still waits for it is refused."""
+        self._closed = True
+        self.stop()
+        if self._resting is not None:
+            self._resting.cancel()
 
     def stop(self) -> None:
         """End the process and all that it has started."""
@@ -62,9 +70,12 @@ class Lane:
             try:
                 yield await self._ready()
             finally:
-                self._resting = asyncio.get_running_loop().call_later(REST_AFTER_S, self.stop)
+                if not self._closed:
+                    self._resting = asyncio.get_running_loop().call_later(REST_AFTER_S, self.stop)
 
     async def _ready(self) -> asyncio.subprocess.Process:
+        if self._closed:
+            raise UserError("this bench is closed: nothing is worked out for it any more")
         if self._process is None or self._process.returncode is not None:
             pipe, nowhere = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
             self._process = await asyncio.create_subprocess_exec(

@@ -85,6 +85,8 @@ def test_what_overhangs_is_what_the_search_takes_for_it_however_the_model_is_tur
         ({"do": "dance"}, "'dance' is no command of the workbench"),
         ({"do": ["turn"]}, "is no command"),
         ({"do": "turn", "axis": "w", "deg": 1}, "axis is 'w': x, y, z are allowed"),
+        ({"do": "turn", "axis": ["x"], "deg": 1}, "axis is"),
+        ({"do": "turn", "axis": "x", "deg": 10**400}, "deg is 1000"),
         ({"do": "turn", "axis": "x", "deg": True}, "deg is True"),
         ({"do": "turn", "axis": "x", "deg": float("nan")}, "deg is nan"),
         ({"do": "lay", "face": 28}, "face is 28: 0 to 27 is allowed"),

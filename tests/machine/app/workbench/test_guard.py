@@ -48,5 +48,9 @@ def test_without_the_token_there_is_nothing(path: str) -> None:
     assert status(path=path) == 404
 
 
+def test_a_number_of_thousands_of_digits_is_nothing_here() -> None:
+    assert status(path=f"/secret/{'9' * 5000}/") == 404
+
+
 def test_two_hosts_are_one_too_many() -> None:
     assert refusal([(b"host", b"127.0.0.1:8123")] * 2, "GET", "/secret/", TOKEN, PORT) is not None

@@ -6,6 +6,7 @@ import pytest
 
 from machine.app.workbench.work import lane as lanes
 from machine.app.workbench.work.lane import Lane
+from profiles.errors import UserError
 from profiles.profile import load
 from tests.machine.workbench import is_there
 from tests.shapes import tee
@@ -17,6 +18,14 @@ def test_a_process_that_rests_goes_and_the_next_task_starts_another(monkeypatch:
     assert before == after
     assert before == pytest.approx(10.0)
     assert not is_there(between)
+
+
+def test_what_waits_for_a_process_that_has_gone_for_good_starts_no_other() -> None:
+    lane = Lane()
+    lane.close()
+    with pytest.raises(UserError, match="this bench is closed"):
+        asyncio.run(lane.run("rank_resting", tee(), load()))
+    assert lane._process is None
 
 
 async def rested() -> tuple[float, int, float]:

@@ -1,0 +1,105 @@
+"""A session whose bench changes while work for it is under way: what lies on it at the end is what was asked for last."""
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from machine.app.requests import Given
+from machine.app.workbench.bench.bench import Model, with_profile
+from machine.app.workbench.session.finding import Search
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.work.cutting import Searched
+from mdp.decomposition import FrontRow
+from mdp.plane import Plane
+from mdp.search.trial import Trial
+from profiles.profile import Profile, load
+from tests.shapes import tee
+
+UP = (0.0, 0.0, 1.0)
+
+
+def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
+    """A session with a model on its bench after some work; its processes answer what the work has them answer."""
+
+    async def run() -> Session:
+        session = Session(load(), Given())
+
+        async def nothing(task: str, *given: Any, **more: Any) -> Any:
+            await asyncio.sleep(0.01)
+            return Trial(()) if task == "try_cuts" else None
+
+        for lane in (session.quick, session.long, session.hand):
+            lane.run = nothing  # type: ignore[method-assign]
+        session.do("open a", replace(session.bench, model=model("a")))
+        await work(session)
+        while session._tasks:
+            await asyncio.gather(*session._tasks)
+        return session
+
+    return asyncio.run(asyncio.wait_for(run(), 20.0))
+
+
+def model(name: str) -> Model:
+    return Model(name, Path(name), tee())
+
+
+def test_of_edits_that_follow_each_other_quickly_none_is_lost() -> None:
+    async def work(session: Session) -> None:
+        for offset_mm in (5.0, 10.0):
+            session.command({"do": "add", "normal": list(UP), "offset_mm": offset_mm, "after": 1})
+        session.command({"do": "move", "part": 3, "normal": list(UP), "offset_mm": 6.0})
+
+    assert [part.offset_mm for part in when_done(work).bench.cuts or ()] == [10.0, 6.0]
+
+
+def test_an_edit_whose_bench_is_another_one_meanwhile_is_not_done_and_says_so() -> None:
+    async def work(session: Session) -> None:
+        session.command({"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
+        await asyncio.sleep(0)
+        session.command({"do": "turn", "axis": "x", "deg": 90})
+
+    session = when_done(work)
+    assert session.bench.cuts is None
+    assert session.problem == "add a plane: what lies on the workbench has changed meanwhile, so it was not done"
+
+
+def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
+    async def work(session: Session) -> None:
+        scales = []
+
+        async def read(task: str, *given: Any, **more: Any) -> Any:
+            if task != "read_model":
+                return ()
+            profile: Profile = given[2]
+            scales.append(profile.process.scale)
+            if len(scales) == 1:
+                doubled = Given(settings=("process.scale=2.0",))
+                session.do("set process.scale", with_profile(session.bench, doubled, load(settings=doubled.settings)))
+            return model(f"{given[1]} at {profile.process.scale:g}")
+
+        session.quick.run = read  # type: ignore[method-assign]
+        await session.open_model(Path("b"), "b")
+
+    read = when_done(work).bench.model
+    assert read is not None
+    assert read.name == "b at 2"
+
+
+def test_the_best_of_a_search_that_was_stopped_does_not_bring_back_the_model_before() -> None:
+    async def work(session: Session) -> None:
+        async def measure(task: str, *given: Any, **more: Any) -> Any:
+            if task == "measure_cuts":
+                session.do("open b", replace(session.bench, model=model("b")))
+                return FrontRow((Plane(np.array(UP), 5.0),), 1.0, 1.0, 1.0)
+            return Trial(()) if task == "try_cuts" else None
+
+        session.hand.run = measure  # type: ignore[method-assign]
+        await session.finding._take_best(Search(session.bench, Searched("", (Plane(np.array(UP), 5.0),))))
+
+    bench = when_done(work).bench
+    assert bench.model is not None
+    assert (bench.model.name, bench.cuts) == ("b", None)
