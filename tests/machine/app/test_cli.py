@@ -181,9 +181,10 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
 
 
 def test_options_of_the_search_are_its_profile_keys(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["decompose", "demo:bracket", *FAST, "--search", "published", "--beam-width", "3", "--json", "a.json"]) == 0
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    assert main(["decompose", "tee.stl", *FAST, "--search", "published", "--beam-width", "3", "--json", "a.json"]) == 0
     words = ["--set", "search.method=published", "--set", "search.beam_width=3"]
-    assert main(["decompose", "demo:bracket", *FAST, *words, "--json", "b.json"]) == 0
+    assert main(["decompose", "tee.stl", *FAST, *words, "--json", "b.json"]) == 0
     first, again = (json.loads(Path(name).read_text()) for name in ("a.json", "b.json"))
     assert {**first, "seconds": None} == {**again, "seconds": None}
 
@@ -192,13 +193,15 @@ def test_options_of_the_search_are_its_profile_keys(folder: Path, capsys: pytest
 def test_a_time_limit_of_nothing_prints_one_part_and_says_so(
     folder: Path, capsys: pytest.CaptureFixture[str], command: list[str]
 ) -> None:
-    assert main([*command, "demo:bracket", *FAST, "--set", "process.support=none", "--time-limit", "0"]) == 0
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    assert main([*command, "tee.stl", *FAST, "--set", "process.support=none", "--time-limit", "0"]) == 0
     assert "search.time_limit_s = 0 ended the search" in capsys.readouterr().err
 
 
 def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Path) -> None:
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
     for name in ("a.gcode", "b.gcode"):
-        assert main(["export", "demo:bracket", *FAST, "-o", name, "--json", "a.json"]) == 0
+        assert main(["export", "tee.stl", *FAST, "-o", name, "--json", "a.json"]) == 0
     assert Path("a.gcode").read_bytes() == Path("b.gcode").read_bytes()
     assert main(["simulate", "a.gcode", *FAST, "--json", "again.json"]) == 0
     first, again = (json.loads(Path(name).read_text()) for name in ("a.json", "again.json"))
@@ -207,15 +210,16 @@ def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Pat
         "axes", "findings",
     }  # fmt: skip
     assert first == again
-    assert main(["simulate", "a.gcode", "--model", "demo:bracket", "--json", "beside.json"]) == 0
+    assert main(["simulate", "a.gcode", "--model", "tee.stl", "--json", "beside.json"]) == 0
     beside = json.loads(Path("beside.json").read_text())["model"]
     assert (beside["outside"], beside["filled"] > 0.5) == (0.0, True)
 
 
 def test_g_code_on_standard_output_is_the_file_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", "demo:bracket", *FAST, "-o", "a.gcode"]) == 0
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    assert main(["export", "tee.stl", *FAST, "-o", "a.gcode"]) == 0
     table = capsys.readouterr().out
-    assert main(["export", "demo:bracket", *FAST, "-o", "-"]) == 0
+    assert main(["export", "tee.stl", *FAST, "-o", "-"]) == 0
     told = capsys.readouterr()
     assert (told.out, table in told.err) == (Path("a.gcode").read_text(), True)
     assert not Path("-").exists()
