@@ -41,7 +41,7 @@ class Marking:
         if self._desk.bench is not before:
             return False
         self._desk.do(word, bench)
-        self._desk.problem = _told(word, gone)
+        self._desk.problem = _told(word, gone) or self._desk.problem
         return True
 
 

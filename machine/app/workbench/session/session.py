@@ -153,7 +153,7 @@ class Session(Desk):
                 bench, refused = await self._with_profile(word, before, given)
             if given != before.given:
                 self.do(word, bench)
-                self.problem = refused
+                self.problem = refused or self.problem
 
     async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
         """A bench with another profile; planes that it forbids go, with the reason, and a model that it scales or turns otherwise

@@ -9,6 +9,8 @@ from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.work.slices import Sliced, SlicesSoFar
 from profiles.errors import PlanError
 
+ENDED = "slicing has ended, for what lies on the workbench is another now: slice it again"
+
 
 @dataclass(frozen=True, eq=False)
 class SlicingUnderWay:
@@ -107,3 +109,4 @@ class Slicing:
     def _follow(self) -> None:
         if self.under_way is not None and self.under_way.bench.printed != self._desk.bench.printed:
             self.stop()
+            self._desk.problem = ENDED

@@ -37,7 +37,7 @@ def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
         session.do("open a", replace(session.bench, model=model("a")))
         await work(session)
         while session._tasks:
-            await asyncio.gather(*session._tasks)
+            await asyncio.gather(*session._tasks, return_exceptions=True)
         return session
 
     return asyncio.run(asyncio.wait_for(run(), 20.0))
@@ -103,3 +103,18 @@ def test_the_best_of_a_search_that_was_stopped_does_not_bring_back_the_model_bef
     bench = when_done(work).bench
     assert bench.model is not None
     assert (bench.model.name, bench.cuts) == ("b", None)
+
+
+def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:
+    async def work(session: Session) -> None:
+        session.command({"do": "slice"})
+        await asyncio.sleep(0)
+        session.command({"do": "turn", "axis": "x", "deg": 90})
+        assert session.problem.startswith("slicing has ended")
+        session.command({"do": "slice"})
+        assert session.slicing.under_way is not None
+        assert session.slicing.under_way.bench is session.bench
+
+    session = when_done(work)
+    assert session.slicing.done is not None
+    assert session.slicing.done.bench is session.bench

@@ -3,6 +3,7 @@
 
 const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
 const STOP_KEY = "e";
+const ANSWER_MS = 3000; // within which the workbench answers an emergency stop
 const FEW = 8;
 let shownPhase = "";
 
@@ -73,20 +74,24 @@ function problem(text) {
 }
 
 /** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. An emergency
- * stop that finds no line is sent as soon as there is one, and told. */
+ * stop that finds no line is sent as soon as there is one, and told; so is one to which nothing answers. */
 function printsLine(follow, refused) {
-  let socket = null, owed = null;
+  let socket = null, owed = null, waiting = 0;
   const open = () => {
     socket = new WebSocket(new URL(`prints?page=${OWN_PAGE}`, location.href.replace(/^http/, "ws")));
     socket.onopen = () => { if (owed) socket.send(owed); owed = null; };
-    socket.onmessage = (event) => { const told = JSON.parse(event.data); if (told.problem) refused(told.problem); else follow(told); };
+    socket.onmessage = (event) => { clearTimeout(waiting); const told = JSON.parse(event.data); if (told.problem) refused(told.problem); else follow(told); };
     socket.onclose = ({ code }) => { if (code !== CLOSED_CODE) setTimeout(open, AGAIN_MS); };
   };
   open();
   return {
     send: (command) => {
       const text = JSON.stringify(command);
-      if (socket.readyState === WebSocket.OPEN) return socket.send(text);
+      if (socket.readyState === WebSocket.OPEN) {
+        clearTimeout(waiting);
+        if (command.do === "emergency") waiting = setTimeout(notice, ANSWER_MS, "THE STOP IS NOT CONFIRMED, tiltprint does not answer: use the machine's own switch.");
+        return socket.send(text);
+      }
       if (command.do === "emergency") owed = text;
       notice(command.do === "emergency" ? "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch." : "The line to tiltprint is lost; nothing was sent.");
     },
