@@ -21,6 +21,7 @@ from profiles.frozen import Vector
 from profiles.profile import Profile
 
 MOST_STEPS = 200  # that can be undone
+MOST_KEPT_FACES = 5_000_000  # of the models of these steps together, some 100 bytes each: every other scale is a model of its own
 POINT_DIGITS = 3  # of the mm of a mark's place
 STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
 
@@ -95,7 +96,7 @@ class History:
 
     def do(self, word: str, bench: Bench) -> "History":
         """A further step; what was undone is forgotten."""
-        return History(Step(word, bench), (*self.before, self.now)[-MOST_STEPS:])
+        return History(Step(word, bench), _kept((*self.before, self.now)[-MOST_STEPS:]))
 
     def undo(self) -> "History":
         """One step back, or the same where there is none."""
@@ -112,6 +113,19 @@ class History:
         if not self.undone:
             return self
         return History(self.undone[-1], (*self.before, self.now), self.undone[:-1])
+
+
+def _kept(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+    """The nearest steps whose models are not too much for the memory; the nearest of all whatever it is."""
+    models, faces = set[Model](), 0
+    for back, step in enumerate(reversed(steps)):
+        model = step.bench.model
+        if model is not None and model not in models:
+            models.add(model)
+            faces += len(model.mesh.faces)
+        if faces > MOST_KEPT_FACES and back:
+            return steps[-back:]
+    return steps
 
 
 def emptied(bench: Bench) -> Bench:

@@ -1,5 +1,6 @@
 """The bench as a value: turning, laying down, taking a row, undo and redo, and what of it overhangs."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,15 @@ def test_everything_is_undone_and_done_again() -> None:
     assert back.now.bench is found
     assert obey(obey(back, {"do": "redo"}), {"do": "redo"}).now.bench is turned.now.bench
     assert obey(back, {"do": "take", "parts": 1}).undone == ()
+
+
+def test_steps_back_end_where_their_models_would_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.app.workbench.bench.bench.MOST_KEPT_FACES", 3 * 28)  # a tee has 28 faces
+    now = history(Bench(PROFILE))
+    for name in "abcdef":
+        now = now.do(f"open {name}", Bench(PROFILE, Model(name, Path(name), tee())))
+        now = now.do(f"find parts of {name}", replace(now.now.bench, cuts=()))
+    assert [step.word for step in now.before][:2] == ["open d", "find parts of d"]
 
 
 def test_what_changes_nothing_is_no_step() -> None:
