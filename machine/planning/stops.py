@@ -25,7 +25,7 @@ class Stop:
     @property
     def option(self) -> str:
         """What a person has written."""
-        place = f"{self.height_mm:g}mm" if self.layer is None else str(self.layer)
+        place = f"{f'{self.height_mm:.6f}'.rstrip('0').rstrip('.')}mm" if self.layer is None else str(self.layer)
         return f"{'--filament-change' if self.change else '--pause'} {self.part}:{place}"
 
 

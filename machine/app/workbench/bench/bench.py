@@ -10,6 +10,7 @@ from machine.app.requests import Given
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.part_settings import following
 from machine.app.workbench.bench.settings import USUAL
+from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
 from mdp.grown import Grown
 from mdp.mesh import Floats, Mesh
@@ -43,7 +44,8 @@ class Bench:
     rotation: rows of what turns the model as it is read. cuts: the base planes of the parts from the second on, in print order;
     None: nobody has cut it yet. rows: the front that the cuts were chosen from, ever more parts; recommended: how many parts the
     search would take, 0: no search has been; priced: times and plastic of the rows are for this profile, as far as there are any.
-    locked: those of the cuts that a search begins with and nobody moves.
+    locked: those of the cuts that a search begins with and nobody moves. stops: where the print waits for a person; copies: how
+    many of the model on the plate; both stay as they are typed until another model is opened.
     """
 
     profile: Profile
@@ -56,6 +58,8 @@ class Bench:
     locked: frozenset[PlannedPart] = frozenset()
     given: Given = USUAL
     priced: bool = True
+    stops: tuple[Stop, ...] = ()
+    copies: int = 1
 
     @property
     def parts(self) -> int:
@@ -73,9 +77,14 @@ class Bench:
         return self.model, self.rotation, self.profile, self.zones
 
     @property
+    def shaped(self) -> tuple[object, ...]:
+        """What of it decides the parts."""
+        return self.model, self.rotation, self.cuts, self.profile, self.zones
+
+    @property
     def printed(self) -> tuple[object, ...]:
         """What of it decides what is printed."""
-        return self.model, self.rotation, self.cuts, self.profile, self.zones
+        return *self.shaped, self.stops, self.copies
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +147,11 @@ def with_model(bench: Bench, model: Model) -> Bench:
     return replace(emptied(bench), model=model)
 
 
+def with_model_anew(bench: Bench, model: Model | None) -> Bench:
+    """The same model read, turned or cut anew: pauses and copies stay."""
+    return replace(emptied(bench), model=model, stops=bench.stops, copies=bench.copies)
+
+
 def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
     """The same model so many times as large, its planes in proportion; its front and its zones were for the size before."""
     planes = {
@@ -145,7 +159,7 @@ def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
     }
     cuts = None if bench.cuts is None else tuple(planes[part] for part in bench.cuts)
     locked = frozenset(planes[part] for part in bench.locked)
-    return Bench(bench.profile, model, bench.rotation, cuts, locked=locked, given=bench.given)
+    return replace(with_model_anew(bench, model), profile=bench.profile, rotation=bench.rotation, cuts=cuts, locked=locked)
 
 
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
@@ -153,7 +167,7 @@ def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
     rows = tuple(_vector(row) for row in rotation)
     if rows == bench.rotation:
         return bench
-    return Bench(bench.profile.of_all_parts, bench.model, rows, zones=_turned_zones(bench, rows), given=bench.given)
+    return replace(with_model_anew(bench, bench.model), rotation=rows, zones=_turned_zones(bench, rows))
 
 
 def _turned_zones(bench: Bench, rows: tuple[Vector, ...]) -> Zones:
@@ -236,7 +250,8 @@ def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
 def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: Profile) -> Bench:
     """The planes of a plan. rows: its front, measured; profile: with the plan's settings of single parts."""
     rotation = STANDING if plan.orientation is None else plan.orientation
-    return Bench(profile, bench.model, rotation, plan.parts, plan.zones, tuple(rows), given=bench.given)
+    bare = with_model_anew(bench, bench.model)
+    return replace(bare, profile=profile, rotation=rotation, cuts=plan.parts, zones=plan.zones, rows=tuple(rows))
 
 
 def with_parts(bench: Bench, count: int) -> Bench:

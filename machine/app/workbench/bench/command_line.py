@@ -39,6 +39,9 @@ def export_command(bench: Bench) -> str:
         words += ["--parts", "1"]
         for each in bench.profile.parts:
             words += ["--part", f"{each.part}:{','.join(f'{key}={_typed(value)}' for key, value in each.process.items())}"]
+    if bench.copies != 1:
+        words += ["--copies", str(bench.copies)]
+    words += [word for stop in bench.stops for word in stop.option.split()]
     return join([*words, "-o", f"{stem}.gcode"])
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from machine.app.workbench.bench.bench import Bench, History, Model, laid_down, with_parts, with_rotation
 from machine.app.workbench.bench.part_settings import check_part, with_part_setting, without_part_settings
 from machine.app.workbench.bench.planes import is_number, planned_part
+from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
 from mdp.mesh import Floats
 from mdp.pose import about
 from profiles.errors import PlanError
@@ -114,6 +115,9 @@ COMMANDS: dict[str, tuple[str, Callable[[Bench, Model, dict[str, Any]], Bench]]]
     "set_part": ("set a part", _set_part),
     "reset_part": ("take a part's changes back", _reset_part),
     "lock": ("lock a plane", _lock),
+    "add_stop": ("add a pause", add_stop),
+    "remove_stop": ("take a pause away", remove_stop),
+    "copies": ("print another number of copies", set_copies),
 }
 
 

@@ -17,6 +17,6 @@ class Pieces:
         bench = self._desk.bench
         if bench.model is None or bench.cuts is None:
             raise PlanError("there are no parts to look at yet: find them first")
-        if self._drawn is None or self._drawn[0].printed != bench.printed:
+        if self._drawn is None or self._drawn[0].shaped != bench.shaped:
             self._drawn = bench, await self._desk.quick.run("draw_pieces", bench)
         return self._drawn[1]

@@ -8,7 +8,16 @@ from typing import Any
 
 from machine.app.pipeline.given_plan import with_plan_settings
 from machine.app.requests import Given
-from machine.app.workbench.bench.bench import Bench, Model, with_cuts, with_model, with_plan, with_profile, with_scaled_model
+from machine.app.workbench.bench.bench import (
+    Bench,
+    Model,
+    with_cuts,
+    with_model,
+    with_model_anew,
+    with_plan,
+    with_profile,
+    with_scaled_model,
+)
 from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.marks import MARKS
@@ -165,7 +174,7 @@ class Session(Desk):
                 model = await self.quick.run("read_model", model.path, model.name, bench.profile.of_all_parts)
             self._begin_ranking(model)
             if new.rotate_deg != old.rotate_deg:
-                return replace(with_model(bench, model), rotation=bench.rotation), ""
+                return replace(with_model_anew(bench, model), rotation=bench.rotation), ""
             bench = with_scaled_model(bench, model, new.scale / old.scale)
         if bench.cuts is not None and effect_of_change(before.profile, bench.profile) == Effect.FRONT:
             trial = await self.trying.attempt(bench, bench.cuts)

@@ -49,7 +49,7 @@ class Trying:
                 self.refused = trial.obstacle
                 raise PlanError(f"{instead}part {trial.refused_part} cannot be cut off: {trial.refused}")
             now = self._desk.bench
-            if now.printed != bench.printed:
+            if now.shaped != bench.shaped:
                 raise PlanError(f"{word}: what lies on the workbench has changed meanwhile, so it was not done")
             self.trial = now, cuts, trial
             self._desk.do(word, with_cuts(now, cuts))
@@ -67,7 +67,7 @@ class Trying:
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
             raise PlanError(f"there is no neck near the plane of part {number}: {where}")
-        if self._desk.bench.printed == bench.printed:
+        if self._desk.bench.shaped == bench.shaped:
             instead = f"the neck near the plane of part {number} is no place for a cut: "
             await self.take(lambda now: ("snap to the neck", moved_to(now, number, neck)), instead)
 

@@ -63,6 +63,8 @@ def snapshot(session: Session) -> dict[str, Any]:
         "given": asdict(bench.given),
         "part_settings": [{"part": each.part, "keys": list(each.process)} for each in bench.profile.parts],
         "priced": bench.priced,
+        "stops": [asdict(stop) for stop in bench.stops],
+        "copies": bench.copies,
         "machine": machine_bodies(bench.profile.machine, known=True),
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,

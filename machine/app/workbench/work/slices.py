@@ -6,6 +6,7 @@ from functools import cached_property
 from hashlib import sha256
 
 from machine.app.pipeline.comparison import in_one_part, in_parts
+from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
@@ -15,6 +16,8 @@ from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding
 from machine.view.comparison import Alternative
 from machine.view.page import print_page
+from mdp.decomposition import Decomposition
+from profiles.profile import Profile
 from slicer.parts import SlicingProgress
 
 
@@ -51,9 +54,9 @@ class Sliced:
 
 
 def slice_bench(tell: Tell, bench: Bench) -> Sliced:
-    """The parts on the bench sliced, planned, written and dry-run, as `export --plan` does; uncut, the model in one piece."""
-    profile = bench.profile
-    made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    """The parts on the bench sliced, planned, written and dry-run, as `export --plan` does with its pauses and copies; uncut, the
+    model in one piece."""
+    made, profile = _plated(bench)
     shares: tuple[float, ...] = ()
     ready: set[int] = set()
     told = ""
@@ -76,7 +79,7 @@ def slice_bench(tell: Tell, bench: Bench) -> Sliced:
             told = text
             tell(SlicesSoFar(text, shares))
 
-    program = build(made, profile, pictures=True, report=report, on_slices=follow)
+    program = build(made, profile, pictures=True, stops=bench.stops, report=report, on_slices=follow)
     report("drawing the page")
     values = summary(program.run)
     return Sliced(
@@ -91,5 +94,10 @@ def slice_bench(tell: Tell, bench: Bench) -> Sliced:
 
 def compare_bench(tell: Tell, bench: Bench) -> tuple[Alternative, ...]:
     """What the model on the bench costs in one piece, as it stands and laid down, as `export --compare` tells it."""
-    made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
-    return in_one_part(made, bench.profile, lambda text, share=None: tell(text))
+    made, profile = _plated(bench)
+    return in_one_part(made, profile, lambda text, share=None: tell(text))
+
+
+def _plated(bench: Bench) -> tuple[Decomposition, Profile]:
+    """The parts on the bench, in copies as `export --copies` has them, and what they are printed with."""
+    return in_copies(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.copies, bench.profile)

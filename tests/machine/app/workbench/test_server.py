@@ -1,12 +1,14 @@
 """The workbench as a process: whom it answers, from a file to its plan and parts, and that it ends with all it started."""
 
 import io
+import json
 import signal
 import socket
 import time
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+from shlex import split
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from websockets.exceptions import InvalidStatus
 from machine.app.cli import main
 from mdp.save import stl
 from tests.machine.workbench import QUICK, Running, is_there, workbench
-from tests.shapes import tee
+from tests.shapes import box, tee
 
 
 @pytest.fixture(scope="module")
@@ -170,6 +172,39 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
         assert bench.ask("print.gcode")[0] == 422
         bench.send(folder / "tee.stl")
         assert page.until(lambda state: not state["sliced"])["compared"] == []
+
+
+def test_copies_and_pauses_are_those_of_the_command_line_and_so_are_their_sentences(bench: Running, folder: Path) -> None:
+    (folder / "box.stl").write_bytes(stl(box(8, 8, 4)))
+    with bench.line() as page:
+        bench.send(folder / "box.stl")
+        page.do("copies", count=2)
+        page.do("add_stop", kind="filament_change", at="1:3")
+        page.do("add_stop", kind="pause", at="1:2.4mm")
+        page.do("slice")
+        sliced = page.until(lambda state: state["sliced"] and not state["slicing"])
+        assert [stop["change"] for stop in sliced["stops"]] == [False, True]
+        command = json.loads(bench.ask("settings.json?part=0")[1])["command"]
+        assert command.endswith(" --parts 1 --copies 2 --pause 1:2.4mm --filament-change 1:3 -o box.gcode")
+        assert main(split(command)[1:]) == 0
+        gcode = bench.ask("print.gcode")[1]
+        assert gcode == (folder / "box.gcode").read_bytes()
+        assert b"\nM600" in gcode
+        page.do("remove_stop", number=1)
+        page.until(lambda state: state["sliced"]["stale"])
+        page.do("undo")
+        page.until(lambda state: not state["sliced"]["stale"])
+        page.do("add_stop", kind="pause", at="2-3")
+        assert page.until(lambda state: state["problem"])["problem"].startswith(
+            "--pause 2-3: PART:LAYER or PART:HEIGHTmm is expected"
+        )
+        page.do("add", normal=[0, 0, 1], offset_mm=2.0)
+        page.until(lambda state: state["parts"] == 2 and not state["problem"])
+        page.do("slice")
+        told = "--copies 2: box.stl is cut into 2 parts, copies are printed in one piece each: --parts 1"
+        assert page.until(lambda state: state["problem"])["problem"] == told
+        bench.send(folder / "box.stl")
+        page.until(lambda state: (state["copies"], state["stops"]) == (1, []))
 
 
 def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbids(bench: Running, folder: Path) -> None:

@@ -46,7 +46,7 @@ function settingsPanel(bench) {
   $("settings-part").addEventListener("change", () => { wrongs.clear(); fetchAll(); });
   $("reset-settings").addEventListener("click", () => bench.send(part() ? { do: "reset_part", part: part() } : { do: "reset" }));
   $("copy-command").addEventListener("click", () => copyText($("command-line"), $("copy-command")));
-  const ofSettings = ({ given, part_settings: own, parts, model, rotation } = {}) => [given, own, parts, model?.name, rotation];
+  const ofSettings = ({ given, part_settings: own, parts, model, rotation, stops, copies } = {}) => [given, own, parts, model?.name, rotation, stops, copies];
   return {
     told: (state, before) => {
       const fresh = !before || !alike(ofSettings(state), ofSettings(before));

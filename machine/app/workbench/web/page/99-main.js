@@ -53,7 +53,7 @@ function main() {
   obstacleOf(bench);
   printFrame(bench, dark);
   wallsOf(bench);
-  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), marksPanel(bench), apartPanel(bench), slicesPanel(bench), comparePanel(bench), saveMenu(bench), settingsPanel(bench), printPanel(bench)];
+  const panels = [benchesPanel(), modelPanel(bench), sizePanel(bench), partsPanel(bench), planesPanel(bench), marksPanel(bench), apartPanel(bench), stopsPanel(bench), slicesPanel(bench), comparePanel(bench), saveMenu(bench), settingsPanel(bench), printPanel(bench)];
   const follow = async (state) => {
     const before = bench.state;
     bench.state = state;
