@@ -67,3 +67,8 @@ def test_a_stop_where_nothing_is_printed_is_refused(pause: str, sentence: str) -
 def test_pressure_advance_is_set_in_the_words_of_the_firmware(dialect: str, line: str) -> None:
     lines = written(dialect, [], [], "material.pressure_advance=0.05")
     assert lines.index(line) < lines.index(";LAYER_CHANGE")
+
+
+@pytest.mark.parametrize("place", ["2:15", "1:8.4mm", "1:1234.56789mm", "1:0.00001mm", "3:20mm"])
+def test_a_stop_is_named_as_it_was_typed(place: str) -> None:
+    assert [stop.option for stop in parse_stops([place], [])] == [f"--pause {place}"]

@@ -50,7 +50,7 @@ function pictureOf(canvas, camera, drawn) {
     if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
     else if (card.solid) {
       (card.walls || []).forEach((each) => each.draw(flat));
-      card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts, ghost: card.walls ? FAINT : 0 });
+      if (!(scene.wallsAlone && card.walls?.length)) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts, ghost: card.walls ? FAINT : 0 });
     }
     if (card.table && below) paintPlate(flat, { strength: 0.18 });
     if (card.plane) {
@@ -124,8 +124,9 @@ function pictureOf(canvas, camera, drawn) {
       else if (found && repainted) card.pieces.paint(chosen);
       ask();
     },
-    /** The walls of what is sliced, triangles of each part, with the model as a ghost about them; null: none. */
-    walls: (found) => {
+    /** The walls of what is sliced, triangles of each part, with the model as a ghost about them, or without it; null: none. */
+    walls: (found, alone) => {
+      scene.wallsAlone = alone;
       const same = (scene.walls || []).length === (found || []).length && (found || []).every((each, k) => each === scene.walls[k]);
       if (same && Boolean(found) === Boolean(scene.walls)) return;
       scene.walls = found;

@@ -14,7 +14,9 @@ function stopsPanel(bench) {
       if (alike(stops, before?.stops)) return;
       if (adding) $("stop-at").value = "";
       adding = false;
+      const held = $("stops").contains(document.activeElement);
       $("stops").replaceChildren(made("tbody", {}, ...stops.map((stop, k) => stopRow(stop, () => bench.send({ do: "remove_stop", number: k + 1 })))));
+      if (held) $("stop-at").focus(); // the row that had the focus is gone
     },
   };
 }

@@ -1,4 +1,4 @@
-// Walls: what is seen of the parts that are sliced, drawn as they become ready, over the faint model.
+// Walls: what is seen of the parts that are sliced, drawn as they become ready, over the faint model; copies, which stand elsewhere, without it.
 
 const PIECE = 7; // numbers of a straight piece: two ends and its height
 
@@ -29,7 +29,7 @@ function wallsOf(bench) {
   };
   const shown = () => bench.tab === "slices" && bench.triangles && slices() && bands.size > 0;
   const show = () => {
-    if (bench.picture) bench.picture.walls(shown() ? [...bands.values()].filter(Boolean) : null);
+    if (bench.picture) bench.picture.walls(shown() ? [...bands.values()].filter(Boolean) : null, bench.state.copies > 1);
     document.documentElement.dataset.walls = shown() ? [...bands.keys()].sort((a, b) => a - b).join(" ") : "";
   };
   const fetchPart = async (part, of) => {
