@@ -6,10 +6,11 @@ import pytest
 
 from mdp.save import stl
 from tests.machine.firefox import FIREFOX, XVFB, Firefox
-from tests.machine.test_workbench_page import FOUND, choose
+from tests.machine.test_workbench_page import FOUND, choose, saved
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import tee
 
+VIEW = "$('print-page').contentDocument"
 pytestmark = pytest.mark.skipif(FIREFOX is None, reason="Firefox is not installed: the workbench is not tried in it")
 
 
@@ -55,4 +56,29 @@ def test_firefox_finds_parts_drags_a_plane_and_undoes_it(firefox: Firefox) -> No
         firefox.drag((x, y), (x, y - 20))
         firefox.wait("$('undo').getAttribute('aria-label') === 'undo: move a plane'")
         assert 20.0 < float(firefox.value("$('plane-offset').value")) < 35.0
+    assert firefox.complaints == []
+
+
+def test_firefox_changes_a_setting_slices_looks_and_prints(firefox: Firefox) -> None:
+    firefox.click("#tab-settings")
+    firefox.wait("document.querySelector('[data-key=\"process.walls\"] input')")
+    firefox.value(
+        "{ const input = document.querySelector('[data-key=\"process.walls\"] input');"
+        "input.value = 1; input.dispatchEvent(new Event('change')); }"
+    )
+    firefox.wait("document.querySelector('[data-key=\"process.walls\"].changed')")
+    firefox.click("#tab-slices")
+    firefox.click("#slice")
+    firefox.wait("!document.body.classList.contains('no-slices')")
+    assert saved(firefox, "#save-gcode").startswith(";")
+    firefox.click("#look")
+    firefox.wait(f"{VIEW}?.documentElement?.dataset.state === '{'failed' if XVFB is None else 'ready'}'")
+    assert firefox.value(f"{VIEW}.title").startswith("tee.stl")
+    firefox.click("#leave-print")
+    firefox.click("#tab-printing")
+    firefox.click("#check")
+    firefox.wait("!$('run-ask').hidden")
+    firefox.click("#begin")
+    firefox.wait("document.documentElement.dataset.printing === 'over'")
+    assert firefox.value("$('run-state').textContent") == "the print is done"
     assert firefox.complaints == []

@@ -51,7 +51,7 @@ def open_model(browser: Browser, bench: Running, name: str, content: bytes) -> N
     browser.wait(f"document.documentElement.dataset.shown && $('title').textContent === {json.dumps(name)} && {IDLE}")
 
 
-def saved(browser: Browser, button: str) -> str:
+def saved(browser: Browser | Firefox, button: str) -> str:
     """The text that a button saves."""
     browser.value(
         "{ window.saved = null; const make = URL.createObjectURL; "

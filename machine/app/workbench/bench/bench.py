@@ -1,8 +1,9 @@
 """Bench: what lies on the workbench, as one value. Every command gives a new one, so undo and redo are values too."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from secrets import token_hex
 
 import numpy as np
 
@@ -29,12 +30,14 @@ STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A model as it is read: its name, its file, its mesh in mm on z = 0, and a sentence for every repair."""
+    """A model as it is read: its name, its file, its mesh in mm on z = 0, and a sentence for every repair. key: what tells it
+    from every other reading; a page asks for its triangles by it."""
 
     name: str
     path: Path
     mesh: Mesh
     notes: tuple[str, ...] = ()
+    key: str = field(default_factory=lambda: token_hex(8))
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, CLOSED_CODE, talk
 from machine.app.workbench.web.page import workbench_page
 from machine.app.workbench.web.prints_line import print_log, prints_line
-from machine.app.workbench.web.snapshot import marks, marks_key, model_key, triangles
+from machine.app.workbench.web.snapshot import marks, marks_key, triangles
 from mdp.read import MOST_BYTES
 from profiles.errors import PlanError
 from profiles.places import KINDS, known
@@ -99,7 +99,7 @@ def _connecting(
 
 async def _model(session: Session, request: Request) -> Response:
     model = session.bench.model
-    if model is None or model_key(model) != request.path_params["key"]:
+    if model is None or model.key != request.path_params["key"]:
         return Response("this model is not on the workbench any more\n", 404)
     return Response(await asyncio.to_thread(triangles, model), media_type="application/octet-stream")
 

@@ -76,7 +76,7 @@ def marks_key(bench: Bench) -> str:
     kinds = [[zone for zone in getattr(bench.zones, kind) if not isinstance(zone, Zone)] for kind in ZONE_KINDS]
     if bench.model is None or not any(kinds):
         return ""
-    return sha256(repr((model_key(bench.model), bench.rotation, kinds)).encode()).hexdigest()[:16]
+    return sha256(repr((bench.model.key, bench.rotation, kinds)).encode()).hexdigest()[:16]
 
 
 def marks(bench: Bench) -> bytes:
@@ -99,15 +99,10 @@ def triangles(model: Model) -> bytes:
     return np.array([len(vertices), len(faces)], "<u4").tobytes() + vertices.tobytes() + faces.tobytes()
 
 
-def model_key(model: Model) -> str:
-    """What tells one model of this run from another: the page asks for its triangles by it."""
-    return f"{id(model.mesh):x}"
-
-
 def _model(model: Model) -> dict[str, Any]:
     low, high = model.mesh.bounds_mm
     return {
-        "key": model_key(model),
+        "key": model.key,
         "name": model.name,
         "faces": len(model.mesh.faces),
         "size_mm": (high - low).tolist(),
