@@ -10,18 +10,12 @@ from machine.view.page import print_page
 from mdp.save import stl
 from tests.machine import hand
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.test_browser import WINDOW, opened, program, put, row, text
+from tests.machine.test_browser import opened, program, put, row, text
 from tests.machine.test_workbench_page import open_model, saved
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import box, tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with Browser(WINDOW) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

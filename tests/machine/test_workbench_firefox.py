@@ -7,17 +7,11 @@ import pytest
 from mdp.save import stl
 from tests.machine.firefox import FIREFOX, XVFB, Firefox
 from tests.machine.test_workbench_page import FOUND, choose, saved
-from tests.machine.workbench import QUICK, Running, workbench
+from tests.machine.workbench import Running
 from tests.shapes import tee
 
 VIEW = "$('print-page').contentDocument"
 pytestmark = pytest.mark.skipif(FIREFOX is None, reason="Firefox is not installed: the workbench is not tried in it")
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

@@ -1,14 +1,12 @@
 """The model on the workbench in a real browser: turned by its rings, scaled, and told where the machine does not reach it."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.test_workbench_page import FOUND, WINDOW, area, drag_slider, open_model
-from tests.machine.workbench import QUICK, Running, workbench
+from tests.machine.test_workbench_page import FOUND, area, drag_slider, open_model
+from tests.machine.workbench import Running
 from tests.shapes import tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
@@ -17,18 +15,6 @@ RING_Y = """(() => { const path = document.querySelector('[data-ring=y] .near'),
   const at = (share) => path.getPointAtLength(share * path.getTotalLength());
   return [at(0.5), at(0.6)].map(({ x, y }) => [x + box.x, y + box.y]); })()"""
 TURNED = "$('undo').getAttribute('aria-label') === 'undo: turn the model'"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with Browser(WINDOW) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
 
 
 def told_by(browser: Browser, ring: str) -> str:

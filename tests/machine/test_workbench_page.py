@@ -1,7 +1,6 @@
 """The workbench in a real browser: from a file to a saved plan that the command line cuts to the same parts."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,27 +9,15 @@ import pytest
 from machine.app.cli import main
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.conftest import WINDOW
 from tests.machine.firefox import Firefox
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import ball, tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
-WINDOW = (900, 560)
 FOUND = "!document.documentElement.hasAttribute('data-searching') && !document.body.classList.contains('no-cuts')"
 IDLE = "document.documentElement.dataset.busy === ''"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with Browser(WINDOW) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
 
 
 def choose(browser: "Browser | Firefox", name: str, content: bytes) -> None:

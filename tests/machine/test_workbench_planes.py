@@ -2,7 +2,6 @@
 page that goes while a plane is in its hand."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,27 +9,13 @@ import pytest
 
 from machine.app.cli import main
 from mdp.save import stl
-from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.workbench import QUICK, Running, workbench
+from tests.machine.browser import Browser
+from tests.machine.workbench import QUICK, Running
 from tests.mdp.search.test_neck import hourglass
 from tests.shapes import tee
 
 LEVEL = {"normal": [0, 0, 1]}
 FREE = "document.documentElement.dataset.busy === ''"
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    if CHROMIUM is None:
-        pytest.skip("Chromium is not installed: the page is not tried in a browser")
-    with Browser((900, 560)) as running:
-        yield running
 
 
 @pytest.fixture

@@ -1,29 +1,16 @@
 """Settings on the workbench in a real browser: of all parts and of one, refused beside their field, and what a front bears."""
 
 import json
-from collections.abc import Iterator
 
 import pytest
 
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.test_workbench_page import FOUND, IDLE, WINDOW, open_model
-from tests.machine.workbench import QUICK, Running, workbench
+from tests.machine.test_workbench_page import FOUND, IDLE, open_model
+from tests.machine.workbench import Running
 from tests.shapes import tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with Browser(WINDOW) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
 
 
 def put(browser: Browser, key: str, value: object) -> None:

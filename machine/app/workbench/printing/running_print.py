@@ -1,9 +1,7 @@
 """Running print: the server's end of a print: its process, its newest state, and what is done when the process dies."""
 
 import asyncio
-import os
 import pickle
-import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -12,6 +10,7 @@ from machine.app.crash import log_bug
 from machine.app.printer.rescue import rescue
 from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.order import PrintOrder, State, first_state
+from machine.app.workbench.work.lane import end_process
 from machine.app.workbench.work.worker import LENGTH, frame
 from profiles.errors import PrinterError
 
@@ -98,14 +97,7 @@ class RunningPrint:
             asyncio.get_running_loop().call_later(EMERGENCY_S, self._kill)
 
     def _kill(self) -> None:
-        process = self._process
-        if process is None or process.returncode is not None:
-            return
-        with suppress(ProcessLookupError, PermissionError):
-            if hasattr(os, "killpg"):
-                os.killpg(process.pid, signal.SIGKILL)
-            else:
-                process.kill()
+        end_process(self._process)
 
     async def _end_without_process(self) -> None:
         """The process has died. What it printed on is told to be safe; nothing has been sent to a printer it only asked."""

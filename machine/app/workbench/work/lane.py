@@ -53,13 +53,7 @@ class Lane:
     def stop(self) -> None:
         """End the process and all that it has started."""
         process, self._process = self._process, None
-        if process is None or process.returncode is not None:
-            return
-        with suppress(ProcessLookupError, PermissionError):
-            if hasattr(os, "killpg"):
-                os.killpg(process.pid, signal.SIGKILL)
-            else:
-                process.kill()
+        end_process(process)
 
     @asynccontextmanager
     async def _held(self) -> AsyncIterator[asyncio.subprocess.Process]:
@@ -97,3 +91,14 @@ class Lane:
                 return value
             else:
                 raise UserError(value)
+
+
+def end_process(process: asyncio.subprocess.Process | None) -> None:
+    """Kill a process that leads a session of its own, with all that it has started, if it still runs."""
+    if process is None or process.returncode is not None:
+        return
+    with suppress(ProcessLookupError, PermissionError):
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
