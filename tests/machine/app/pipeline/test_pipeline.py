@@ -19,7 +19,7 @@ if SHARED.exists():
     RUNS += [("generic_ac", str(SHARED / name)) for name in ("hook.stl", "bracket.3mf", "kitten.off")]
     RUNS += [("fractal5pro", str(SHARED / "deer.ply"))]
 QUICK = ["search.directions=200", "search.beam_width=1", "process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3"]
-QUICK += ["process.scale=0.45"]  # a quarter of the lines, the same shapes
+QUICK += ["process.scale=0.35"]  # a tenth of the lines, the same shapes
 
 
 def _built(model: str, machine: str) -> Program:
