@@ -87,6 +87,9 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     assert browser.value("$('legend').textContent") != ""
     drag_slider(browser, "front", 0, "input")
     assert browser.value("$('front-told').querySelector('dd').textContent") == "1"
+    with bench.line() as other:
+        other.do("no such command")  # whereupon all pages are told something
+    browser.wait("!$('problem').hidden")
     assert browser.value("$('legend').querySelectorAll('span.swatch').length") == 1
     drag_slider(browser, "front", 0, "change")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: take another number of parts'")

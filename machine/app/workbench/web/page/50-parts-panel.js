@@ -6,8 +6,15 @@ const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * M
 function partsPanel(bench) {
   $("find").addEventListener("click", () => bench.send({ do: "search" }));
   $("stop").addEventListener("click", () => bench.send({ do: "stop" }));
-  $("front").addEventListener("input", () => { const row = bench.state.front[$("front").value]; tellRow(row, bench.state); bench.look(row); });
-  $("front").addEventListener("change", () => bench.send({ do: "take", parts: bench.state.front[$("front").value].parts }));
+  $("front").addEventListener("input", () => {
+    bench.rowInHand = bench.state.front[$("front").value];
+    tellRow(bench.rowInHand, bench.state);
+    bench.look();
+  });
+  $("front").addEventListener("change", () => {
+    bench.rowInHand = null;
+    bench.send({ do: "take", parts: bench.state.front[$("front").value].parts });
+  });
   $("recommended").addEventListener("click", () => bench.send({ do: "take", parts: bench.state.recommended }));
   return {
     told: (state, before) => {
@@ -17,10 +24,11 @@ function partsPanel(bench) {
       $("search-told").textContent = search ? search.text : "";
       document.body.classList.toggle("no-cuts", !parts);
       $("front-field").hidden = !front.length;
-      if (!front.length) return;
+      if (!front.length) return void (bench.rowInHand = null);
       const told = ({ front, parts, recommended, cuts, priced } = {}) => JSON.stringify([front, parts, recommended, cuts, priced]);
       const fresh = told(state) !== told(before || undefined);
       if (!fresh) return; // a finger may be on the slider
+      bench.rowInHand = null;
       const place = front.findIndex((row) => row.parts === parts);
       $("front").max = front.length - 1;
       $("front").value = Math.max(place, 0);
@@ -48,7 +56,7 @@ function tellRow(row, { recommended, parts, cuts, priced }) {
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
-    ["parts", `${row.parts}${byHand ? ", changed by hand since; this is how they were found" : best ? ` (recommended: ${row.reason})` : ""}`], ["area to support", mm2(row.support_area_mm2)],
+    ["parts", `${row.parts}${byHand ? ", changed by hand since; this is how they were found" : best ? ` (recommended: ${row.why})` : ""}`], ["area to support", mm2(row.support_area_mm2)],
     ["seams", `${row.seam_mm.toFixed(0)} mm`], ["takes about", orDash(row.time_s, roughly)],
     ["plastic", orDash(row.filament_mm, (long) => `${(long / 1000).toFixed(1)} m`)],
   ]);

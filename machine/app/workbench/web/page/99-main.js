@@ -2,7 +2,7 @@
 
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => { bench.placeHandles(); bench.placeRings(); bench.placeMarks(); }), root = document.documentElement;
-  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, placeHandles: () => {}, placeRings: () => {}, placeMarks: () => {} };
+  const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, rowInHand: null, placeHandles: () => {}, placeRings: () => {}, placeMarks: () => {} };
   const dark = themeOf((now) => { bench.themed?.(now); if (picture && bench.state) picture.machine(bench.state.machine, now); });
   const line = lineTo((state) => follow(state), (gone) => {
     root.dataset.line = gone ? "lost" : "open";
@@ -35,11 +35,11 @@ function main() {
     root.dataset.liveMs = (performance.now() - began).toFixed(1);
   };
   bench.preview = (rotation) => stand(rotation, true);
-  /** Parts in their colours where they are looked at, else red faces; row: of the front, before it is taken. */
-  bench.look = (row = null) => {
+  /** Parts in their colours where they are looked at, else red faces; the row of the front under the hand before it is taken, whatever is told meanwhile. */
+  bench.look = () => {
     if (!picture || !bench.triangles) return;
     const { search, parts, colours } = bench.state;
-    const planes = row ? row.planes : search && search.planes.length ? search.planes : parts ? bench.planes() : null;
+    const planes = bench.rowInHand ? bench.rowInHand.planes : search && search.planes.length ? search.planes : parts ? bench.planes() : null;
     const cut = bench.tab !== "model" && planes;
     picture.cut(cut ? planes : null, colours);
     bench.showApart();
@@ -134,29 +134,6 @@ function swatch(colour) {
   const mark = made("span", { className: "swatch" });
   mark.style.backgroundColor = colour;
   return mark;
-}
-
-function tabsOf(chosen) {
-  const all = [...document.querySelectorAll("[role=tab]")];
-  const choose = (tab) => {
-    all.forEach((each) => {
-      each.setAttribute("aria-selected", each === tab);
-      each.tabIndex = each === tab ? 0 : -1;
-      $(each.getAttribute("aria-controls")).hidden = each !== tab;
-    });
-    chosen(tab.getAttribute("aria-controls"));
-  };
-  all.forEach((tab, k) => {
-    tab.addEventListener("click", () => choose(tab));
-    tab.addEventListener("keydown", (event) => {
-      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-      if (!step) return;
-      const next = all[(k + step + all.length) % all.length];
-      choose(next);
-      next.focus();
-      event.stopPropagation();
-    });
-  });
 }
 
 /** Dark or light: what the system prefers until the person says otherwise. */
