@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from machine.view.parts import page_colours
-from mdp.decomposition import Decomposition
+from mdp.decomposition import Decomposition, FrontRow
 
 
 @dataclass(frozen=True)
@@ -30,19 +30,26 @@ class Alternative:
     findings: int = 0
 
 
+def front_record(row: FrontRow) -> dict[str, Any]:
+    """A row of a front as pages know it. planes: in print order, from part 2 on; why: of the chosen row, else ""."""
+    return {
+        "parts": row.parts,
+        "support_area_mm2": row.support_area_mm2,
+        "seam_mm": row.seam_mm,
+        "cost_mm2": row.cost_mm2,
+        "time_s": row.time_s,
+        "filament_mm": row.filament_mm,
+        "chosen": row.chosen,
+        "why": row.reason,
+        "planes": [{"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm} for plane in reversed(row.planes)],
+    }
+
+
 def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:
-    """The rows of a front as the page knows them. planes: in print order, from part 2 on; why: of the chosen row, else ""."""
+    """The rows of a front with the colours of their parts, and the command that takes each."""
     return [
         {
-            "parts": row.parts,
-            "support_area_mm2": row.support_area_mm2,
-            "seam_mm": row.seam_mm,
-            "cost_mm2": row.cost_mm2,
-            "time_s": row.time_s,
-            "filament_mm": row.filament_mm,
-            "chosen": row.chosen,
-            "why": row.reason,
-            "planes": [{"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm} for plane in reversed(row.planes)],
+            **front_record(row),
             "colours": page_colours(row.parts),
             "command": f"tiltprint decompose {shlex.quote(decomposition.name)} --parts {row.parts}",
         }

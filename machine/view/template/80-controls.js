@@ -22,7 +22,7 @@ function controlsOf(print, scene, bells) {
   $("apart").addEventListener("input", () => { scene.apart = Number($("apart").value); bells.ring("look"); });
   if (print.header.parts.length < 2) document.body.classList.add("one-part");
   typeBoxes(print, scene, bells);
-  tabs();
+  tabsOf((panel) => document.body.classList.toggle("reporting", panel === "report"));
 }
 
 /** A box for every kind of line in the print, with its share of the time. */
@@ -74,29 +74,6 @@ function kindEntries(rows) {
   const used = new Set();
   for (let i = 0; i < rows.count; i++) if (rows.kind[i] === KIND.extrude) used.add(rows.type[i]);
   return [...used].sort((a, b) => a - b).map((place) => [typeColour(rows.types[place]), rows.types[place] || "not told"]);
-}
-
-function tabs() {
-  const all = [...document.querySelectorAll("[role=tab]")];
-  const choose = (chosen) => {
-    document.body.classList.toggle("reporting", chosen.id === "tab-report");
-    all.forEach((tab) => {
-      tab.setAttribute("aria-selected", tab === chosen);
-      tab.tabIndex = tab === chosen ? 0 : -1;
-      $(tab.getAttribute("aria-controls")).hidden = tab !== chosen;
-    });
-  };
-  all.forEach((tab, k) => {
-    tab.addEventListener("click", () => choose(tab));
-    tab.addEventListener("keydown", (event) => {
-      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-      if (!step) return;
-      const next = all[(k + step + all.length) % all.length];
-      choose(next);
-      next.focus();
-      event.stopPropagation();
-    });
-  });
 }
 
 /** Dark or light: what the system prefers until the person says otherwise. */

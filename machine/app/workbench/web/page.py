@@ -8,7 +8,7 @@ from importlib import resources
 # What is taken over from machine/view/template: the scene, not the print.
 SHARED = (
     "10-math.js", "12-block.js", "15-chain.js", "20-rows.js", "30-gl.js", "34-lines.js", "38-solids.js", "40-model.js",
-    "42-bodies.js", "44-camera.js", "50-colours.js", "61-frames.js", "70-page.js",
+    "42-bodies.js", "44-camera.js", "50-colours.js", "61-frames.js", "70-page.js", "71-tabs.js",
 )  # fmt: skip
 MARKER = re.compile(r"/\*(?:STYLE|SCRIPT)\*/")
 

@@ -13,9 +13,9 @@ from machine.app.workbench.bench.marks import named_faces
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.slices import slices_told
+from machine.view.comparison import front_record
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
-from mdp.decomposition import FrontRow
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS
@@ -49,7 +49,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         ],
         "search": None if search is None else {"text": search.searched.text, "planes": planes},
         **slices_told(session),
-        "front": [_row(row) for row in bench.rows],
+        "front": [front_record(row) for row in bench.rows],
         "parts": bench.parts,
         "recommended": bench.recommended,
         "cuts": _cuts(bench.cuts or ()),
@@ -109,19 +109,6 @@ def _model(model: Model) -> dict[str, Any]:
         "volume_mm3": model.mesh.volume_mm3,
         "notes": model.notes,
         "drawn": len(model.mesh.faces) <= MOST_FACES,
-    }
-
-
-def _row(row: FrontRow) -> dict[str, Any]:
-    return {
-        "parts": row.parts,
-        "support_area_mm2": row.support_area_mm2,
-        "seam_mm": row.seam_mm,
-        "cost_mm2": row.cost_mm2,
-        "time_s": row.time_s,
-        "filament_mm": row.filament_mm,
-        "reason": row.reason,
-        "planes": [_plane(plane) for plane in reversed(row.planes)],
     }
 
 
