@@ -13,7 +13,7 @@ from machine.view.comparison import Alternative, front_records
 from machine.view.encoding import pack
 from machine.view.parts import page_colours
 from machine.view.program import Program
-from machine.view.report import parts_report, print_report
+from machine.view.report import parts_report, print_report, with_alternatives
 from machine.view.thinning import shown_rows
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats
@@ -66,6 +66,11 @@ def of_print(
     }
     table = layers.columns(run.program, by_layer, ends_s, height, shown)
     return pack(header, rows | table | scene.surfaces(program.decomposition, profile))
+
+
+def compared(header: dict[str, Any], alternatives: Sequence[Alternative]) -> dict[str, Any]:
+    """The header of a print with its alternatives beside it."""
+    return header | {"report": with_alternatives(header["report"], alternatives)}
 
 
 def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, Any]:

@@ -6,7 +6,7 @@ Differences of neighbours in zigzag, their bytes sorted by weight, then deflate:
 import json
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import prod
 from typing import Any
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 MAGIC = b"TILTVW01"
 ALIGNED = 8
+LENGTH = struct.Struct("<I")
 LEVEL = 6
 MOST = 2**32 - 1
 TYPES = {"u8": "<u1", "u16": "<u2", "i32": "<i4", "f32": "<f4"}
@@ -44,12 +45,22 @@ def pack(header: Mapping[str, Any], columns: Mapping[str, Column]) -> bytes:
         }  # fmt: skip
         blocks.append(block + bytes(-len(block) % ALIGNED))
         offset += len(blocks[-1])
-    text = json.dumps({**header, "arrays": arrays}, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode(
-        errors="replace"
-    )
-    text += b" " * (-(len(MAGIC) + 4 + len(text)) % ALIGNED)
+    return _press({**header, "arrays": arrays}, blocks)
+
+
+def with_header(block: bytes, change: Callable[[dict[str, Any]], Mapping[str, Any]]) -> bytes:
+    """A packed block with another header: what change makes of its own."""
+    raw = zlib.decompress(block)
+    begin = len(MAGIC) + LENGTH.size
+    end = begin + LENGTH.unpack_from(raw, len(MAGIC))[0]
+    return _press(change(json.loads(raw[begin:end])), (memoryview(raw)[end:],))
+
+
+def _press(header: Mapping[str, Any], arrays: Iterable[bytes | memoryview]) -> bytes:
+    text = json.dumps(header, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode(errors="replace")
+    text += b" " * (-(len(MAGIC) + LENGTH.size + len(text)) % ALIGNED)
     press = zlib.compressobj(LEVEL)
-    pressed = [press.compress(block) for block in (MAGIC + struct.pack("<I", len(text)) + text, *blocks)]
+    pressed = [press.compress(each) for each in (MAGIC + LENGTH.pack(len(text)) + text, *arrays)]
     return b"".join([*pressed, press.flush()])
 
 

@@ -8,7 +8,8 @@ from html import escape
 from importlib import resources
 
 from machine.view.comparison import Alternative
-from machine.view.contents import of_parts, of_print
+from machine.view.contents import compared, of_parts, of_print
+from machine.view.encoding import with_header
 from machine.view.program import Program
 from mdp.decomposition import Decomposition
 from profiles.profile import Profile
@@ -32,6 +33,14 @@ def print_page(
 ) -> bytes:
     """The page of a whole print; arguments as of_print takes them."""
     return page(name, of_print(name, program, profile, known, alternatives, live), live)
+
+
+def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> bytes:
+    """A page that print_page has written without alternatives, with them: the same bytes as if it had known them."""
+    begin = content.index(DATA) + len(DATA)
+    end = content.index(b"</script>", begin)
+    block = with_header(base64.b64decode(content[begin:end]), lambda header: compared(header, alternatives))
+    return content[:begin] + base64.b64encode(block) + content[end:]
 
 
 def page(title: str, block: bytes, live: bool = False) -> bytes:

@@ -30,6 +30,7 @@ MOVES = {
     MoveKind.TRAVEL: "travel", MoveKind.RETRACT: "retraction", PRIME: "prime", WIPE: "wipe", MoveKind.ROTATE: "turning the table",
 }  # fmt: skip
 UNTOLD = "not told"
+COMPARED = "Compared"
 STANDS_ON = "base cm³"
 CUT = "base: plastic where the part stands on earlier ones that one piece would not have"
 RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
@@ -64,6 +65,12 @@ def print_report(
     names = _names(profile) if ours else _assumptions(profile, known)
     facts = [*_figures(program.run, profile, layers), *names]
     return {"facts": facts, "tables": tables + (settings_tables(profile) if ours else [])}
+
+
+def with_alternatives(report: dict[str, Any], alternatives: Sequence[Alternative]) -> dict[str, Any]:
+    """The report of a print from a model, the alternatives in the place of the areas that are compared at no cost."""
+    tables = [_alternatives(alternatives) if table["title"] == COMPARED else table for table in report["tables"]]
+    return report | {"tables": tables}
 
 
 def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), folded: bool = False) -> Table:
@@ -155,21 +162,24 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
     rows = [[name, f"{max(area, 0.0):.1f}", _share(whole - area, whole)] for name, area in risky_mm2]
     rows[0][2] = ""
     notes = [f"best single orientation: {in_words(best)}", "--compare tells time and material too"]
-    return _table("Compared", ["print", "risky mm²", "less"], rows, notes)
+    return _table(COMPARED, ["print", "risky mm²", "less"], rows, notes)
 
 
 def _alternatives(alternatives: Sequence[Alternative]) -> Table:
-    """This print beside the model in one part: time, filament, support, risky area."""
+    """This print beside the model in one part: time, filament, support, seams, findings, risky area."""
     rows = []
     for each in alternatives:
-        costs = ["-"] * 5
+        costs = ["-"] * 7
         if each.time_s is not None:
             filament_mm, mass_g, support_mm3 = each.filament_mm or 0.0, each.filament_g or 0.0, each.support_mm3 or 0.0
             volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(each.interface_mm3.values()) / 1000:.2f}"]
-            costs = [duration(each.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes]
+            scars = [f"{each.seam_mm:.0f}", str(each.findings)]
+            costs = [duration(each.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
         rows.append([each.name, *costs, f"{max(each.risky_mm2, 0.0):.1f}"])
     notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
-    return _table("Compared", ["print", "time", "m", "g", "support cm³", "interfaces cm³", "risky mm²"], rows, notes)
+    return _table(
+        COMPARED, ["print", "time", "m", "g", "support cm³", "interfaces cm³", "seams mm", "findings", "risky mm²"], rows, notes
+    )
 
 
 def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:

@@ -69,12 +69,12 @@ def test_areas_are_compared_at_no_cost_and_alternatives_where_they_are_known() -
     assert [row[0] for row in areas["rows"]] == ["straight up", "best single orientation", "in 2 parts"]
     assert areas["rows"][2] == ["in 2 parts", "0.0", "100.0 %"]
     alternatives = (
-        Alternative("in 2 parts", "", 2, 60.0, 1000.0, 3.0, 0.0, 0.0, interface_mm3={2: 170.0}),
+        Alternative("in 2 parts", "", 2, 60.0, 1000.0, 3.0, 0.0, 0.0, seam_mm=43.7, interface_mm3={2: 170.0}, findings=2),
         Alternative("straight up", "", 1, *[None] * 4, 100.0, "too high"),
     )
     known = tables(program, alternatives)["Compared"]
-    assert known["rows"][0] == ["in 2 parts", "1m 0s", "1.00", "3.0", "0.00", "0.17", "0.0"]
-    assert known["rows"][1][1:6] == ["-"] * 5
+    assert known["rows"][0] == ["in 2 parts", "1m 0s", "1.00", "3.0", "0.00", "0.17", "44", "2", "0.0"]
+    assert known["rows"][1][1:8] == ["-"] * 7
     assert known["notes"] == ["straight up: too high"]
 
 

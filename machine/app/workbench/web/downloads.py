@@ -1,11 +1,14 @@
 """Downloads: what a page saves and looks at: the plan, the parts, the G-code and the page of the print."""
 
+import asyncio
+
 from starlette.requests import Request
 from starlette.responses import Response
 
 from machine.app.workbench.bench.command_line import file_stem
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.slicing import Slices
+from machine.view.page import with_comparison
 from profiles.errors import PlanError
 
 
@@ -40,8 +43,11 @@ async def print_walls(session: Session, request: Request) -> Response:
 
 
 async def shared_page(session: Session, request: Request) -> Response:
-    """The same as a file to save."""
-    return _download(session.slicing.needed().page, "text/html", f"{file_stem(session.bench)}.html")
+    """The same as a file to save, with the comparison with one piece where that has been worked out."""
+    content, alternatives = session.slicing.needed().page, session.comparing.rows()
+    if alternatives:
+        content = await asyncio.to_thread(with_comparison, content, alternatives)
+    return _download(content, "text/html", f"{file_stem(session.bench)}.html")
 
 
 async def gcode(session: Session, request: Request) -> Response:

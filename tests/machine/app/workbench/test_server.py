@@ -156,9 +156,10 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
         page.until(lambda state: state["slicing"])
         sliced = page.until(lambda state: state["sliced"] and not state["slicing"])["sliced"]
         (folder / "plan.toml").write_bytes(bench.ask("plan.toml")[1])
-        assert main(["export", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "tee.gcode", "--html", "tee.html"]) == 0
+        export = ["export", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "tee.gcode", "--compare", "--html", "tee.html"]
+        assert main(export) == 0
         assert bench.ask("print.gcode")[1] == (folder / "tee.gcode").read_bytes()
-        assert bench.ask(f"print/{sliced['key']}")[1] == bench.ask("print.html")[1] == (folder / "tee.html").read_bytes()
+        assert bench.ask(f"print/{sliced['key']}")[1] == bench.ask("print.html")[1] != (folder / "tee.html").read_bytes()
         assert bench.ask(f"print/{sliced['key']}/text")[1] == bench.ask("print.gcode")[1]
         direction = np.frombuffer(bench.ask(f"walls/{sliced['number']}/2")[1], "<f4", 3)
         assert (sliced["ready"], direction.tolist()) == ([1, 2], [1.0, 0.0, 0.0])
@@ -167,6 +168,7 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
         assert (parts["name"], parts["time_s"], parts["findings"]) == ("in 2 parts", sliced["time_s"], len(sliced["findings"]))
         assert upright["support_mm3"] > parts["support_mm3"]
         assert parts["seam_mm"] > upright["seam_mm"] == 0.0
+        assert bench.ask("print.html")[1] == (folder / "tee.html").read_bytes()  # with the comparison, as of --compare
         page.do("turn", axis="z", deg=30)
         assert page.until(lambda state: state["sliced"]["stale"])["sliced"]["key"] == sliced["key"]
         assert bench.ask("print.gcode")[0] == 422

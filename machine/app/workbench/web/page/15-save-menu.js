@@ -29,13 +29,13 @@ function saveMenu(bench) {
     $(id).querySelector("small").textContent = why || otherwise;
   };
   return {
-    told: ({ model, parts, sliced }) => {
+    told: ({ model, parts, sliced, compared }) => {
       const uncut = !model ? "no model yet" : parts ? "" : "no parts yet: find them, or add a plane";
       const unsliced = !model ? "no model yet" : !sliced ? "not sliced yet" : sliced.stale ? "out of date: slice again" : "";
       tell("save-plan", uncut, "the command line takes it with --plan");
       tell("save-parts", uncut, "zip of an STL each, a coloured 3MF and the plan");
       tell("save-gcode", unsliced, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
-      tell("save-page", unsliced, "one HTML file to open anywhere, as view writes it");
+      tell("save-page", unsliced, `one HTML file to open anywhere, as view writes it${compared.length ? ", with the comparison" : ""}`);
     },
   };
 }
