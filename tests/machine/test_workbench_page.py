@@ -87,9 +87,14 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     assert browser.value("$('legend').textContent") != ""
     drag_slider(browser, "front", 0, "input")
     assert browser.value("$('front-told').querySelector('dd').textContent") == "1"
-    with bench.line() as other:
-        other.do("no such command")  # whereupon all pages are told something
-    browser.wait("!$('problem').hidden")
+    with bench.line() as other:  # whose news moves neither the slider nor the picture under the hand
+        other.do("set", key="process.infill_density", value="1")
+        other.until(lambda state: not state["priced"])
+        told = other.until(lambda state: state["priced"])
+        browser.wait(f"Number(document.documentElement.dataset.version) >= {told['version']}")
+    assert browser.value("$('front').value") == "0"
+    metres = f"{told['front'][0]['filament_mm'] / 1000:.1f} m"
+    assert browser.value("$('front-told').textContent").endswith(f"plastic{metres}")
     assert browser.value("$('legend').querySelectorAll('span.swatch').length") == 1
     drag_slider(browser, "front", 0, "change")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: take another number of parts'")

@@ -9,6 +9,7 @@ import numpy as np
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.effect import Effect, effect_of_change
+from machine.app.workbench.bench.following import following_stops, gone_in_words
 from machine.app.workbench.bench.part_settings import following
 from machine.app.workbench.bench.settings import USUAL
 from machine.planning.stops import Stop
@@ -47,8 +48,8 @@ class Bench:
     rotation: rows of what turns the model as it is read. cuts: the base planes of the parts from the second on, in print order;
     None: nobody has cut it yet. rows: the front that the cuts were chosen from, ever more parts; recommended: how many parts the
     search would take, 0: no search has been; priced: times and plastic of the rows are for this profile, as far as there are any.
-    locked: those of the cuts that a search begins with and nobody moves. stops: where the print waits for a person; copies: how
-    many of the model on the plate; both stay as they are typed until another model is opened.
+    locked: those of the cuts that a search begins with and nobody moves. stops: where the print waits for a person, each with its
+    part wherever that goes; copies: how many of the model on the plate; both stay until another model is opened.
     """
 
     profile: Profile
@@ -92,10 +93,11 @@ class Bench:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A command's word and the bench after it."""
+    """A command's word, the bench after it, and a sentence for what it has taken away beside what it was for."""
 
     word: str
     bench: Bench
+    told: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +109,10 @@ class History:
     undone: tuple[Step, ...] = ()
 
     def do(self, word: str, bench: Bench) -> "History":
-        """A further step; what was undone is forgotten."""
-        return History(Step(word, bench), _kept((*self.before, self.now)[-MOST_STEPS:]))
+        """A further step; pauses go with their parts, and what was undone is forgotten."""
+        kept, gone = following_stops(bench.stops, self.now.bench.cuts or (), bench.cuts or ())
+        after = bench if kept == bench.stops else replace(bench, stops=kept)
+        return History(Step(word, after, gone_in_words(word, gone)), _kept((*self.before, self.now)[-MOST_STEPS:]))
 
     def undo(self) -> "History":
         """One step back, or the same where there is none."""

@@ -1,8 +1,6 @@
 """Part settings: what a person sets for one part alone, and which part it is for when planes come, go or change their order."""
 
-from collections.abc import Sequence
-
-from mdp.plans.plan_file import PlannedPart
+from machine.app.workbench.bench.following import Cuts, part_after
 from profiles.errors import PlanError
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, with_part_settings
@@ -38,17 +36,10 @@ def check_part(part: object, parts: int) -> int:
     return part
 
 
-def following(profile: Profile, before: Sequence[PlannedPart], after: Sequence[PlannedPart]) -> Profile:
-    """The profile with settings for the parts that they were made for, among other planes: a part goes with its plane, also where
-    that was moved alone; what a part that is gone had goes with it."""
-    kept = []
-    for each in profile.parts:
-        place = each.part - 2
-        if place < 0:
-            kept.append(each)
-        elif place < len(before) and before[place] in after:
-            kept.append(each.model_copy(update={"part": after.index(before[place]) + 2}))
-        elif place < len(before) == len(after) and after[place] not in before:
-            kept.append(each)
+def following(profile: Profile, before: Cuts, after: Cuts) -> Profile:
+    """The profile with settings for the parts that they were made for, among other planes; what a part that is gone had goes with
+    it."""
+    places = ((each, part_after(before, after, each.part)) for each in profile.parts)
+    kept = [each.model_copy(update={"part": part}) for each, part in places if part is not None]
     kept.sort(key=lambda each: each.part)
     return profile if kept == profile.parts else profile.model_copy(update={"parts": kept})

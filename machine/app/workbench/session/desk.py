@@ -7,7 +7,6 @@ import sys
 import tempfile
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -90,15 +89,26 @@ class Desk(News):
         self.tell()
         return self.problem
 
-    def do(self, word: str, bench: Bench) -> None:
-        """Take a further step, which can be undone."""
+    def do(self, word: str, bench: Bench, told: str = "") -> None:
+        """Take a further step, which can be undone. told: what it has taken away, beside what its step says itself."""
+        self.advance(self.history.do(word, bench), told)
+
+    def advance(self, history: History, told: str = "") -> None:
+        """Go on with another history; a step forth tells what it has taken away."""
+        forth = history.before[-1:] == (self.history.now,)
         self.problem = ""
-        self.become(self.history.do(word, bench))
+        for sentence in (told, history.now.told if forth else ""):
+            self.add_problem(sentence)
+        self.become(history)
+
+    def add_problem(self, sentence: str) -> None:
+        """Tell a sentence beside what is told already."""
+        self.problem = "; ".join(filter(None, (self.problem, sentence)))
 
     def amend(self, bench: Bench, better: Bench) -> None:
         """What lies on the bench, if it is still this, known better; no step of its own."""
         if self.bench is bench:
-            self.history = replace(self.history, now=Step(self.history.now.word, better))
+            self.history = self.history.amended(better)
 
     def become(self, history: History) -> None:
         """Go on with another history."""

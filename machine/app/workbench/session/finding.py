@@ -71,8 +71,8 @@ class Finding:
             row = replace(await self._trying.measure(search.bench, cuts), chosen=True)
             if _other(search.bench, self._desk.bench):
                 return  # they are planes of another model, or of one that stood otherwise
-            taken = with_front(self._desk.bench, [row])
-            self._desk.do("stop the search", taken)
+            self._desk.do("stop the search", with_front(self._desk.bench, [row]))
+            taken = self._desk.bench
         rows = await self._desk.long.run("measure_plan", taken, plan_of_bench(taken, "the search"))
         self._desk.amend(taken, replace(taken, rows=tuple(rows)))
 

@@ -40,8 +40,7 @@ class Marking:
             bench = with_cuts(bench, tuple(each for each in bench.cuts if each is not part))
         if self._desk.bench is not before:
             return False
-        self._desk.do(word, bench)
-        self._desk.problem = _told(word, gone) or self._desk.problem
+        self._desk.do(word, bench, _told(word, gone))
         return True
 
 

@@ -137,7 +137,7 @@ class Session(Desk):
             case "demo":
                 self.start(self.open_demo(str(asked.get("name"))))
             case _:
-                self.become(obey(self.history, asked))
+                self.advance(obey(self.history, asked))
         self.tell()
 
     async def files(self) -> Files:
@@ -161,8 +161,7 @@ class Session(Desk):
                 given = change(before.given)
                 bench, refused = await self._with_profile(word, before, given)
             if given != before.given:
-                self.do(word, bench)
-                self.problem = refused or self.problem
+                self.do(word, bench, refused)
 
     async def _with_profile(self, word: str, before: Bench, given: Given) -> tuple[Bench, str]:
         """A bench with another profile; planes that it forbids go, with the reason, and a model that it scales or turns otherwise

@@ -109,4 +109,4 @@ class Slicing:
     def _follow(self) -> None:
         if self.under_way is not None and self.under_way.bench.printed != self._desk.bench.printed:
             self.stop()
-            self._desk.problem = ENDED
+            self._desk.add_problem(ENDED)

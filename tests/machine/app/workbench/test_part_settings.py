@@ -11,6 +11,7 @@ from machine.app.workbench.bench.bench import Bench, History, Model, Step, with_
 from machine.app.workbench.bench.command_line import export_command, turned_by, turns_deg
 from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.settings import settings_list
+from machine.planning.stops import parse_stops
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError, ProfileError
 from profiles.profile import load
@@ -44,6 +45,24 @@ def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
     assert "process.scale" not in first | second
     assert second - first == {key for key in second if key.startswith("process.interface_")} - first
     assert "process.interface_fan" in second - first
+
+
+@pytest.mark.parametrize(
+    ("cuts", "stops", "told"),
+    [
+        ((LOW, HIGH, MIDDLE), "--pause 1:3 --pause 4:15 --filament-change 9:1", ""),
+        ((HIGH, MIDDLE), "--pause 1:3 --pause 3:15 --filament-change 9:1", ""),
+        ((LOW,), "--pause 1:3 --filament-change 9:1", "cut: taken away with part 3: --pause 3:15"),
+    ],
+)
+def test_a_pause_goes_with_its_part_and_says_so_and_undo_brings_it_back(
+    cuts: tuple[PlannedPart, ...], stops: str, told: str
+) -> None:
+    steps = History(Step("", replace(BENCH, stops=parse_stops(["1:3", "3:15"], ["9:1"]))))
+    after = steps.do("cut", with_cuts(steps.now.bench, cuts))
+    assert " ".join(stop.option for stop in after.now.bench.stops) == stops
+    assert after.now.told == told
+    assert after.undo().now.bench.stops == steps.now.bench.stops
 
 
 def test_settings_follow_the_plane_of_their_part_and_go_with_it() -> None:

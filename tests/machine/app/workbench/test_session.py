@@ -105,6 +105,21 @@ def test_the_best_of_a_search_that_was_stopped_does_not_bring_back_the_model_bef
     assert (bench.model.name, bench.cuts) == ("b", None)
 
 
+def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> None:
+    async def work(session: Session) -> None:
+        session.command({"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
+        await asyncio.sleep(0.05)
+        for at in ("1:3", "2:8.4mm"):
+            session.command({"do": "add_stop", "kind": "pause", "at": at})
+        session.command({"do": "slice"})
+        await asyncio.sleep(0)
+        session.command({"do": "turn", "axis": "x", "deg": 90})
+
+    session = when_done(work)
+    assert [stop.option for stop in session.bench.stops] == ["--pause 1:3"]
+    assert session.problem.startswith("turn the model: taken away with part 2: --pause 2:8.4mm; slicing has ended")
+
+
 def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:
     async def work(session: Session) -> None:
         session.command({"do": "slice"})

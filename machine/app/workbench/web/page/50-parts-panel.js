@@ -6,40 +6,65 @@ const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * M
 function partsPanel(bench) {
   $("find").addEventListener("click", () => bench.send({ do: "search" }));
   $("stop").addEventListener("click", () => bench.send({ do: "stop" }));
+  let shown = ""; // of which front the slider is
+  const told = ({ front, parts, recommended, cuts, priced }) => JSON.stringify([front, parts, recommended, cuts, priced]);
+  const show = (state) => {
+    const { front, parts, recommended } = state, place = front.findIndex((row) => row.parts === parts);
+    shown = told(state);
+    bench.rowInHand = null;
+    $("front").max = front.length - 1;
+    $("front").value = Math.max(place, 0);
+    $("front").disabled = front.length < 2;
+    marksUnder(front, recommended);
+    tellRow(front[Math.max(place, 0)], state);
+    listIn("front-notes", state.notes);
+    $("recommended").hidden = !recommended;
+  };
+  let held = null; // the front whose slider is under the hand: nothing moves it there, not even another front
+  const hold = () => { held ||= bench.state.front; };
+  const letGo = () => {
+    if (!held) return;
+    held = null;
+    show(bench.state);
+    bench.look();
+  };
+  $("front").addEventListener("pointerdown", hold);
+  for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first
+  $("front").addEventListener("blur", letGo);
   $("front").addEventListener("input", () => {
-    bench.rowInHand = bench.state.front[$("front").value];
+    hold();
+    bench.rowInHand = rowUnder(held[$("front").value], bench.state);
     tellRow(bench.rowInHand, bench.state);
     bench.look();
   });
   $("front").addEventListener("change", () => {
-    bench.rowInHand = null;
-    bench.send({ do: "take", parts: bench.state.front[$("front").value].parts });
+    const { parts } = (held || bench.state.front)[$("front").value];
+    held = bench.rowInHand = null;
+    bench.send({ do: "take", parts });
   });
   $("recommended").addEventListener("click", () => bench.send({ do: "take", parts: bench.state.recommended }));
   return {
-    told: (state, before) => {
-      const { front, search, parts, recommended } = state;
+    told: (state) => {
+      const { front, search, parts } = state;
       $("find").disabled = Boolean(search);
       $("stop").hidden = !search;
       $("search-told").textContent = search ? search.text : "";
       document.body.classList.toggle("no-cuts", !parts);
       $("front-field").hidden = !front.length;
-      if (!front.length) return void (bench.rowInHand = null);
-      const told = ({ front, parts, recommended, cuts, priced } = {}) => JSON.stringify([front, parts, recommended, cuts, priced]);
-      const fresh = told(state) !== told(before || undefined);
-      if (!fresh) return; // a finger may be on the slider
-      bench.rowInHand = null;
-      const place = front.findIndex((row) => row.parts === parts);
-      $("front").max = front.length - 1;
-      $("front").value = Math.max(place, 0);
-      $("front").disabled = front.length < 2;
-      marksUnder(front, recommended);
-      tellRow(front[Math.max(place, 0)], state);
-      listIn("front-notes", state.notes);
-      $("recommended").hidden = !recommended;
+      if (!front.length) {
+        held = bench.rowInHand = null;
+        shown = "";
+      } else if (!held) { if (told(state) !== shown) show(state); }
+      else if (bench.rowInHand) {
+        bench.rowInHand = rowUnder(bench.rowInHand, state);
+        tellRow(bench.rowInHand, state);
+      }
     },
   };
 }
+
+/** The row in hand as the newest front has it, with its time and plastic; as it was where that has none of so many parts. */
+const rowUnder = (row, { front }) => front.find(({ parts }) => parts === row.parts) || row;
 
 function marksUnder(front, recommended) {
   $("front-marks").replaceChildren(...front.map(({ parts }, place) => {

@@ -1,0 +1,42 @@
+"""Following: which part a part is among other planes, so that what a person said of it goes along."""
+
+from collections.abc import Sequence
+
+from machine.planning.stops import Stop
+from mdp.plans.plan_file import PlannedPart
+
+Cuts = Sequence[PlannedPart]
+
+
+def part_after(before: Cuts, after: Cuts, part: int) -> int | None:
+    """The number that a part has among other planes: a part goes with its plane, also where that was moved alone, and part 1
+    stays on the platform. None: it is gone."""
+    place = part - 2
+    if place < 0:
+        return part
+    if place >= len(before):
+        return None
+    if before[place] in after:
+        return after.index(before[place]) + 2
+    return part if len(before) == len(after) and after[place] not in before else None
+
+
+def following_stops(stops: Sequence[Stop], before: Cuts, after: Cuts) -> tuple[tuple[Stop, ...], tuple[Stop, ...]]:
+    """The stops among other planes, and those whose parts are gone. One that was typed for a part that has not been there yet
+    stays as it is."""
+    kept, gone = list[Stop](), list[Stop]()
+    for stop in stops:
+        part = stop.part if stop.part > len(before) + 1 else part_after(before, after, stop.part)
+        if part is None:
+            gone.append(stop)
+        else:
+            kept.append(Stop(part, stop.layer, stop.height_mm, stop.change))
+    return tuple(kept), tuple(gone)
+
+
+def gone_in_words(word: str, gone: Sequence[Stop]) -> str:
+    """What a step has taken away with its parts; "" for nothing."""
+    if not gone:
+        return ""
+    parts = "their parts" if len({stop.part for stop in gone}) > 1 else f"part {gone[0].part}"
+    return f"{word}: taken away with {parts}: {', '.join(stop.option for stop in gone)}"
