@@ -47,6 +47,13 @@ PICTURE = """new Promise((done) => {
   };
   look();
 })"""
+# Calls back in the midst of a picture.
+WHILE_DRAWN = """((then) => {
+  const root = document.documentElement;
+  const seen = new MutationObserver(() => { if (root.dataset.picture === 'drawing') { seen.disconnect(); then(); } });
+  seen.observe(root, { attributeFilter: ['data-picture'] });
+  document.getElementById('position').dispatchEvent(new Event('input'));
+})"""
 # Pixels of such a picture in the red of risky faces.
 REDS = f"""{PICTURE}.then(async (address) => {{
   const picture = new Image(), copy = document.createElement('canvas'), pen = copy.getContext('2d');
@@ -406,8 +413,8 @@ def test_the_page_fits_a_telephone(page: Browser) -> None:
 def test_the_picture_returns_after_the_graphics_card_has_let_go_of_it(page: Browser) -> None:
     before = page.value(PICTURE)
     page.value("window.card = document.getElementById('canvas').getContext('webgl2').getExtension('WEBGL_lose_context')")
-    page.value("card.loseContext()")
-    page.wait("!document.getElementById('notice').hidden")
+    page.value(f"new Promise((done) => {{ {WHILE_DRAWN}(() => {{ card.loseContext(); done(); }}); }})")
+    page.wait("document.documentElement.dataset.picture === 'idle' && !document.getElementById('notice').hidden")
     page.value("card.restoreContext()")
     page.wait("document.getElementById('notice').hidden")
     page.wait(f"{PICTURE}.then((now) => now === {json.dumps(before)})")

@@ -187,12 +187,17 @@ def test_a_broken_model_is_told_and_the_one_before_it_stays(browser: Browser, be
     assert browser.value("$('title').textContent") == "tee.stl"
 
 
-def test_when_the_workbench_ends_the_page_says_so(browser: Browser) -> None:
+def test_a_page_without_a_workbench_says_so_and_above_all_that_a_stop_has_not_arrived(browser: Browser) -> None:
     with workbench() as running:
         browser.open(running.address)
         browser.wait("document.documentElement.dataset.line === 'open'")
     browser.wait("document.documentElement.dataset.line === 'lost'")
     assert "line to tiltprint is lost" in browser.value("$('notice').textContent")
+    browser.value("$('emergency').click()")
+    counting = "WebSocket = class extends WebSocket { constructor(at) { super(at); tries++; } }"
+    browser.value(f"window.tries = 0; {counting}")
+    browser.wait("tries >= 6")  # each time the line is told to be lost, and the stop stays what is read
+    assert browser.value("$('notice').textContent").startswith("THE STOP HAS NOT ARRIVED")
 
 
 def test_without_webgl_the_numbers_and_the_front_are_there(bench: Running) -> None:

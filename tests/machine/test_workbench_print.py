@@ -124,6 +124,8 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.key("e")  # a letter of the port's name
         assert browser.value("$('port-typed').value") == "e"
         assert browser.value(PRINTING) == "printing"
+        other.command("pause")  # so that it is not done before the view is there, however slow this computer
+        browser.wait(f"{PRINTING} === 'paused'")
         browser.click("#follow")
         browser.wait(f"['ready', 'failed'].includes({VIEW}?.documentElement?.dataset.state)")
         browser.value(f"{VIEW}.querySelector('button').focus()")

@@ -118,7 +118,7 @@ function outlive(canvas, drop, build) {
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     drop();
-    notice("The graphics card has let go of the picture; it returns as soon as the card is ready.");
+    notice("The graphics card has let go of the picture; it returns as soon as the card is ready.", "card");
   });
-  canvas.addEventListener("webglcontextrestored", () => { notice(""); build(); });
+  canvas.addEventListener("webglcontextrestored", () => { notice("", "card"); build(); });
 }

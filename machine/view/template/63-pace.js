@@ -61,7 +61,10 @@ function paceOf(gl, painter, count) {
     if (!painter.ready()) return tell("idle");
     tell("drawing");
     const start = performance.now(), fine = draw();
-    finished(gl, () => { learn(fine, performance.now() - start); next(); });
+    finished(gl, () => {
+      if (!gl.isContextLost()) learn(fine, performance.now() - start);
+      next();
+    });
   };
   const queue = () => { tell("asked"); requestAnimationFrame(begin); };
   const ask = () => {
@@ -93,7 +96,7 @@ function finished(gl, then) {
   setTimeout(look, 1);
 }
 
-const progress = (share) => notice(share < 1 ? `Drawing every move: ${Math.floor(100 * share)} %` : "");
+const progress = (share) => notice(share < 1 ? `Drawing every move: ${Math.floor(100 * share)} %` : "", "drawing");
 
 /** The next power of two, from 1 on. */
 const doublings = (x) => 2 ** Math.ceil(Math.log2(Math.max(x, 1)));

@@ -84,12 +84,12 @@ function bestCorner({ header, chain }) {
 
 function withoutPicture() {
   document.body.classList.add("no-picture");
-  notice("This browser shows no WebGL2, so there is no picture of the print; the report and the findings are complete.");
+  notice("This browser shows no WebGL2, so there is no picture of the print; the report and the findings are complete.", "page");
   $("tab-report").click();
   document.documentElement.dataset.state = "failed";
 }
 
 main().catch((error) => {
-  notice(`The page could not be shown: ${error.message}`);
+  notice(`The page could not be shown: ${error.message}`, "page");
   document.documentElement.dataset.state = "failed";
 });

@@ -10,13 +10,13 @@ async function openBench(files = []) {
   const answer = await fetch(`../benches?like=${HERE}`, { method: "POST" }), told = await answer.json();
   if (!answer.ok) {
     page?.close();
-    return notice(told.problem);
+    return notice(told.problem, "benches");
   }
   const address = new URL(`../${told.number}/`, location.href).href;
   if (page) page.location.replace(address);
   else {
-    notice("The browser opens no further page by itself: the new bench is in the list.");
-    setTimeout(() => notice(""), TOLD_MS);
+    notice("The browser opens no further page by itself: the new bench is in the list.", "benches");
+    setTimeout(() => notice("", "benches"), TOLD_MS);
   }
   await sendFiles(files, `../${told.number}/`);
   showBenches();

@@ -32,7 +32,7 @@ function planesPanel(bench) {
   bench.snap = (whether) => {
     bench.snapping = whether;
     $("snap").setAttribute("aria-pressed", whether);
-    notice(whether ? "Click the face whose plane it is to take." : "");
+    notice(whether ? "Click the face whose plane it is to take." : "", "hand");
   };
   bench.choosePartAt = (place) => {
     const seen = bench.picture.carried(place), parts = bench.planes();

@@ -33,14 +33,14 @@ function marksPanel(bench) {
     $("mark-box").setAttribute("aria-pressed", what === "box");
     const told = { faces: `Click where there is to be ${MARK_KINDS[kind()].word}; Esc ends it.`, box: "Click a corner of the box." };
     if (what) bench.snap(false);
-    notice(told[what] || "");
+    notice(told[what] || "", "hand");
   };
   const fine = (place) => place.map((x) => Math.round(1000 * x) / 1000);
   bench.markAt = (place) => {
     if (bench.marking === "faces") return bench.send({ do: "mark", kind: kind(), point_mm: fine(place), angle_deg: Number($("mark-angle").value) });
     if (!corner) {
       corner = place;
-      return notice("Now the opposite corner.");
+      return notice("Now the opposite corner.", "hand");
     }
     const [least, most] = bounds([...corner, ...place]);
     bench.mark("");

@@ -8,7 +8,7 @@ const FEW = 8;
 let shownPhase = "";
 
 function printPanel(bench) {
-  let state = { ports: null, asking: false, prints: [] }, chosen = 0, mine = new Set();
+  let state = { ports: null, asking: false, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
   const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem);
   const follow = followIn(bench, () => print());
   const send = (command) => { problem(""); socket.send(command); };
@@ -20,9 +20,10 @@ function printPanel(bench) {
     const known = before.prints.map((each) => each.number), fresh = state.prints.find((each) => !known.includes(each.number));
     if (fresh) chosen = fresh.number;
     else if (!print()) chosen = (running.at(-1) || state.prints.at(-1) || { number: 0 }).number;
-    for (const each of state.prints) {
-      if (mine.has(each.number) && each.holder !== OWN_PAGE) notice(`Another page has taken over the command of the print of ${each.name}.`);
-    }
+    const lost = state.prints.find((each) => mine.has(each.number) && each.holder !== OWN_PAGE);
+    if (lost) notice(`Another page has taken over the command of the print of ${lost.name}.`, "taken");
+    taken = (lost || running.find((each) => each.number === taken && each.holder !== OWN_PAGE))?.number || 0;
+    if (!taken) notice("", "taken");
     mine = new Set(state.prints.filter((each) => each.holder === OWN_PAGE).map((each) => each.number));
     showPorts(state, before);
     showWhich(state.prints, chosen);
@@ -79,8 +80,17 @@ function printsLine(follow, refused) {
   let socket = null, owed = null, waiting = 0;
   const open = () => {
     socket = new WebSocket(new URL(`prints?page=${OWN_PAGE}`, location.href.replace(/^http/, "ws")));
-    socket.onopen = () => { if (owed) socket.send(owed); owed = null; };
-    socket.onmessage = (event) => { clearTimeout(waiting); const told = JSON.parse(event.data); if (told.problem) refused(told.problem); else follow(told); };
+    socket.onopen = () => {
+      if (owed) socket.send(owed);
+      owed = null;
+      notice("", "sent");
+    };
+    socket.onmessage = (event) => {
+      clearTimeout(waiting);
+      if (!owed) notice("", "stop");
+      const told = JSON.parse(event.data);
+      if (told.problem) refused(told.problem); else follow(told);
+    };
     socket.onclose = ({ code }) => { if (code !== CLOSED_CODE) setTimeout(open, AGAIN_MS); };
   };
   open();
@@ -89,11 +99,12 @@ function printsLine(follow, refused) {
       const text = JSON.stringify(command);
       if (socket.readyState === WebSocket.OPEN) {
         clearTimeout(waiting);
-        if (command.do === "emergency") waiting = setTimeout(notice, ANSWER_MS, "THE STOP IS NOT CONFIRMED, tiltprint does not answer: use the machine's own switch.");
+        if (command.do === "emergency") waiting = setTimeout(notice, ANSWER_MS, "THE STOP IS NOT CONFIRMED, tiltprint does not answer: use the machine's own switch.", "stop");
         return socket.send(text);
       }
-      if (command.do === "emergency") owed = text;
-      notice(command.do === "emergency" ? "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch." : "The line to tiltprint is lost; nothing was sent.");
+      if (command.do !== "emergency") return notice("The line to tiltprint is lost; nothing was sent.", "sent");
+      owed = text;
+      notice("THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.", "stop");
     },
   };
 }

@@ -6,16 +6,16 @@ function main() {
   const dark = themeOf((now) => { bench.themed?.(now); if (picture && bench.state) picture.machine(bench.state.machine, now); });
   const line = lineTo((state) => follow(state), (gone) => {
     root.dataset.line = gone ? "lost" : "open";
-    notice(gone ? "The line to tiltprint is lost; trying again." : "");
+    notice(gone ? "The line to tiltprint is lost; trying again." : "", "line");
   }, () => {
     root.dataset.line = "closed";
-    notice("This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.");
+    notice("This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.", "line");
   });
   bench.send = line.send;
   bench.lay = (whether) => {
     bench.laying = whether;
     $("lay").setAttribute("aria-pressed", whether);
-    notice(whether ? "Click the face that is to lie on the platform." : "");
+    notice(whether ? "Click the face that is to lie on the platform." : "", "hand");
     if (picture) picture.ask(); // the rings give way
   };
   let stood = ""; // as it is in the picture
