@@ -2,22 +2,29 @@
 
 A commit is judged by itself and not by luck: no example has a deadline and no drawing of examples a time limit, for a busy
 machine is no fault of a law; what the person or the service that runs the tests has set for colours, widths, settings or
-interrupts does not count.
+interrupts does not count. Compiled modules are kept beside their sources whatever that person wants: the suite starts
+hundreds of programs, and each would compile all it imports again.
 
 `pytest --hypothesis-profile=explore` draws new examples: run it a few times when a law's code was changed.
 """
 
+import gc
 import os
 import signal
+import sys
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from machine.app.start import SELDOM
+
 # What shapes messages, and what turns on or off what a program shows; a terminal's own words are the test's to say.
 SHAPING = ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE", "PYTHONWARNINGS")
 
-for name in SHAPING:
+for name in (*SHAPING, "PYTHONDONTWRITEBYTECODE"):
     os.environ.pop(name, None)
+sys.dont_write_bytecode = False
+gc.set_threshold(*SELDOM)
 
 # A shell ignores SIGINT for what it starts in the background, nohup SIGHUP: commands that tests start would inherit it.
 for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -29,6 +36,11 @@ SLOW_IS_NO_FAULT = (HealthCheck.too_slow,)
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=SLOW_IS_NO_FAULT)
 settings.register_profile("explore", print_blob=True, deadline=None, suppress_health_check=SLOW_IS_NO_FAULT)
 settings.load_profile("repeatable")
+
+
+def pytest_collection_finish() -> None:
+    """The tests themselves, half a million objects, are never garbage: no look for it goes through them."""
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -5,14 +5,13 @@ from collections.abc import Iterable
 from os.path import isfile
 from pathlib import Path
 
-from machine.app.requests import ModelRequest, Outputs, PrintRequest
+from machine.app.requests import STDOUT, ModelRequest, Outputs, PrintRequest
 from mdp.ranking.ranker import SUFFIX
 from mdp.read import DEMO
 from mdp.save import FOLDER_FILES, PART_FILES
 from profiles.errors import OutputError
 from profiles.places import is_file_name
 
-STDOUT = Path("-")
 PROGRAM = ".gcode"  # ends the name of a program that is kept beside its journal
 Role = tuple[str, Path | None]  # what the file is for, as a message says it, and its path; None: not asked for
 

@@ -9,8 +9,7 @@ from os.path import exists, isdir, isfile, islink  # pathlib's raise for a name 
 from pathlib import Path
 from typing import Any
 
-from machine.app.file_roles import STDOUT
-from machine.app.requests import Outputs
+from machine.app.requests import STDOUT, Outputs
 from profiles.errors import OutputError
 
 

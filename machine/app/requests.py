@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from machine.planning.stops import Stop
     from profiles.profile import Profile
 
+STDOUT = Path("-")  # stands for standard output where a file is asked for
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port that stands for the simulated printer
 FORCE_GOES_ON = "--force goes on"  # in a sentence: what it refuses is done all the same when it is forced

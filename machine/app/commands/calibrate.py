@@ -5,7 +5,7 @@ from pathlib import Path
 from machine.app.commands.calibrate_dialogue import ask_touches
 from machine.app.output import check_writable, write_bytes, write_lines
 from machine.app.requests import CalibrationRequest
-from machine.app.terminal.report import show
+from machine.app.terminal.plain import show
 from machine.calibration.fit import Calibration, calibrate
 from machine.calibration.program import calibration_lines, course
 from machine.calibration.saved import found_tables, own_profile

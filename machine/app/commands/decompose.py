@@ -2,16 +2,17 @@
 
 from pathlib import Path
 
-from machine.app.file_roles import STDOUT, check_model_files
+from machine.app.file_roles import check_model_files
 from machine.app.output import check_outputs, delete, make_folder, write_bytes, write_json
 from machine.app.pictures.front_picture import front_picture
 from machine.app.pictures.picture import contact_sheet, parts_picture
 from machine.app.pictures.png import write_png
 from machine.app.pipeline import compilers
 from machine.app.pipeline.pipeline import decompose_model
-from machine.app.requests import ModelRequest, Outputs
+from machine.app.requests import STDOUT, ModelRequest, Outputs
 from machine.app.terminal.advice import advice
-from machine.app.terminal.report import part_settings_lines, parts_table, show
+from machine.app.terminal.plain import show
+from machine.app.terminal.report import part_settings_lines, parts_table
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
 from mdp.plans.writing import plan_text

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from machine.app.requests import GCODE_SUFFIXES, EditRequest
+from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
-from machine.app.terminal.report import show
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.serve import serve_workbench
 from mdp.plans.plan_file import PlanFile

@@ -1,14 +1,15 @@
 """The export command: a model's G-code, dry-run first."""
 
-from machine.app.file_roles import STDOUT, check_model_files
+from machine.app.file_roles import check_model_files
 from machine.app.output import check_outputs, write_bytes, write_json, write_lines
 from machine.app.pictures.layer import draw_layer, parse_layer
 from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
-from machine.app.requests import ModelRequest
+from machine.app.requests import STDOUT, ModelRequest
+from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say_lines
-from machine.app.terminal.report import print_table, show
+from machine.app.terminal.report import print_table
 from machine.dryrun.dryrun import summary
 from machine.view.page import print_page
 from profiles.errors import OutputError

@@ -4,8 +4,8 @@ import json
 from threading import Event
 
 from machine.app.printer.port_reports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
+from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
-from machine.app.terminal.report import show
 from machine.link.port import check_baud
 
 

@@ -12,7 +12,8 @@ from machine.app.printer.ready import ready_program
 from machine.app.printer.stream import PrintJob, print_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
-from machine.app.terminal.report import print_table, show
+from machine.app.terminal.plain import show
+from machine.app.terminal.report import print_table
 from machine.dryrun.starvation import check_baud
 from machine.network.address import is_server_address
 

@@ -13,8 +13,9 @@ from machine.app.printer.server_checks import check_free, check_server_machine, 
 from machine.app.printer.stream import PrintJob
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest, SendRequest
+from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
-from machine.app.terminal.report import print_table, show
+from machine.app.terminal.report import print_table
 from machine.network.address import parse_server_address
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import PrintServer

@@ -3,11 +3,12 @@
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from machine.app.file_roles import STDOUT, check_model_files
+from machine.app.file_roles import check_model_files
 from machine.app.output import check_outputs, write_bytes, write_json
 from machine.app.pipeline.programs import load_program
-from machine.app.requests import ModelRequest
-from machine.app.terminal.report import agreement_line, print_table, show
+from machine.app.requests import STDOUT, ModelRequest
+from machine.app.terminal.plain import show
+from machine.app.terminal.report import agreement_line, print_table
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
 from machine.dryrun.starvation import check_baud, find_starvation

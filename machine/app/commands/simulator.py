@@ -7,8 +7,8 @@ from math import inf, isfinite
 from machine.app.printer.running_simulators import announced
 from machine.app.requests import SimulatorRequest
 from machine.app.terminal.interrupts import stopping
+from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
-from machine.app.terminal.report import show
 from machine.firmware import dialect_of, dialects
 from machine.link.port import BAUDS
 from machine.simulator.board import BuildOptions, build_options

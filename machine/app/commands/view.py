@@ -8,9 +8,8 @@ from machine.app.output import check_writable, write_bytes
 from machine.app.pipeline.comparison import compare_with_one_part
 from machine.app.pipeline.programs import load_program
 from machine.app.requests import ModelRequest
-from machine.app.terminal.plain import plain_line
+from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import say
-from machine.app.terminal.report import show
 from machine.view.findings import relevant_findings
 from machine.view.page import DATA, print_page
 from machine.view.program import Program

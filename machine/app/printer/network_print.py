@@ -5,10 +5,9 @@ from functools import partial
 
 from machine.app.printer.stream import PrintJob
 from machine.app.terminal.interrupts import calling
-from machine.app.terminal.plain import plain_line
+from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.print_display import Follow, PrintDisplay
 from machine.app.terminal.progress import reporting, say
-from machine.app.terminal.report import show
 from machine.app.terminal.screen import Course, Words
 from machine.app.terminal.server_keys import ServerKeyboard
 from machine.link.pending_commands import Control

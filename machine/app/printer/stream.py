@@ -11,9 +11,9 @@ from machine.app.printer.journal_folder import new_journal
 from machine.app.printer.serial_log import SerialLog, new_log, tap
 from machine.app.requests import SIMULATED, PrintRequest
 from machine.app.terminal.interrupts import stopping
+from machine.app.terminal.plain import show
 from machine.app.terminal.print_display import Follow
 from machine.app.terminal.progress import say
-from machine.app.terminal.report import show
 from machine.app.terminal.screen import Course
 from machine.firmware import dialect_of
 from machine.link.identification import Answer, Kind

@@ -1,6 +1,7 @@
 """Plain: text from files, names and printers as it may go to a terminal: nothing in it commands the terminal, none is endless."""
 
 import re
+import sys
 
 # C0 and C1 controls, DEL, what turns the direction of writing around (CVE-2021-42574), line separators, halves of characters that
 # stand for bytes of a file name.
@@ -20,6 +21,12 @@ def plain_line(text: str) -> str:
 def plain_lines(text: str) -> str:
     """The same for a text of several lines, tables too: newlines stay."""
     return "\n".join(_escaped(line) for line in text.split("\n"))
+
+
+def show(text: str) -> None:
+    """A result on stdout."""
+    sys.stdout.write(plain_lines(text))
+    sys.stdout.flush()
 
 
 def _escaped(text: str) -> str:

@@ -1,10 +1,8 @@
 """Report: the tables that the commands print on stdout."""
 
-import sys
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
 
-from machine.app.terminal.plain import plain_lines
 from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
 from machine.view.parts import risky_before_mm2
@@ -129,9 +127,3 @@ def agreement_line(agreed: Agreement) -> str:
 
 def _count(number: int, things: str) -> str:
     return f"{number} {things if number != 1 else things.removesuffix('s')}"
-
-
-def show(text: str) -> None:
-    """A result on stdout."""
-    sys.stdout.write(plain_lines(text))
-    sys.stdout.flush()
