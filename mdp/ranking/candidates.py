@@ -79,14 +79,6 @@ class Bounds:
     crumb_mm: float
 
 
-def bounds(
-    mesh: Mesh, machine: Machine, search: Search, fixed: Floats | None = None, keep: Sequence[Zone | Patches] = ()
-) -> Bounds:
-    """Bounds of a model's search for the sampled directions, or for `fixed` ones."""
-    chosen = directions(search) if fixed is None else fixed
-    return bounds_of(chosen, platform_disc(mesh, search), mesh.volume_mm3, machine, search, keep)
-
-
 def bounds_of(
     chosen: Floats,
     disc: tuple[Floats, float],

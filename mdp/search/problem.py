@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
+from math import sqrt
 from time import perf_counter
 
 import numpy as np
@@ -19,9 +20,9 @@ from mdp.ranking.candidates import (
     Bounds,
     Feasibility,
     Reason,
-    bounds,
     bounds_of,
     check,
+    directions,
     platform_disc,
     refusals,
     residual_mm2,
@@ -68,7 +69,6 @@ class Problem:
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
         self.platform_disc = platform_disc(mesh, settings)
-        self.limits: Bounds = bounds(mesh, self.machine, settings, keep=self.zones.keep)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         savable_mm2 = self._savable_mm2()
         self.least_gain_mm2 = settings.least_gain * savable_mm2
@@ -78,6 +78,11 @@ class Problem:
         self._evaluated: list[int] = []  # appended to by several threads
         self._stopped = False
         self.begin()
+
+    @cached_property
+    def limits(self) -> Bounds:
+        """The bounds of the sampled directions; a plane by hand needs but those of its own."""
+        return self.bounds_along(directions(self.settings))
 
     def begin(self) -> None:
         """Have the time limit count from now on."""
@@ -154,7 +159,7 @@ class Problem:
         return bool(self.check_plane(node, plane, self.bounds_along(plane.normal[None])).reason[0] == Reason.FEASIBLE)
 
     def bounds_along(self, directions: Floats) -> Bounds:
-        """The bounds of (k, 3) directions that are not sampled."""
+        """The bounds of (k, 3) directions."""
         volume_mm3, keep = self.model.volume_mm3, self.zones.keep
         return bounds_of(directions, self.platform_disc, volume_mm3, self.machine, self.settings, keep)
 
@@ -172,7 +177,7 @@ class Problem:
 
     def stress_mpa(self, node: Node, plane: Plane) -> float:
         """The stress at the base of what lies above a plane when the nozzle pushes its top."""
-        return self.load_n * stress_per_newton(node.remainder.mesh, plane, self.limits.crumb_mm)
+        return self.load_n * stress_per_newton(node.remainder.mesh, plane, sqrt(self.settings.least_interface_mm2))
 
     def cut(self, node: Node, plane: Plane, residual_mm2: float | None = None) -> Node | None:
         """The node after a cut; None when nothing is cut off or no pose serves the part.

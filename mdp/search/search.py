@@ -17,7 +17,6 @@ from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
-from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile
 from mdp.ranking.candidates import REASONS
 from mdp.ranking.ranker import Ranker, ranker_named
@@ -40,12 +39,12 @@ MOST_FOLDED = 1e-2  # share of the volume; the reader disentangles what is worse
 
 @dataclass(frozen=True)
 class Progress:
-    """Where the search stands: after which stage, 0 when it begins. planes: of the best so far, in the order of its cuts."""
+    """Where the search stands: after which stage, 0 when it begins. measure: what gives the best so far as a row of the front."""
 
     stage: int
     beam: int
     best_share: float
-    planes: tuple[Plane, ...] = ()
+    measure: Callable[[], FrontRow]
 
 
 def decompose(
@@ -295,13 +294,12 @@ def _prefer_symmetry(problem: Problem, front: Front) -> None:
 def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:
     """Tell that a search begins, where there is anything to search; its time limit counts from then on."""
     if _continues(problem, 0):
-        report(Progress(0, 1, 1.0))
+        report(Progress(0, 1, 1.0, partial(front_row, problem.start, problem.terms)))
         problem.begin()
 
 
 def _report(problem: Problem, report: Callable[[Progress], None], stage: int, held: int, best: Node) -> None:
-    planes = tuple(cut.base for cut in best.cuts)
-    report(Progress(stage, held, best.cost_mm2 / problem.model.risky_mm2, planes))
+    report(Progress(stage, held, best.cost_mm2 / problem.model.risky_mm2, partial(front_row, best, problem.terms)))
 
 
 def _continues(problem: Problem, stage: int) -> bool:

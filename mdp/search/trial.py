@@ -10,16 +10,17 @@ from dataclasses import dataclass
 from math import inf
 
 from mdp.cost.part_forecast import ModelForecast, PartForecast
-from mdp.decomposition import FrontRow
+from mdp.mesh import Mesh
 from mdp.overhang import UP
+from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
 from mdp.search.by_hand import Refusal, cut_or_refuse, refusal
-from mdp.search.front import front_row
 from mdp.search.neck import find_neck
 from mdp.search.node import Node
 from mdp.search.obstacle import Obstacle, find_refused
 from mdp.search.problem import Problem
-from profiles.errors import PlanError
+from mdp.zone import NO_ZONES, Zones
+from profiles.profile import Profile
 
 Key = tuple[float, float, float, float]
 
@@ -40,10 +41,14 @@ class Trial:
 
 
 class Trials:
-    """The trials of one problem."""
+    """The trials of one model."""
 
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+    def __init__(self, mesh: Mesh, profile: Profile, zones: Zones = NO_ZONES) -> None:
+        """A closed mesh standing on the platform. How much less a seam counts where it is hidden is in no figure of a trial, and
+        takes longer to work out than all else: here all seams count alike."""
+        alike = profile.search.model_copy(update={"hidden_seam_share": 1.0})
+        lifted = on_pedestal(mesh, profile.search.pedestal_mm)
+        self._problem = problem = Problem(lifted, profile.model_copy(update={"search": alike}), zones)
         root = problem.root
         self._forecast = ModelForecast.of(root.remainder, root.seam_weights, problem.terms)
         self._cut: list[tuple[Key, Node]] = []  # of the last trial, in the order of its cuts
@@ -67,16 +72,6 @@ class Trials:
         """Have ready what the first trial needs of the whole model."""
         low, high = (float(z) for z in self._problem.mesh.bounds_mm[:, 2])
         self.attempt((Plane(UP, 0.5 * (low + high)),), 0)
-
-    def row(self, planes: Sequence[Plane]) -> FrontRow:
-        """What the parts of base planes cost, as a front has it. Raises PlanError for a plane that cannot be cut."""
-        order = planes[::-1]
-        self._keep_alike(order)
-        for done in range(len(self._cut), len(order)):
-            refused = self._cut_off(order[done])
-            if refused is not None:
-                raise PlanError(f"part {len(order) + 1 - done} cannot be cut off: {refused.text}")
-        return front_row(self._node, self._problem.terms)
 
     def neck(self, planes: Sequence[Plane], number: int, reach_mm: float) -> Plane | None:
         """The neck near the plane of the part of a number, of what the parts printed after it leave; None: there is none, or

@@ -6,7 +6,6 @@ import pytest
 from mdp.mesh import Mesh
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, PlannedPart
-from mdp.search.problem import Problem
 from mdp.search.search import cut_by_plan
 from mdp.search.trial import Trials
 from profiles.profile import load
@@ -17,7 +16,7 @@ ARMS = (Plane(np.array([1.0, 0.0, 0.0]), 8.0), Plane(np.array([-1.0, 0.0, 0.0]),
 
 
 def trials(mesh: Mesh) -> Trials:
-    return Trials(Problem(mesh, PROFILE))
+    return Trials(mesh, PROFILE)
 
 
 def test_figures_are_those_of_the_cuts_themselves() -> None:

@@ -3,11 +3,9 @@
 import asyncio
 from dataclasses import dataclass, replace
 
-from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench, with_front
+from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench, with_front
 from machine.app.workbench.session.desk import Desk
-from machine.app.workbench.session.trying import Trying
 from machine.app.workbench.work.cutting import Searched
-from mdp.decomposition import FrontRow
 from profiles.errors import PlanError
 
 
@@ -22,10 +20,10 @@ class Search:
 class Finding:
     """search: the one under way; notes: of the last one."""
 
-    def __init__(self, desk: Desk, trying: Trying) -> None:
+    def __init__(self, desk: Desk) -> None:
         self.search: Search | None = None
         self.notes: tuple[str, ...] = ()
-        self._desk, self._trying = desk, trying
+        self._desk = desk
         self._task: asyncio.Task[None] | None = None
         self._pricing: asyncio.Task[None] | None = None  # of the best of a search that was stopped
         desk.followers.append(self._follow)
@@ -42,14 +40,16 @@ class Finding:
             self._task = self._desk.start(self._find(bench))
 
     def stop(self) -> None:
-        """End the search; the best that it has met so far is taken."""
+        """End the search; the best that it has met so far is taken, and what its parts take to print told when that is known."""
         search, self.search = self.search, None
         if search is None or self._task is None:
             return
         self._task.cancel()
         self._desk.start(self._desk.long.warm())
-        if search.searched.planes:
-            self._pricing = self._desk.start(self._take_best(search))
+        best = search.searched.best
+        if best is not None and best.planes:
+            self._desk.do("stop the search", with_front(self._desk.bench, [replace(best, chosen=True)]))
+            self._pricing = self._desk.start(self._price(self._desk.bench))
 
     async def _find(self, bench: Bench) -> None:
         def follow(searched: Searched) -> None:
@@ -64,15 +64,7 @@ class Finding:
             if self.search is not None and self.search.bench is bench:
                 self.search = None
 
-    async def _take_best(self, search: Search) -> None:
-        """Its parts at once, what they take to print when that is known."""
-        cuts = parts_of(FrontRow(search.searched.planes, 0.0, 0.0, 0.0))
-        with self._desk.waiting("cutting the best so far"):
-            row = replace(await self._trying.measure(search.bench, cuts), chosen=True)
-            if _other(search.bench, self._desk.bench):
-                return  # they are planes of another model, or of one that stood otherwise
-            self._desk.do("stop the search", with_front(self._desk.bench, [row]))
-            taken = self._desk.bench
+    async def _price(self, taken: Bench) -> None:
         rows = await self._desk.long.run("measure_plan", taken, plan_of_bench(taken, "the search"))
         self._desk.amend(taken, replace(taken, rows=tuple(rows)))
 

@@ -48,7 +48,7 @@ class Session(Desk):
         super().__init__(Bench(profile, given=given))
         self.slicing, self.readiness = Slicing(self), Readiness(self)
         self.trying = Trying(self, self.readiness)
-        self.finding = Finding(self, self.trying)
+        self.finding = Finding(self)
         self.comparing = Comparing(self, self.slicing)
         self.pieces, self._pricing = Pieces(self), Pricing(self)
         self._settling = asyncio.Lock()

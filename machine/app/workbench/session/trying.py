@@ -9,7 +9,6 @@ from machine.app.workbench.bench.bench import Bench, with_cuts
 from machine.app.workbench.bench.planes import Cuts, free_place, moved_to
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.readiness import Readiness
-from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.neck import REACH_DEG, REACH_SHARE
 from mdp.search.obstacle import Obstacle
@@ -76,12 +75,6 @@ class Trying:
         async with self._one:
             trial: Trial = await self._readiness.ask("try_cuts", bench, cuts, most_cuts)
             return trial
-
-    async def measure(self, bench: Bench, cuts: Cuts) -> FrontRow:
-        """The row of the front that planes make, without its time. Raises PlanError for a plane that cannot be cut."""
-        async with self._one:
-            row: FrontRow = await self._readiness.ask("measure_cuts", bench, cuts)
-            return row
 
     async def _try_newest(self) -> None:
         """Figures at once; where parts are not looked at yet, one after the other as soon as the hand rests."""

@@ -28,7 +28,8 @@ def snapshot(session: Session) -> dict[str, Any]:
     """Everything but the triangles; small enough to be told whole whenever anything changes."""
     bench, history, search = session.bench, session.history, session.finding.search
     resting = session.resting[1] if session.resting is not None and session.resting[0] is bench.model else ()
-    planes = [] if search is None else [_plane(plane) for plane in reversed(search.searched.planes)]
+    best = None if search is None else search.searched.best
+    planes = [] if best is None else [_plane(plane) for plane in reversed(best.planes)]
     return {
         "version": session.version,
         "problem": session.problem,

@@ -13,7 +13,6 @@ from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan
 from machine.app.workbench.work.worker import Tell
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
-from mdp.plane import Plane
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
@@ -27,10 +26,10 @@ ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
 
 @dataclass(frozen=True, eq=False)
 class Searched:
-    """How far a search is: a sentence, and the planes of the best so far in the order of its cuts."""
+    """How far a search is: a sentence, and the best so far as a row of the front; None: nothing is cut yet."""
 
     text: str
-    planes: tuple[Plane, ...] = ()
+    best: FrontRow | None = None
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[st
             compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text)))
             return
         left = f"{100 * progress.best_share:.1f} % of the risky area left"
-        tell(Searched(f"stage {progress.stage}, {progress.beam} in the beam, {left}", progress.planes))
+        tell(Searched(f"stage {progress.stage}, {progress.beam} in the beam, {left}", progress.measure()))
 
     mesh, name = standing_mesh(bench), _name(bench)
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))

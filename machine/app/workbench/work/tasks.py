@@ -8,7 +8,7 @@ from machine.app.workbench.work.cutting import find_parts, make_files, measure_p
 from machine.app.workbench.work.models import rank_resting, read_model
 from machine.app.workbench.work.pieces import draw_pieces
 from machine.app.workbench.work.slices import compare_bench, slice_bench
-from machine.app.workbench.work.trials import load_kernels, make_ready, measure_cuts, near_neck, try_cuts
+from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, try_cuts
 
 TASKS: dict[str, Callable[..., Any]] = {
     task.__name__: task
@@ -25,7 +25,6 @@ TASKS: dict[str, Callable[..., Any]] = {
         load_kernels,
         make_ready,
         try_cuts,
-        measure_cuts,
         near_neck,
     )
 }

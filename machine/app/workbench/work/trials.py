@@ -12,11 +12,8 @@ from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.work.cutting import standing_mesh
 from machine.app.workbench.work.worker import Tell
 from mdp.cut import convex_hull
-from mdp.decomposition import FrontRow
-from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
-from mdp.search.problem import Problem
 from mdp.search.trial import Trial, Trials
 from profiles.profile import load
 
@@ -24,13 +21,12 @@ _ready: tuple[int, Trials] | None = None  # of the bench that this process has h
 
 
 def make_ready(tell: Tell, number: int, bench: Bench) -> None:
-    """Work out once what planes on a bench of this number need: what needs support along which direction, where seams hide."""
+    """Work out once what planes on a bench of this number need."""
     global _ready
     if _ready is not None and _ready[0] == number:
         return
     compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
-    mesh = on_pedestal(standing_mesh(bench), bench.profile.search.pedestal_mm)
-    trials = Trials(Problem(mesh, bench.profile, bench.zones))
+    trials = Trials(standing_mesh(bench), bench.profile, bench.zones)
     trials.warm()
     _ready = number, trials
 
@@ -39,19 +35,13 @@ def load_kernels(tell: Tell) -> None:
     """Have what planes need loaded, or compiled, before there is a model: a box shows what that is."""
     compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
     corners = np.array(list(product((0.0, 10.0), repeat=3)))
-    Trials(Problem(convex_hull(corners), load())).warm()
+    Trials(convex_hull(corners), load()).warm()
 
 
 def try_cuts(tell: Tell, number: int, cuts: tuple[PlannedPart, ...], most_cuts: float) -> Trial | None:
     """Planes tried; most_cuts: see mdp.search.trial."""
     trials = _trials(number)
     return None if trials is None else trials.attempt(_planes(cuts), most_cuts)
-
-
-def measure_cuts(tell: Tell, number: int, cuts: tuple[PlannedPart, ...]) -> FrontRow | None:
-    """The row of the front that planes make, chosen, without its time. Raises PlanError for a plane that cannot be cut."""
-    trials = _trials(number)
-    return None if trials is None else trials.row(_planes(cuts))
 
 
 def near_neck(tell: Tell, number: int, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float) -> tuple[Plane | None] | None:

@@ -15,6 +15,7 @@ from machine.app.workbench.session.session import Session
 from machine.app.workbench.work.cutting import Searched
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
+from mdp.plans.plan_file import PlannedPart
 from mdp.search.trial import Trial
 from profiles.profile import Profile, load
 from tests.shapes import tee
@@ -89,20 +90,22 @@ def test_a_model_that_is_read_while_its_scale_is_set_has_that_scale() -> None:
     assert read.name == "b at 2"
 
 
-def test_the_best_of_a_search_that_was_stopped_does_not_bring_back_the_model_before() -> None:
+def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_told_later() -> None:
+    best = FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0)
+
     async def work(session: Session) -> None:
-        async def measure(task: str, *given: Any, **more: Any) -> Any:
-            if task == "measure_cuts":
-                session.do("open b", replace(session.bench, model=model("b")))
-                return FrontRow((Plane(np.array(UP), 5.0),), 1.0, 1.0, 1.0)
-            return Trial(()) if task == "try_cuts" else None
+        async def price(task: str, *given: Any, **more: Any) -> Any:
+            return (replace(best, time_s=60.0, chosen=True),) if task == "measure_plan" else await asyncio.sleep(9.0)
 
-        session.hand.run = measure  # type: ignore[method-assign]
-        await session.finding._take_best(Search(session.bench, Searched("", (Plane(np.array(UP), 5.0),))))
+        session.long.run = price  # type: ignore[method-assign]
+        session.finding.begin()
+        await asyncio.sleep(0)
+        session.finding.search = Search(session.bench, Searched("", best))
+        session.finding.stop()
+        assert (session.bench.cuts, session.bench.rows[0].time_s) == ((PlannedPart(UP, 5.0),), None)
 
-    bench = when_done(work).bench
-    assert bench.model is not None
-    assert (bench.model.name, bench.cuts) == ("b", None)
+    (row,) = when_done(work).bench.rows
+    assert (row.seam_mm, row.time_s) == (2.0, 60.0)
 
 
 def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> None:
