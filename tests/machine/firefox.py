@@ -26,18 +26,25 @@ PREFERENCES = {
     "network.captive-portal-service.enabled": False,
 }
 PATIENCE_S = 150.0
+KEYS = {"ArrowUp": "\ue013", "Escape": "\ue00c"}  # as WebDriver names them
 ORIGIN = {"type": "pointer", "parameters": {"pointerType": "mouse"}, "id": "mouse"}
 
 
 class Firefox:
-    """One Firefox with one page, with those methods of `Browser` that the workbench's tests need; a context."""
+    """One Firefox with one page, with those methods of `Browser` that the workbench's tests need; a context.
+
+    downloads: the folder into which it saves.
+    """
 
     def __init__(self, size: tuple[int, int] = (1280, 800)) -> None:
         self.complaints: list[str] = []
         self.requests: list[str] = []
         self._count, self._page = 0, ""
         self._folder = tempfile.TemporaryDirectory(prefix="browser", ignore_cleanup_errors=True)
-        lines = (f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in PREFERENCES.items())
+        self.downloads = Path(self._folder.name, "downloads")
+        self.downloads.mkdir()
+        wanted = {**PREFERENCES, "browser.download.folderList": 2, "browser.download.dir": str(self.downloads)}
+        lines = (f"user_pref({json.dumps(name)}, {json.dumps(value)});\n" for name, value in wanted.items())
         Path(self._folder.name, "user.js").write_text("".join(lines))
         self._display, shown = _display()
         self._left = ExitStack()
@@ -98,9 +105,13 @@ class Firefox:
         actions = [places[0], button[0], places[1], button[1]]
         self._send("input.performActions", context=self._page, actions=[{**ORIGIN, "actions": actions}])
 
+    def press(self, x: float, y: float) -> None:
+        """A real mouse click at a place of the page."""
+        self.drag((x, y), (x, y))
+
     def key(self, key: str) -> None:
-        """One key pressed and released; only those that are letters."""
-        actions = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
+        """One key pressed and released: a letter, a figure or one of KEYS."""
+        actions = [{"type": kind, "value": KEYS.get(key, key)} for kind in ("keyDown", "keyUp")]
         self._send("input.performActions", context=self._page, actions=[{"type": "key", "id": "keys", "actions": actions}])
 
     def screenshot(self, path: Path | None = None) -> bytes:

@@ -10,8 +10,24 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
+from tests.machine.browser import Browser
+from tests.machine.firefox import Firefox
 from tests.machine.workbench import PATIENCE_S, Running
 
+# Every control of the page and of the page of the print in it gets an e; what would be sent is heard and goes nowhere.
+LETTER_E = """(() => {
+  let stops = 0;
+  const send = WebSocket.prototype.send, kinds = [new Set(), new Set()];
+  WebSocket.prototype.send = (text) => { if (JSON.parse(text).do === 'emergency') stops += 1; };
+  for (const page of [document, $('print-page').contentDocument])
+    for (const field of page.querySelectorAll('input, textarea, select, button')) {
+      const before = stops;
+      field.dispatchEvent(new page.defaultView.KeyboardEvent('keydown', { key: 'e', bubbles: true, cancelable: true }));
+      kinds[stops - before].add(field.type);
+    }
+  WebSocket.prototype.send = send;
+  return kinds.map((each) => [...each].sort());
+})()"""
 ASKS = ("M105", "M114")  # sent when a moment has come, not at a place of the program
 
 
@@ -67,6 +83,12 @@ def prints_line(running: Running, page: str) -> Iterator[PrintPage]:
     address = f"ws://127.0.0.1:{running.port}{running.place}prints?page={page}"
     with connect(address, origin=f"http://127.0.0.1:{running.port}", max_size=None, proxy=None) as socket:  # type: ignore[arg-type]
         yield PrintPage(socket)
+
+
+def kinds_of_fields(browser: Browser | Firefox) -> tuple[list[str], list[str]]:
+    """The kinds of fields into which an e is typed, and those on which it is the emergency stop; while something prints."""
+    typed, stopping = browser.value(LETTER_E)
+    return typed, stopping
 
 
 def commands_sent(log: Path) -> list[str]:

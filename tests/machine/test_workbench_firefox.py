@@ -1,16 +1,20 @@
-"""The workbench in Firefox: the same journey as in Chromium, shorter."""
+"""The workbench in Firefox: one journey through all that it does, each test a stage of it, from the file to the printed part."""
 
+import time
 from collections.abc import Iterator
 
 import pytest
 
 from mdp.save import stl
-from tests.machine.firefox import FIREFOX, XVFB, Firefox
-from tests.machine.test_workbench_page import FOUND, choose, saved
+from tests.machine.firefox import FIREFOX, PATIENCE_S, XVFB, Firefox
+from tests.machine.prints import kinds_of_fields, prints_line
+from tests.machine.test_workbench_page import FOUND, choose
 from tests.machine.workbench import Running
 from tests.shapes import tee
 
 VIEW = "$('print-page').contentDocument"
+PRINTING = "document.documentElement.dataset.printing"
+SLICED = "!document.body.classList.contains('no-slices') && !document.body.classList.contains('stale')"
 pytestmark = pytest.mark.skipif(FIREFOX is None, reason="Firefox is not installed: the workbench is not tried in it")
 
 
@@ -19,60 +23,207 @@ def firefox(bench: Running) -> Iterator[Firefox]:
     with Firefox((900, 560)) as running:
         running.open(bench.address)
         running.wait("document.documentElement.dataset.line === 'open' && document.documentElement.dataset.busy === ''")
-        choose(running, "tee.stl", stl(tee()))
+        choose(running, "tee.stl", stl(tee(8.0, 24.0, 24.0)))
         running.wait("document.documentElement.dataset.shown && $('title').textContent === 'tee.stl'")
         yield running
 
 
-def test_firefox_draws_the_model_where_it_has_a_display(firefox: Firefox) -> None:
+def middle(firefox: Firefox, element: str) -> tuple[float, float]:
+    x, y = firefox.value(
+        f"(() => {{ const b = $('{element}').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; }})()"
+    )
+    return x, y
+
+
+def put(firefox: Firefox, element: str, value: object, event: str = "change") -> None:
+    firefox.value(f"{{ const e = {element}; e.value = '{value}'; e.dispatchEvent(new Event('{event}')); }}")
+
+
+def put_setting(firefox: Firefox, key: str, value: object) -> None:
+    """A setting found by its name, changed, and marked as changed."""
+    put(firefox, "$('search-settings')", key, "input")
+    firefox.wait(f"document.querySelector('[data-key=\"{key}\"] input')")
+    assert firefox.value("document.querySelectorAll('#settings-list [data-key]').length") == 1
+    put(firefox, f"document.querySelector('[data-key=\"{key}\"] input')", value)
+    firefox.wait(f"document.querySelector('[data-key=\"{key}\"].changed')")
+
+
+def done(word: str) -> str:
+    return f"$('undo').getAttribute('aria-label') === 'undo: {word}'"
+
+
+def undo(firefox: Firefox, before: str) -> None:
+    firefox.click("#undo")
+    firefox.wait(done(before))
+
+
+def test_firefox_draws_the_model_lays_it_down_and_on_a_face(firefox: Firefox) -> None:
     drawn = "document.documentElement.dataset.state === 'ready'"
     assert firefox.value(drawn) is (XVFB is not None)
-    assert "40.0 × 10.0 × 40.0 mm" in firefox.value("$('model-told').textContent")
-    assert "mm²" in firefox.value("$('overhang').textContent")
+    assert "24.0 × 8.0 × 24.0 mm" in firefox.value("$('model-told').textContent")
+    standing = firefox.value("$('overhang').textContent")
+    firefox.wait("$('resting').children.length > 1")
+    firefox.click("#resting button")
+    firefox.wait(done("lay the model down"))
+    assert firefox.value("$('overhang').textContent") != standing
+    undo(firefox, "open tee.stl")
+    if XVFB is not None:
+        firefox.click("[data-view=top]")
+        firefox.click("#fit")
+        firefox.click("#lay")
+        firefox.press(*middle(firefox, "canvas"))
+        firefox.wait(done("lay a face down"))
+        assert firefox.value("$('overhang').textContent") == "0.0 mm²"  # upside down a T needs no support
+        undo(firefox, "open tee.stl")
+    assert firefox.value("$('overhang').textContent") == standing
 
 
-def test_firefox_finds_parts_drags_a_plane_and_undoes_it(firefox: Firefox) -> None:
+def test_firefox_finds_parts_and_goes_through_the_front(firefox: Firefox) -> None:
     firefox.click("#tab-parts")
     firefox.click("#find")
     firefox.wait(FOUND)
     assert "recommended" in firefox.value("$('front-told').textContent")
-    firefox.click("#undo")
-    firefox.wait("document.body.classList.contains('no-cuts')")
+    put(firefox, "$('front')", 0, "input")
+    assert firefox.value("$('front-told').querySelector('dd').textContent") == "1"
+    put(firefox, "$('front')", 0)
+    firefox.wait(done("take another number of parts"))
+    undo(firefox, "find parts")
+    firefox.wait("$('front').value === $('front').max")
+    undo(firefox, "open tee.stl")
+    assert firefox.value("document.body.classList.contains('no-cuts')")
+
+
+def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mark(firefox: Firefox) -> None:
     firefox.click("[data-view=front]")
     firefox.click("#add")
     firefox.wait("!$('plane').hidden && $('plane-told').textContent")
-    assert firefox.value("$('plane-offset').value") == "20.00"
+    assert firefox.value("$('plane-offset').value") == "12.00"
     if XVFB is not None:
         firefox.wait("!$('handles').hidden")
-        x, y = firefox.value(
-            "(() => { const b = $('hand-along').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
-        )
-        firefox.drag((x, y), (x, y - 20))
-        firefox.wait("$('undo').getAttribute('aria-label') === 'undo: move a plane'")
-        assert 20.0 < float(firefox.value("$('plane-offset').value")) < 35.0
+        x, y = middle(firefox, "hand-along")
+        firefox.drag((x, y), (x, y - 12))
+        firefox.wait(done("move a plane"))
+        assert 12.0 < float(firefox.value("$('plane-offset').value")) < 20.0
+        firefox.value("$('hand-tilt-a').focus()")
+        firefox.key("ArrowUp")
+        firefox.wait("Math.abs(Number($('plane-tilt').value) - 1) < 0.11")
+        firefox.value("document.activeElement.blur()")
+    put(firefox, "$('plane-tilt')", 30)
+    firefox.wait("$('plane-tilt').value === '30.0'")
+    firefox.click("#planes input[type=checkbox]")
+    firefox.wait("$('plane-offset').disabled && !$('find-others').disabled")
+    put(firefox, "$('mark-kind')", "no_support")
+    firefox.click("#mark-middle")
+    firefox.wait(f"document.querySelectorAll('#marks tr').length === 1 && {done('mark: no support here')}")
+    locked = firefox.value("JSON.stringify([$('plane-offset').value, $('plane-tilt').value])")
+    firefox.click("#find-others")
+    firefox.wait(f"{FOUND} && {done('find parts')}")
+    assert firefox.value("document.querySelectorAll('#planes input[type=checkbox]:checked').length") == 1
+    firefox.click("#planes tr:has([type=checkbox]:checked) input[type=radio]")
+    firefox.wait("!$('plane').hidden")
+    assert firefox.value("JSON.stringify([$('plane-offset').value, $('plane-tilt').value])") == locked
     assert firefox.complaints == []
 
 
-def test_firefox_changes_a_setting_slices_looks_and_prints(firefox: Firefox) -> None:
+def test_firefox_changes_settings_of_all_parts_and_of_one(firefox: Firefox) -> None:
     firefox.click("#tab-settings")
-    firefox.wait("document.querySelector('[data-key=\"process.walls\"] input')")
-    firefox.value(
-        "{ const input = document.querySelector('[data-key=\"process.walls\"] input');"
-        "input.value = 1; input.dispatchEvent(new Event('change')); }"
-    )
-    firefox.wait("document.querySelector('[data-key=\"process.walls\"].changed')")
+    put_setting(firefox, "process.walls", 1)
+    put(firefox, "$('settings-part')", 2)
+    firefox.wait("!document.querySelector('[data-key=\"process.walls\"].changed')")
+    put_setting(firefox, "process.walls", 2)
+    assert firefox.value("$('settings-part').selectedOptions[0].text") == "part 2 (1 of its own)"
+    put(firefox, "$('settings-part')", 0)
+    assert "--set process.walls=1" in firefox.value("$('command-line').textContent")
+    put_setting(firefox, "machine.table.radius_mm", 5)
+
+
+def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: Firefox) -> None:
     firefox.click("#tab-slices")
     firefox.click("#slice")
-    firefox.wait("!document.body.classList.contains('no-slices')")
-    assert saved(firefox, "#save-gcode").startswith(";")
-    firefox.click("#look")
+    firefox.wait(SLICED)
+    firefox.click("#sliced-findings .error")
     firefox.wait(f"{VIEW}?.documentElement?.dataset.state === '{'failed' if XVFB is None else 'ready'}'")
-    assert firefox.value(f"{VIEW}.title").startswith("tee.stl")
+    firefox.wait(f"{VIEW}.querySelector('#findings .chosen')")
+    line = firefox.value(f"{VIEW}.getElementById('readout-line').textContent")
+    assert f"line {line}" in firefox.value("document.querySelector('#sliced-findings .error small').textContent")
+    put(firefox, f"{VIEW}.getElementById('part')", 1)
+    put(firefox, f"{VIEW}.getElementById('layer-high-number')", 3)
+    assert firefox.value(f"{VIEW}.getElementById('layer-high').value") == "2"
+    put(firefox, f"{VIEW}.getElementById('layer-high-mm')", 0.8)
+    assert firefox.value(f"{VIEW}.getElementById('layer-high-number').value") == "2"
     firefox.click("#leave-print")
-    firefox.click("#tab-printing")
+    firefox.click("#undo")  # the table is as wide again as it is
+    firefox.wait("document.body.classList.contains('stale')")
+    firefox.click("#slice")
+    firefox.wait(SLICED)
+    firefox.click("#look")
+    firefox.value(f"{VIEW}?.documentElement?.removeAttribute('data-state')")
+    firefox.wait(f"{VIEW}?.documentElement?.dataset.state === '{'failed' if XVFB is None else 'ready'}'")
+    firefox.value(f"{VIEW}.getElementById('tab-code').click()")
+    firefox.wait(f"{VIEW}.querySelector('#code-seen .now')")
+    put(firefox, f"{VIEW}.getElementById('code-line')", 200)
+    firefox.wait(f"{VIEW}.querySelector('#code-seen .now')?.dataset.line === '200'")
+    assert 150 < int(firefox.value(f"{VIEW}.getElementById('readout-line').textContent")) <= 200
+    put(firefox, f"{VIEW}.getElementById('position')", 300, "input")
+    line = firefox.value(f"{VIEW}.getElementById('readout-line').textContent")
+    firefox.wait(f"{VIEW}.querySelector('#code-seen .now')?.dataset.line === '{line}'")
+    firefox.click("#leave-print")
+    firefox.click("#compare")
+    firefox.wait("$('compared').textContent.includes('straight up')")
+
+
+@pytest.mark.parametrize(("button", "asked", "saved"), [
+    ("#save-plan", "plan.toml", "tee-plan.toml"), ("#save-parts", "parts.zip", "tee-parts.zip"),
+    ("#save-gcode", "print.gcode", "tee.gcode"), ("#save-page", "print.html", "tee.html"),
+])  # fmt: skip
+def test_firefox_saves_what_the_workbench_has_byte_by_byte(
+    firefox: Firefox, bench: Running, button: str, asked: str, saved: str
+) -> None:
+    status, content = bench.ask(asked)
+    firefox.click(button)
+    end_s, file = time.monotonic() + PATIENCE_S, firefox.downloads / saved
+    while not (file.is_file() and file.stat().st_size == len(content)) and time.monotonic() < end_s:
+        time.sleep(0.02)
+    assert (status, file.read_bytes()) == (200, content)
+
+
+def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(firefox: Firefox, bench: Running) -> None:
+    with prints_line(bench, "other") as other:
+        firefox.click("#tab-printing")
+        put(firefox, "$('sim-speed')", 10)
+        firefox.click("#check")
+        firefox.wait("!$('run-ask').hidden")
+        firefox.click("#begin")
+        other.until(lambda one: one["progress"])
+        other.command("pause")
+        assert other.refused() == "another page commands this print: take the command over first"
+        other.command("take")
+        firefox.wait("!$('held').hidden && $('run-commands').hidden")
+        assert "Another page commands this print; this one watches." in firefox.value("$('held-told').textContent")
+        firefox.click("#take")
+        firefox.wait("$('held').hidden && !$('run-commands').hidden")
+        typed, stopping = kinds_of_fields(firefox)
+        assert typed == ["number", "search", "text"]
+        assert not set(typed) & set(stopping)
+        firefox.value(
+            "{ $('printer-field').open = true; $('baud-line').hidden = false; $('baud').value = ''; $('baud').focus(); }"
+        )
+        for key in "1e3":
+            firefox.key(key)
+        assert firefox.value("[$('baud').value, $('baud').valueAsNumber]") == ["1e3", 1000]
+        assert firefox.value(PRINTING) != "over"
+        firefox.value("{ $('baud').value = 115200; $('sim-speed').focus(); }")  # a list, which is no field to type into
+        firefox.key("e")
+        firefox.wait(f"{PRINTING} === 'over' && $('emergency').hidden")
+        assert "emergency stop: the printer has halted" in firefox.value("$('stop-words').textContent")
+
+
+def test_firefox_prints_to_the_end(firefox: Firefox) -> None:
+    put(firefox, "$('sim-speed')", 0)
     firefox.click("#check")
     firefox.wait("!$('run-ask').hidden")
     firefox.click("#begin")
-    firefox.wait("document.documentElement.dataset.printing === 'over'")
+    firefox.wait(f"{PRINTING} === 'over'")
     assert firefox.value("$('run-state').textContent") == "the print is done"
+    assert firefox.value("$('print-bar').hidden")
     assert firefox.complaints == []

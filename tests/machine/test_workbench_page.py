@@ -196,8 +196,10 @@ def test_a_page_without_a_workbench_says_so_and_above_all_that_a_stop_has_not_ar
     browser.value("$('emergency').click()")
     counting = "WebSocket = class extends WebSocket { constructor(at) { super(at); tries++; } }"
     browser.value(f"window.tries = 0; {counting}")
-    browser.wait("tries >= 6")  # each time the line is told to be lost, and the stop stays what is read
-    assert browser.value("$('notice').textContent").startswith("THE STOP HAS NOT ARRIVED")
+    browser.wait("tries >= 6")  # each time the line is told to be lost
+    assert browser.value("$('stop-words').checkVisibility() && $('stop-words').textContent").startswith(
+        "THE STOP HAS NOT ARRIVED"
+    )
 
 
 def test_without_webgl_the_numbers_and_the_front_are_there(bench: Running) -> None:

@@ -14,7 +14,7 @@ from machine.simulator.simulator import SimulatedPrinter
 from mdp.save import stl
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.prints import commands_sent, prints_line
+from tests.machine.prints import commands_sent, kinds_of_fields, prints_line
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import box
 
@@ -120,17 +120,27 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.wait(f"{PRINTING} === 'printing' && !$('print-bar').hidden")
         assert json.loads(browser.value("JSON.stringify([$('run-commands').hidden, $('held').hidden])")) == [True, False]
         browser.click("#tab-printing")
+        other.command("pause")  # so that it is not done before it is stopped, however slow this computer
+        browser.wait(f"{PRINTING} === 'paused'")
         browser.value("{ $('printer-field').open = true; $('port-typed').focus(); }")
         browser.key("e")  # a letter of the port's name
         assert browser.value("$('port-typed').value") == "e"
-        assert browser.value(PRINTING) == "printing"
-        other.command("pause")  # so that it is not done before the view is there, however slow this computer
-        browser.wait(f"{PRINTING} === 'paused'")
+        assert browser.value(PRINTING) == "paused"
         browser.click("#follow")
         browser.wait(f"['ready', 'failed'].includes({VIEW}?.documentElement?.dataset.state)")
+        typed, stopping = kinds_of_fields(browser)
+        assert typed == ["number", "search", "text"]
+        assert not set(typed) & set(stopping)
         browser.value(f"{VIEW}.querySelector('button').focus()")
-        browser.key("e")
-        browser.wait(f"{PRINTING} === 'over' && $('print-bar').hidden")
+        sliced.process.send_signal(signal.SIGSTOP)  # the workbench hangs while somebody presses the key
+        try:
+            browser.key("e")
+            browser.wait("$('stop-words').textContent === \"THE STOP IS NOT CONFIRMED: use the machine's own switch.\"")
+            assert browser.value("$('stop-words').checkVisibility()")
+        finally:
+            sliced.process.send_signal(signal.SIGCONT)
+        browser.wait(f"{PRINTING} === 'over' && $('emergency').hidden")
+        assert browser.value("$('stop-words').textContent").startswith("box.stl: emergency stop: the printer has halted")
         assert browser.value("$('run-state').textContent").startswith("emergency stop: the printer has halted")
         assert "M112" in commands_sent(Path(other.until(lambda one: one["phase"] == "over")["log"]))
         assert browser.complaints == []

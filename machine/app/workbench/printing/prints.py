@@ -110,8 +110,9 @@ class Prints(News):
             begun.fail(error)
 
     def _stop_at_once(self, number: object) -> None:
-        """The one that was named, all when none was or it is not known: when in doubt everything stops."""
-        named = [each for each in self.running if each.number == number]
+        """The one that was named, all when none was or it is not known: when in doubt everything stops. One that is over already
+        stops no other, for a button is pressed twice in a fright."""
+        named = [each for each in self.prints if each.number == number]
         for each in named or self.running:
             each.stop_at_once()
 

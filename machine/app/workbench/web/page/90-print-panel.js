@@ -3,7 +3,8 @@
 
 const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
 const STOP_KEY = "e";
-const ANSWER_MS = 3000; // within which the workbench answers an emergency stop
+const ANSWER_MS = 3000; // within which the workbench answers, and a printer has confirmed an emergency stop
+const SAME_PRESS_MS = 1000; // who presses twice in a fright means the print of the first time
 const FEW = 8;
 let shownPhase = "";
 
@@ -12,6 +13,7 @@ function printPanel(bench) {
   const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem);
   const follow = followIn(bench, () => print());
   const send = (command) => { problem(""); socket.send(command); };
+  const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
   const print = () => state.prints.find((each) => each.number === chosen) || null;
   const command = (word, more = {}) => { const one = print(); if (one) send({ do: word, print: one.number, ...more }); };
 
@@ -30,6 +32,7 @@ function printPanel(bench) {
     showPrint(print(), print()?.holder === OWN_PAGE);
     follow.told();
     showBar(running, print());
+    stops.told();
     document.documentElement.dataset.printing = print() ? print().progress?.state && print().phase === "printing" ? print().progress.state : print().phase : "";
   }
 
@@ -53,13 +56,13 @@ function printPanel(bench) {
     $(id).addEventListener("input", () => { $(id).dataset.held = true; $(`${id}-told`).textContent = `${$(id).value} %`; });
     $(id).addEventListener("change", () => { delete $(id).dataset.held; command(id, { percent: Number($(id).value) }); });
   }
-  $("emergency").addEventListener("click", () => send({ do: "emergency", print: Number($("emergency").dataset.print) }));
+  $("emergency").addEventListener("click", () => stops.press(Number($("emergency").dataset.print)));
   const byKey = (event) => {
-    if (event.key.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || event.repeat || typedInto(event.target)) return;
+    if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || event.repeat || typedInto(event.target)) return;
     if (!state.prints.some((each) => each.phase !== "over")) return;
     event.preventDefault();
     event.stopPropagation();
-    send({ do: "emergency", print: null });
+    stops.ask(null);
   };
   addEventListener("keydown", byKey, true);
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
@@ -74,8 +77,42 @@ function problem(text) {
   $("print-problem").hidden = !text;
 }
 
+/** Emergency stops, and in the bar at the foot, which nothing covers, what has become of them, until a person has noted it. */
+function stopsAsked(prints, send, isOpen) {
+  let asked = new Set(), late = 0, pressed = { number: 0, at: -Infinity };
+  const going = ({ phase }) => phase !== "over";
+  const stopped = () => prints().filter(({ number }) => asked.has(number));
+  const say = (text) => {
+    if ($("stop-words").textContent !== text) $("stop-words").textContent = text;
+    $("stop-told").hidden = !text;
+    $("print-bar").hidden = !text && $("emergency").hidden;
+  };
+  const doubt = () => {
+    if (stopped().length ? !stopped().some(going) : isOpen()) return;
+    say(isOpen() ? "THE STOP IS NOT CONFIRMED: use the machine's own switch." : "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.");
+  };
+  /** number: of a print; null: all. */
+  const ask = (number) => {
+    for (const each of prints().filter(going)) if (number === null || number === each.number) asked.add(each.number);
+    send({ do: "emergency", print: number });
+    if (!isOpen()) doubt();
+    clearTimeout(late);
+    late = setTimeout(doubt, ANSWER_MS);
+  };
+  $("stop-noted").addEventListener("click", () => { if (!stopped().some(going)) asked = new Set(); say(""); });
+  return {
+    ask,
+    press: (number) => {
+      const now = performance.now();
+      pressed = { number: now - pressed.at < SAME_PRESS_MS ? pressed.number : number, at: now };
+      ask(pressed.number);
+    },
+    told: () => { if (!stopped().some(going)) say(stopped().map(({ name, sentence }) => `${name}: ${sentence}.`).join(" ")); },
+  };
+}
+
 /** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. An emergency
- * stop that finds no line is sent as soon as there is one, and told; so is one to which nothing answers. */
+ * stop that finds no line is sent as soon as there is one; a command to which nothing answers is told. */
 function printsLine(follow, refused) {
   let socket = null, owed = null, waiting = 0;
   const open = () => {
@@ -87,24 +124,25 @@ function printsLine(follow, refused) {
     };
     socket.onmessage = (event) => {
       clearTimeout(waiting);
-      if (!owed) notice("", "stop");
+      notice("", "sent");
       const told = JSON.parse(event.data);
       if (told.problem) refused(told.problem); else follow(told);
     };
     socket.onclose = ({ code }) => { if (code !== CLOSED_CODE) setTimeout(open, AGAIN_MS); };
   };
+  const isOpen = () => socket.readyState === WebSocket.OPEN;
   open();
   return {
+    isOpen,
     send: (command) => {
       const text = JSON.stringify(command);
-      if (socket.readyState === WebSocket.OPEN) {
-        clearTimeout(waiting);
-        if (command.do === "emergency") waiting = setTimeout(notice, ANSWER_MS, "THE STOP IS NOT CONFIRMED, tiltprint does not answer: use the machine's own switch.", "stop");
+      clearTimeout(waiting);
+      if (isOpen()) {
+        waiting = setTimeout(notice, ANSWER_MS, "tiltprint does not answer: what was asked for may not have arrived.", "sent");
         return socket.send(text);
       }
-      if (command.do !== "emergency") return notice("The line to tiltprint is lost; nothing was sent.", "sent");
-      owed = text;
-      notice("THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.", "stop");
+      if (command.do === "emergency") owed = text;
+      else notice("The line to tiltprint is lost; nothing was sent.", "sent");
     },
   };
 }
@@ -234,7 +272,8 @@ function showProgress(progress, over) {
 /** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
 function showBar(running, looked) {
   const shown = running.includes(looked) ? looked : running.at(-1);
-  $("print-bar").hidden = !running.length;
+  $("bar-told").hidden = $("emergency").hidden = !shown;
+  $("print-bar").hidden = !shown && $("stop-told").hidden;
   if (!shown) return;
   $("bar-told").textContent = `${shown.name} at ${shown.port}: ${shown.progress ? stateTold(shown.progress) : shown.phase}`;
   $("emergency").dataset.print = shown.number;

@@ -135,3 +135,19 @@ def test_an_emergency_stop_goes_before_all_that_was_asked_earlier() -> None:
     control.ask(Command.PAUSE)
     control.ask(Command.EMERGENCY_STOP)
     assert [asked.command for asked in iter(control.take, None)] == [Command.EMERGENCY_STOP, Command.PAUSE]
+
+
+def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped: list[int] = []
+    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda one: stopped.append(one.number))
+
+    async def run() -> None:
+        prints = Prints()
+        prints.prints += [RunningPrint(number, order("sim"), "me", lambda: None) for number in (1, 2)]
+        prints.prints[0].state["phase"] = "over"  # by the first press
+        prints.command("anybody", {"do": "emergency", "print": 1}, lambda asked: order(""))
+        assert 2 not in stopped
+        prints.command("anybody", {"do": "emergency", "print": None}, lambda asked: order(""))
+        assert 2 in stopped
+
+    asyncio.run(run())
