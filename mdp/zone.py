@@ -12,6 +12,7 @@ import numpy as np
 
 from mdp.formats.surface import Indices
 from mdp.grown import Grown
+from mdp.head import corners
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
@@ -24,32 +25,44 @@ MOST_PRODUCTS = 4_000_000  # of directions and points at a time
 
 @dataclass(frozen=True)
 class Zone:
-    """A box by its least and greatest x, y, z, mm."""
+    """A box by its least and greatest x, y, z, mm; axes: rows of the rotation whose x, y, z they are, None: the frame's own."""
 
     min_mm: Vector
     max_mm: Vector
+    axes: tuple[Vector, Vector, Vector] | None = None
+
+    def along(self, places: Floats) -> Floats:
+        """(..., 3) places or directions of the frame as the box's own x, y, z."""
+        return places if self.axes is None else places @ np.array(self.axes).T
+
+    @property
+    def corners(self) -> Floats:
+        """(8, 3) corners."""
+        own = corners(self.min_mm, self.max_mm)
+        return own if self.axes is None else own @ np.array(self.axes)
 
     def moved(self, shift_mm: Vector) -> "Zone":
         """The box somewhere else."""
-        low, high = (np.add(corner, shift_mm).tolist() for corner in (self.min_mm, self.max_mm))
-        return Zone((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+        low, high = (np.add(corner, self.along(np.array(shift_mm))).tolist() for corner in (self.min_mm, self.max_mm))
+        return replace(self, min_mm=(low[0], low[1], low[2]), max_mm=(high[0], high[1], high[2]))
 
     def spans_mm(self, directions: Floats) -> Floats:
         """(k, 1, 2) least and greatest direction . p over the box for (k, 3) directions."""
         middle, half = 0.5 * np.add(self.min_mm, self.max_mm), 0.5 * np.subtract(self.max_mm, self.min_mm)
-        centre, reach = directions @ middle, np.abs(directions) @ half
+        own = self.along(directions)
+        centre, reach = own @ middle, np.abs(own) @ half
         return np.stack([centre - reach, centre + reach], axis=1)[:, None]
 
     def touches(self, mesh: Mesh) -> Mask:
         """(m,) which faces reach into the box: no axis of a box, a triangle or two edges parts them (Akenine-Moeller)."""
         middle, half = 0.5 * np.add(self.min_mm, self.max_mm), 0.5 * np.subtract(self.max_mm, self.min_mm)
-        corners = mesh.vertices[mesh.faces] - middle
-        edges = np.roll(corners, -1, axis=1) - corners
-        axes = [np.broadcast_to(axis, mesh.normals.shape) for axis in np.eye(3)]
-        axes += [mesh.normals, *(np.cross(axis, edges[:, k]) for axis, k in product(np.eye(3), range(3)))]
+        places, normals = self.along(mesh.vertices)[mesh.faces] - middle, self.along(mesh.normals)
+        edges = np.roll(places, -1, axis=1) - places
+        axes = [np.broadcast_to(axis, normals.shape) for axis in np.eye(3)]
+        axes += [normals, *(np.cross(axis, edges[:, k]) for axis, k in product(np.eye(3), range(3)))]
         inside = np.ones(len(mesh.faces), dtype=np.bool_)
         for axis in axes:
-            heights, reach = np.einsum("fci,fi->fc", corners, axis), np.abs(axis) @ half
+            heights, reach = np.einsum("fci,fi->fc", places, axis), np.abs(axis) @ half
             inside &= (heights.min(axis=1) <= reach) & (heights.max(axis=1) >= -reach)
         return inside
 

@@ -14,6 +14,11 @@
     min_mm = [-5.0, -5.0, 20.0]
     max_mm = [5.0, 5.0, 30.0]
 
+    [[keep]]                            # the same through a box that leans: so much along each of three axes of its own
+    min_mm = [-5.0, -5.0, 20.0]
+    max_mm = [5.0, 5.0, 30.0]
+    axes = [[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]]
+
     [[no_seam]]                         # seams here count a hundred times: a box, or the faces of a colour of the model's file
     colour = "#00ff00"
 
@@ -46,7 +51,7 @@ GRID_MM, GRID_SHIFT = 1e-3, 0.3141  # of what a sha256 tells apart; shifted, for
 ZONE_KINDS = ("keep", "no_seam", "no_support")  # as mdp.zone.Zones has them
 KEYS = ("version", "model", "sha256", "orientation", "part", *ZONE_KINDS, "front")
 PART_KEYS = ("normal", "offset_mm", "process")
-ZONE_KEYS = ("min_mm", "max_mm", "colour", "point_mm", "angle_deg")
+ZONE_KEYS = ("min_mm", "max_mm", "axes", "colour", "point_mm", "angle_deg")
 ROW_KEYS = ("planes", "support_area_mm2", "seam_mm", "cost_mm2")
 
 

@@ -101,7 +101,7 @@ class _Reader:
             low, high = (self._vector(values.get(corner), where + corner) for corner in ZONE_KEYS[:2])
             if not all(least < most for least, most in zip(low, high, strict=True)):
                 raise self._error(f"{where}min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
-            zones.append(Zone(low, high))
+            zones.append(Zone(low, high, self._rotation(values, f"{where}axes") if "axes" in values else None))
         return tuple(zones)
 
     def _grown(self, values: dict[str, Any], where: str) -> Grown:
@@ -124,15 +124,17 @@ class _Reader:
         return Painted(colour)
 
     def _orientation(self, table: dict[str, Any]) -> tuple[Vector, ...] | None:
-        given = table.get("orientation")
-        if given is None:
-            return None
-        rows = tuple(self._vector(row, "orientation") for row in (given if isinstance(given, list) else [given]))
+        return None if table.get("orientation") is None else self._rotation(table, "orientation")
+
+    def _rotation(self, table: dict[str, Any], key: str) -> tuple[Vector, Vector, Vector]:
+        """The rows of a rotation; key: where it stands, its last word the table's key."""
+        given = table[key.split()[-1]]
+        rows = tuple(self._vector(row, key) for row in (given if isinstance(given, list) else [given]))
         matrix = np.array(rows)
         turns = matrix.shape == (3, 3) and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0
         if not turns:
-            raise self._error(f"orientation is {_show(given)}: a rotation is expected, three rows of three numbers")
-        return rows
+            raise self._error(f"{key} is {_show(given)}: a rotation is expected, three rows of three numbers")
+        return rows[0], rows[1], rows[2]
 
     def _list(self, table: dict[str, Any], key: str, most: int) -> list[dict[str, Any]]:
         tables = table.get(key, [])

@@ -38,7 +38,8 @@ def _zone_values(zone: AnyZone) -> dict[str, Any]:
         return {"colour": colour_text(zone.colour)}
     if isinstance(zone, Grown):
         return {"point_mm": list(zone.point_mm), "angle_deg": zone.angle_deg}
-    return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm)}
+    leaning = {} if zone.axes is None else {"axes": [list(axis) for axis in zone.axes]}
+    return {"min_mm": list(zone.min_mm), "max_mm": list(zone.max_mm), **leaning}
 
 
 def _table(values: dict[str, Any]) -> tomlkit.items.Table:

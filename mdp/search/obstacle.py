@@ -57,7 +57,7 @@ def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -
             return _sliver(node.remainder.mesh, plane)
         case Reason.KEEP:
             zone = problem.zones.keep[(problem.zones.crossed(plane) or 1) - 1]
-            corners = np.array([zone.min_mm, zone.max_mm]) if isinstance(zone, Zone) else zone.points
+            corners = zone.corners if isinstance(zone, Zone) else zone.points
             return Obstacle((_vector(0.5 * (corners.min(axis=0) + corners.max(axis=0))),))
         case Reason.WEAK:
             section = passing_places(node.remainder.mesh, plane)

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from mdp.decomposition import Part
-from mdp.head import corners
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, offset, union
@@ -39,7 +38,7 @@ def _of_layers(part: Part, cuts_mm: Floats) -> list[Polygons]:
     """For each layer the sections of the boxes and the shadows of the faces that belong to it."""
     marked, mesh = part.no_support, part.in_part_frame()
     named = {} if marked.faces is None else faces_by_layer(mesh, cuts_mm, marked.faces & (mesh.normals[:, 2] != 0.0))
-    boxes = [corners(box.min_mm, box.max_mm) @ part.rotation.T - (0.0, 0.0, part.base.offset_mm) for box in marked.boxes]
+    boxes = [box.corners @ part.rotation.T - (0.0, 0.0, part.base.offset_mm) for box in marked.boxes]
     layers = []
     for k, height_mm in enumerate(cuts_mm.tolist()):
         pieces = [_section(box, height_mm) for box in boxes]

@@ -47,6 +47,7 @@ def _chords(mesh: Mesh, chosen: Mask, cuts_mm: Floats) -> tuple[Floats, Indices]
 
 def _within(segments: Floats, box: Zone) -> tuple[Floats, Floats]:
     """Shares along (k, 2, 3) segments between which each lies in a box; the first is the greater where none of it does."""
+    segments = box.along(segments)
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         one, other = (np.array(box.min_mm) - start) / along, (np.array(box.max_mm) - start) / along

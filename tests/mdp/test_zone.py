@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Mesh
 from mdp.plane import Plane
+from mdp.pose import about
 from mdp.zone import Painted, Zone, Zones, spans_mm, touched
 from tests import shapes
 from tests.mdp.files import both
@@ -43,6 +44,21 @@ def test_a_plane_passes_through_a_zone_between_its_lowest_and_its_highest_corner
     direction, zone = random_direction(height, around), Zone((-1.0, 2.0, 3.0), (4.0, 5.0, 9.0))
     corners = np.array([[x, y, z] for x in (-1.0, 4.0) for y in (2.0, 5.0) for z in (3.0, 9.0)]) @ direction
     np.testing.assert_allclose(spans_mm(direction[None], [zone])[0], [[corners.min(), corners.max()]], atol=1e-12)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 50), st.integers(1, 999), st.integers(1, 999))
+def test_a_box_that_is_turned_with_a_model_reaches_the_same_faces_and_the_same_planes(
+    seed: int, height: int, around: int
+) -> None:
+    mesh, plain, shift = random_solid(seed), Zone((-4.0, -6.0, 1.0), (3.0, 5.0, 6.0)), (3.0, -2.0, 1.0)
+    turn, direction = about(random_direction(height, around), 0.001 * height), random_direction(around, height)
+    x, y, z = (tuple(row) for row in turn.T.tolist())
+    turned = Zone(plain.min_mm, plain.max_mm, (x, y, z)).moved(shift)
+    assert (turned.touches(mesh.transform(turn, shift)) == plain.touches(mesh)).all()
+    np.testing.assert_allclose(turned.corners, plain.corners @ turn.T + shift, atol=1e-12)
+    spans = spans_mm(direction[None], [plain])[0] + turn @ direction @ shift
+    np.testing.assert_allclose(spans_mm((turn @ direction)[None], [turned])[0], spans, atol=1e-12)
 
 
 RED = 0xFF0000

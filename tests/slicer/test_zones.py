@@ -9,6 +9,7 @@ from mdp.decomposition import Part
 from mdp.grown import Grown
 from mdp.mesh import Floats
 from mdp.zone import AnyZone, Marked, Zone
+from profiles.frozen import Vector
 from slicer.estimate.sampled_part import sample_part
 from slicer.estimate.shell import NOTHING
 from slicer.heights import Heights
@@ -23,6 +24,7 @@ from tests.slicer.hand import BARE, cut, of_kind, profile, volume_mm3, whole
 BACK = Grown((0.0, 10.0, 5.0), 1.0)
 BACK_BOX = Zone((-20.0, 8.0, -1.0), (20.0, 12.0, 30.0))
 SUPPORTED = profile("process.skirt_loops=0", "process.support=auto")
+LEANING = ((0.8, 0.36, 0.48), (-0.6, 0.48, 0.64), (0.0, -0.8, 0.6))  # rows of a rotation
 RIGHT_ARM = Zone((4.5, -10.0, -1.0), (25.0, 10.0, 35.0))
 
 
@@ -53,7 +55,8 @@ def test_layers_begin_at_the_rear_unless_no_seam_is_wanted_there(zone: AnyZone) 
     assert len(begins(free)) == len(begins(kept))
 
 
-def test_boxes_that_share_a_leaning_part_share_its_walls() -> None:
+@pytest.mark.parametrize("axes", [None, LEANING])
+def test_boxes_that_share_a_leaning_part_share_its_walls(axes: tuple[Vector, Vector, Vector] | None) -> None:
     leaning = cut(tee(), ((0.6, 0.0, 0.8), 33.0))[1]
     cuts_mm = np.arange(0.1, 9.0, 0.2)
 
@@ -62,11 +65,11 @@ def test_boxes_that_share_a_leaning_part_share_its_walls() -> None:
         layers = [each.reshape(-1, 2, 3) for each in unwanted_segments(replace(leaning, no_seam=zone), cuts_mm)]
         for within in zone.boxes:
             spots = (np.concatenate(layers) + np.array([0.0, 0.0, leaning.base.offset_mm])) @ leaning.rotation
-            assert (spots >= np.array(within.min_mm) - 1e-9).all()
-            assert (spots <= np.array(within.max_mm) + 1e-9).all()
+            assert (within.along(spots) >= np.array(within.min_mm) - 1e-9).all()
+            assert (within.along(spots) <= np.array(within.max_mm) + 1e-9).all()
         return np.array([np.linalg.norm(each[:, 1] - each[:, 0], axis=1).sum() for each in layers])
 
-    left, right = Zone((-50.0, -50.0, 0.0), (50.0, 1.0, 50.0)), Zone((-50.0, 1.0, 0.0), (50.0, 50.0, 50.0))
+    left, right = Zone((-50.0, -50.0, -50.0), (50.0, 1.0, 50.0), axes), Zone((-50.0, 1.0, -50.0), (50.0, 50.0, 50.0), axes)
     whole_mm = wall_mm(Marked(faces=np.ones(len(leaning.mesh.faces), dtype=np.bool_)))
     np.testing.assert_allclose(wall_mm(Marked((left,))) + wall_mm(Marked((right,))), whole_mm, rtol=1e-9)
     assert whole_mm.min() > 20.0
@@ -101,3 +104,14 @@ def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> N
     stands = int(np.searchsorted(heights.bottom_mm, 4.3))  # the first layer that support on it would have
     shut = shut_areas(marked, heights, process)
     assert (shut[stands].area(), shut[-1].area()) == (pytest.approx(400.0, rel=0.01), 0.0)
+
+
+def test_a_box_that_leans_shuts_of_each_layer_what_lies_in_it() -> None:
+    part, half = whole(box(20.0, 20.0, 20.0)), 0.5**0.5
+    leaning = Zone((-5.0, -10.0, -5.0), (5.0, 10.0, 5.0), ((half, 0.0, -half), (0.0, 1.0, 0.0), (half, 0.0, half))).moved(
+        (0, 0, 10)
+    )
+    tips_mm = np.array([3.0, 7.0, 11.0])
+    heights = Heights(tips_mm, np.full(3, 1e-9), np.array([2.0, 6.0, 10.0]))
+    shut = shut_areas(replace(part, no_support=Marked((leaning,))), heights, SUPPORTED.process)
+    assert shut[-1].area() == pytest.approx(20.0 * 10.0 * 2.0**0.5)  # as wide as its side's diagonal half way up

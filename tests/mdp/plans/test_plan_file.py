@@ -33,10 +33,11 @@ OPEN = st.builds(
 )
 ROWS = st.builds(PlannedRow, st.lists(WHOLE, max_size=3).map(tuple), st.floats(0, 1e9), st.floats(0, 1e9), st.floats(0, 1e9))
 CORNERS = st.tuples(*[st.floats(-9e4, 9e4)] * 3)
-ZONES = CORNERS.map(lambda low: Zone(low, (low[0] + 1.0, low[1] + 20.0, low[2] + 300.0)))
+TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+AXES = st.none() | st.just(TURNED)
+ZONES = st.builds(lambda low, axes: Zone(low, (low[0] + 1.0, low[1] + 20.0, low[2] + 300.0), axes), CORNERS, AXES)
 GROWN = st.builds(Grown, CORNERS, st.floats(0.0, 180.0))
 COLOURS = st.builds(Painted, st.integers(0, 0xFFFFFF))
-TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 PLANS = st.builds(
     PlanFile,
     name=st.just("plan.toml"),
@@ -87,6 +88,10 @@ REFUSED = [
     (FIRST * 1 + "[[part]]\n" * 1001, "there are 1002 [[part]] tables: up to 1000 are allowed"),
     ("version = 1\n[[keep]]\nmin_mm = [0, 0, 0]", "keep 1: max_mm is missing: 3 numbers in brackets are expected"),
     ("version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 0, 1]", "each number of min_mm must be less"),
+    (
+        "version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 1, 1]\naxes = [[1, 0, 0], [0, 1, 0], [0, 0, 2]]",
+        "keep 1: axes is [[1, 0, 0], [0, 1, 0], [0, 0, 2]]: a rotation is expected, three rows of three numbers",
+    ),
     ("version = 1\n[[no_seam]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, inf, 1]", "no_seam 1: max_mm is [1, inf, 1]"),
     (
         "version = 1\n[[keep]]\ncolour = 'red'",
