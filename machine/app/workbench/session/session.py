@@ -27,6 +27,7 @@ from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.marking import Marking
+from machine.app.workbench.session.open_bench import OpenBench
 from machine.app.workbench.session.pieces import Pieces
 from machine.app.workbench.session.pricing import Pricing
 from machine.app.workbench.session.readiness import Readiness
@@ -42,7 +43,7 @@ from profiles.profile import Profile
 
 
 class Session(Desk):
-    """A desk with all that is done on it. resting: the ways in which a model rests."""
+    """A desk with all that is done on it. resting: the ways in which a model rests; benches: all that are open, this one too."""
 
     def __init__(self, profile: Profile, given: Given) -> None:
         super().__init__(Bench(profile, given=given))
@@ -55,6 +56,7 @@ class Session(Desk):
         self.marking = Marking(self, self.trying)
         self._ranking: asyncio.Task[None] | None = None
         self.resting: tuple[Model, tuple[Resting, ...]] | None = None
+        self.benches: tuple[OpenBench, ...] = ()
 
     def warm(self) -> None:
         """Load the program's heavy parts while nobody waits."""

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from machine.app.workbench.bench.bench import History, Step, emptied
+from machine.app.workbench.session.open_bench import OpenBench
 from machine.app.workbench.session.session import Session
 from profiles.errors import PlanError
 
@@ -10,7 +11,7 @@ MOST_SESSIONS = 20
 
 
 class Workbench:
-    """sessions: by number, from 1 on; a number is not given again."""
+    """sessions: by number, from 1 on; a number is not given again. Each is told what the others are, as soon as that changes."""
 
     def __init__(self, make: Callable[[], Session]) -> None:
         self.sessions: dict[int, Session] = {}
@@ -26,7 +27,9 @@ class Workbench:
         self.sessions[self._last] = session = self._make()
         if like is not None:
             session.history = History(Step("", emptied(like.bench)))
+        session.listeners.append(self._list_again)
         session.warm()
+        self._list_again()
         return self._last
 
     def close(self, number: int) -> None:
@@ -34,8 +37,22 @@ class Workbench:
         session = self.sessions.pop(number, None)
         if session is not None:
             session.close()
+            self._list_again()
 
     def close_all(self) -> None:
         """End all of them."""
         for number in list(self.sessions):
             self.close(number)
+
+    def _list_again(self) -> None:
+        benches = tuple(_described(number, session) for number, session in self.sessions.items())
+        for session in self.sessions.values():
+            if session.benches != benches:
+                session.benches = benches
+                session.tell()
+
+
+def _described(number: int, session: Session) -> OpenBench:
+    bench = session.bench
+    work = session.busy or ("finding parts" if session.finding.search else "slicing" if session.slicing.under_way else "")
+    return OpenBench(number, "" if bench.model is None else bench.model.name, bench.parts, work)

@@ -1,26 +1,20 @@
-"""Benches: the list of the open ones, a further one with a page of its own, and closing one, which ends its work."""
-
-from typing import Any
+"""Benches: a further one with a page of its own, and closing one, which ends its work."""
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from profiles.errors import PlanError
 
 
 def bench_routes(workbench: Workbench) -> list[Route]:
-    """What is not of one bench: `benches` (GET: a list; POST: one more, with the settings of that `like`), `benches/N` (DELETE),
+    """What is not of one bench: `benches` (POST: one more, with the settings of that `like`), `benches/N` (DELETE),
     and the address without a number, which leads to the first."""
 
     async def first(request: Request) -> Response:
         number = min(workbench.sessions, default=0) or workbench.open()
         return RedirectResponse(f"{number}/")
-
-    async def listed(request: Request) -> Response:
-        return JSONResponse([_described(number, session) for number, session in sorted(workbench.sessions.items())])
 
     async def opened(request: Request) -> Response:
         like = request.query_params.get("like", "")
@@ -38,13 +32,6 @@ def bench_routes(workbench: Workbench) -> list[Route]:
 
     return [
         Route("/{token}/", first),
-        Route("/{token}/benches", listed, methods=["GET"]),
         Route("/{token}/benches", opened, methods=["POST"]),
         Route("/{token}/benches/{number:int}", closed, methods=["DELETE"]),
     ]
-
-
-def _described(number: int, session: Session) -> dict[str, Any]:
-    bench = session.bench
-    work = session.busy or ("finding parts" if session.finding.search else "slicing" if session.slicing.under_way else "")
-    return {"number": number, "name": "" if bench.model is None else bench.model.name, "parts": bench.parts, "work": work}

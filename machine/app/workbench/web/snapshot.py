@@ -67,6 +67,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "stops": [asdict(stop) for stop in bench.stops],
         "copies": bench.copies,
         "machine": machine_bodies(bench.profile.machine, known=True),
+        "benches": [asdict(each) for each in session.benches],
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }

@@ -1,13 +1,15 @@
 """News: a version that grows with every change, and whoever waits for a newer one."""
 
 import asyncio
+from collections.abc import Callable
 
 
 class News:
-    """All from the event loop."""
+    """All from the event loop. listeners: called with every change, before whoever waits for it."""
 
     def __init__(self) -> None:
         self.version = 0
+        self.listeners: list[Callable[[], None]] = []
         self._changed = asyncio.Event()
 
     def tell(self) -> None:
@@ -15,6 +17,8 @@ class News:
         self.version += 1
         self._changed.set()
         self._changed = asyncio.Event()
+        for listen in self.listeners:
+            listen()
 
     async def changed(self, seen: int) -> None:
         """Return when there is something newer than the version that was seen."""

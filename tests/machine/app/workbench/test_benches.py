@@ -26,7 +26,8 @@ def above(bench: Running, path: str) -> str:
 
 
 def benches(bench: Running) -> list[dict[str, Any]]:
-    listed: list[dict[str, Any]] = json.loads(bench.ask(above(bench, "benches"))[1])
+    with bench.line() as page:
+        listed: list[dict[str, Any]] = page.state["benches"]
     return listed
 
 
@@ -42,8 +43,10 @@ def test_a_second_model_lies_on_a_bench_of_its_own_that_is_closed_with_its_proce
     before = set(bench.children())
     number = json.loads(change(bench, "benches?like=1", "POST")[1])["number"]
     second = Running(bench.process, bench.address.replace("/1/", f"/{number}/"))
-    second.send(_file(tmp_path, "second.stl"))
-    assert [each["name"] for each in benches(bench)] == ["first.stl", "second.stl"]
+    with bench.line() as page:  # which hears of the other bench over its own line
+        page.until(lambda state: [each["name"] for each in state["benches"]] == ["first.stl", ""])
+        second.send(_file(tmp_path, "second.stl"))
+        page.until(lambda state: [each["name"] for each in state["benches"]] == ["first.stl", "second.stl"])
     with second.line() as page:
         assert page.state["given"]["settings"][-1] == "process.walls=5"
         assert set(bench.children()) - before

@@ -19,7 +19,6 @@ async function openBench(files = []) {
     setTimeout(() => notice("", "benches"), TOLD_MS);
   }
   await sendFiles(files, `../${told.number}/`);
-  showBenches();
 }
 
 /** Files sent to a bench one after the other, models before plans, which are for them. */
@@ -35,29 +34,23 @@ async function takeFiles(files) {
   await sendFiles(files.filter((file) => !further.includes(file)));
 }
 
-async function closeBench(number) {
-  await fetch(`../benches/${number}`, { method: "DELETE" });
-  if (number !== HERE) showBenches();
-}
+const closeBench = (number) => fetch(`../benches/${number}`, { method: "DELETE" });
 
 /** The list of the open benches, where there are several. */
-async function showBenches() {
-  const answer = await fetch("../benches").catch(() => null);
-  if (!answer || !answer.ok) return;
-  const benches = await answer.json();
+function showBenches(benches) {
   $("benches").hidden = benches.length < 2;
-  $("benches-list").replaceChildren(...benches.map(({ number, name, parts, work }) => {
-    const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
-    const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
-    const close = made("button", { type: "button", text: "×", title: "Close this bench and end its work", ariaLabel: `Close the bench of ${text}` });
-    close.addEventListener("click", () => closeBench(number));
-    return made("li", {}, label, close);
-  }));
+  putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
+}
+
+function benchRow({ number, name, parts, work }) {
+  const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
+  const label = number === HERE ? made("b", { text: `${text} (this page)` }) : made("a", { text, href: `../${number}/`, target: "_blank" });
+  const close = made("button", { type: "button", text: "×", title: "Close this bench and end its work", ariaLabel: `Close the bench of ${text}` });
+  close.addEventListener("click", () => closeBench(number));
+  return made("li", {}, label, close);
 }
 
 function benchesPanel() {
   $("another").addEventListener("click", () => openBench());
-  addEventListener("focus", showBenches);
-  showBenches();
-  return { told: ({ model, parts }, before) => { if (model?.key !== before?.model?.key || parts !== before?.parts) showBenches(); } };
+  return { told: ({ benches }, before) => { if (!alike(benches, before?.benches)) showBenches(benches); } };
 }
