@@ -18,6 +18,8 @@ else:
 
 LEAST_LEAN_DEG = 1.0  # a table that leans less can print nothing but upright parts
 UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
+GCODE = "gcode"  # of a text in the schema: lines of G-code
+Block = Annotated[str, Field(json_schema_extra={"format": GCODE})]
 Pixels = Annotated[int, Field(ge=16, le=1024)]
 
 
@@ -110,11 +112,11 @@ class Table(Frozen):
 class Blocks(Frozen):
     """G-code blocks; {placeholders} are listed in docs/profiles.md."""
 
-    start: str = Field(description="before the first part: homing, heating, priming")
-    end: str = Field(description="after the last part: heaters off, parking")
-    before_part: str = Field("", description="before each reorientation")
-    after_part: str = Field("", description="after each part")
-    resume: str = Field(
+    start: Block = Field(description="before the first part: homing, heating, priming")
+    end: Block = Field(description="after the last part: heaters off, parking")
+    before_part: Block = Field("", description="before each reorientation")
+    after_part: Block = Field("", description="after each part")
+    resume: Block = Field(
         "",
         description="after a power cut, a print on the table: makes the axes know where they stand, and leaves the tip at "
         "{clear_z_mm} or above, the table at {tilt_deg} {turn_deg}; {x_mm} {y_mm} {z_mm} is where the tip was. Empty: all are "

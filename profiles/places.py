@@ -73,6 +73,20 @@ def tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
     return merged(inherited(kind, name, document, (*seen, place)), own_tables(document))
 
 
+def shipped_base(kind: str, name: str) -> str | None:
+    """The shipped profile that a profile is, or inherits by way of whatever others; None where it says all itself, or where one
+    of the user's own stands in the shipped one's place."""
+    seen: tuple[str, ...] = ()
+    while True:
+        document, place = _document(kind, name, seen)
+        if place == name and name in shipped(kind):
+            return None if name in own(kind) else name
+        parent = document.get(PARENT)
+        if parent is None:
+            return None
+        name, seen = _parent_of(name, parent), (*seen, place)
+
+
 def inherited(kind: str, name: str, document: Mapping[str, Any], seen: tuple[str, ...] = ()) -> dict[str, Any]:
     """The tables of the profile that a document inherits; none when it inherits nothing."""
     parent = document.get(PARENT)
@@ -80,9 +94,12 @@ def inherited(kind: str, name: str, document: Mapping[str, Any], seen: tuple[str
         return {}
     if not isinstance(parent, str):
         raise ProfileError(f"{name}: inherits is {parent!r}: the name of one profile or the path of one .toml file is expected")
-    if Path(parent).suffix == ".toml":
-        parent = str(Path(name).parent / parent)
-    return tables(kind, parent, seen)
+    return tables(kind, _parent_of(name, parent), seen)
+
+
+def _parent_of(name: str, parent: str) -> str:
+    """The name of the profile that another inherits; the path of a file counts from the inheriting one."""
+    return str(Path(name).parent / parent) if Path(parent).suffix == ".toml" else parent
 
 
 def strangers(kind: str, name: str, document: Mapping[str, Any]) -> str | None:

@@ -83,9 +83,10 @@ def with_part_settings(profile: Profile, given: Iterable[PartSettings]) -> Profi
     return whole
 
 
-def load_one(name: str, settings: Iterable[str] = ()) -> dict[str, Frozen]:
-    """The sections of one profile by name, resolved and with settings applied; ProfileError when it is wrong."""
-    kind = kind_of(name)
+def load_one(name: str, settings: Iterable[str] = (), kind: str = "") -> dict[str, Frozen]:
+    """The sections of one profile by name, resolved and with settings applied; ProfileError when it is wrong. kind: where it is
+    known."""
+    kind = kind or kind_of(name)
     whole: dict[str, Any] = {section: {} for section in OF_KIND[kind]} | tables(kind, name)
     for setting in settings:
         _apply(whole, setting)

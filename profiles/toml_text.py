@@ -1,7 +1,14 @@
-"""TOML text: what a person has written, read once for all files and options; whatever is wrong with it is one short reason."""
+"""TOML text: what a person has written, read once for all files and options, and values written so that it reads them back;
+whatever is wrong with a text is one short reason."""
 
+import json
+import re
 import tomllib
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+BARE = re.compile(r"[A-Za-z0-9_-]+")
+DELETE = "\x7f"  # the one character that JSON leaves as it is and TOML forbids
 
 
 def read_toml(text: str) -> dict[str, Any]:
@@ -17,8 +24,32 @@ def read_toml(text: str) -> dict[str, Any]:
 
 
 def read_value(text: str) -> Any:
-    """A single value as TOML has it; what is no TOML is text."""
+    """A single value as TOML has it; what is no TOML is text. A table in braces may take several lines, as in TOML 1.1."""
+    line = text.replace("\n", " ") if text.startswith("{") else text
     try:
-        return read_toml(f"value = {text}")["value"]
+        return read_toml(f"value = {line}")["value"]
     except ValueError:
         return text
+
+
+def value_text(value: Any) -> str:
+    """A value of a profile in one line of TOML."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key_text(key)} = {value_text(each)}' for key, each in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(value_text, value))}]"
+    return json.dumps(value, ensure_ascii=False).replace(DELETE, "\\u007f")
+
+
+def rows_text(value: Mapping[str, Any] | Sequence[Any]) -> str:
+    """The same of a list or a table, a line for each of what is in it."""
+    if isinstance(value, Mapping):
+        rows = ",\n".join(f"  {key_text(key)} = {value_text(each)}" for key, each in value.items())
+        return f"{{\n{rows}\n}}" if rows else "{}"
+    rows = "".join(f"  {value_text(each)},\n" for each in value)
+    return f"[\n{rows}]" if rows else "[]"
+
+
+def key_text(key: str) -> str:
+    """A key of a table, in quotation marks where it needs them."""
+    return key if BARE.fullmatch(key) else value_text(key)

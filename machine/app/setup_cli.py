@@ -67,6 +67,18 @@ def profiles_show(
     return show(name, json, settings or [])
 
 
+@profiles_app.command("save")
+def profiles_save(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="name of a profile, or a .toml file")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.toml", help="profile to write, for --machine and the like")],
+    settings: Settings = None,
+) -> int:
+    """A profile with changes of yours as a profile of your own, that says what differs and inherits the rest."""
+    from machine.app.commands.profiles import save
+
+    return save(name, settings or [], out)
+
+
 @profiles_app.command("check")
 def profiles_check(file: Annotated[Path, typer.Argument(metavar="FILE", help="a .toml profile")]) -> int:
     """All problems of a profile file at once; exit 1 when there are any."""

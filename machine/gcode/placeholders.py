@@ -1,14 +1,16 @@
 """Placeholders: what the profile's G-code blocks may name in braces, the values, and the blocks with them filled in."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import pi
 
 from machine.firmware.klipper import stepper_name
 from machine.gcode.settings import clock
 from machine.planning.moves import BeginPart
-from mdp.pose import level
+from mdp.mesh import Floats
+from mdp.pose import Pose, level
 from profiles.errors import ProfileError
+from profiles.machine import Machine
 from profiles.profile import Profile
 
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
@@ -21,14 +23,7 @@ def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: f
     first = parts[0] if parts else None
     pose = first.pose if first else level(machine)
     return {
-        "tilt": machine.tilt.letter,
-        "turn": machine.turn.letter,
-        "tilt_stepper": stepper_name(machine.tilt),
-        "turn_stepper": stepper_name(machine.turn),
-        "tilt_speed": machine.tilt.speed_deg_s,
-        "turn_speed": machine.turn.speed_deg_s,
-        "tilt_acceleration": machine.tilt.acceleration_deg_s2,
-        "turn_acceleration": machine.turn.acceleration_deg_s2,
+        **_axes(machine),
         "nozzle_c": material.nozzle_c,
         "first_layer_nozzle_c": material.first_layer_nozzle_c,
         "homing_nozzle_c": material.homing_nozzle_c,
@@ -50,6 +45,28 @@ def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: f
         "material": material.name,
         "process": process.name,
         "machine": machine.name,
+    }
+
+
+def resume_placeholders(machine: Machine, tip_mm: Sequence[float] | Floats, pose: Pose, clear_z_mm: float) -> dict[str, object]:
+    """What the block may name that goes on with a print after a power cut: where the tip was, the table's pose, a safe height."""
+    return {
+        "x_mm": float(tip_mm[0]), "y_mm": float(tip_mm[1]), "z_mm": float(tip_mm[2]),
+        "tilt_deg": pose.tilt_deg, "turn_deg": pose.turn_deg, "clear_z_mm": clear_z_mm, **_axes(machine),
+    }  # fmt: skip
+
+
+def _axes(machine: Machine) -> dict[str, object]:
+    """What all blocks may say of the rotary axes."""
+    return {
+        "tilt": machine.tilt.letter,
+        "turn": machine.turn.letter,
+        "tilt_stepper": stepper_name(machine.tilt),
+        "turn_stepper": stepper_name(machine.turn),
+        "tilt_speed": machine.tilt.speed_deg_s,
+        "turn_speed": machine.turn.speed_deg_s,
+        "tilt_acceleration": machine.tilt.acceleration_deg_s2,
+        "turn_acceleration": machine.turn.acceleration_deg_s2,
     }
 
 

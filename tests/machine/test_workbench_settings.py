@@ -1,12 +1,17 @@
 """Settings on the workbench in a real browser: of all parts and of one, refused beside their field, and what a front bears."""
 
 import json
+import shlex
+from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
+from machine.app.cli import main
 from mdp.save import stl
+from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.test_workbench_page import FOUND, IDLE, open_model
+from tests.machine.test_workbench_page import FOUND, IDLE, open_model, saved
 from tests.machine.workbench import Running
 from tests.shapes import tee
 
@@ -15,7 +20,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not instal
 
 def put(browser: Browser, key: str, value: object) -> None:
     """A value typed into a setting's field."""
-    field = f"document.querySelector('[data-key=\"{key}\"] input')"
+    field = f"document.querySelector('[data-key=\"{key}\"] :is(input, textarea)')"
     browser.wait(field)
     browser.value(f"{{ const input = {field}; input.value = {json.dumps(value)}; input.dispatchEvent(new Event('change')); }}")
 
@@ -51,6 +56,37 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     browser.wait(changed("machine.tilt.limits_deg"))
     browser.click("#undo")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: set a part'")
+
+
+def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_command_line_writes(
+    browser: Browser, bench: Running, tmp_path: Path
+) -> None:
+    open_model(browser, bench, "block.stl", stl(tee()))
+    browser.click("#tab-settings")
+    put(browser, "machine.gcode.before_part", "M400\nM117 {prat}")
+    wrong = "document.querySelector('[data-key=\"machine.gcode.before_part\"] .wrong')?.textContent"
+    browser.wait(wrong)
+    assert "placeholder {prat} is not known: allowed are bed_c" in browser.value(wrong)
+    assert (
+        browser.value("document.querySelector('[data-key=\"machine.gcode.before_part\"] textarea').value") == "M400\nM117 {prat}"
+    )
+    put(browser, "machine.gcode.before_part", "M400\nM117 'part' {part}")
+    browser.wait(changed("machine.gcode.before_part"))
+    put(browser, "machine.head.silhouette_mm", "[\n  [0.5, 0],\n  [9, 12],\n]")
+    browser.wait(changed("machine.head.silhouette_mm"))
+    words = shlex.split(browser.value("$('command-line').textContent"))
+    settings = [word for option, word in pairwise(words) if option == "--set" and word.startswith("machine.")]
+    assert settings[-2:] == [
+        r'''machine.gcode.before_part="M400\nM117 'part' {part}"''',
+        "machine.head.silhouette_mm=[[0.5, 0], [9, 12]]",
+    ]
+    mine = tmp_path / "mine.toml"
+    assert main(["profiles", "save", "generic_ac", *(f"--set={each}" for each in settings), "-o", str(mine)]) == 0
+    assert saved(browser, "#save-machine") == mine.read_text()
+    assert load(machine=str(mine)).machine == load(settings=settings).machine
+    browser.click("#undo")
+    browser.wait(f"!{changed('machine.head.silhouette_mm')} && {changed('machine.gcode.before_part')}")
+    assert browser.complaints == []
 
 
 def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_and_it_goes_with_the_angle(

@@ -8,7 +8,6 @@ from pathlib import Path
 from machine.app.terminal.plain import plain_line, plain_lines
 from machine.app.terminal.progress import say
 from profiles.check import check_file
-from profiles.errors import ProfileError
 from profiles.frozen import Frozen
 from profiles.machine import Machine
 from profiles.places import own, own_folder
@@ -50,32 +49,27 @@ def _origin(model: Frozen, key: str) -> str:
     return next((f"from: {model.sources[place]}" for place in places if place in model.sources), "")
 
 
+def save(name: str, settings: Sequence[str], out: Path) -> int:
+    """Write one profile with these settings as a profile file."""
+    from machine.app.output import check_writable, write_bytes
+    from machine.app.profile_file import profile_text
+
+    check_writable(out)
+    kind = kind_of(name)
+    write_bytes(out, profile_text(kind, name, settings).encode())
+    say(f"saved: {out}; use it as --{kind} {out}")
+    return 0
+
+
 def check(file: Path) -> int:
     """Print every problem of a profile file; 1 when there are any."""
     problems = check_file(file)
     if not problems and kind_of(str(file)) == "machine":
-        problems = _block_problems(load_one(str(file))["machine"])
+        from machine.gcode.blocks import block_problems
+
+        problems = block_problems(load().model_copy(update=load_one(str(file))))
     for problem in problems:
         say(f"tiltprint: {problem if str(file) in problem else f'{file}: {problem}'}")
     if not problems:
         sys.stdout.write(plain_line(f"{file}: no problem found") + "\n")
     return 1 if problems else 0
-
-
-def _block_problems(machine: Frozen) -> list[str]:
-    """What cannot be filled in of the machine's G-code blocks, each block by itself."""
-    from machine.gcode.writer import BLOCKS, write_gcode
-    from machine.planning.moves import MachineProgram
-
-    problems: list[str] = []
-    if not isinstance(machine, Machine):
-        return problems
-    for name in BLOCKS:
-        empty = dict.fromkeys(BLOCKS, "")
-        blocks = machine.gcode.model_copy(update=empty | {name: getattr(machine.gcode, name)})
-        profile = load().model_copy(update={"machine": machine.model_copy(update={"gcode": blocks})})
-        try:
-            write_gcode(MachineProgram("check", ()), profile)
-        except ProfileError as error:
-            problems.append(str(error))
-    return problems

@@ -8,7 +8,7 @@ import numpy as np
 from machine.firmware import dialect_of
 from machine.firmware.klipper import stepper_name
 from machine.gcode.pen import Pen
-from machine.gcode.placeholders import fill_block
+from machine.gcode.placeholders import fill_block, resume_placeholders
 from machine.gcode.turning import turn
 from machine.kinematics.collision import Printed
 from machine.link.pause.park_moves import NEAR_MM, SLOWLY
@@ -52,13 +52,7 @@ def homed_return_moves(
     """
     machine, dialect = profile.machine, dialect_of(profile.machine)
     height = _clear_z_mm(profile, printed, pose)
-    values = {
-        "x_mm": float(at[0]), "y_mm": float(at[1]), "z_mm": float(at[2]), "tilt_deg": pose.tilt_deg, "turn_deg": pose.turn_deg,
-        "clear_z_mm": height, "tilt": machine.tilt.letter, "turn": machine.turn.letter,
-        "tilt_stepper": stepper_name(machine.tilt), "turn_stepper": stepper_name(machine.turn),
-        "tilt_speed": machine.tilt.speed_deg_s, "turn_speed": machine.turn.speed_deg_s,
-        "tilt_acceleration": machine.tilt.acceleration_deg_s2, "turn_acceleration": machine.turn.acceleration_deg_s2,
-    }  # fmt: skip
+    values = resume_placeholders(machine, at, pose, height)
     named = "machine.gcode.resume"
     if machine.gcode.resume:
         homing = fill_block(machine.gcode.resume, named, values, dialect.longest_line)

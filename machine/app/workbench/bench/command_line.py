@@ -17,7 +17,12 @@ LEVEL = 1.0 - 1e-12  # sine of the turn about y from which the turns about x and
 def file_stem(bench: Bench) -> str:
     """The model's name for that of a file: plain letters only."""
     name = "" if bench.model is None else Path(bench.model.name.removeprefix("demo:")).stem
-    return "".join(letter if letter.isascii() and (letter.isalnum() or letter in "-_.") else "_" for letter in name) or "model"
+    return plain_name(name) or "model"
+
+
+def plain_name(name: str) -> str:
+    """A name that a file has on any system."""
+    return "".join(letter if letter.isascii() and (letter.isalnum() or letter in "-_.") else "_" for letter in name)
 
 
 def export_command(bench: Bench) -> str:

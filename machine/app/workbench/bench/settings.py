@@ -6,13 +6,16 @@ from typing import Any
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.part_settings import own_values
+from machine.gcode.blocks import block_problems, placeholder_names
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
+from profiles.machine import GCODE
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
-from profiles.places import KINDS, known
+from profiles.places import KINDS, OF_KIND, known
 from profiles.profile import SECTIONS, Profile, load, with_part_settings
+from profiles.toml_text import read_value, rows_text, value_text
 
-SHOWN = ("number", "integer", "boolean", "choice")  # kinds of values that a schema tells as a page has them
+BLOCKS_OF = "machine.gcode."
 ORDER = ("process", "material", "search", "machine")  # what is changed most comes first
 BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
 
@@ -21,9 +24,23 @@ USUAL = Given()
 
 
 def with_setting(given: Given, key: str, value: str | None) -> Given:
-    """The same with another value for a key; None: as the profile has it."""
+    """The same with another value for a key, spelled in one line; None: as the profile has it."""
     others = tuple(setting for setting in given.settings if setting.partition("=")[0].strip() != key)
-    return replace(given, settings=others if value is None else (*others, f"{key}={value}"))
+    return replace(given, settings=others if value is None else (*others, f"{key}={_in_one_line(value)}"))
+
+
+def _in_one_line(value: str) -> str:
+    """A value as it is best typed at a terminal: text without quotation marks where it is text without them, too."""
+    meant = read_value(value.strip())
+    if isinstance(meant, str):
+        plain = "\n" not in meant and meant == meant.strip() and read_value(meant) == meant
+        return meant if plain else value_text(meant)
+    return value_text(meant) if "\n" in value else value.strip()
+
+
+def settings_of(given: Given, kind: str) -> list[str]:
+    """Those of a machine, a material or a process alone."""
+    return [setting for setting in given.settings if setting.partition(".")[0].strip() in OF_KIND[kind]]
 
 
 def with_name(given: Given, kind: str, name: str) -> Given:
@@ -46,6 +63,14 @@ def profile_as_given(given: Given, before: Profile) -> Profile:
     return with_part_settings(profile, before.parts)
 
 
+def check_block(profile: Profile, key: str) -> None:
+    """Raises ProfileError where the key is one of a G-code block that cannot be filled in."""
+    if key.startswith(BLOCKS_OF):
+        problems = block_problems(profile, key.removeprefix(BLOCKS_OF))
+        if problems:
+            raise ProfileError("; ".join(problems))
+
+
 def allowed_keys(part: int) -> set[str]:
     """The keys of the process that a part may have of its own."""
     return set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
@@ -57,7 +82,7 @@ def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[st
     if part == 0:
         changed = {setting.partition("=")[0].strip() for setting in given.settings}
         return [
-            {**row, "changed": row["key"] in changed}
+            {**row, "changed": row["key"] in changed, "placeholders": _placeholders(row["key"], profile)}
             for section in ORDER
             for row in _rows(section, SECTIONS[section], getattr(profile, section).model_dump(mode="json"))
         ]
@@ -71,8 +96,6 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
     """group, about: of the table that the model is, "" for the section itself, whose keys are in groups by their matters."""
     schema = model.model_json_schema()["properties"]
     for name, field in model.model_fields.items():
-        if name == "name":
-            continue
         table = field.annotation
         if isinstance(table, type) and issubclass(table, Frozen):
             yield from _rows(f"{prefix}.{name}", table, values[name], f"{prefix}.{name}", field.description or _sentence(table))
@@ -89,20 +112,24 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
 
 
 def _kind(schema: dict[str, Any], value: Any) -> dict[str, Any]:
-    """How a page has a value typed or chosen. kind: of SHOWN; `numbers`: so many with commas between; `text`: a line of it;
-    `fixed`: not at all, it stays in the profile's file."""
-    ways = [way for way in schema.get("anyOf", [schema]) if way.get("type") != "null"]
-    way = ways[0]
+    """How a page has a value typed or chosen. kind: `number`, `integer`, `boolean`, `choice`; `numbers`: so many with commas
+    between; `text`: a line of it; `block`: lines of G-code; `rows`: a list or a table as TOML."""
+    way = next(way for way in schema.get("anyOf", [schema]) if way.get("type") != "null")
     kind = "choice" if "enum" in way else str(way.get("type"))
     numbers = kind == "array" and all(each.get("type") in ("number", "integer") for each in way.get("prefixItems", [{}]))
-    if kind == "string" and "pattern" in way:
-        kind = "text"
+    if kind == "string":
+        kind = "block" if way.get("format") == GCODE else "text"
     elif numbers:
         kind, value = "numbers", None if value is None else ", ".join(f"{number:.12g}" for number in value)
-    elif len(ways) > 1 or kind not in SHOWN:
-        kind, value = "fixed", None
+    elif kind in ("array", "object"):
+        kind, value = "rows", rows_text(value)
     least, most = (next((way[word] for word in words if word in way), None) for words in BOUNDS)
     return {"kind": kind, "least": least, "most": most, "choices": way.get("enum", []), "value": value}
+
+
+def _placeholders(key: str, profile: Profile) -> list[str]:
+    """What a G-code block may name in braces; of any other key nothing."""
+    return placeholder_names(profile, key.removeprefix(BLOCKS_OF)) if key.startswith(BLOCKS_OF) else []
 
 
 def _sentence(model: type[Frozen]) -> str:

@@ -22,7 +22,7 @@ from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.marks import MARKS
 from machine.app.workbench.bench.planes import EDITS, edited, instead_of
-from machine.app.workbench.bench.settings import profile_as_given, with_name, with_setting
+from machine.app.workbench.bench.settings import check_block, profile_as_given, with_name, with_setting
 from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
@@ -121,7 +121,7 @@ class Session(Desk):
                 value = asked.get("value")
                 key = str(asked.get("key"))
                 text = None if value is None else str(value)
-                self._take_given(f"set {key}", lambda given: with_setting(given, key, text))
+                self._take_given(f"set {key}", lambda given: with_setting(given, key, text), key)
             case "reset":
                 self._take_given("take all changes back", lambda given: replace(given, settings=()))
             case "profile":
@@ -150,9 +150,10 @@ class Session(Desk):
             files: Files = await self.quick.run("make_files", self.bench)
         return files
 
-    def _take_given(self, word: str, change: Callable[[Given], Given]) -> None:
-        """Take other names and settings; those of the bench by then, for several may be asked for at once."""
-        profile_as_given(change(self.bench.given), self.bench.profile)  # refused at once
+    def _take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> None:
+        """Take other names and settings; those of the bench by then, for several may be asked for at once. key: the one that is
+        set."""
+        check_block(profile_as_given(change(self.bench.given), self.bench.profile), key)  # refused at once
         self.start(self._settle(word, change))
 
     async def _settle(self, word: str, change: Callable[[Given], Given]) -> None:

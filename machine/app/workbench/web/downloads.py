@@ -1,15 +1,29 @@
-"""Downloads: what a page saves and looks at: the plan, the parts, the G-code and the page of the print."""
+"""Downloads: what a page saves and looks at: profiles, the plan, the parts, the G-code and the page of the print."""
 
 import asyncio
+from pathlib import Path
 
 from starlette.requests import Request
 from starlette.responses import Response
 
-from machine.app.workbench.bench.command_line import file_stem
+from machine.app.profile_file import profile_text
+from machine.app.workbench.bench.command_line import file_stem, plain_name
+from machine.app.workbench.bench.settings import settings_of
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.slicing import Slices
 from machine.view.page import with_comparison
 from profiles.errors import PlanError
+from profiles.places import KINDS
+
+
+async def profile(session: Session, request: Request) -> Response:
+    """The machine, the material or the process with what is changed of it, as a profile file."""
+    given, kind = session.bench.given, request.path_params["kind"]
+    if kind not in KINDS:
+        return Response("there is no such profile\n", 404)
+    name = getattr(given, kind)
+    text = profile_text(kind, name, settings_of(given, kind))
+    return _download(text.encode(), "application/toml", f"{plain_name(Path(name).stem) or kind}-own.toml")
 
 
 async def plan(session: Session, request: Request) -> Response:

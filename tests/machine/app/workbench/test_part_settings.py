@@ -1,6 +1,9 @@
 """Settings of single parts on the workbench, and the command line that does what lies on the bench."""
 
+import json
+import shlex
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +13,7 @@ from machine.app.requests import Given
 from machine.app.workbench.bench.bench import Bench, History, Model, Step, with_cuts
 from machine.app.workbench.bench.command_line import export_command, turned_by, turns_deg
 from machine.app.workbench.bench.commands import obey
-from machine.app.workbench.bench.settings import settings_list
+from machine.app.workbench.bench.settings import settings_list, with_setting
 from machine.planning.stops import parse_stops
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError, ProfileError
@@ -92,6 +95,23 @@ def test_the_command_line_names_what_differs_from_the_usual() -> None:
     assert export_command(replace(BENCH, given=given)) == f"{start} --plan tee-plan.toml -o tee.gcode"
     uncut = obeyed(replace(BENCH, given=given, cuts=None), do="set_part", part=1, key="process.ironing", value="true")
     assert export_command(uncut) == f"{start} --parts 1 --part 1:ironing=true -o tee.gcode"
+
+
+def test_the_command_line_sets_blocks_lists_and_names_as_they_are() -> None:
+    given = BENCH.given
+    for key, value in {
+        "machine.gcode.before_part": json.dumps("M400\nM117 'part' \"{part}\" \\ $HOME `ls` -x\n"),
+        "machine.head.boxes": '[\n  {name = "it\'s a duct", min_mm = [1, 1, 1], max_mm = [2, 2, 2]},\n]',
+        "machine.name": json.dumps("mine, number 2"),
+        "machine.sources": '{\n  "machine.x" = "measured",\n  "machine.y" = "guessed"\n}',
+    }.items():
+        given = with_setting(given, key, value)
+    words = shlex.split(export_command(replace(BENCH, given=given)))
+    typed = [word for option, word in pairwise(words) if option == "--set"]
+    machine = load(settings=typed).machine
+    assert machine.gcode.before_part == "M400\nM117 'part' \"{part}\" \\ $HOME `ls` -x\n"
+    assert [box.name for box in machine.head.boxes] == ["it's a duct"]
+    assert (machine.name, machine.sources) == ("mine, number 2", {"machine.x": "measured", "machine.y": "guessed"})
 
 
 @pytest.mark.parametrize("angles_deg", [(20.0, -50.0, 130.0), (0.0, 90.0, 30.0), (0.0, 0.0, 0.0)])

@@ -1,14 +1,18 @@
 """Settings of the workbench: what a page is told of the profile's keys, and what changes by names and values."""
 
+import json
+from typing import Any
+
 import pytest
 
 from machine.app.requests import Given
-from machine.app.workbench.bench.settings import USUAL, profile_as_given, settings_list, with_name, with_setting
+from machine.app.workbench.bench.settings import USUAL, check_block, profile_as_given, settings_list, with_name, with_setting
 from profiles.errors import ProfileError
-from profiles.profile import load
+from profiles.profile import SECTIONS, load
+from profiles.wording import keys
 
 
-def told(key: str, given: Given = USUAL) -> dict[str, object]:
+def told(key: str, given: Given = USUAL) -> dict[str, Any]:
     return next(row for row in settings_list(profile_as_given(given, load()), given) if row["key"] == key)
 
 
@@ -28,6 +32,40 @@ def test_choices_and_yes_or_no_are_told_as_such() -> None:
     assert told("process.seam")["choices"] == ["aligned", "corner", "rear", "nearest", "random"]
     assert told("process.ironing")["kind"] == "boolean"
     assert told("search.time_limit_s")["value"] is None
+
+
+def test_every_key_can_be_typed_and_what_is_told_of_it_is_taken_back_as_the_same() -> None:
+    rows = settings_list(load(), USUAL)
+    assert {row["key"] for row in rows} == {key for name, kind in SECTIONS.items() for key, _ in keys(kind, f"{name}.")}
+    assert {row["kind"] for row in rows} == {"number", "integer", "boolean", "choice", "numbers", "text", "block", "rows"}
+    given = USUAL
+    for row in rows:
+        if row["kind"] in ("text", "block", "rows"):
+            given = with_setting(given, row["key"], row["value"] if row["kind"] == "rows" else json.dumps(row["value"]))
+    assert profile_as_given(given, load()) == load()
+    assert not any("\n" in setting for setting in given.settings)
+
+
+def test_a_block_names_its_placeholders_and_one_that_cannot_be_filled_in_is_refused() -> None:
+    assert "clear_z_mm" in told("machine.gcode.resume")["placeholders"]
+    assert "nozzle_c" in told("machine.gcode.start")["placeholders"]
+    given = with_setting(USUAL, "machine.gcode.resume", json.dumps("G28\nG0 Z{nozzle_c}"))
+    with pytest.raises(
+        ProfileError, match=r"machine\.gcode\.resume: placeholder \{nozzle_c\} is not known: allowed are clear_z_mm"
+    ):
+        check_block(profile_as_given(given, load()), "machine.gcode.resume")
+
+
+@pytest.mark.parametrize(
+    ("typed", "sentence"),
+    [
+        ("[[1.0, 2.0], [1.0, 3.0]]", r"machine\.head\.silhouette_mm: .* radii must rise"),
+        ("[[1.0], 2.0", r"machine\.head\.silhouette_mm is \"\[\[1.0\], 2.0\": it must be a list of one or more pairs of numbers"),
+    ],
+)
+def test_a_list_is_refused_in_the_profile_s_own_sentence(typed: str, sentence: str) -> None:
+    with pytest.raises(ProfileError, match=sentence):
+        profile_as_given(with_setting(USUAL, "machine.head.silhouette_mm", typed), load())
 
 
 def test_what_is_set_is_marked_and_goes_back() -> None:

@@ -1,5 +1,7 @@
 // Save menu: all that is saved of a bench, in one place; what is not there yet says why.
 
+const SECTIONS_OF = { machine: ["machine"], material: ["material"], process: ["process", "search"] }; // of the profiles' files
+
 function saveMenu(bench) {
   const button = $("save"), menu = $("save-menu"), dialog = $("save-anyway");
   const show = (whether) => {
@@ -24,17 +26,23 @@ function saveMenu(bench) {
   $("save-gcode").addEventListener("click", () => { close(); if (bench.state.sliced.errors.length) confirm(); else save("print.gcode"); });
   $("save-errors").addEventListener("click", () => { dialog.close(); save("print.gcode?force=yes"); });
   $("save-not").addEventListener("click", () => dialog.close());
+  for (const kind of Object.keys(SECTIONS_OF)) $(`save-${kind}`).addEventListener("click", saving(`profile/${kind}.toml`));
   const tell = (id, why, otherwise) => {
     $(id).disabled = Boolean(why);
     $(id).querySelector("small").textContent = why || otherwise;
   };
   return {
-    told: ({ model, parts, sliced, compared }) => {
+    told: ({ model, parts, sliced, compared, given }) => {
       const uncut = !model ? "no model yet" : parts ? "" : "no parts yet: find them, or add a plane";
       const unsliced = !model ? "no model yet" : !sliced ? "not sliced yet" : sliced.stale ? "out of date: slice again" : "";
       tell("save-plan", uncut, "the command line takes it with --plan");
       tell("save-parts", uncut, "zip of an STL each, a coloured 3MF and the plan");
       tell("save-gcode", unsliced, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
+      for (const [kind, sections] of Object.entries(SECTIONS_OF)) {
+        const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length;
+        const changed = `${given[kind]} with ${count} change${count === 1 ? "" : "s"}: --${kind} takes it, profiles save writes the same`;
+        tell(`save-${kind}`, count ? "" : `nothing of ${given[kind]} is changed`, changed);
+      }
       tell("save-page", unsliced, `one HTML file to open anywhere, as view writes it${compared.length ? ", with the comparison" : ""}`);
     },
   };

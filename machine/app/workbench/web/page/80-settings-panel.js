@@ -1,13 +1,11 @@
 // Settings panel: the profile's own keys in groups, searched by a word; of all parts or of one; what is changed is marked.
 
-const FIXED = "This stays in the profile's file.";
-
 function settingsPanel(bench) {
-  const wrongs = new Map(); // key -> {text, value}: what was refused last, told beside its field
+  const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
   let settings = [], pending = null;
   const part = () => Number($("settings-part").value) || 0;
-  const send = (key, value) => {
-    pending = { key, value };
+  const send = (key, value, typed) => {
+    pending = { key, typed };
     bench.send(part() ? { do: "set_part", part: part(), key, value } : { do: "set", key, value });
   };
   const shown = ({ key, meaning, about, changed }) => {
@@ -52,7 +50,7 @@ function settingsPanel(bench) {
       const fresh = !before || !alike(ofSettings(state), ofSettings(before));
       if (fresh) partsToChoose(state);
       const refused = pending && state.problem;
-      if (refused) wrongs.set(pending.key, { text: state.problem, value: pending.value });
+      if (refused) wrongs.set(pending.key, { text: state.problem, typed: pending.typed });
       else if (fresh && pending) wrongs.delete(pending.key);
       if (refused || fresh) pending = null;
       if (refused && bench.tab === "settings") $("problem").hidden = true; // it stands beside its field
@@ -71,20 +69,21 @@ function showProfiles(profiles, bench) {
   putRows(rows, $("profiles-list"));
 }
 
-/** Rows {id, told, make()} put into a list: those that tell the same as before stay, so that the keyboard keeps its place. */
+/** Rows {id, told, make()} put into a list: those that tell the same as before stay, so that the keyboard keeps its place, and so
+ * do those that a person types in. */
 function putRows(rows, into = $("settings-list")) {
   const here = [...into.children], same = here.length === rows.length && rows.every(({ id }, k) => here[k].dataset.id === id);
   const known = new Map(here.map((element) => [element.dataset.id, element])), held = document.activeElement?.closest("[data-id]")?.dataset.id;
   const elements = rows.map(({ id, told, make }) => {
     const old = known.get(id);
-    if (old?.dataset.told === told) return old;
+    if (old && (old.dataset.told === told || old.dataset.typing)) return old;
     const element = make();
     Object.assign(element.dataset, { id, told });
     if (same) old.replaceWith(element);
     return element;
   });
   if (!same) into.replaceChildren(...elements);
-  if (held && document.activeElement === document.body) into.querySelector(`[data-id="${held}"] :is(input, select)`)?.focus();
+  if (held && document.activeElement === document.body) into.querySelector(`[data-id="${held}"] :is(input, select, textarea, button)`)?.focus();
 }
 
 function groupTitle({ group, about }) {
@@ -93,17 +92,19 @@ function groupTitle({ group, about }) {
 }
 
 function settingRow(setting, wrong, send) {
-  const { key, meaning, kind, least, most, value, changed } = setting, now = wrong && kind !== "boolean" ? wrong.value : value;
-  const input = inputOf(setting, now);
+  const { key, meaning, kind, least, most, value, changed, placeholders = [] } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
   const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
   const told = made("small", { text: meaning + range, id: `meaning-${key}` }), refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
-  if (kind === "fixed") return settingBox(setting, [made("label", {}, made("span", { text: key })), told, made("small", { text: FIXED })]);
   input.setAttribute("aria-describedby", told.id);
   input.setAttribute("aria-invalid", Boolean(wrong));
-  input.addEventListener("change", () => send(key, typedIn(input, kind)));
   const back = made("button", { type: "button", text: "↺", title: "As it was", ariaLabel: `${key} as it was`, hidden: !changed && !wrong });
   back.addEventListener("click", () => send(key, null));
-  return settingBox(setting, [made("label", {}, made("span", { text: key }), input, back), refused, told]);
+  const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
+  const row = settingBox(setting, [made("label", {}, made("span", { text: key }), input, back), refused, told, named]);
+  input.addEventListener("input", () => { row.dataset.typing = kind; });
+  input.addEventListener("change", () => send(key, typedIn(input, kind), typedAs(input, kind)));
+  for (const done of ["change", "blur"]) input.addEventListener(done, () => delete row.dataset.typing);
+  return row;
 }
 
 function settingBox({ key, changed }, children) {
@@ -113,17 +114,22 @@ function settingBox({ key, changed }, children) {
 }
 
 function inputOf({ kind, choices, least, most }, value) {
+  const typed = value ?? "";
   if (kind === "choice") return made("select", {}, ...choices.map((text) => made("option", { text, value: text, selected: String(text) === String(value) })));
   if (kind === "boolean") return made("input", { type: "checkbox", checked: value });
-  if (kind === "numbers" || kind === "text") return made("input", { type: "text", value: value === null ? "" : String(value).replace(/^\[|\]$/g, "") });
+  if (kind === "numbers" || kind === "text") return made("input", { type: "text", value: typed });
+  if (kind === "block" || kind === "rows") return made("textarea", { value: typed, rows: Math.min(Math.max(String(typed).split("\n").length, 2), 14), spellcheck: false, wrap: "off" });
   const limits = { ...(least === null ? {} : { min: least }), ...(most === null ? {} : { max: most }) };
-  return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: value ?? "", ...limits });
+  return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: typed, ...limits });
 }
 
-/** What a person has typed or chosen, as --set takes it; null, for nothing: as the profile has it. */
+const typedAs = (input, kind) => (kind === "boolean" ? input.checked : input.value);
+
+/** What a person has typed or chosen, as --set takes it; null, for nothing where text cannot be empty: as the profile has it. */
 function typedIn(input, kind) {
   if (kind === "boolean") return `${input.checked}`;
-  const text = input.value.trim();
+  const text = kind === "block" ? input.value : input.value.trim();
+  if (kind === "block" || kind === "text") return JSON.stringify(text).replace(/\x7f/g, "\\u007f"); // which TOML reads, too
   return text && kind === "numbers" ? `[${text}]` : text || null;
 }
 

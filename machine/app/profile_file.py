@@ -1,0 +1,92 @@
+"""Profile file: a machine, a material or a process with a person's settings over it, as the text of a profile of one's own."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from profiles.axes import STANDING
+from profiles.frozen import Frozen
+from profiles.machine import Machine
+from profiles.places import OF_KIND, PARENT, merged, own_tables, shipped_base, tables
+from profiles.profile import load_one, sound_section
+from profiles.toml_text import key_text, read_toml, rows_text, value_text
+
+LONGEST_LINE = 100
+Tables = dict[str, Any]
+
+
+def profile_text(kind: str, name: str, settings: Iterable[str] = ()) -> str:
+    """The text of a profile file that reads back to this profile with these settings.
+
+    It inherits the shipped profile that this one is or goes back to and says what differs; where that cannot say it, as a row
+    taken out of a table, it says all itself. Raises ProfileError.
+    """
+    wanted = load_one(name, settings, kind)
+    base, whole = shipped_base(kind, name), _values(wanted)
+    if base is not None:
+        own_name = {"name": whole[kind]["name"]}
+        differing = _differing(_values(load_one(base, kind=kind)), whole)
+        text = _text(merged({kind: own_name}, differing), f"{PARENT} = {value_text(base)}\n")
+        if _read(kind, text) == wanted:
+            return text
+    return _text(whole)
+
+
+def _values(sections: Mapping[str, Frozen]) -> Tables:
+    """What a file would say; a machine whose table stands still says nothing of its axes."""
+    whole = {section: model.model_dump(mode="json") for section, model in sections.items()}
+    machine = sections.get("machine")
+    if isinstance(machine, Machine) and not machine.tilts:
+        whole["machine"] = {key: value for key, value in whole["machine"].items() if key not in STANDING}
+    return whole
+
+
+def _read(kind: str, text: str) -> dict[str, Frozen | None]:
+    """The sections of a profile file; None for one that is not valid."""
+    document = read_toml(text)
+    whole: Tables = {section: {} for section in OF_KIND[kind]} | merged(tables(kind, document[PARENT]), own_tables(document))
+    return {section: sound_section(section, whole[section]) for section in OF_KIND[kind]}
+
+
+def _differing(shared: Mapping[str, Any], whole: Mapping[str, Any]) -> Tables:
+    """What of tables is not in others."""
+    out: Tables = {}
+    for key, value in whole.items():
+        other = shared.get(key)
+        if isinstance(value, Mapping) and isinstance(other, Mapping):
+            below = _differing(other, value)
+            if below:
+                out[key] = below
+        elif value != other:
+            out[key] = value
+    return out
+
+
+def _text(whole: Mapping[str, Any], head: str = "") -> str:
+    return "\n".join((*([head] if head else []), *_blocks((), whole)))
+
+
+def _blocks(path: tuple[str, ...], table: Mapping[str, Any]) -> Iterator[str]:
+    """A table, then those in it; what is left out of a profile is not written."""
+    lines = [f"{key_text(key)} = {_value(value)}" for key, value in table.items() if value is not None and not _is_table(value)]
+    if path and (lines or not any(map(_is_table, table.values()))):
+        yield "\n".join((f"[{'.'.join(map(key_text, path))}]", *lines, ""))
+    for key, value in table.items():
+        if _is_table(value):
+            yield from _blocks((*path, key), value)
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _value(value: Any) -> str:
+    """A text of several lines as such where it needs no sign of its own, a long list row by row."""
+    if (
+        isinstance(value, str)
+        and "\n" in value
+        and "'''" not in value
+        and all(each == "\n" or each.isprintable() for each in value)
+    ):
+        return f"'''\n{value}'''"
+    line = value_text(value)
+    return rows_text(value) if isinstance(value, list) and len(line) > LONGEST_LINE else line
