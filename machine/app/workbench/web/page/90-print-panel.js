@@ -111,15 +111,15 @@ function stopsAsked(prints, send, isOpen) {
   };
 }
 
-/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. An emergency
- * stop that finds no line is sent as soon as there is one; a command to which nothing answers is told. */
+/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. Emergency
+ * stops that find no line are sent as soon as there is one; a command to which nothing answers is told. */
 function printsLine(follow, refused) {
-  let socket = null, owed = null, waiting = 0;
+  let socket = null, owed = [], waiting = 0;
   const open = () => {
     socket = new WebSocket(new URL(`prints?page=${OWN_PAGE}`, location.href.replace(/^http/, "ws")));
     socket.onopen = () => {
-      if (owed) socket.send(owed);
-      owed = null;
+      owed.forEach((text) => socket.send(text));
+      owed = [];
       notice("", "sent");
     };
     socket.onmessage = (event) => {
@@ -141,7 +141,7 @@ function printsLine(follow, refused) {
         waiting = setTimeout(notice, ANSWER_MS, "tiltprint does not answer: what was asked for may not have arrived.", "sent");
         return socket.send(text);
       }
-      if (command.do === "emergency") owed = text;
+      if (command.do === "emergency") owed.push(text);
       else notice("The line to tiltprint is lost; nothing was sent.", "sent");
     },
   };
