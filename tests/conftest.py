@@ -38,11 +38,6 @@ settings.register_profile("explore", print_blob=True, deadline=None, suppress_he
 settings.load_profile("repeatable")
 
 
-def pytest_collection_finish() -> None:
-    """The tests themselves, half a million objects, are never garbage: no look for it goes through them."""
-    gc.freeze()
-
-
 @pytest.fixture(autouse=True, scope="session")
 def _folders_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Logs, journals and settings are not those of the person who runs the tests."""

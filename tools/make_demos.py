@@ -14,14 +14,18 @@ import manifold3d as m3
 import numpy as np
 from numpy.typing import NDArray
 
+from mdp.kernels.kernel import kernel
+
 FOLDER = Path(__file__).resolve().parents[1] / "mdp" / "demos"
 Point = tuple[float, float, float]
 Knot = tuple[float, float, float, float]
 Limb = list[Knot]  # x, y, z, radius of the knots of a chain of round cones
 
 
-def cone_distance(a: Knot, b: Knot, x: float, y: float, z: float) -> float:
-    """Distance of a point to a segment whose radius runs linearly from its first to its second end, mm."""
+@kernel
+def cone_distance(knots: NDArray[np.float64], k: int, x: float, y: float, z: float) -> float:
+    """Distance of a point to the segment from knot k to the next, along which the radius runs linearly, mm."""
+    a, b = knots[k], knots[k + 1]
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     share = ((x - a[0]) * dx + (y - a[1]) * dy + (z - a[2]) * dz) / (dx * dx + dy * dy + dz * dz)
     share = min(max(share, 0.0), 1.0)
@@ -29,28 +33,24 @@ def cone_distance(a: Knot, b: Knot, x: float, y: float, z: float) -> float:
     return math.sqrt(across) - (a[3] + share * (b[3] - a[3]))
 
 
+@kernel
+def _united(knots: NDArray[np.float64], first: NDArray[np.int64], blend_mm: float, x: float, y: float, z: float) -> float:
+    """The field of smooth_union; limb k has the knots first[k] to before first[k + 1]."""
+    union = np.inf
+    for limb in range(len(first) - 1):
+        d = np.inf
+        for k in range(first[limb], first[limb + 1] - 1):
+            d = min(d, cone_distance(knots, k, x, y, z))
+        mix = max(blend_mm - abs(union - d), 0.0) / blend_mm
+        union = min(union, d) - mix * mix * blend_mm / 4.0
+    return -union
+
+
 def smooth_union(limbs: Sequence[Limb], blend_mm: float) -> Callable[[float, float, float], float]:
     """The signed field (positive inside) of limbs blended by the quadratic smooth minimum over blend_mm."""
-    balls = [_ball(limb) for limb in limbs]
-
-    def field(x: float, y: float, z: float) -> float:
-        union = math.inf
-        for limb, (centre, radius) in zip(limbs, balls, strict=True):
-            if math.dist(centre, (x, y, z)) - radius > union + 1.001 * blend_mm:
-                continue  # too far away to change a bit of the sum
-            d = min(cone_distance(a, b, x, y, z) for a, b in pairwise(limb))
-            mix = max(blend_mm - abs(union - d), 0.0) / blend_mm
-            union = min(union, d) - mix * mix * blend_mm / 4.0
-        return -union
-
-    return field
-
-
-def _ball(limb: Limb) -> tuple[tuple[float, float, float], float]:
-    """Centre and radius of a ball that holds a limb, mm."""
-    knots = np.array(limb)
-    centre = (knots[:, :3].min(axis=0) + knots[:, :3].max(axis=0)) / 2.0
-    return tuple(centre.tolist()), float((np.linalg.norm(knots[:, :3] - centre, axis=1) + knots[:, 3]).max())
+    knots = np.array([knot for limb in limbs for knot in limb], dtype=np.float64)
+    first = np.concatenate(([0], np.cumsum([len(limb) for limb in limbs])))
+    return lambda x, y, z: _united(knots, first, blend_mm, x, y, z)
 
 
 def grown(limbs: Sequence[Limb], blend_mm: float, edge_mm: float, tolerance_mm: float) -> m3.Manifold:

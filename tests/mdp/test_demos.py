@@ -90,8 +90,9 @@ def test_the_grown_demos_are_remade_byte_for_byte(name: str, tmp_path: Path) -> 
 
 
 def test_the_distance_to_a_cone_is_that_to_its_axis_less_the_radius_there() -> None:
-    assert cone_distance((0, 0, 0, 2.0), (0, 0, 10, 4.0), 9.0, 0.0, 5.0) == pytest.approx(6.0)
-    assert cone_distance((0, 0, 0, 2.0), (0, 0, 10, 4.0), 0.0, 0.0, 17.0) == pytest.approx(3.0)
+    knots = np.array([(0, 0, 0, 2.0), (0, 0, 10, 4.0)])
+    assert cone_distance(knots, 0, 9.0, 0.0, 5.0) == pytest.approx(6.0)
+    assert cone_distance(knots, 0, 0.0, 0.0, 17.0) == pytest.approx(3.0)
 
 
 def test_a_smooth_union_reaches_a_quarter_of_the_blend_beyond_two_equally_near_limbs() -> None:

@@ -168,7 +168,11 @@ def turn_and_part(lines: Lines, index: int) -> range:
 
 
 def without_part(index: int) -> Edit:
-    return lambda lines: [line for k, line in enumerate(lines) if k not in turn_and_part(lines, index)]
+    def edit(lines: Lines) -> Lines:
+        gone = turn_and_part(lines, index)
+        return [*lines[: gone.start], *lines[gone.stop :]]
+
+    return edit
 
 
 def repeated(places: Callable[[Lines], Iterable[int]]) -> Edit:

@@ -104,14 +104,14 @@ def test_planes_that_cannot_be_cut_end_in_one_sentence(
     assert not Path("parts").exists()
 
 
-COARSE = ("--set", "process.layer_height_mm=0.4", "--set", "process.line_width_mm=0.8", "--set", "search.directions=60")
-
-
 @pytest.mark.parametrize("orient", [[], ["--orient"]])
 def test_export_by_a_plan_gives_the_g_code_of_the_search_byte_by_byte(folder: Path, orient: list[str]) -> None:
-    _run("export", "demo:tree", "-o", "searched.gcode", *COARSE, *orient)
-    _run("decompose", "demo:tree", "--plan", "tree.toml", *COARSE, *orient)
-    _run("export", "demo:tree", "-o", "planned.gcode", *COARSE, "--plan", "tree.toml")
+    Path("tee.stl").write_bytes(stl(shapes.tee()))
+    _run("export", "tee.stl", "-o", "searched.gcode", *orient)
+    _run("decompose", "tee.stl", "--plan", "tee.toml", *orient)
+    _run("export", "tee.stl", "-o", "planned.gcode", "--plan", "tee.toml")
+    told = Path("tee.toml").read_text()
+    assert (told.count("[[part]]") > 1, "orientation" in told) == (not orient, bool(orient))
     assert Path("planned.gcode").read_bytes() == Path("searched.gcode").read_bytes()
 
 
