@@ -11,7 +11,7 @@ from machine.app.cli import main
 from mdp.save import stl
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.test_workbench_page import FOUND, IDLE, open_model, saved
+from tests.machine.test_workbench_page import FOUND, IDLE, choose, open_model, saved
 from tests.machine.workbench import Running
 from tests.shapes import tee
 
@@ -72,6 +72,17 @@ def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_comm
     )
     put(browser, "machine.gcode.before_part", "M400\nM117 'part' {part}")
     browser.wait(changed("machine.gcode.before_part"))
+    field = "document.querySelector('[data-key=\"machine.gcode.after_part\"] textarea')"
+    browser.value(f"{{ {field}.focus(); {field}.value = 'M300'; {field}.dispatchEvent(new Event('input')); }}")
+    with bench.line() as other:  # of whose news a field that is typed in hears nothing
+        other.do("set", key="machine.gcode.after_part", value="M18")
+        other.until(lambda state: state["undo"] == "set machine.gcode.after_part")
+    browser.wait("$('command-line').textContent.includes('M18')")
+    assert browser.value(f"{field}.value") == "M300"
+    browser.value(f"{field}.dispatchEvent(new Event('blur'))")
+    assert browser.value(f"{field}.value") == "M18"
+    browser.click("#undo")
+    browser.wait("!$('command-line').textContent.includes('M18')")
     put(browser, "machine.head.silhouette_mm", "[\n  [0.5, 0],\n  [9, 12],\n]")
     browser.wait(changed("machine.head.silhouette_mm"))
     words = shlex.split(browser.value("$('command-line').textContent"))
@@ -84,6 +95,12 @@ def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_comm
     assert main(["profiles", "save", "generic_ac", *(f"--set={each}" for each in settings), "-o", str(mine)]) == 0
     assert saved(browser, "#save-machine") == mine.read_text()
     assert load(machine=str(mine)).machine == load(settings=settings).machine
+    choose(browser, "mine.toml", mine.read_bytes())
+    browser.wait("$('command-line').textContent.includes('--machine mine.toml')")
+    assert browser.value("$('profiles-list').querySelector('select').value") == "mine.toml"
+    assert browser.value("$('undo').getAttribute('aria-label')") == "undo: take mine.toml"
+    browser.click("#undo")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: set machine.head.silhouette_mm'")
     browser.click("#undo")
     browser.wait(f"!{changed('machine.head.silhouette_mm')} && {changed('machine.gcode.before_part')}")
     assert browser.complaints == []

@@ -48,6 +48,11 @@ def with_name(given: Given, kind: str, name: str) -> Given:
     if kind not in KINDS or name not in known(kind):
         allowed = ", ".join(known(kind)) if kind in KINDS else ", ".join(KINDS)
         raise ProfileError(f"{name!r} is no {kind if kind in KINDS else 'profile'}: {allowed} are known")
+    return named(given, kind, name)
+
+
+def named(given: Given, kind: str, name: str) -> Given:
+    """The same with another machine, material or process, by its name or its file."""
     match kind:
         case "machine":
             return replace(given, machine=name)

@@ -121,13 +121,13 @@ class Session(Desk):
                 value = asked.get("value")
                 key = str(asked.get("key"))
                 text = None if value is None else str(value)
-                self._take_given(f"set {key}", lambda given: with_setting(given, key, text), key)
+                self.take_given(f"set {key}", lambda given: with_setting(given, key, text), key)
             case "reset":
-                self._take_given("take all changes back", lambda given: replace(given, settings=()))
+                self.take_given("take all changes back", lambda given: replace(given, settings=()))
             case "profile":
                 name = str(asked.get("name"))
                 kind = str(asked.get("kind"))
-                self._take_given(f"take {name}", lambda given: with_name(given, kind, name))
+                self.take_given(f"take {name}", lambda given: with_name(given, kind, name))
             case "try":
                 self.trying.move(edited(self.bench, {**asked, "do": "move"})[1])
             case name if name in EDITS:
@@ -150,7 +150,7 @@ class Session(Desk):
             files: Files = await self.quick.run("make_files", self.bench)
         return files
 
-    def _take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> None:
+    def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> None:
         """Take other names and settings; those of the bench by then, for several may be asked for at once. key: the one that is
         set."""
         check_block(profile_as_given(change(self.bench.given), self.bench.profile), key)  # refused at once

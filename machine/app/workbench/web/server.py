@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 
 from starlette.applications import Starlette
@@ -22,18 +23,19 @@ from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, CLOSED_CODE, talk
 from machine.app.workbench.web.page import workbench_page
 from machine.app.workbench.web.prints_line import print_log, prints_line
+from machine.app.workbench.web.profile_files import ProfileFiles
 from machine.app.workbench.web.snapshot import marks, marks_key, triangles
 from mdp.read import MOST_BYTES
 from profiles.errors import PlanError
 from profiles.places import KINDS, known
 
-PLAN_SUFFIX = ".toml"
+TEXT_SUFFIX = ".toml"  # of plans and profiles
 Answer = Callable[[Request], Awaitable[Response]]
 
 
 def application(workbench: Workbench, prints: Prints, token: str, port: int) -> ASGIApp:
     """The whole server, below `/TOKEN/`; the number of a session follows."""
-    below = "/{token}/{session:int}/"
+    below, files = "/{token}/{session:int}/", ProfileFiles()
 
     def route(path: str, act: Callable[[Session, Request], Awaitable[Response]], method: str = "GET") -> Route:
         return Route(below + path, _answering(workbench, act), methods=[method])
@@ -42,7 +44,7 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int) -> 
         route("", _page(port)),
         route("model/{key}", _model),
         route("marks/{key}", _marks),
-        route("file", _take_file, "POST"),
+        route("file", _take_file(files), "POST"),
         route("plan.toml", plan),
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces),
@@ -52,7 +54,7 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int) -> 
         route("walls/{number:int}/{part:int}", print_walls),
         route("print.html", shared_page),
         route("print.gcode", gcode),
-        route("settings.json", _settings),
+        route("settings.json", _settings(files)),
         Route(below + "prints/{print:int}/log", print_log(prints)),
         WebSocketRoute(below + "line", _connecting(workbench, talk)),
         WebSocketRoute(below + "prints", _connecting(workbench, prints_line(prints))),
@@ -116,16 +118,19 @@ async def _marks(session: Session, request: Request) -> Response:
     return Response(await asyncio.to_thread(marks, bench), media_type="application/octet-stream")
 
 
-async def _take_file(session: Session, request: Request) -> Response:
-    """A model or a plan that the person has chosen or dropped, into the session's own folder."""
-    name = Path(request.query_params.get("name", "")).name
-    path = session.new_file(name)
-    await _receive(request, path, name)
-    if path.suffix.lower() == PLAN_SUFFIX:
-        await session.open_plan(path)
-    else:
-        await session.open_model(path, name)
-    return JSONResponse({})
+def _take_file(files: ProfileFiles) -> Callable[[Session, Request], Awaitable[Response]]:
+    async def answer(session: Session, request: Request) -> Response:
+        """A model, a plan or a profile that the person has chosen or dropped, into the session's own folder."""
+        name = Path(request.query_params.get("name", "")).name
+        path = session.new_file(name)
+        await _receive(request, path, name)
+        if path.suffix.lower() != TEXT_SUFFIX:
+            await session.open_model(path, name)
+        elif not files.take(path, session):
+            await session.open_plan(path)
+        return JSONResponse({})
+
+    return answer
 
 
 async def _receive(request: Request, path: Path, name: str) -> None:
@@ -140,11 +145,13 @@ async def _receive(request: Request, path: Path, name: str) -> None:
             file.write(piece)
 
 
-async def _settings(session: Session, request: Request) -> Response:
-    bench = session.bench
-    names = {
-        kind: {"names": sorted({*known(kind), getattr(bench.given, kind)}), "name": getattr(bench.given, kind)} for kind in KINDS
-    }
-    part = request.query_params.get("part", "")
-    rows = settings_list(bench.profile, bench.given, int(part) if part.isascii() and part.isdigit() and len(part) < 6 else 0)
-    return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
+def _settings(files: ProfileFiles) -> Callable[[Session, Request], Awaitable[Response]]:
+    async def answer(session: Session, request: Request) -> Response:
+        given = files.as_shown(session.bench.given)
+        bench = replace(session.bench, given=given)
+        names = {kind: {"names": sorted({*known(kind), getattr(given, kind)}), "name": getattr(given, kind)} for kind in KINDS}
+        part = request.query_params.get("part", "")
+        rows = settings_list(bench.profile, given, int(part) if part.isascii() and part.isdigit() and len(part) < 6 else 0)
+        return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
+
+    return answer

@@ -40,8 +40,8 @@ function saveMenu(bench) {
       tell("save-gcode", unsliced, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
       for (const [kind, sections] of Object.entries(SECTIONS_OF)) {
         const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length;
-        const changed = `${given[kind]} with ${count} change${count === 1 ? "" : "s"}: --${kind} takes it, profiles save writes the same`;
-        tell(`save-${kind}`, count ? "" : `nothing of ${given[kind]} is changed`, changed);
+        const name = given[kind].split(/[\\/]/).at(-1), changed = `${name} with ${count} change${count === 1 ? "" : "s"}: --${kind} takes it, profiles save writes the same`;
+        tell(`save-${kind}`, count ? "" : `nothing of ${name} is changed`, changed);
       }
       tell("save-page", unsliced, `one HTML file to open anywhere, as view writes it${compared.length ? ", with the comparison" : ""}`);
     },

@@ -18,7 +18,7 @@ function settingsPanel(bench) {
     $("reset-settings").disabled = !changed;
     putRows(rows.flatMap((setting, k) => {
       const wrong = wrongs.get(setting.key), title = rows[k - 1]?.group === setting.group ? [] : [groupTitle(setting)];
-      return [...title, { id: setting.key, told: JSON.stringify([setting, wrong]), make: () => settingRow(setting, wrong, send) }];
+      return [...title, { id: setting.key, told: JSON.stringify([setting, wrong]), make: () => settingRow(setting, wrong, send, list) }];
     }));
   };
   const fetchAll = async () => {
@@ -91,7 +91,8 @@ function groupTitle({ group, about }) {
   return { id: `group ${group}`, told: text, make: () => made("h3", { text }) };
 }
 
-function settingRow(setting, wrong, send) {
+/** again(): called when a person leaves what was typed in, for what has been told meanwhile. */
+function settingRow(setting, wrong, send, again) {
   const { key, meaning, kind, least, most, value, changed, placeholders = [] } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
   const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
   const told = made("small", { text: meaning + range, id: `meaning-${key}` }), refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
@@ -103,7 +104,13 @@ function settingRow(setting, wrong, send) {
   const row = settingBox(setting, [made("label", {}, made("span", { text: key }), input, back), refused, told, named]);
   input.addEventListener("input", () => { row.dataset.typing = kind; });
   input.addEventListener("change", () => send(key, typedIn(input, kind), typedAs(input, kind)));
-  for (const done of ["change", "blur"]) input.addEventListener(done, () => delete row.dataset.typing);
+  for (const done of ["change", "blur"]) {
+    input.addEventListener(done, () => {
+      if (!row.dataset.typing) return;
+      delete row.dataset.typing;
+      if (done === "blur") again();
+    });
+  }
   return row;
 }
 
