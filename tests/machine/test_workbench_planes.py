@@ -155,6 +155,10 @@ def test_the_head_is_drawn_where_it_would_touch_and_goes_with_the_plane(browser:
         browser.wait("document.documentElement.dataset.obstacle === ''")
 
 
+def box_mm(zone: dict[str, Any]) -> list[float]:
+    return [high - low for low, high in zip(zone["min_mm"], zone["max_mm"], strict=True)]
+
+
 def test_faces_and_boxes_are_marked_by_clicks_moved_and_taken_away(browser: Browser, bench: Running, folder: Path) -> None:
     with bench.line() as page:
         opened(page, bench, "tee.stl")
@@ -184,6 +188,15 @@ def test_faces_and_boxes_are_marked_by_clicks_moved_and_taken_away(browser: Brow
             lambda state: any(abs(z.get("max_mm", [0, 0, 0])[2] - float(before) - 0.5) < 0.01 for z in state["zones"])
         )["zones"][1]
         assert zone["kind"] == "no_seam"
+        page.do("turn", axis="y", deg=30)
+        browser.wait(f"$('marks').textContent.includes('leaning') && {FREE}")
+        browser.value("document.querySelector('#mark-handles [data-side=\"max_mm 0\"]').focus()")
+        browser.key("ArrowUp")
+        leaning = page.until(lambda state: any(box_mm(z)[0] - box_mm(zone)[0] > 0.4 for z in state["zones"] if "min_mm" in z))
+        assert box_mm(leaning["zones"][1])[1:] == pytest.approx(box_mm(zone)[1:])
+        page.do("undo")
+        page.do("undo")
+        browser.wait(f"!$('marks').textContent.includes('leaning') && {FREE}")
         browser.click("#marks button")
         browser.wait("document.querySelectorAll('#marks tr').length === 1")
         browser.click("#undo")

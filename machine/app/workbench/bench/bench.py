@@ -8,24 +8,23 @@ from secrets import token_hex
 import numpy as np
 
 from machine.app.requests import Given
+from machine.app.workbench.bench.carried import Placing, carried_part, carried_zones
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.following import following_stops, gone_in_words
 from machine.app.workbench.bench.part_settings import following
 from machine.app.workbench.bench.settings import USUAL
 from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
-from mdp.grown import Grown
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
-from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
+from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow
 from mdp.search.front import choose, pays, price_of_second_mm2
-from mdp.zone import NO_ZONES, AnyZone, Zone, Zones
+from mdp.zone import NO_ZONES, Zones
 from profiles.frozen import Vector
 from profiles.profile import Profile
 
 MOST_STEPS = 200  # that can be undone
 MOST_KEPT_FACES = 5_000_000  # of the models of these steps together, some 100 bytes each: every other scale is a model of its own
-POINT_DIGITS = 3  # of the mm of a mark's place
 STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
 
 
@@ -160,48 +159,35 @@ def with_model_anew(bench: Bench, model: Model | None) -> Bench:
 
 
 def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
-    """The same model so many times as large, its planes in proportion; its front and its zones were for the size before."""
-    planes = {
-        part: replace(part, offset_mm=None if part.offset_mm is None else part.offset_mm * factor) for part in bench.cuts or ()
-    }
-    cuts = None if bench.cuts is None else tuple(planes[part] for part in bench.cuts)
-    locked = frozenset(planes[part] for part in bench.locked)
-    return replace(with_model_anew(bench, model), profile=bench.profile, rotation=bench.rotation, cuts=cuts, locked=locked)
+    """The same model so many times as large, its planes and zones in proportion; its front was for the size before."""
+    bare = replace(with_model_anew(bench, model), profile=bench.profile, rotation=bench.rotation)
+    return _with_places_of(bare, bench, factor)
 
 
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
-    """The model turned otherwise; its cuts were for the way that it stood before, and so were boxes. Marked faces stay marked."""
+    """The model turned otherwise, with its zones; its cuts were for the way that it stood before."""
     rows = tuple(_vector(row) for row in rotation)
     if rows == bench.rotation:
         return bench
-    return replace(with_model_anew(bench, bench.model), rotation=rows, zones=_turned_zones(bench, rows))
+    turned = replace(with_model_anew(bench, bench.model), rotation=rows)
+    return replace(_with_places_of(turned, bench), cuts=None, locked=frozenset())
 
 
-def _turned_zones(bench: Bench, rows: tuple[Vector, ...]) -> Zones:
-    """The zones that are no boxes, on the model as it stands when it is turned so."""
-    if bench.model is None or bench.zones == NO_ZONES:
-        return NO_ZONES
-    (before, was_mm), (after, is_mm) = (_placing(bench.model.mesh, rotation) for rotation in (bench.rotation, rows))
-
-    def turned(zone: AnyZone) -> AnyZone:
-        if not isinstance(zone, Grown):
-            return zone
-        return replace(
-            zone, point_mm=_vector(np.round(after @ before.T @ (np.array(zone.point_mm) - was_mm) + is_mm, POINT_DIGITS))
-        )
-
-    kept = {kind: tuple(turned(zone) for zone in getattr(bench.zones, kind) if not isinstance(zone, Zone)) for kind in ZONE_KINDS}
-    return Zones(**kept)
+def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0) -> Bench:
+    """The planes and zones of a bench before on the same places of its model, which is so many times as large now."""
+    if before.model is None or bench.model is None:
+        return bench
+    move = _placing(bench, factor).after(_placing(before))
+    planes = {part: carried_part(part, move) for part in before.cuts or ()}
+    cuts = None if before.cuts is None else tuple(planes[part] for part in before.cuts)
+    locked = frozenset(planes[part] for part in before.locked)
+    return replace(bench, cuts=cuts, locked=locked, zones=carried_zones(before.zones, move))
 
 
-def _placing(mesh: Mesh, rows: tuple[Vector, ...]) -> tuple[Floats, Floats]:
-    """What turns a model as it is read, and what shifts it then onto the platform, mm."""
-    rotation = np.array(rows)
-    if rows == STANDING:
-        return rotation, np.zeros(3)
-    turned = mesh.vertices @ rotation.T
-    low, high = turned.min(axis=0), turned.max(axis=0)
-    return rotation, np.array([-0.5 * (low[0] + high[0]), -0.5 * (low[1] + high[1]), -low[2]])
+def _placing(bench: Bench, factor: float = 1.0) -> Placing:
+    """How the model on a bench stands on the platform."""
+    assert bench.model is not None
+    return Placing.of(bench.model.mesh, bench.turned, bench.profile.search.pedestal_mm, factor)
 
 
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
@@ -223,8 +209,10 @@ def with_zones(bench: Bench, zones: Zones) -> Bench:
 
 def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
     """Another profile. The front goes where a search may find another one now, its times and plastic where they may be others;
-    the planes may serve all the same."""
+    the planes may serve all the same. On another pedestal planes and zones stay with the model."""
     changed = replace(bench, given=given, profile=profile)
+    if profile.search.pedestal_mm != bench.profile.search.pedestal_mm:
+        changed = _with_places_of(changed, bench)
     effect = effect_of_change(bench.profile, profile)
     if effect == Effect.NONE or not bench.rows:
         return changed

@@ -9,7 +9,7 @@ import numpy as np
 
 from machine.app.workbench.bench.bench import Bench, History, Model, laid_down, with_parts, with_rotation
 from machine.app.workbench.bench.part_settings import check_part, with_part_setting, without_part_settings
-from machine.app.workbench.bench.planes import is_number, planned_part
+from machine.app.workbench.bench.planes import is_number, planned_part, rotation_rows
 from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
 from mdp.mesh import Floats
 from mdp.pose import about
@@ -18,7 +18,6 @@ from profiles.profile import Profile
 
 AXES = {"x": 0, "y": 1, "z": 2}
 TURN_DIGITS = 15  # so that quarter turns are exact
-ROTATION_ERROR = 1e-6
 
 
 def obey(history: History, asked: dict[str, Any]) -> History:
@@ -51,14 +50,7 @@ def _turn(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
 
 def _stand(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
     """Turn the model as the rows of `rotation` say."""
-    given = asked.get("rotation")
-    rows = given if isinstance(given, list) and len(given) == 3 else []
-    if not rows or not all(isinstance(row, list) and len(row) == 3 and all(map(is_number, row)) for row in rows):
-        raise PlanError("rotation: three rows of three numbers are expected")
-    matrix = np.array(rows, dtype=np.float64)
-    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=ROTATION_ERROR) or np.linalg.det(matrix) < 0.0:
-        raise PlanError("rotation: its rows are no rotation")
-    return with_rotation(bench, matrix.tolist())
+    return with_rotation(bench, rotation_rows(asked.get("rotation"), "rotation"))
 
 
 def _lay(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:

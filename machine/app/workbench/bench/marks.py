@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.bench.planes import MOST_MM, is_number
+from machine.app.workbench.bench.planes import MOST_MM, is_number, rotation_rows
 from mdp.grown import FARTHEST_MM, MOST_GROWN_DEG, Grown
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
@@ -24,8 +24,8 @@ WORDS = {"keep": "mark: no cut here", "no_seam": "mark: no seam here", "no_suppo
 def marked(bench: Bench, asked: dict[str, Any]) -> tuple[str, Zones]:
     """A word for what a command does to the zones, and the zones after it. Raises PlanError for what makes no sense.
 
-    mark: a box `min_mm`, `max_mm`, or the faces around `point_mm` as far as `angle_deg`, becomes a zone of `kind`, in place
-    of that of `number`, if one is given; unmark: the zone `number` of `kind` goes.
+    mark: a box `min_mm`, `max_mm`, along `axes` of its own where it leans, or the faces around `point_mm` as far as `angle_deg`,
+    becomes a zone of `kind`, in place of that of `number`, if one is given; unmark: the zone `number` of `kind` goes.
     """
     if bench.model is None:
         raise PlanError("there is no model on the workbench yet: choose a file first")
@@ -52,7 +52,7 @@ def _zone(asked: dict[str, Any], bench: Bench) -> AnyZone:
         low, high = _vector(asked, "min_mm"), _vector(asked, "max_mm")
         if not all(least < most for least, most in zip(low, high, strict=True)):
             raise PlanError(f"min_mm is {list(low)} and max_mm {list(high)}: each number of min_mm must be less")
-        return Zone(low, high)
+        return Zone(low, high, None if asked.get("axes") is None else rotation_rows(asked["axes"], "axes"))
     point, angle_deg = _vector(asked, "point_mm"), asked.get("angle_deg")
     if not is_number(angle_deg) or not 0.0 <= angle_deg <= MOST_GROWN_DEG:
         raise PlanError(f"angle_deg is {angle_deg!r}: 0 to {MOST_GROWN_DEG:g} is allowed")
@@ -73,9 +73,11 @@ def _vector(asked: dict[str, Any], key: str) -> Vector:
 
 
 def standing_mesh(bench: Bench) -> Mesh:
-    """The model as it stands on the platform, in the workpiece frame."""
+    """The model as it stands on the platform or a pedestal, in the workpiece frame."""
     assert bench.model is not None
-    return bench.model.mesh if bench.turned is None else standing_still(bench.model.mesh, bench.turned)
+    standing = bench.model.mesh if bench.turned is None else standing_still(bench.model.mesh, bench.turned)
+    lift_mm = bench.profile.search.pedestal_mm
+    return standing.transform(np.eye(3), (0.0, 0.0, lift_mm)) if lift_mm > 0.0 else standing
 
 
 def named_faces(bench: Bench) -> Mask:

@@ -3,16 +3,20 @@
 from math import hypot
 from typing import Any, TypeGuard
 
+import numpy as np
+
 from machine.app.workbench.bench.bench import Bench
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
+from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS
 
 Cuts = tuple[PlannedPart, ...]
 MOST_MM = 1e5
 MOST_NUMBER = 1e300  # an int of a page may be longer than any float
 LEAST_NORMAL, MOST_NORMAL = 1e-6, 1e6
+ROTATION_ERROR = 1e-6
 
 
 def edited(bench: Bench, asked: dict[str, Any]) -> tuple[str, Cuts]:
@@ -83,6 +87,18 @@ def _plane(asked: dict[str, Any]) -> PlannedPart:
         raise PlanError(f"offset_mm is {offset_mm!r}: a number from {-MOST_MM:g} to {MOST_MM:g} is allowed")
     x, y, z = (float(value) / length for value in normal)
     return PlannedPart((x, y, z), float(offset_mm))
+
+
+def rotation_rows(given: Any, key: str) -> tuple[Vector, Vector, Vector]:
+    """The rows of a rotation that a page has sent. Raises PlanError for what is none."""
+    rows = given if isinstance(given, list) and len(given) == 3 else []
+    if not rows or not all(isinstance(row, list) and len(row) == 3 and all(map(is_number, row)) for row in rows):
+        raise PlanError(f"{key}: three rows of three numbers are expected")
+    matrix = np.array(rows, dtype=np.float64)
+    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=ROTATION_ERROR) or np.linalg.det(matrix) < 0.0:
+        raise PlanError(f"{key}: its rows are no rotation")
+    x, y, z = ((float(row[0]), float(row[1]), float(row[2])) for row in matrix)
+    return x, y, z
 
 
 def _number(value: Any, key: str, least: int, most: int) -> int:

@@ -6,34 +6,52 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from machine.app.workbench.bench.bench import Bench, Model, with_rotation
+from machine.app.workbench.bench.bench import Bench, Model, with_profile, with_rotation, with_scaled_model
 from machine.app.workbench.bench.marks import named_faces, standing_mesh
 from mdp.grown import Grown
+from mdp.plans.plan_file import PlannedPart
 from mdp.pose import about, unit
 from mdp.zone import Zone, Zones
 from profiles.profile import load
 from tests.shapes import tee
 
 ARM = Grown((-12.0, 1.0, 30.0), 1.0)
+BOX = Zone((1.0, 2.0, 3.0), (9.0, 9.0, 9.0))
 BENCH = replace(
     Bench(load(), Model("tee.stl", Path("tee.stl"), tee())),
-    zones=Zones(keep=(Zone((0.0, 0.0, 0.0), (9.0, 9.0, 9.0)),), no_support=(ARM,)),
+    zones=Zones(keep=(BOX,), no_support=(ARM,)),
 )
 
 
 @pytest.mark.parametrize("angle_deg", [90.0, 180.0, 37.0])
-def test_marked_faces_stay_marked_however_often_the_model_is_turned_and_boxes_go(angle_deg: float) -> None:
+def test_marks_stay_where_they_are_on_the_model_however_often_it_is_turned(angle_deg: float) -> None:
     turned = with_rotation(BENCH, about(unit([1.0, 2.0, 0.5]), np.radians(angle_deg)).tolist())
     again = with_rotation(turned, about(unit([0.0, 1.0, -0.5]), np.radians(angle_deg)).tolist())
     for bench in (turned, again):
-        assert bench.zones.keep == ()
+        (box,), (zone,) = bench.zones.keep, bench.zones.no_support
+        assert isinstance(box, Zone)
+        assert (box.touches(standing_mesh(bench)) == BOX.touches(tee())).all()
         assert (named_faces(bench) == named_faces(BENCH)).all()
-        (zone,) = bench.zones.no_support
         assert isinstance(zone, Grown)
         assert zone.away_mm(standing_mesh(bench)) < 0.002
-    back = with_rotation(again, BENCH.rotation).zones.no_support[0]
-    assert isinstance(back, Grown)
-    assert back.point_mm == pytest.approx(ARM.point_mm, abs=0.003)
+    back = with_rotation(again, BENCH.rotation).zones
+    assert back.keep == (BOX,)
+    assert isinstance(back.no_support[0], Grown)
+    assert back.no_support[0].point_mm == pytest.approx(ARM.point_mm, abs=0.003)
+
+
+def test_a_box_on_a_model_that_is_laid_down_is_a_plain_one_again() -> None:
+    (box,) = with_rotation(BENCH, ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))).zones.keep
+    assert box == Zone((-17.0, 2.0, 11.0), (-11.0, 9.0, 19.0))  # the tee is 40 mm wide and tall
+
+
+def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> None:
+    cut = replace(BENCH, cuts=(PlannedPart((0.6, 0.0, 0.8), 20.0),))
+    assert cut.model is not None
+    larger = with_scaled_model(cut, replace(cut.model, mesh=tee().transform(2.0 * np.eye(3))), 2.0)
+    lifted = with_profile(larger, larger.given, load(settings=["search.pedestal_mm=10"]))
+    assert lifted.cuts == (PlannedPart((0.6, 0.0, 0.8), 48.0),)
+    assert lifted.zones == Zones(keep=(Zone((2.0, 4.0, 16.0), (18.0, 18.0, 28.0)),), no_support=(Grown((-24.0, 2.0, 70.0), 1.0),))
 
 
 def test_faces_of_several_kinds_are_told_of_each() -> None:

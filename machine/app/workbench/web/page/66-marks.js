@@ -9,6 +9,11 @@ const PAINT = 0.6; // faces are painted in darker colours, which no part has
 const AROUND_MM = 1; // of the corners that are clicked, so that a box reaches through the surface
 const THINNEST_MM = 0.2;
 
+/** A box's own axes: a model that was turned has taken them along. */
+const axesOf = ({ axes }) => axes || [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+/** A place that is told along a box's own axes, in the platform's frame. */
+const fromBox = (zone, place) => axesOf(zone).reduce((sum, axis, k) => add(sum, scaled(axis, place[k])), [0, 0, 0]);
+
 /** The colours of all corners, marked faces in those of their first kind. */
 function markedOver(bits, colours) {
   if (!bits) return colours;
@@ -52,7 +57,7 @@ function marksPanel(bench) {
   };
   const put = (zone) => {
     hand = zone;
-    bench.send({ do: "mark", kind: zone.kind, number: zone.number, min_mm: fine(zone.min_mm), max_mm: fine(zone.max_mm) });
+    bench.send({ do: "mark", kind: zone.kind, number: zone.number, min_mm: fine(zone.min_mm), max_mm: fine(zone.max_mm), axes: zone.axes || null });
   };
   /** A box with one side somewhere else, never thinner than it can be. */
   const withSide = (zone, { axis, end }, at) => {
@@ -60,7 +65,7 @@ function marksPanel(bench) {
     const value = end === "min_mm" ? Math.min(at, limit) : Math.max(at, limit);
     return { ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) };
   };
-  const sidePlace = (zone, { axis, end }) => [0, 1, 2].map((k) => (k === axis ? zone[end][k] : (zone.min_mm[k] + zone.max_mm[k]) / 2));
+  const sidePlace = (zone, { axis, end }) => fromBox(zone, [0, 1, 2].map((k) => (k === axis ? zone[end][k] : (zone.min_mm[k] + zone.max_mm[k]) / 2)));
   const choose = (zone) => {
     chosen = zone && { kind: zone.kind, number: zone.number };
     hand = null;
@@ -87,7 +92,7 @@ function marksPanel(bench) {
     gripOf(knob, {
       take: (event) => {
         const zone = box(), place = sidePlace(zone, side), from = bench.picture.placeOf(place);
-        const to = bench.picture.placeOf(place.map((x, k) => x + (k === side.axis ? 1 : 0)));
+        const to = bench.picture.placeOf(add(place, axesOf(zone)[side.axis]));
         if (!from || !to) return null;
         const way = [to[0] - from[0], to[1] - from[1]], pixels = Math.max(Math.hypot(...way), LEAST_PIXELS);
         return { zone, at: zone[side.end][side.axis], start: [event.clientX, event.clientY], way: way.map((x) => x / pixels), pixels };
@@ -161,10 +166,11 @@ function marksPanel(bench) {
 }
 
 /** What a box looks like: its sides let the light through; the edges of the chosen one are seen through all. */
-function boxDrawn({ kind, min_mm: least, max_mm: most }, chosen) {
+function boxDrawn(zone, chosen) {
+  const { kind, min_mm: least, max_mm: most } = zone, seen = (corners) => corners.map((place) => fromBox(zone, place));
   const ink = [...MARK_KINDS[kind].colour, 255];
-  const sides = trianglesOf([{ corners: boxCorners(least, most), colour: [...MARK_KINDS[kind].colour, 200] }]);
-  return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: boxEdges(least, most), colour: ink }]), over: chosen }];
+  const sides = trianglesOf([{ corners: seen(boxCorners(least, most)), colour: [...MARK_KINDS[kind].colour, 200] }]);
+  return [{ solid: sides, strength: chosen ? 0.4 : 0.22 }, { lines: trianglesOf([{ corners: seen(boxEdges(least, most)), colour: ink }]), over: chosen }];
 }
 
 function markRow(zone, chosen, choose, bench) {
@@ -173,7 +179,7 @@ function markRow(zone, chosen, choose, bench) {
   mark.addEventListener("change", choose);
   const remove = made("button", { type: "button", text: "×", title: `Remove ${name}`, ariaLabel: `remove ${name}` });
   remove.addEventListener("click", () => bench.send({ do: "unmark", kind: zone.kind, number: zone.number }));
-  const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm`
+  const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
     : zone.point_mm ? `faces up to ${zone.angle_deg}°` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
   const row = made("tr", {}, made("td", {}, made("label", {}, mark, swatch(`rgb(${colour})`), word)), made("td", { text: where }), made("td", {}, remove));
   row.addEventListener("click", (event) => { if (!["INPUT", "LABEL", "BUTTON"].includes(event.target.tagName)) choose(); });

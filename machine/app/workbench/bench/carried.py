@@ -1,0 +1,82 @@
+"""Carried: planes and zones that belong to a model go along when it is turned, scaled or lifted."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mdp.grown import Grown
+from mdp.mesh import Floats, Mesh
+from mdp.plans.plan_file import ZONE_KINDS, PlannedPart
+from mdp.zone import AnyZone, Zone, Zones
+from profiles.frozen import Vector
+
+POINT_DIGITS, BOX_DIGITS = 3, 9  # of the mm of a mark's place and of a box's sides
+LEVEL = 1e-9  # of a cosine: a box turned by quarters is along the platform's axes again
+
+
+@dataclass(frozen=True, eq=False)
+class Placing:
+    """How a model as it is read is put on the platform: turned (3, 3), scaled, shifted by mm."""
+
+    turn: Floats
+    factor: float
+    shift_mm: Floats
+
+    @classmethod
+    def of(cls, mesh: Mesh, turned: Floats | None, lift_mm: float, factor: float = 1.0) -> "Placing":
+        """A mesh set on the platform, or on a pedestal. turned: None, it stands as it is read; factor: by how much it was scaled
+        when it was read."""
+        lift = np.array([0.0, 0.0, lift_mm])
+        if turned is None:
+            return cls(np.eye(3), factor, lift)
+        places = mesh.vertices @ turned.T
+        low, high = places.min(axis=0), places.max(axis=0)
+        return cls(turned, factor, lift - (0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]))
+
+    def after(self, before: "Placing") -> "Placing":
+        """What brings places of the same model from where they were before to where they are now."""
+        turn, factor = self.turn @ before.turn.T, self.factor / before.factor
+        return Placing(turn, factor, self.shift_mm - factor * turn @ before.shift_mm)
+
+
+def carried_zones(zones: Zones, move: Placing) -> Zones:
+    """The zones on the same places of the model."""
+    kinds = {kind: tuple(_carried(zone, move) for zone in getattr(zones, kind)) for kind in ZONE_KINDS}
+    return Zones(**kinds)
+
+
+def carried_part(part: PlannedPart, move: Placing) -> PlannedPart:
+    """A part whose plane, where it is given whole, goes through the same places of the model."""
+    if part.normal is None or part.offset_mm is None:
+        return part
+    normal = move.turn @ np.array(part.normal)
+    return replace(part, normal=_vector(normal), offset_mm=move.factor * part.offset_mm + float(normal @ move.shift_mm))
+
+
+def _carried(zone: AnyZone, move: Placing) -> AnyZone:
+    if isinstance(zone, Zone):
+        return _carried_box(zone, move)
+    if isinstance(zone, Grown):
+        place = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
+        return replace(zone, point_mm=_vector(np.round(place, POINT_DIGITS)))
+    return zone
+
+
+def _carried_box(box: Zone, move: Placing) -> Zone:
+    axes = box.along(move.turn).T  # the box's own, which go along, as rows
+    low, high = (move.factor * np.array(corner) + axes @ move.shift_mm for corner in (box.min_mm, box.max_mm))
+    level = np.round(axes)
+    if np.abs(axes - level).max() > LEVEL:
+        x, y, z = (_vector(row) for row in axes)
+        return Zone(_side(low), _side(high), (x, y, z))
+    low, high = level.T @ low, level.T @ high
+    return Zone(_side(np.minimum(low, high)), _side(np.maximum(low, high)))
+
+
+def _side(values: Floats) -> Vector:
+    return _vector(np.round(values, BOX_DIGITS) + 0.0)
+
+
+def _vector(values: Floats) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
