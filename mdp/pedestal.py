@@ -24,13 +24,21 @@ def on_pedestal(mesh: Mesh, height_mm: float) -> Mesh:
     if height_mm <= 0.0:
         return mesh
     solid = solid_of(mesh, apart=mesh.colours is not None)
-    sunk_mm = min(PLATFORM_TOLERANCE_MM, 0.5 * float(mesh.bounds_mm[1, 2]))
-    pedestal = m3.Manifold.extrude(_outline(solid, sunk_mm), height_mm + sunk_mm)
-    joined = solid.translate((0.0, 0.0, height_mm)) + pedestal
+    joined = solid.translate((0.0, 0.0, height_mm)) + _prism(solid, height_mm)
     if joined.status() != m3.Error.NoError:
         raise MeshError(f"the model cannot be put on a pedestal of {height_mm:g} mm ({joined.status().name})")
     lifted = mesh_of(joined)
     return lifted if mesh.colours is None else Mesh(lifted.vertices, lifted.faces, _colours(mesh.colours, solid, joined))
+
+
+def pedestal_under(mesh: Mesh, height_mm: float) -> Mesh:
+    """The pedestal alone, with the 0.3 mm that the model is sunk into it."""
+    return mesh_of(_prism(solid_of(mesh), height_mm))
+
+
+def _prism(solid: m3.Manifold, height_mm: float) -> m3.Manifold:
+    sunk_mm = min(PLATFORM_TOLERANCE_MM, 0.5 * float(solid.bounding_box()[5]))
+    return m3.Manifold.extrude(_outline(solid, sunk_mm), height_mm + sunk_mm)
 
 
 def _colours(colours: Ints, solid: m3.Manifold, joined: m3.Manifold) -> Ints:

@@ -173,6 +173,10 @@ def test_a_finding_leads_to_its_place_and_errors_are_saved_only_on_demand(browse
 def test_copies_and_pauses_are_typed_told_and_taken_away(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "box.stl", stl(box(8, 8, 4)))
     browser.click("#tab-slices")
+    scene = "box: [[-4, -4, 0], [4, 4, 4]], shifts: [], wallsAlone: true, plane: null, extras: {}"
+    walls = "[[-30, -20, 0], [30, 20, 4]].map((place) => ({ places: new Float32Array(place) }))"
+    framed = browser.value(f"bounds(placesDrawn({{ {scene}, walls: {walls} }}).flat())")
+    assert framed == [[-30, -20, 0], [30, 20, 4]]  # what is drawn are the copies, not the model
     type_in(browser, "copies", 0)
     browser.wait("$('problem').textContent === '--copies is 0: 1 to 1000 is allowed' && $('copies').value === '1'")
     type_in(browser, "stop-kind", "filament_change")

@@ -8,7 +8,10 @@ from typing import Any
 import pytest
 
 from machine.app.cli import main
+from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.save import stl
+from mdp.search.search import cut_by_plan
+from profiles.profile import load
 from tests.machine.browser import Browser
 from tests.machine.workbench import QUICK, Running
 from tests.mdp.search.test_neck import hourglass
@@ -153,6 +156,30 @@ def test_the_head_is_drawn_where_it_would_touch_and_goes_with_the_plane(browser:
         assert browser.value("document.documentElement.dataset.obstacle") == "head"
         page.do("move", part=2, normal=[0, 0, 1], offset_mm=11.0)
         browser.wait("document.documentElement.dataset.obstacle === ''")
+
+
+def test_a_model_on_a_pedestal_is_drawn_on_it_and_has_the_figures_of_the_search(
+    browser: Browser, bench: Running, folder: Path
+) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        page.do("set", key="search.pedestal_mm", value="12")
+        assert page.until(lambda state: state["pedestal"])["overhang_mm2"] == pytest.approx(300.0)
+        added(page, 50.0)
+        trial = page.until(lambda state: state["trial"] and state["trial"]["cuts"])["trial"]
+        given = [each.removeprefix("--set=") for each in QUICK if each != "--set"]
+        plan = PlanFile("", parts=(PlannedPart((0.0, 0.0, 1.0), 50.0),))
+        row = cut_by_plan(tee(), "tee", load(settings=[*given, "search.pedestal_mm=12"]), plan).chosen
+        assert row is not None
+        assert (trial["support_area_mm2"], trial["seam_mm"]) == pytest.approx((row.support_area_mm2, row.seam_mm))
+        looked_at(browser, bench, "tee.stl")
+        browser.wait(f"document.documentElement.dataset.pedestal === '{page.state['pedestal']}'")
+        browser.click("#planes input[value='2']")
+        browser.wait("!$('handles').hidden")  # the plane meets the model, which is 40 mm tall, 38 mm above the pedestal
+        page.do("set", key="search.pedestal_mm", value=None)
+        assert page.until(lambda state: not state["pedestal_mm"])["cuts"][0]["offset_mm"] == 38.0
+        browser.wait("document.documentElement.dataset.pedestal === '' && !$('handles').hidden")
+        assert browser.complaints == []
 
 
 def box_mm(zone: dict[str, Any]) -> list[float]:

@@ -29,6 +29,17 @@ def test_figures_are_those_of_the_cuts_themselves() -> None:
     assert tried.support_area_mm2 == pytest.approx(cut.chosen.support_area_mm2)
 
 
+def test_figures_on_a_pedestal_are_those_of_the_cuts_too() -> None:
+    lifted = PROFILE.model_copy(update={"search": PROFILE.search.model_copy(update={"pedestal_mm": 12.0})})
+    low = Plane(np.array([0.0, 0.0, 1.0]), 16.0)  # 4 mm above the pedestal
+    tried = Trials(tee(), lifted).attempt((low,))
+    cut = cut_by_plan(tee(), "tee", lifted, PlanFile("", parts=(PlannedPart((0.0, 0.0, 1.0), 16.0),)))
+    assert [part.volume_mm3 for part in tried.parts if part] == pytest.approx([100.0 * 26.0 + 400.0 * 10.0])
+    assert tried.seam_mm == pytest.approx(cut.seam_mm) == pytest.approx(40.0)
+    assert cut.chosen is not None
+    assert tried.support_area_mm2 == pytest.approx(cut.chosen.support_area_mm2) == pytest.approx(300.0)
+
+
 def test_cuts_that_meet_each_other_have_their_own_figures_too() -> None:
     leaning = [((1.0, 0.0, 0.5), 12.0), ((-1.0, 0.0, 0.8), 16.0), ((0.0, 0.3, 1.0), 24.0)]
     planes = [Plane(np.array(normal) / np.linalg.norm(normal), offset_mm) for normal, offset_mm in leaning]

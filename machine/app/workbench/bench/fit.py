@@ -6,10 +6,12 @@ from functools import lru_cache
 import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.marks import standing_mesh
 from machine.planning.limits import check_parts
-from mdp.search.orientation import standing_still
+from mdp.mesh import Mesh
 from mdp.search.parts import one_piece
 from profiles.errors import MoveError
+from profiles.profile import Profile
 
 
 @dataclass(frozen=True)
@@ -26,11 +28,15 @@ def standing(bench: Bench) -> Standing | None:
     """The model as it stands on the platform; None without one."""
     if bench.model is None:
         return None
-    turned = bench.turned
-    mesh = bench.model.mesh if turned is None else standing_still(bench.model.mesh, turned)
+    mesh = standing_mesh(bench)
     x, y, z = (float(side) for side in np.ptp(mesh.bounds_mm, axis=0))
+    return Standing((x, y, z), out_of_reach(mesh, bench.profile))
+
+
+def out_of_reach(mesh: Mesh, profile: Profile) -> str:
+    """What the machine does not reach of a mesh on the platform; "" where it reaches all."""
     try:
-        check_parts((one_piece(mesh, bench.profile.machine),), bench.profile)
+        check_parts((one_piece(mesh, profile.machine),), profile)
     except MoveError as error:
-        return Standing((x, y, z), str(error))
-    return Standing((x, y, z), "")
+        return str(error)
+    return ""

@@ -28,6 +28,7 @@ from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.marking import Marking
 from machine.app.workbench.session.open_bench import OpenBench
+from machine.app.workbench.session.pedestal import Pedestal
 from machine.app.workbench.session.pieces import Pieces
 from machine.app.workbench.session.pricing import Pricing
 from machine.app.workbench.session.readiness import Readiness
@@ -51,7 +52,7 @@ class Session(Desk):
         self.trying = Trying(self, self.readiness)
         self.finding = Finding(self)
         self.comparing = Comparing(self, self.slicing)
-        self.pieces, self._pricing = Pieces(self), Pricing(self)
+        self.pieces, self._pricing, self.pedestal = Pieces(self), Pricing(self), Pedestal(self)
         self._settling = asyncio.Lock()
         self.marking = Marking(self, self.trying)
         self._ranking: asyncio.Task[None] | None = None

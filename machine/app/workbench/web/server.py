@@ -44,6 +44,7 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int) -> 
         route("", _page(port)),
         route("model/{key}", _model),
         route("marks/{key}", _marks),
+        route("pedestal/{key}", _pedestal),
         route("file", _take_file(files), "POST"),
         route("plan.toml", plan),
         route("profile/{kind}.toml", profile),
@@ -104,7 +105,14 @@ async def _model(session: Session, request: Request) -> Response:
     model = session.bench.model
     if model is None or model.key != request.path_params["key"]:
         return Response("this model is not on the workbench any more\n", 404)
-    return Response(await asyncio.to_thread(triangles, model), media_type="application/octet-stream")
+    return Response(await asyncio.to_thread(triangles, model.mesh), media_type="application/octet-stream")
+
+
+async def _pedestal(session: Session, request: Request) -> Response:
+    pedestal = session.pedestal.now
+    if pedestal is None or session.pedestal.key != request.path_params["key"]:
+        return Response(status_code=204)
+    return Response(triangles(pedestal.body), media_type="application/octet-stream")
 
 
 async def _pieces(session: Session, request: Request) -> Response:

@@ -16,6 +16,7 @@ from machine.app.workbench.web.slices import slices_told
 from machine.view.comparison import front_record
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
+from mdp.mesh import Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS
@@ -27,6 +28,7 @@ MOST_FACES = 2_000_000  # that a page draws
 def snapshot(session: Session) -> dict[str, Any]:
     """Everything but the triangles; small enough to be told whole whenever anything changes."""
     bench, history, search = session.bench, session.history, session.finding.search
+    lifted = session.pedestal.now
     resting = session.resting[1] if session.resting is not None and session.resting[0] is bench.model else ()
     best = None if search is None else search.searched.best
     planes = [] if best is None else [_plane(plane) for plane in reversed(best.planes)]
@@ -40,10 +42,14 @@ def snapshot(session: Session) -> dict[str, Any]:
         "model": None if bench.model is None else _model(bench.model),
         "rotation": bench.rotation,
         "scale": bench.profile.process.scale,
-        "standing": None if (stands := standing(bench)) is None else asdict(stands),
+        "standing": None
+        if (stands := standing(bench)) is None
+        else asdict(stands) | ({"problem": lifted.problem} if lifted else {}),
+        "pedestal_mm": bench.profile.search.pedestal_mm,
+        "pedestal": session.pedestal.key,
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATFORM_TOLERANCE_MM,
-        "overhang_mm2": _overhang_mm2(bench),
+        "overhang_mm2": lifted.overhang_mm2 if lifted else _overhang_mm2(bench),
         "resting": [
             {"rotation": each.rotation, "words": each.words, "overhang_mm2": each.overhang_mm2, "height_mm": each.height_mm}
             for each in resting
@@ -95,9 +101,9 @@ def _zones(bench: Bench) -> list[dict[str, Any]]:
     ]
 
 
-def triangles(model: Model) -> bytes:
+def triangles(mesh: Mesh) -> bytes:
     """Two counts as uint32, then vertices (n, 3) float32 in mm and faces (m, 3) uint32, all little-endian."""
-    vertices, faces = model.mesh.vertices.astype("<f4"), model.mesh.faces.astype("<u4")
+    vertices, faces = mesh.vertices.astype("<f4"), mesh.faces.astype("<u4")
     return np.array([len(vertices), len(faces)], "<u4").tobytes() + vertices.tobytes() + faces.tobytes()
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan, price_row
 from machine.app.workbench.work.models import rank_resting, read_model
+from machine.app.workbench.work.pedestal import stand_on_pedestal
 from machine.app.workbench.work.pieces import draw_pieces
 from machine.app.workbench.work.slices import compare_bench, slice_bench
 from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, try_cuts
@@ -20,6 +21,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         price_row,
         make_files,
         draw_pieces,
+        stand_on_pedestal,
         slice_bench,
         compare_bench,
         load_kernels,

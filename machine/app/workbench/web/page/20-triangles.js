@@ -66,8 +66,8 @@ function placeMet({ corners, normals }, face, from, along) {
   return add(from, scaled(along, dot(normal, sub(corner, from)) / dot(normal, along)));
 }
 
-/** The matrix that turns the model by rows of a rotation, sets it on z = 0 and centres it. */
-function standingBy(rows, vertices) {
+/** The matrix that turns the model by rows of a rotation, sets it on a pedestal so high, 0 the platform, and centres it. */
+function standingBy(rows, vertices, lift) {
   const [a, b, c] = rows, least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < vertices.length; i += 3)
     for (let k = 0; k < 3; k++) {
@@ -75,7 +75,7 @@ function standingBy(rows, vertices) {
       if (x < least[k]) least[k] = x;
       if (x > most[k]) most[k] = x;
     }
-  const shift = vertices.length ? [-(least[0] + most[0]) / 2, -(least[1] + most[1]) / 2, -least[2]] : [0, 0, 0];
+  const shift = vertices.length ? [-(least[0] + most[0]) / 2, -(least[1] + most[1]) / 2, lift - least[2]] : [0, 0, 0];
   const matrix = [a[0], b[0], c[0], 0, a[1], b[1], c[1], 0, a[2], b[2], c[2], 0, ...shift, 1];
   return { matrix, box: [add(least, shift), add(most, shift)] };
 }

@@ -1,17 +1,29 @@
 // Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
 
-const MODEL_COLOUR = [176, 184, 194];
+const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156];
 
 const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
 
 const PLANE_COLOUR = [30, 120, 190];
+
+const cornersOf = (box) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => box[(i >> axis) & 1][axis]));
+
+/** Corners of boxes about all that is drawn but the table: the model or its parts, or the walls of all copies, planes, marks and what is in the way. */
+function placesDrawn({ box, pieces, shifts, walls, wallsAlone, plane, pedestal, extras }) {
+  const bands = (pieces ? null : walls) || [], whole = pieces ? pieces.parts.map((part, k) => part.box.map((place) => add(place, shifts[k]))) : bands.map(({ places }) => bounds(places));
+  if (!pieces && !(wallsAlone && bands.length)) whole.push(box, pedestal ? bounds(pedestal.vertices) : []);
+  const rim = plane ? beside(plane.normal).flatMap((way) => [1, -1].map((sign) => add(plane.centre_mm, scaled(way, sign * plane.radius_mm)))) : [];
+  const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((each) => each && each.places.length)
+    .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
+  return [...whole.filter((each) => each.length).flatMap(cornersOf), ...rim, ...around];
+}
 
 /** {show(model), stand, red(marks), cut(planes, colours), plane, fit, ask, ray, placeOf}: drawn when the browser next draws;
  * drawn() is called after that. */
 function pictureOf(canvas, camera, drawn) {
   const gl = canvas.getContext("webgl2", { alpha: true, antialias: false, depth: false });
   if (!gl) return null;
-  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, machine: null, dark: false, marks: null, extras: {} };
+  const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, pedestal: null, machine: null, dark: false, marks: null, extras: {} };
   let card = null, asked = false, count = 0;
   const build = () => {
     gl.enable(gl.DEPTH_TEST);
@@ -21,6 +33,7 @@ function pictureOf(canvas, camera, drawn) {
     table();
     solid();
     plane();
+    pedestal();
     pieces();
     Object.keys(scene.extras).forEach(extra);
     walls();
@@ -50,7 +63,9 @@ function pictureOf(canvas, camera, drawn) {
     if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts);
     else if (card.solid) {
       (card.walls || []).forEach((each) => each.draw(flat));
-      if (!(scene.wallsAlone && card.walls?.length)) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts, ghost: card.walls ? FAINT : 0 });
+      const ghost = card.walls ? FAINT : 0, alone = scene.wallsAlone && card.walls?.length;
+      if (!alone) card.solid.draw(seenAs(scene.matrix), { cuts: scene.cuts, ghost });
+      if (!alone && card.pedestal) card.pedestal.draw(flat, { ghost });
     }
     if (card.table && below) paintPlate(flat, { strength: 0.18 });
     if (card.plane) {
@@ -67,6 +82,10 @@ function pictureOf(canvas, camera, drawn) {
     if (!scene.plane) return void (card.plane = null);
     const { discs, rims } = planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR);
     card.plane = { disc: solidOf(gl, discs), rim: linesOf(gl, rims) };
+  };
+  const pedestal = () => {
+    const colours = scene.pedestal && new Uint8Array(12 * scene.pedestal.count);
+    card.pedestal = colours && solidOf(gl, { places: scene.pedestal.corners, colours: paintedRed(scene.pedestal.count, null, PEDESTAL_COLOUR, colours) });
   };
   const pieces = () => { card.pieces = scene.pieces && piecesOn(gl, scene.pieces, scene.chosen); };
   const extra = (name) => {
@@ -135,6 +154,13 @@ function pictureOf(canvas, camera, drawn) {
     },
     /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
     plane: (held) => { scene.plane = held; plane(); ask(); },
+    /** The triangles of what the model stands on, in the platform's frame, or none. */
+    pedestal: (body) => {
+      if (body === scene.pedestal) return;
+      scene.pedestal = body;
+      pedestal();
+      ask();
+    },
     /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
     placeOf: (place) => {
       const [x, y, , w] = scene.toClip ? projected(scene.toClip, place) : [0, 0, 0, 0];
@@ -144,10 +170,9 @@ function pictureOf(canvas, camera, drawn) {
     carried: (place) => carried(scene.matrix, place),
     box: () => scene.box,
     matrix: () => scene.matrix,
-    fit: () => {
-      const boxes = scene.pieces ? scene.pieces.parts.map(({ box }, k) => box.map((place) => add(place, scene.shifts[k]))) : [scene.box];
-      const corners = boxes.flatMap((box) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((axis) => box[(i >> axis) & 1][axis])));
-      camera.fit(corners, canvas.clientWidth / Math.max(canvas.clientHeight, 1));
+    /** All that is drawn brought into view, and other places. */
+    fit: (others = []) => {
+      camera.fit([...placesDrawn(scene), ...others], canvas.clientWidth / Math.max(canvas.clientHeight, 1));
       ask();
     },
     /** From where and along what an event on the canvas looks, in the frame of the platform. */

@@ -47,10 +47,13 @@ function ringsOf(bench) {
       stepped: () => done(true),
     });
   });
+  const shown = () => Boolean(on() && bench.tab === "model" && bench.triangles && bench.state.model && !bench.laying);
+  /** Places of the rings, as far as they are shown. */
+  bench.ringPlaces = () => (shown() ? Object.values(RING_AXES).flatMap((axis) => ringPoints(axis, ringNow())) : []);
   /** Where the rings are seen now; called whenever the picture is drawn. */
   bench.placeRings = () => {
-    svg.toggleAttribute("hidden", !(on() && bench.tab === "model" && bench.triangles && bench.state.model && !bench.laying));
-    if (svg.hasAttribute("hidden")) return;
+    svg.toggleAttribute("hidden", !shown());
+    if (!shown()) return;
     const ring = turning ? turning.ring : ringNow(), eye = bench.picture.eye();
     groups.forEach((group) => {
       const points = ringPoints(RING_AXES[group.dataset.ring], ring), middle = length(sub(eye, ring.centre));

@@ -82,8 +82,8 @@ function marksPanel(bench) {
   for (const what of ["faces", "box"]) $(`mark-${what}`).addEventListener("click", () => bench.mark(bench.marking === what ? "" : what));
   $("mark-kind").addEventListener("change", () => bench.mark(bench.marking || ""));
   $("mark-middle").addEventListener("click", () => {
-    const [x, y, z] = bench.state.standing.size_mm;
-    addBox([-x / 6, -y / 6, z / 3], [x / 6, y / 6, (2 * z) / 3]);
+    const [x, y, z] = bench.state.standing.size_mm, low = bench.state.pedestal_mm;
+    addBox([-x / 6, -y / 6, low + z / 3], [x / 6, y / 6, low + (2 * z) / 3]);
   });
   const knobs = BOX_SIDES.map((side) => {
     const knob = made("button", { type: "button", text: "xyz"[side.axis] + (side.end === "min_mm" ? "−" : "+"), ariaLabel: `${side.name} of the box: drag, or arrow keys` });

@@ -19,7 +19,7 @@ function main() {
     if (picture) picture.ask(); // the rings give way
   };
   let stood = ""; // as it is in the picture
-  const standingOf = (rotation) => JSON.stringify([rotation, bench.state.limit, bench.state.platform_mm, bench.key]);
+  const standingOf = (rotation) => JSON.stringify([rotation, bench.state.limit, bench.state.platform_mm, bench.state.pedestal_mm, bench.key]);
   /** Where the model stands now, and red what overhangs: the figure is the server's as soon as nothing moves. */
   const stand = (rotation, live) => {
     if (!bench.triangles) return;
@@ -29,7 +29,8 @@ function main() {
     stood = standingOf(rotation);
     if (live) $("overhang").textContent = mm2(found.area);
     if (picture) {
-      picture.stand(standingBy(rotation, bench.triangles.vertices));
+      picture.stand(standingBy(rotation, bench.triangles.vertices, bench.state.pedestal_mm));
+      showPedestal(bench, stood !== standingOf(bench.state.rotation));
       bench.look();
     }
     root.dataset.liveMs = (performance.now() - began).toFixed(1);
@@ -65,6 +66,7 @@ function main() {
     else if (standingOf(state.rotation) !== stood) stand(state.rotation, false);
     else bench.look();
     bench.showPlane();
+    fetchPedestal(bench);
     if (bench.state.version === state.version) root.dataset.version = state.version;
   };
   const fetchModel = async (key) => {
@@ -85,12 +87,29 @@ function main() {
   $("redo").addEventListener("click", () => bench.send({ do: "redo" }));
   if (picture) {
     handle($("canvas"), camera, { changed: picture.ask, pressed: (event) => press(event, bench, picture) });
-    viewsOf(camera, picture);
+    viewsOf(bench, camera, picture);
   }
   ringsOf(bench);
   keysOf(bench, camera, picture);
   root.dataset.state = picture ? "ready" : "failed";
   if (!picture) document.body.classList.add("no-picture");
+}
+
+/** What the model stands on, while it stands still: turned, it would have another one. */
+function showPedestal(bench, turning = false) {
+  const { body, of } = bench.pedestal || {};
+  if (bench.picture) bench.picture.pedestal(!turning && body && of === bench.state.pedestal ? body : null);
+}
+
+async function fetchPedestal(bench) {
+  const key = bench.state.pedestal;
+  if ((bench.pedestal?.of || "") === key || !bench.picture) return;
+  bench.pedestal = { of: key, body: null };
+  const answer = key ? await fetch(`pedestal/${key}`) : null;
+  if (bench.pedestal.of !== key) return;
+  bench.pedestal.body = answer && answer.status === 200 ? trianglesFrom(await answer.arrayBuffer()) : null;
+  showPedestal(bench);
+  document.documentElement.dataset.pedestal = key;
 }
 
 /** A click on the model: the face is laid down or the plane takes its place when that was asked for; else a part is chosen. */
@@ -148,13 +167,13 @@ function themeOf(changed) {
   return dark;
 }
 
-function viewsOf(camera, picture) {
+function viewsOf(bench, camera, picture) {
   const views = { ...VIEWS, corner: [CORNERS[0], 24] };
   document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => {
     [camera.yaw, camera.pitch] = views[button.dataset.view].map((angle) => angle * RAD);
     picture.ask();
   }));
-  $("fit").addEventListener("click", picture.fit);
+  $("fit").addEventListener("click", () => picture.fit(bench.ringPlaces()));
 }
 
 /** Everything that hands do to the view, from the keyboard; undo and redo. */
