@@ -14,7 +14,7 @@ from machine.view.encoding import pack
 from machine.view.parts import page_colours
 from machine.view.program import Program
 from machine.view.report import parts_report, print_report, with_alternatives
-from machine.view.thinning import shown_rows
+from machine.view.text import line_patterns
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats
 from profiles.profile import Profile
@@ -45,17 +45,19 @@ def of_print(
 ) -> bytes:
     """A whole print. known: the machine is the one it was made for; live: it follows a running print."""
     run, by_layer = program.run, layers.layers_of(program.run.program, profile.process.layer_height_mm)
-    ends_s, shown = paths.end_times_s(run), shown_rows(run.program)
+    ends_s, shown = paths.end_times_s(run), paths.shown_rows(run.program)
     rows = paths.columns(run, profile, by_layer, ends_s, shown)
     height = np.zeros(len(ends_s))
     height[shown] = rows["height"].values
     count = len(ends_s)
+    told, text = line_patterns(program.lines, rows)
     source = _source(program)
     header = _head(name, source, profile, known) | {
         "live": live,
         "time_s": run.time_s,
         "filament_mm": float(np.max(run.program.filament_mm, initial=0.0)),
         "lines": len(program.lines),
+        "text": told,
         "types": list(run.program.types),
         "layers_by": by_layer.by,
         "thinned": {"rows": count, "kept": len(shown)} if len(shown) < count else None,
@@ -65,7 +67,7 @@ def of_print(
         "report": print_report(program, profile, by_layer, ends_s, alternatives, known, source != "foreign"),
     }
     table = layers.columns(run.program, by_layer, ends_s, height, shown)
-    return pack(header, rows | table | scene.surfaces(program.decomposition, profile))
+    return pack(header, rows | text | table | scene.surfaces(program.decomposition, profile))
 
 
 def compared(header: dict[str, Any], alternatives: Sequence[Alternative]) -> dict[str, Any]:
@@ -88,6 +90,7 @@ def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, An
             "material": material.name, "diameter_mm": material.diameter_mm, "density_g_cm3": material.density_g_cm3,
         },
         "lines": 0,
+        "text": None,
         "types": [""],
         "layers_by": "comments",
         "thinned": None,

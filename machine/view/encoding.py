@@ -64,24 +64,24 @@ def _press(header: Mapping[str, Any], arrays: Iterable[bytes | memoryview]) -> b
     return b"".join([*pressed, press.flush()])
 
 
-def _store_column(column: Column) -> NDArray[np.int64]:
-    """Whole multiples of the scale."""
-    whole: NDArray[np.int64] = np.rint(np.asarray(column.values, dtype=np.float64) / column.scale).astype(np.int64)
-    return whole
+def whole(column: Column) -> NDArray[np.int64]:
+    """The values as whole multiples of the scale, as they are stored."""
+    multiples: NDArray[np.int64] = np.rint(np.asarray(column.values, dtype=np.float64) / column.scale).astype(np.int64)
+    return multiples
 
 
 def _plain(column: Column) -> bytes:
     if column.type == "f32":
         return np.asarray(column.values, dtype=TYPES["f32"]).tobytes()
     limits = np.iinfo(TYPES[column.type])
-    return np.clip(_store_column(column), limits.min, limits.max).astype(TYPES[column.type]).tobytes()
+    return np.clip(whole(column), limits.min, limits.max).astype(TYPES[column.type]).tobytes()
 
 
 def _delta(column: Column) -> bytes:
     """Every column's zigzag differences, as far as they fit into 32 bits, as four planes of bytes, the lowest first."""
-    whole = _store_column(column)
+    multiples = whole(column)
     blocks = []
-    for each in whole.reshape(len(whole), prod(whole.shape[1:])).T:
+    for each in multiples.reshape(len(multiples), prod(multiples.shape[1:])).T:
         steps = np.diff(each, prepend=0)
         words = np.minimum((steps << 1) ^ (steps >> 63), MOST).astype("<u4")
         blocks.append(np.ascontiguousarray(words.view(np.uint8).reshape(-1, 4).T).tobytes())

@@ -1,4 +1,5 @@
-"""Paths: the rows of a dry run as the page's columns, one row a straight move."""
+"""Paths: the rows of a dry run as the page's columns, one row a straight move; of a very long program so many that a browser
+stays quick."""
 
 from dataclasses import replace
 
@@ -19,6 +20,9 @@ from profiles.profile import Profile
 WIPE, PRIME = 4, 5  # kinds of the page beside those of MoveKind
 REACH = 1e6  # mm and deg: what lies beyond is no place of a machine
 STILL = 1e-9
+MOST_ROWS = 1_500_000
+FINEST_MM = 0.01
+Mask = NDArray[np.bool_]
 NONE: dict[str, Column] = {
     "end": Column(np.zeros((0, 5)), "i32", 0.001, delta=True),
     "jump_row": Column(np.zeros(0), "i32"),
@@ -118,3 +122,50 @@ def _fan(program: ParsedProgram, machine: Machine) -> Floats:
         elif event.code == "M107":
             shares.append(replace(event, value=0.0))
     return _following(replace(program, events=tuple(shares)), ("M106", "M107"))
+
+
+def shown_rows(program: ParsedProgram, most: int = MOST_ROWS) -> NDArray[np.int64]:
+    """(k,) places of the rows to show: all when there are no more than `most`.
+
+    Points inside strokes go, in all of the print alike, those first that lie nearest to the line between their neighbours. What
+    begins or ends a stroke, a turn, a layer or a part stays, and so does every row of another kind, however many there are.
+    """
+    shown = np.arange(len(program.line))
+    if len(shown) <= most:
+        return shown
+    inner = _inside_strokes(program)
+    tolerance_mm = FINEST_MM
+    while len(shown) > most and inner.any():
+        goes = _alternate(inner & (_off_the_chord_mm(program.end[shown, :3]) <= tolerance_mm))
+        shown, inner = shown[~goes], inner[~goes]
+        if goes.sum() * 20 < len(goes):
+            tolerance_mm *= 2.0
+    return shown
+
+
+def _inside_strokes(program: ParsedProgram) -> Mask:
+    """(n,) rows whose end is no end of a stroke: the next row goes on with the same bead."""
+    extruding = program.kind == MoveKind.EXTRUDE
+    goes_on = np.zeros(len(extruding), dtype=np.bool_)
+    goes_on[:-1] = extruding[1:] & extruding[:-1] & np.all(program.start[1:] == program.end[:-1], axis=1)
+    for column in (program.part, program.layer, program.type, program.width_mm, program.height_mm, program.feed):
+        goes_on[:-1] &= column[1:] == column[:-1]
+    return goes_on
+
+
+def _off_the_chord_mm(points: Floats) -> Floats:
+    """(n,) how far each point lies from the line through its neighbours; 0 at both ends."""
+    off = np.zeros(len(points))
+    chord, arm = points[2:] - points[:-2], points[1:-1] - points[:-2]
+    length2 = np.maximum((chord * chord).sum(axis=1), 1e-12)
+    along = np.clip((arm * chord).sum(axis=1) / length2, 0.0, 1.0)
+    off[1:-1] = np.linalg.norm(arm - along[:, None] * chord, axis=1)
+    return off
+
+
+def _alternate(marked: Mask) -> Mask:
+    """Every second of marks that follow each other, so that no two neighbours are left."""
+    places = np.arange(len(marked))
+    begun = np.maximum.accumulate(np.where(marked & ~np.append(False, marked[:-1]), places, -1))
+    alternate: Mask = marked & ((places - begun) % 2 == 0)
+    return alternate

@@ -30,6 +30,30 @@ def unpacked(block: bytes) -> tuple[dict[str, Any], Arrays]:
     return header, {name: _array(raw[12 + length :], told) for name, told in header["arrays"].items()}
 
 
+def text_of(header: dict[str, Any], found: Arrays) -> list[str]:
+    """The lines of the G-code."""
+    told, rows, end = header["text"], found["line"], np.rint(found["end"] * 1000).astype(int)
+    pushed = np.rint(found["filament"] * 1e5).astype(int)
+
+    def line(number: int, pattern: str) -> str:
+        last, before = int((rows <= number).sum()) - 1, int((rows < number).sum()) - 1
+        zero = ([0] + [zero for begin, zero in told["zeros"] if begin <= number])[-1]
+
+        def number_of(match: re.Match[str]) -> str:
+            letter, hole = match[1], ord(match[2])
+            if letter in "XYZ":
+                value, digits = end[last, "XYZ".index(letter)], 3
+            else:
+                value, digits = pushed[last] - (zero if hole > 3 else pushed[before] if before >= 0 else 0), 5
+            full = f"{value / 10**digits:.{digits}f}"
+            short = full.rstrip("0").rstrip(".")
+            return letter + (full, short, short.replace("0.", ".", 1))[(hole - 1) % 3]
+
+        return re.sub("([A-Z])([\x01-\x06])", number_of, pattern)
+
+    return [line(k + 1, told["patterns"][int(place)]) for k, place in enumerate(found["text"])]
+
+
 def _array(raw: bytes, told: dict[str, Any]) -> NDArray[Any]:
     assert told["offset"] % 8 == 0
     rows, *rest = told["shape"]

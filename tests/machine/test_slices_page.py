@@ -1,17 +1,23 @@
 """Slices looked at in a real browser, in the page of the print and in the workbench: layers, times, text, findings, saving."""
 
+import base64
 import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from machine.dryrun.dryrun import dry_run
+from machine.view import text as text_of_page
+from machine.view.contents import of_print
 from machine.view.page import print_page
+from machine.view.program import Program
 from mdp.save import stl
 from tests.machine import hand
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.test_browser import opened, program, put, row, text
 from tests.machine.test_workbench_page import open_model, saved
+from tests.machine.view.test_text import FOREIGN
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import box, tee
 
@@ -88,7 +94,6 @@ def test_a_click_beside_the_layers_goes_to_that_layer_whose_time_is_told(page: B
 def test_the_text_follows_the_slider_and_the_slider_the_text(page: Browser) -> None:
     lines = hand.text("generic_ac")
     page.click("#tab-code")
-    choose_text(page, lines)
     put(page, "position", 40)
     line = int(text(page, "readout-line"))
     assert marked(page) == f"{line}{lines[line - 1]}"
@@ -104,12 +109,29 @@ def test_the_text_follows_the_slider_and_the_slider_the_text(page: Browser) -> N
     assert row(page) == 40
 
 
-def test_the_text_of_another_print_is_not_shown(page: Browser) -> None:
-    lines = hand.text("generic_ac")
+@pytest.mark.parametrize("lines", [hand.text("generic_ac"), tuple(FOREIGN.split("\n"))], ids=["ours", "foreign"])
+def test_the_page_reads_the_text_out_of_its_rows_letter_for_letter(page: Browser, lines: tuple[str, ...]) -> None:
+    profile = program()[0]
+    block = base64.b64encode(of_print("text", Program(lines, dry_run(lines, profile), None), profile)).decode()
+    read = "linesOfRows({ header: block.header, rows: rowsOf(block), patternOf: block.array('text')[0] })"
+    all_of = f"((text) => Array.from({{ length: text.count }}, (_, k) => text.line(k + 1)))({read})"
+    assert tuple(page.value(f"openBlock('{block}').then((block) => {all_of})")) == lines
+
+
+def test_a_text_that_is_not_in_the_page_comes_from_the_prints_file_and_from_no_other(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(text_of_page, "MOST_LETTERS", 0)
+    profile, printed = program()
+    page, lines = opened(browser, tmp_path, print_page("post and arm", printed, profile)), printed.lines
     page.click("#tab-code")
     choose_text(page, lines[:-2])
     assert f"print.gcode has {len(lines) - 2} lines; the file of this print has {len(lines)}" in text(page, "code-told")
     assert not page.value("document.body.classList.contains('has-text')")
+    choose_text(page, lines)
+    put(page, "position", 40)
+    line = int(text(page, "readout-line"))
+    assert marked(page) == f"{line}{lines[line - 1]}"
 
 
 FRAME = "document.getElementById('print-page').contentWindow"

@@ -12,8 +12,8 @@ from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import say
 from machine.view.findings import relevant_findings
 from machine.view.page import DATA, print_page
+from machine.view.paths import MOST_ROWS
 from machine.view.program import Program
-from machine.view.thinning import MOST_ROWS
 from profiles.errors import GcodeError, OutputError, ProfileError
 
 

@@ -7,7 +7,7 @@ async function printOf(text) {
   for (const layer of rows.layers) layerTime.fill(layer.time, layer.first, layer.last + 1);
   const box = boxOf(rows, path, surfaces, header), area = (Math.PI * header.filament.diameter_mm ** 2) / 4;
   const worked = { box, span: length(sub(box[1], box[0])), flow: flowOf(rows, path, area), marks: once(() => marksOf(rows)) };
-  return { header, chain, rows, path, surfaces, layerTime, ...worked };
+  return { header, chain, rows, path, surfaces, layerTime, patternOf: block.array("text")[0], ...worked };
 }
 
 /** What is to be seen of the work: plastic and surfaces, else the room over the table. */

@@ -11,10 +11,10 @@ async function linesOfFile(file) {
   return { count: starts.length - 1, line: (k) => decoder.decode(bytes.subarray(starts[k - 1], starts[k] - 1)).trimEnd() };
 }
 
-/** {take(file), seen()}: take shows a file's text, seen() is called when the tab is opened. */
+/** {take(file), go(line), needed()}: the text that is in the page, else that of a file. */
 function textOf(print, scene, bells, stop) {
   const { rows, header } = print, pane = $("code-lines"), room = $("code-room");
-  let text = null, asked = { row: -1, line: 0 }, queued = false;
+  let text = linesOfRows(print), asked = { row: -1, line: 0 }, queued = false;
   const now = () => (asked.row === scene.row ? asked.line : rows.line[scene.row] || 0);
   const fit = () => Math.max(Math.floor(pane.clientHeight / LINE_PX), 1);
   const high = () => Math.min(text.count * LINE_PX, MOST_PX);
@@ -54,12 +54,14 @@ function textOf(print, scene, bells, stop) {
     asked = { row, line: chosen };
     scene.go(row);
   };
+  const has = () => document.body.classList.add("has-text");
+  /** Shows a file's text. */
   const take = async (file) => {
     const taken = await linesOfFile(file), other = taken.count !== header.lines;
     $("code-told").textContent = !other ? "" : `${file.name} has ${taken.count.toLocaleString("en")} lines; the file of this print has ${header.lines.toLocaleString("en")}: it is another one.`;
     if (other) return;
     text = taken;
-    document.body.classList.add("has-text");
+    has();
     follow();
   };
   const steps = { ArrowUp: () => -1, ArrowDown: () => 1, PageUp: () => -fit(), PageDown: fit, Home: () => -Infinity, End: () => Infinity };
@@ -77,7 +79,8 @@ function textOf(print, scene, bells, stop) {
   $("tab-code").addEventListener("click", follow);
   bells.on("row", follow);
   new ResizeObserver(follow).observe(pane);
-  return { take, go };
+  if (text) has();
+  return { take, go, needed: () => !text };
 }
 
 function textLine(number, { line }, marked) {

@@ -17,7 +17,7 @@ function outsideOf({ scene, findings, code, chooseTheme }) {
     if (source === parent && origin === location.origin) heard[data?.tiltprint]?.(data);
   });
   let asked = false;
-  $("tab-code").addEventListener("click", () => { if (!asked) tell("text"); asked = true; });
+  $("tab-code").addEventListener("click", () => { if (!asked && code.needed()) tell("text"); asked = true; });
   addEventListener("keydown", (event) => { if (event.key === "Escape" && !$("help").open) tell("leave"); });
   tell("ready");
 }

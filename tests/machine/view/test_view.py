@@ -18,13 +18,13 @@ from machine.reader.parsed import MoveKind
 from machine.view.contents import of_parts, of_print
 from machine.view.encoding import Column, pack
 from machine.view.layers import layers_of
+from machine.view.paths import shown_rows
 from machine.view.program import Program
-from machine.view.thinning import shown_rows
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from profiles.profile import Profile, load
 from tests.machine import hand
-from tests.machine.pages import Arrays, on_the_work, unpacked
+from tests.machine.pages import Arrays, on_the_work, text_of, unpacked
 
 PLAIN = load(settings=["machine.uncalibrated=[]"])
 WHOLE = st.integers(-(2**30), 2**30)
@@ -274,7 +274,7 @@ def test_thinning_keeps_the_ends_of_strokes_and_every_other_move() -> None:
 
 
 def test_what_is_kept_stays_exact(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("machine.view.contents.shown_rows", lambda program: shown_rows(program, most=500))
+    monkeypatch.setattr("machine.view.paths.shown_rows", lambda program: shown_rows(program, most=500))
     program = parse_gcode(WAVE.split("\n"), PLAIN.machine)
     header, found = read(WAVE)
     rows = np.searchsorted(program.line, found["line"])
@@ -307,3 +307,4 @@ def test_whatever_the_order_of_lines_rows_layers_and_parts_fit_together(lines: l
     assert (found["layer_first"][1:] >= ends[:-1]).all()
     assert all(ends <= rows)
     assert all(-1 <= finding["row"] < max(rows, 1) for finding in header["findings"])
+    assert text_of(header, found) == "\n".join(lines).split("\n")

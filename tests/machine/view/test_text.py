@@ -1,0 +1,42 @@
+"""The text of the G-code in the page: letter for letter, read back by docs/view.md."""
+
+import pytest
+
+from machine.view import text
+from tests.machine.pages import text_of
+from tests.machine.view.test_view import example, read, shown
+
+FOREIGN = """; a slicer that counts its filament from the last G92 on
+M82
+G28
+G92 E0
+G1 Z.3 F600
+G1 X10.5 Y-0.25 E.4 F1200 ; E0.40000
+G1 X100 Y0.125 E12.5
+G2 X90 Y10 I-5 J5 E13.01
+G92 E1.5
+G1 X0.1 E1.75
+G1 E-.5
+G1 X20 Y20 F6000
+M83
+G1 X25 E0.25
+"""
+
+
+@pytest.mark.parametrize("machine", ["generic_ac", "trident_5axis", "linuxcnc_xyzac"])
+def test_the_text_of_our_own_programs_is_in_the_page(machine: str) -> None:
+    assert tuple(text_of(*shown(machine))) == example(machine)[1].lines
+
+
+def test_the_text_of_another_slicer_is_in_the_page_and_its_numbers_are_not() -> None:
+    header, found = read(FOREIGN)
+    assert text_of(header, found) == FOREIGN.split("\n")
+    assert header["text"]["patterns"][6:8] == ["G1 X\x02 Y\x01 E\x05", "G2 X\x02 Y\x02 I-5 J5 E\x05"]
+    assert header["text"]["zeros"] == [[9, 1151000]]
+
+
+def test_a_text_whose_lines_are_all_unlike_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(text, "MOST_LETTERS", 40)
+    header, found = read(FOREIGN)
+    assert (header["text"], header["lines"], len(found["text"])) == (None, 15, 0)
+    assert read("G28\n;\x01 a letter that stands for a number\nG1 X1 F600\n")[0]["text"] is None
