@@ -1,7 +1,8 @@
 """Frozen: what all validated values of a profile share."""
 
 from collections.abc import Iterable
-from typing import Any
+from types import NoneType
+from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
@@ -17,11 +18,22 @@ class Frozen(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
+    def _left_out(cls, value: Any, info: ValidationInfo) -> Any:
+        """An empty text leaves out what may be left out, also where a profile that is inherited has a value."""
+        return None if value == "" and may_be_left_out(cls.model_fields[str(info.field_name)].annotation) else value
+
+    @field_validator("*", mode="before")
+    @classmethod
     def _no_truth_as_number(cls, value: Any, info: ValidationInfo) -> Any:
         """Refuses true and false where pydantic would read 1 and 0."""
         if isinstance(value, bool) and cls.model_fields[str(info.field_name)].annotation is not bool:
             raise PydanticCustomError("truth_as_number", "true and false are no numbers")
         return value
+
+
+def may_be_left_out(annotation: Any) -> bool:
+    """Whether a key of this type may have no value."""
+    return NoneType in get_args(annotation)
 
 
 def refuse(problems: Iterable[str]) -> None:

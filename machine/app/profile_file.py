@@ -48,7 +48,7 @@ def _read(kind: str, text: str) -> dict[str, Frozen | None]:
 
 
 def _differing(shared: Mapping[str, Any], whole: Mapping[str, Any]) -> Tables:
-    """What of tables is not in others."""
+    """What of tables is not in others; an empty text for what is left out."""
     out: Tables = {}
     for key, value in whole.items():
         other = shared.get(key)
@@ -57,7 +57,7 @@ def _differing(shared: Mapping[str, Any], whole: Mapping[str, Any]) -> Tables:
             if below:
                 out[key] = below
         elif value != other:
-            out[key] = value
+            out[key] = "" if value is None else value
     return out
 
 

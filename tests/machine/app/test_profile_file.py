@@ -19,6 +19,7 @@ BLOCK = 'machine.gcode.start="G28\\nM117 \'ready\' \\"{nozzle_c}\\" \\\\\\n"'  #
         ("generic_ac", ['machine.sources={"machine.x" = "measured"}', "machine.uncalibrated=[]"]),  # rows that were inherited go
         ("generic_ac", ["machine.shape=fixed"]),
         ("three_axis", ["machine.sources={}"]),
+        ("three_axis", ["machine.table.radius_mm=90", "machine.table.size_mm="]),  # which has a value there
         ("tpu", ["material.pressure_advance=0.1"]),
         ("fine", ["process.walls=5", "search.beam_width=9", "process.rotate_deg=[0, 90, 0]"]),
     ],

@@ -8,7 +8,7 @@ from machine.app.requests import Given
 from machine.app.workbench.bench.part_settings import own_values
 from machine.gcode.blocks import block_problems, placeholder_names
 from profiles.errors import ProfileError
-from profiles.frozen import Frozen
+from profiles.frozen import Frozen, may_be_left_out
 from profiles.machine import GCODE
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
 from profiles.places import KINDS, OF_KIND, known
@@ -27,6 +27,14 @@ def with_setting(given: Given, key: str, value: str | None) -> Given:
     """The same with another value for a key, spelled in one line; None: as the profile has it."""
     others = tuple(setting for setting in given.settings if setting.partition("=")[0].strip() != key)
     return replace(given, settings=others if value is None else (*others, f"{key}={_in_one_line(value)}"))
+
+
+def with_typed(given: Given, key: str, value: str | None, before: Profile) -> Given:
+    """The same for what a person types: nothing, where the profile has nothing, is no change. Raises ProfileError."""
+    changed, unchanged = (with_setting(given, key, each) for each in (value, None))
+    if value == "" and profile_as_given(changed, before) == profile_as_given(unchanged, before):
+        return unchanged
+    return changed
 
 
 def _in_one_line(value: str) -> str:
@@ -112,6 +120,7 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
             "group": group or own,
             "about": about or _sentence(matter),
             "meaning": field.description or "",
+            "optional": may_be_left_out(field.annotation),
             **_kind(schema[name], values[name]),
         }
 

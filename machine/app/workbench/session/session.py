@@ -22,7 +22,7 @@ from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.marks import MARKS
 from machine.app.workbench.bench.planes import EDITS, edited, instead_of
-from machine.app.workbench.bench.settings import check_block, profile_as_given, with_name, with_setting
+from machine.app.workbench.bench.settings import check_block, profile_as_given, with_name, with_typed
 from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding
@@ -122,7 +122,7 @@ class Session(Desk):
                 value = asked.get("value")
                 key = str(asked.get("key"))
                 text = None if value is None else str(value)
-                self.take_given(f"set {key}", lambda given: with_setting(given, key, text), key)
+                self.take_given(f"set {key}", lambda given: with_typed(given, key, text, self.bench.profile), key)
             case "reset":
                 self.take_given("take all changes back", lambda given: replace(given, settings=()))
             case "profile":

@@ -6,7 +6,15 @@ from typing import Any
 import pytest
 
 from machine.app.requests import Given
-from machine.app.workbench.bench.settings import USUAL, check_block, profile_as_given, settings_list, with_name, with_setting
+from machine.app.workbench.bench.settings import (
+    USUAL,
+    check_block,
+    profile_as_given,
+    settings_list,
+    with_name,
+    with_setting,
+    with_typed,
+)
 from profiles.errors import ProfileError
 from profiles.profile import SECTIONS, load
 from profiles.wording import keys
@@ -66,6 +74,15 @@ def test_a_block_names_its_placeholders_and_one_that_cannot_be_filled_in_is_refu
 def test_a_list_is_refused_in_the_profile_s_own_sentence(typed: str, sentence: str) -> None:
     with pytest.raises(ProfileError, match=sentence):
         profile_as_given(with_setting(USUAL, "machine.head.silhouette_mm", typed), load())
+
+
+def test_nothing_leaves_out_what_may_be_left_out_and_is_no_change_where_the_profile_has_nothing() -> None:
+    wound = with_setting(USUAL, "machine.turn.budget_deg", "720")
+    assert (told("machine.turn.budget_deg")["optional"], told("machine.clearance_mm")["optional"]) == (True, False)
+    assert profile_as_given(with_setting(wound, "machine.turn.budget_deg", ""), load()).machine.turn.budget_deg is None
+    assert with_typed(wound, "machine.turn.budget_deg", "", load()) == USUAL
+    with pytest.raises(ProfileError, match=r'machine\.clearance_mm is "": it must be a number from 0 to 100'):
+        profile_as_given(with_setting(USUAL, "machine.clearance_mm", ""), load())
 
 
 def test_what_is_set_is_marked_and_goes_back() -> None:

@@ -53,7 +53,8 @@ function settingsPanel(bench) {
       if (refused) wrongs.set(pending.key, { text: state.problem, typed: pending.typed });
       else if (fresh && pending) wrongs.delete(pending.key);
       if (refused || fresh) pending = null;
-      if (refused && bench.tab === "settings") $("problem").hidden = true; // it stands beside its field
+      const beside = [...wrongs.values()].some(({ text }) => text === state.problem);
+      if (beside && bench.tab === "settings") $("problem").hidden = true; // it stands beside its field, whatever is told next
       if (fresh) fetchAll();
       else if (refused) list();
     },
@@ -93,7 +94,7 @@ function groupTitle({ group, about }) {
 
 /** again(): called when a person leaves what was typed in, for what has been told meanwhile. */
 function settingRow(setting, wrong, send, again) {
-  const { key, meaning, kind, least, most, value, changed, placeholders = [] } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
+  const { key, meaning, kind, least, most, value, changed, placeholders = [], optional } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
   const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
   const told = made("small", { text: meaning + range, id: `meaning-${key}` }), refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
   input.setAttribute("aria-describedby", told.id);
@@ -103,7 +104,7 @@ function settingRow(setting, wrong, send, again) {
   const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
   const row = settingBox(setting, [made("label", {}, made("span", { text: key }), input, back), refused, told, named]);
   input.addEventListener("input", () => { row.dataset.typing = kind; });
-  input.addEventListener("change", () => send(key, typedIn(input, kind), typedAs(input, kind)));
+  input.addEventListener("change", () => send(key, typedIn(input, kind, optional), typedAs(input, kind)));
   for (const done of ["change", "blur"]) {
     input.addEventListener(done, () => {
       if (!row.dataset.typing) return;
@@ -132,12 +133,13 @@ function inputOf({ kind, choices, least, most }, value) {
 
 const typedAs = (input, kind) => (kind === "boolean" ? input.checked : input.value);
 
-/** What a person has typed or chosen, as --set takes it; null, for nothing where text cannot be empty: as the profile has it. */
-function typedIn(input, kind) {
+/** What a person has typed or chosen, as --set takes it; null, for nothing where there must be something: as the profile has it. */
+function typedIn(input, kind, optional) {
   if (kind === "boolean") return `${input.checked}`;
   const text = kind === "block" ? input.value : input.value.trim();
   if (kind === "block" || kind === "text") return JSON.stringify(text).replace(/\x7f/g, "\\u007f"); // which TOML reads, too
-  return text && kind === "numbers" ? `[${text}]` : text || null;
+  if (!text) return optional ? "" : null;
+  return kind === "numbers" ? `[${text}]` : text;
 }
 
 /** A text into the clipboard, or marked for the person to take where the browser allows no more. */
