@@ -126,7 +126,7 @@ function inputOf({ kind, choices, least, most }, value) {
   if (kind === "choice") return made("select", {}, ...choices.map((text) => made("option", { text, value: text, selected: String(text) === String(value) })));
   if (kind === "boolean") return made("input", { type: "checkbox", checked: value });
   if (kind === "numbers" || kind === "text") return made("input", { type: "text", value: typed });
-  if (kind === "block" || kind === "rows") return made("textarea", { value: typed, rows: Math.min(Math.max(String(typed).split("\n").length, 2), 14), spellcheck: false, wrap: "off" });
+  if (kind === "block" || kind === "rows") return made("textarea", { value: typed, rows: Math.min(Math.max(String(typed).split("\n").length, 2), 14), spellcheck: false, wrap: kind === "block" ? "off" : "soft" });
   const limits = { ...(least === null ? {} : { min: least }), ...(most === null ? {} : { max: most }) };
   return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: typed, ...limits });
 }
