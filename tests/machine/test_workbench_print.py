@@ -137,6 +137,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
             browser.key("e")
             browser.wait("$('stop-words').textContent === \"THE STOP IS NOT CONFIRMED: use the machine's own switch.\"")
             assert browser.value("$('stop-words').checkVisibility()")
+            browser.wait("$('bar-told').textContent.includes('nothing heard of it for ')")
         finally:
             sliced.process.send_signal(signal.SIGCONT)
         browser.wait(f"{PRINTING} === 'over' && $('emergency').hidden")

@@ -4,6 +4,7 @@
 const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
 const STOP_KEY = "e";
 const ANSWER_MS = 3000; // within which the workbench answers, and a printer has confirmed an emergency stop
+const SILENT_MS = 5000; // a print that goes on is told five times a second
 const SAME_PRESS_MS = 1000; // who presses twice in a fright means the print of the first time
 const FEW = 8;
 let shownPhase = "";
@@ -31,11 +32,17 @@ function printPanel(bench) {
     showWhich(state.prints, chosen);
     showPrint(print(), print()?.holder === OWN_PAGE);
     follow.told();
+    hear(state.prints);
     showBar(running, print());
     stops.told();
     document.documentElement.dataset.printing = print() ? print().progress?.state && print().phase === "printing" ? print().progress.state : print().phase : "";
   }
 
+  setInterval(() => {
+    if (!state.prints.some((each) => silence(each))) return;
+    showPrint(print(), print()?.holder === OWN_PAGE);
+    showBar(state.prints.filter((each) => each.phase !== "over"), print());
+  }, 1000);
   $("ask-ports").addEventListener("click", () => send({ do: "ports", baud: Number($("baud").value) }));
   $("ports").addEventListener("change", () => { $("sim-speed-line").hidden = port() !== "sim"; $("baud-line").hidden = port() === "sim"; unforce(); });
   $("port-typed").addEventListener("focus", () => { $("port-other").checked = true; $("ports").dispatchEvent(new Event("change")); });
@@ -67,6 +74,21 @@ function printPanel(bench) {
   addEventListener("keydown", byKey, true);
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
   return { told: ({ sliced, model }) => { $("check").disabled = !model; $("unsliced").hidden = Boolean(sliced && !sliced.stale); follow.told(); } };
+}
+
+const HEARD = new Map(); // by the number of a print: what was heard of it last, and when
+
+function hear(prints) {
+  for (const { number, phase, progress } of prints) {
+    const word = `${phase} ${progress?.elapsed_s}`;
+    if (HEARD.get(number)?.word !== word) HEARD.set(number, { word, at: performance.now() });
+  }
+}
+
+/** That a print which goes on has not been heard of for a while: it may hang, or what lies between; "" where it has. */
+function silence({ number, phase, progress }) {
+  const past = performance.now() - (HEARD.get(number)?.at ?? Infinity);
+  return phase !== "over" && progress && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";
 }
 
 /** Where a letter that is pressed is written, so that it is no command. */
@@ -212,7 +234,7 @@ function showPrint(print, commands) {
   if (!print) return void ($("printer-field").open = true);
   const { phase, progress, figures, end } = print, over = phase === "over", runs = phase === "printing" || phase === "leaving";
   $("run-title").textContent = `${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`;
-  $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(progress) : { checking: "checking …", ready: "ready to print", printing: "starting", leaving: "ending" }[phase];
+  $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(print) : { checking: "checking …", ready: "ready to print", printing: "starting", leaving: "ending" }[phase];
   $("run-state").className = over ? end : "";
   const news = `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`; // a reader need not hear every per cent
   if ($("run-news").textContent !== news) $("run-news").textContent = news;
@@ -241,9 +263,10 @@ function showPrint(print, commands) {
   if (over && print.forcible && commands) $("force-line").hidden = false;
 }
 
-const stateTold = ({ state, share, left_s: left, message }) => [
-  share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message,
-].filter(Boolean).join(" · ");
+function stateTold(print) {
+  const { state, share, left_s: left, message } = print.progress;
+  return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message].filter(Boolean).join(" · ");
+}
 
 const figuresTold = ({ lines, time_s: time, filament_mm: filament, errors }) =>
   `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m of filament${errors ? `, ${errors} errors in the dry run` : ""}`;
@@ -275,6 +298,6 @@ function showBar(running, looked) {
   $("bar-told").hidden = $("emergency").hidden = !shown;
   $("print-bar").hidden = !shown && $("stop-told").hidden;
   if (!shown) return;
-  $("bar-told").textContent = `${shown.name} at ${shown.port}: ${shown.progress ? stateTold(shown.progress) : shown.phase}`;
+  $("bar-told").textContent = `${shown.name} at ${shown.port}: ${shown.progress ? stateTold(shown) : shown.phase}`;
   $("emergency").dataset.print = shown.number;
 }
