@@ -78,10 +78,14 @@ def test_a_search_reads_only_what_takes_the_front_away_and_prices_nothing_that_l
     ("setting", "effect"),
     [
         ("material.nozzle_c=205", Effect.NONE),
+        ("machine.name=mine", Effect.NONE),
+        ('machine.gcode.end="M84"', Effect.NONE),
+        ('machine.sources={"machine.x" = "measured"}', Effect.NONE),
         ("process.infill_density=0.5", Effect.PRICES),
         ("machine.x.speed_mm_s=50", Effect.PRICES),
         ("process.self_supporting_angle_deg=30", Effect.FRONT),
         ("machine.tilt.limits_deg=[-20, 20]", Effect.FRONT),
+        ("machine.head.boxes=[]", Effect.FRONT),
         ("search.seam_mm=0", Effect.FRONT),
     ],
 )
