@@ -9,8 +9,9 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import partial
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
 from machine.network.server import ACTIVE, JobStatus, Phase, PrintServer
@@ -53,6 +54,14 @@ def follow_print(
     return _Follower(server, file, size, on_status, control, left).run()
 
 
+def stop_at_once(server: PrintServer) -> None:
+    """The emergency stop. Raises ServerError where it is not confirmed."""
+    try:
+        server.emergency_stop()
+    except ServerError as error:
+        raise ServerError(f"emergency stop: {server.name} did not confirm it: cut the power ({error})") from None
+
+
 class _Follower:
     def __init__(
         self, server: PrintServer, file: str, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]
@@ -74,8 +83,11 @@ class _Follower:
         self._failed: Exception | None = None  # of the start, or of a thread
         self._shown: tuple[JobStatus | None, str] = (None, "")
         self._shown_s = 0.0
+        self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
 
     def run(self) -> End:
+        if self._take_requests():  # a stop that was asked for before the start: nothing is started any more
+            return End.STOPPED
         works = (self._poll, self._carry_out)
         threads = [threading.Thread(target=self._guard, args=(work,), name="print server", daemon=True) for work in works]
         for thread in threads:
@@ -149,7 +161,7 @@ class _Follower:
         while not self._over.is_set():
             before = self._heard
             try:
-                self._heard = _Heard(self._server.status())
+                self._heard = _Heard(self._with_percents(self._server.status()))
             except ServerError as error:
                 self._heard = _Heard(before.status, error, before.answered_s)
             self._over.wait(POLL_S)
@@ -158,26 +170,32 @@ class _Follower:
         """Hand on what a person has asked for; True after an emergency stop."""
         while (request := self._control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
-                self._stop()
+                stop_at_once(self._server)
                 return True
             if order := self._order(request):
                 self._orders.append(order)
         return False
 
-    def _stop(self) -> None:
-        try:
-            self._server.emergency_stop()
-        except ServerError as error:
-            raise ServerError(f"emergency stop: {self._server.name} did not confirm it: cut the power ({error})") from None
-
     def _order(self, request: PendingCommand) -> Callable[[], None] | None:
         server, value = self._server, request.value
         if request.command in (Command.FEED, Command.FLOW):
-            feed = request.command is Command.FEED
-            self._message = percent_refusal(value, FEED_PERCENT if feed else FLOW_PERCENT) or ""
-            return None if self._message else (lambda: server.command(f"{'M220' if feed else 'M221'} S{value:g}"))
+            limits = FEED_PERCENT if request.command is Command.FEED else FLOW_PERCENT
+            self._message = percent_refusal(value, limits) or ""
+            return None if self._message else partial(self._set_percent, request.command, value)
         orders = {Command.PAUSE: server.pause, Command.RESUME: server.resume, Command.CANCEL: server.cancel}
         return orders.get(request.command)
+
+    def _set_percent(self, command: Command, value: float) -> None:
+        self._server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
+        self._percents[command] = value
+
+    def _with_percents(self, status: JobStatus) -> JobStatus:
+        feed, flow = status.feed_percent, status.flow_percent
+        return replace(
+            status,
+            feed_percent=self._percents.get(Command.FEED) if feed is None else feed,
+            flow_percent=self._percents.get(Command.FLOW) if flow is None else flow,
+        )
 
     def _carry_out(self) -> None:
         """The start, then orders one after the other; what a server refuses of these is told, and following goes on.

@@ -10,10 +10,14 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
+from machine.link.journal import read_journal
+from machine.network.credentials import VARIABLE
+from machine.simulator.faults import Fault
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.save import stl
 from profiles.profile import load
 from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.network.stand_ins import KEY, stand_in
 from tests.machine.prints import commands_sent, kinds_of_fields, prints_line
 from tests.machine.workbench import QUICK, Running, workbench
 from tests.shapes import box
@@ -29,7 +33,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def sliced(folder: Path) -> Iterator[Running]:
+def key() -> Iterator[None]:
+    """The key of the print server's stand-in, where the workbench and the command line look for it."""
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv(VARIABLE, KEY)
+        yield
+
+
+@pytest.fixture(scope="module")
+def sliced(folder: Path, key: None) -> Iterator[Running]:
     """A workbench on which a little box is sliced in one piece."""
     with workbench(*QUICK) as running:
         with running.line() as page, prints_line(running, "first") as printing:
@@ -52,7 +64,7 @@ def sliced(folder: Path) -> Iterator[Running]:
 
 @pytest.mark.parametrize(("port", "sentence"), [
     ("", "no printer is chosen: choose a port, or sim for the simulated one"),
-    ("octoprint:host", "octoprint is a print server, which takes whole files: tiltprint print --port octoprint:HOST"),
+    ("octoprint:me:secret@host", "server address: names and passwords do not belong into it: keys have a file of their own"),
 ])  # fmt: skip
 def test_what_is_no_port_of_a_printer_is_told(sliced: Running, port: str, sentence: str) -> None:
     with prints_line(sliced, "first") as page:
@@ -145,6 +157,105 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert browser.value("$('run-state').textContent").startswith("emergency stop: the printer has halted")
         assert "M112" in commands_sent(Path(other.until(lambda one: one["phase"] == "over")["log"]))
         assert browser.complaints == []
+
+
+def type_port(browser: Browser, port: str) -> None:
+    browser.click("#port-other")
+    browser.value(f"$('port-typed').value = {json.dumps(port)}")
+    browser.value("$('port-typed').dispatchEvent(new Event('input', { bubbles: true }))")
+
+
+def test_a_page_prints_on_a_print_server_finds_the_print_again_and_leaves_it_printing(sliced: Running, browser: Browser) -> None:
+    with stand_in("octoprint") as (job, address), prints_line(sliced, "other") as other:
+        job.steps = 200
+        browser.open(sliced.address)
+        browser.click("#tab-printing")
+        browser.wait("document.documentElement.dataset.line === 'open' && $('unsliced').hidden")
+        type_port(browser, address)
+        assert browser.value("$('baud-line').hidden && $('sim-speed-line').hidden && !$('port-hint').hidden")
+        browser.click("#check")
+        browser.wait("!$('run-ask').hidden")
+        checks = browser.value("$('run-checks').textContent")
+        assert f"OctoPrint 1.11.8 answers at {address}, is free" in checks
+        assert "there is no journal to resume from after a power cut" in checks
+        assert job.files == {}
+        browser.click("#begin")
+        browser.wait(f"{PRINTING} === 'printing' && $('run-told').textContent.includes('line')")
+        assert job.files["box.stl.gcode"] == sliced.ask("print.gcode")[1]
+        browser.value("{ $('feed').value = 150; $('feed').dispatchEvent(new Event('change')); }")
+        browser.click("#pause")
+        browser.wait(f"{PRINTING} === 'paused' && $('pause').textContent === 'Resume'")
+        assert (job.state, job.commands) == ("paused", ["M220 S150"])
+        browser.wait("$('feed-told').textContent === '150 %'")  # although this server does not tell it
+        other.until(lambda one: one.get("port") == address and one["phase"] == "printing")
+        other.command("resume")
+        assert other.refused() == "another page commands this print: take the command over first"
+
+        browser.open(sliced.address)
+        browser.wait(f"{PRINTING} === 'paused' && !$('print-bar').hidden")
+        browser.click("#tab-printing")
+        browser.click("#take")
+        browser.wait("!$('run-commands').hidden && !$('leave-printing').hidden")
+        browser.click("#pause")
+        browser.wait(f"{PRINTING} === 'printing'")
+        browser.click("#leave-printing")
+        browser.wait(f"{PRINTING} === 'over'")
+        assert (
+            browser.value("$('run-state').textContent") == f"box.stl goes on printing on {address}: this page follows it no more"
+        )
+        assert job.state == "printing"
+        assert KEY not in json.dumps(other.state)
+        assert browser.complaints == []
+
+
+def homed(printer: SimulatedPrinter) -> list[str]:
+    return [event for _, event in printer.record.events if event.startswith("homed")]
+
+
+def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_question_is_answered(
+    sliced: Running, browser: Browser
+) -> None:
+    cut = Fault("reset", at=255, unit="line")
+    with SimulatedPrinter(load().machine, faults=[cut]) as printer, prints_line(sliced, "first") as page:
+        page.do("check", port=printer.path)
+        page.until(lambda one: one["phase"] == "ready")
+        page.command("begin")
+        ended = page.until(lambda one: one["phase"] == "over")
+        assert "the printer restarted in the middle of the print" in ended["sentence"]
+        page.do("go_on", journal=ended["journal"], port="sim")
+        refused = page.until(lambda one: one["resumes"] and one["phase"] == "over")
+        assert refused["sentence"] == "--port sim: a simulated printer ends with its print; the port of a printer is expected"
+
+        browser.open(sliced.address)
+        browser.click("#tab-printing")
+        browser.wait("document.documentElement.dataset.line === 'open'")
+        type_port(browser, printer.path)
+        browser.click("#rest-field summary")
+        browser.wait(f"document.querySelector(`#journals input[value={json.dumps(ended['journal'])}]`)")
+        browser.click(f"#journals input[value={json.dumps(ended['journal'])}]")
+        browser.click("#go-on-with")
+        browser.wait("!$('run-ask').hidden")
+        assert "box.stl, part 1 of 1" in browser.value("$('run-checks').textContent")
+        asked = browser.value("$('ask-told').textContent").splitlines()
+        assert "the printer has restarted" in asked[0]
+        assert asked[1].startswith("look first: all must stand as it was cut off, tip at X")
+        page.do("go_on", journal=ended["journal"], port="/dev/another")
+        assert page.refused() == f"journal {ended['journal']}: its print goes on already, or has not ended"
+        browser.click("#leave")
+        browser.wait(f"{PRINTING} === 'over'")
+        assert browser.value("$('run-state').textContent") == "nothing was moved or heated"
+        assert homed(printer) == ["homed XYZ"]
+
+        page.until(lambda one: one["end"] == "left")
+        page.do("go_on", journal=ended["journal"], port=printer.path)
+        page.until(lambda one: one["phase"] == "ready")
+        page.command("begin")
+        rest = page.until(lambda one: one["phase"] == "over")
+        assert rest["sentence"] == "the print is done"
+        assert homed(printer) == ["homed XYZ", "homed XY"]
+    first, second = (read_journal(Path(each["journal"])) for each in (ended, rest))
+    assert (first.continued_in, second.finished) == (rest["journal"], True)
+    assert browser.complaints == []
 
 
 def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced: Running) -> None:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from machine.app.file_roles import check_model_files
 from machine.app.output import check_writable
-from machine.app.pipeline.programs import LoadedProgram, load_program, refuse_errors
-from machine.app.printer.network_print import hand_over, print_there
-from machine.app.printer.serial_log import new_log
-from machine.app.printer.server_checks import check_free, check_server_machine, check_server_program
+from machine.app.pipeline.programs import LoadedProgram, load_program
+from machine.app.printer.attendance import AtServerTerminal, Observers
+from machine.app.printer.network_print import hand_over, print_there, server_session
+from machine.app.printer.serial_log import SerialLog
+from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
 from machine.app.printer.stream import PrintJob
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest, SendRequest
@@ -17,9 +18,9 @@ from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import print_table
 from machine.network.address import parse_server_address
+from machine.network.follow import End
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import PrintServer
-from machine.network.servers import open_server
 from profiles.errors import GcodeError, NoAnswerError, ServerError
 
 
@@ -29,7 +30,7 @@ def send(request: ModelRequest, sending: SendRequest) -> int:
         raise GcodeError(
             f"{request.name} is no G-code file: export makes one of a model, print --port {sending.server} prints it"
         )
-    with _session(request, sending.server, sending.log, "send") as server:
+    with _session(request, sending.server, sending.log, "send") as (server, _):
         loaded = _checked(request, server, sending.server, sending.start)
         upload = GcodeUpload(request.name, loaded.program.lines)
         file = hand_over(server, upload, request.name)
@@ -52,35 +53,29 @@ def _start(server: PrintServer, file: str) -> None:
 
 
 def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:
-    """Hand a model's program or a G-code file to a print server, have it printed, and follow it."""
+    """Hand a model's program or a G-code file to a print server, have it printed, and follow it; 130 when a person ended that."""
     if printing.journal is not None:
         raise ServerError(
             f"--journal {printing.journal}: {printing.port} prints from a file of its own, which needs no journal here"
         )
-    with _session(request, printing.port, printing.log, "print") as server:
+    with _session(request, printing.port, printing.log, "print") as (server, log):
         loaded = _checked(request, server, printing.port, True)
         job = PrintJob(request.name, loaded.program, loaded.profile)
-        upload = GcodeUpload(request.name, loaded.program.lines)
         with serve_watch_page(job.name, job.program, job.profile, printing.watch_port) as watchers:
-            file = hand_over(server, upload, request.name)
-            check_free(server.name, server.status())  # somebody else may have begun while the program was made
-            code = print_there(server, job, upload, file, watchers.follow)
-            watchers.end("stopped" if code else "done")
-    return code
+            end = print_there(server, job, Observers(log, None, watchers.follow), AtServerTerminal(server.name))
+            watchers.end("done" if end is End.DONE else "stopped")
+    return 0 if end is End.DONE else 130
 
 
 @contextmanager
-def _session(request: ModelRequest, address: str, log: Path | None, kind: str) -> Iterator[PrintServer]:
-    """A session with a server, logged without keys."""
+def _session(request: ModelRequest, address: str, log: Path | None, kind: str) -> Iterator[tuple[PrintServer, SerialLog]]:
+    """A session with a server and its log."""
     parse_server_address(address)
     if log is not None:
         check_writable(log)
     check_model_files(request, (("--log", log),))
-    with new_log(kind, f"{request.name} to {address}", log) as record:
-        if record.trouble:
-            say(f"what is asked and answered is not logged: {record.file}: {record.trouble}")
-        with open_server(address, record.note) as server:
-            yield server
+    with server_session(address, f"{request.name} to {address}", kind, log) as session:
+        yield session
 
 
 def _checked(request: ModelRequest, server: PrintServer, text: str, starts: bool) -> LoadedProgram:
@@ -96,7 +91,6 @@ def _checked(request: ModelRequest, server: PrintServer, text: str, starts: bool
     program, profile = loaded.program, loaded.profile
     if request.is_gcode:
         check_server_machine(address, greeting, profile.machine, request.force)
-    check_server_program(greeting, program, profile, request.name, request.force)
-    refuse_errors(program, request.force)
+    ready_for_server(greeting, program, profile, request.name, request.force)
     show(print_table(program, profile))
     return loaded

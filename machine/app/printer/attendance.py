@@ -1,15 +1,18 @@
 """Attendance: who stands at a print, sees where it is and commands it: a person at the terminal, or at a page."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from threading import Event as Flag
 from typing import Protocol
 
 from machine.app.printer.serial_log import SerialLog
+from machine.app.terminal.interrupts import calling
 from machine.app.terminal.keys import Keyboard
 from machine.app.terminal.print_display import PrintDisplay
+from machine.app.terminal.progress import Report, reporting
 from machine.app.terminal.screen import Course, Words
+from machine.app.terminal.server_keys import ServerKeyboard
 from machine.link.journal import Journal
 from machine.link.pending_commands import Control
 from machine.link.progress import Progress
@@ -54,3 +57,47 @@ class AtTerminal:
     def show(self, observers: Observers, course: Course) -> PrintDisplay:
         """The screen."""
         return PrintDisplay(observers.log.title, course, Keyboard(self.control), self.words)
+
+
+class ServerAttendance(Protocol):
+    """The same of a print on a server, which prints without this program: a person may leave it printing."""
+
+    control: Control
+
+    def uploading(self) -> AbstractContextManager[Report]:
+        """What shows how far the file has been handed over."""
+
+    def gives_up(self) -> bool:
+        """Whether there is to be no print, as long as none has begun."""
+
+    def gone(self) -> bool:
+        """Whether the person has left while the print goes on."""
+
+    def show(self, observers: Observers, course: Course) -> AbstractContextManager[Display]:
+        """What shows the print while it is followed."""
+
+
+class AtServerTerminal:
+    """A screen with the keys of a print on a server; Ctrl-C asks first. An upload is broken off by it."""
+
+    def __init__(self, server: str) -> None:
+        self.control = Control()
+        self._board = ServerKeyboard(self.control, server)
+
+    def uploading(self) -> AbstractContextManager[Report]:
+        """A line on stderr."""
+        return reporting()
+
+    def gives_up(self) -> bool:
+        """Never: a KeyboardInterrupt says so."""
+        return False
+
+    def gone(self) -> bool:
+        """By the key l, or by an interrupt whose question nobody has answered."""
+        return self._board.gone()
+
+    @contextmanager
+    def show(self, observers: Observers, course: Course) -> Iterator[Display]:
+        """The screen."""
+        with PrintDisplay(observers.log.title, course, self._board, Words()) as display, calling(self._board.interrupt):
+            yield display

@@ -2,15 +2,16 @@
 
 import os
 from collections.abc import Iterable
+from dataclasses import dataclass
 from datetime import datetime
 from os.path import lexists
 from pathlib import Path
 
 from machine.app.file_roles import PROGRAM, program_beside
 from machine.app.output import write_lines
-from machine.link.journal import Journal, JournalHeading
+from machine.link.journal import Checkpoint, Journal, JournalHeading, read_journal
 from machine.reader.gcode_file import GcodeFile
-from profiles.errors import OutputError
+from profiles.errors import JournalError, OutputError
 from profiles.folders import state_folder
 from profiles.profile import Profile
 
@@ -46,9 +47,45 @@ def continue_journal(program: GcodeFile, profile: Profile, name: str, file: Path
     return Journal(file if file is not None else _new_path(name), heading)
 
 
+@dataclass(frozen=True)
+class ResumableJournal:
+    """A journal of the state folder whose print did not come to its end.
+
+    line: up to which it was surely executed; written_s: when it was written last, seconds since 1970.
+    """
+
+    path: Path
+    name: str
+    machine: str
+    line: int
+    written_s: float
+
+
+def resumable_journals() -> list[ResumableJournal]:
+    """The newest first; those that cannot be read, are resumed already or have lost their program are left out."""
+    found = (_resumable(path) for path in sorted(_folder().glob("*.journal"), reverse=True))
+    return [each for each in found if each is not None]
+
+
+def _resumable(path: Path) -> ResumableJournal | None:
+    try:
+        story, written_s = read_journal(path), path.stat().st_mtime
+    except (JournalError, OSError):
+        return None
+    last, heading = story.last, story.heading
+    if story.finished or story.continued_in is not None or last == Checkpoint() or not Path(heading.program).is_file():
+        return None
+    machine = heading.profile.get("machine", {}).get("name", "")
+    return ResumableJournal(path, heading.name, str(machine), last.executed, written_s)
+
+
+def _folder() -> Path:
+    return state_folder() / "journals"
+
+
 def _new_path(name: str) -> Path:
     """A new file's path, named after the time and the model."""
-    folder = state_folder() / "journals"
+    folder = _folder()
     try:
         folder.mkdir(0o700, exist_ok=True)
         _thin(folder)

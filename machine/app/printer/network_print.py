@@ -1,20 +1,24 @@
 """Network print: a program handed over to a print server, started there and followed to its end."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 
+from machine.app.printer.attendance import Observers, ServerAttendance
+from machine.app.printer.rescue import STOPPED
+from machine.app.printer.serial_log import SerialLog, new_log
+from machine.app.printer.server_checks import check_free
 from machine.app.printer.stream import PrintJob
-from machine.app.terminal.interrupts import calling
 from machine.app.terminal.plain import plain_line, show
-from machine.app.terminal.print_display import Follow, PrintDisplay
 from machine.app.terminal.progress import reporting, say
-from machine.app.terminal.screen import Course, Words
-from machine.app.terminal.server_keys import ServerKeyboard
-from machine.link.pending_commands import Control
+from machine.app.terminal.screen import Course
+from machine.link.pending_commands import CancelledError
 from machine.link.progress import ProgramPosition, Progress
 from machine.network.follow import End, follow_print
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import JobStatus, PrintServer
+from machine.network.servers import open_server
 from machine.view.quantities import duration
 from profiles.errors import FirmwareError
 
@@ -24,24 +28,37 @@ LIMITS = (
 )
 
 
-def hand_over(server: PrintServer, upload: GcodeUpload, named: str) -> str:
-    """Upload with progress; returns the name by which the server prints it. Raises ServerError."""
+@contextmanager
+def server_session(address: str, title: str, kind: str, file: Path | None = None) -> Iterator[tuple[PrintServer, SerialLog]]:
+    """A session with a server and the log of it, without keys. kind, file: of the log. Raises ServerError, ProfileError."""
+    with new_log(kind, title, file) as record:
+        if record.trouble:
+            say(f"what is asked and answered is not logged: {record.file}: {record.trouble}")
+        with open_server(address, record.note) as server:
+            yield server, record
+
+
+def hand_over(server: PrintServer, upload: GcodeUpload, named: str, person: ServerAttendance | None = None) -> str:
+    """Upload with progress; returns the name by which the server prints it. Raises ServerError, CancelledError when the person
+    gives it up."""
     if upload.name != named:
         say(f"{named} becomes {upload.name} there")
     if server.has(upload.name):
         say(f"replaces the {upload.name} that is there")
     total, gone = len(upload.content), 0
-    with reporting() as report:
+    with reporting() if person is None else person.uploading() as report:
 
         def sent(count: int) -> None:
             nonlocal gone
+            if person is not None and person.gives_up():
+                raise CancelledError
             gone = count
             state = f"{_megabytes(count)} of {_megabytes(total)}" if count < total else "the server reads it"
             report(f"uploading {upload.name}: {state}", count / total if total else None)
 
         try:
             file = server.upload(upload, sent)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, CancelledError):
             kept = "keeps nothing of" if gone < total else "may hold all of"
             say(f"upload broken off: {server.name} {kept} {upload.name}")
             raise
@@ -49,44 +66,48 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str) -> str:
     return file
 
 
-def print_there(server: PrintServer, job: PrintJob, upload: GcodeUpload, file: str, follow: Follow | None) -> int:
-    """Have a file printed and show it until it ends or the person leaves; 130 when a person stopped or left it.
+def print_there(server: PrintServer, job: PrintJob, observers: Observers, person: ServerAttendance) -> End:
+    """Hand a program over, have it printed and show it until it ends or the person leaves; says how it ended.
 
-    Raises ServerError, FirmwareError.
+    Raises ServerError, FirmwareError after an emergency stop, CancelledError when the person gives it up before it has begun.
     """
+    upload = GcodeUpload(job.name, job.program.lines)
+    file = hand_over(server, upload, job.name, person)
+    check_free(server.name, server.status())  # somebody else may have begun while the program was made
+    if person.gives_up():
+        raise CancelledError
     say(LIMITS)
-    control, course = Control(), Course(job.program.run)
-    board = ServerKeyboard(control, server.name)
+    course = Course(job.program.run)
     progress = ServerProgress(upload, job.program.lines, course.remaining_s)
-    with PrintDisplay(f"{file} on {server.name}", course, board, Words()) as display, calling(board.interrupt):
+    with person.show(observers, course) as display:
         display.open()
 
         def on_status(status: JobStatus, message: str) -> None:
             now = progress.at(status, message)
             display(now)
-            if follow is not None:
-                follow(now)
+            if observers.follow is not None:
+                observers.follow(now)
 
         try:
-            end = follow_print(server, file, len(upload.content), on_status, control, board.gone)
+            end = follow_print(server, file, len(upload.content), on_status, person.control, person.gone)
         except KeyboardInterrupt:
             say("ended at once: whether the print has been cancelled is not known, look at the printer")
             raise
-    return _report_end(end, file, server.name, progress)
+    _report_end(end, file, server.name, progress)
+    return end
 
 
-def _report_end(end: End, file: str, server: str, progress: "ServerProgress") -> int:
+def _report_end(end: End, file: str, server: str, progress: "ServerProgress") -> None:
     if end is End.STOPPED:
-        raise FirmwareError(f"emergency stop: {server} has taken it; restart the printer before the next print")
+        raise FirmwareError(STOPPED.format(server=server))
     if end is End.DONE:
         show(f"printed {file} on {server} in {duration(progress.elapsed_s)}\n")
-        return 0
+        return
     said = {
         End.LEFT: f"{file} goes on printing on {server}",
         End.CANCELLED: f"the print was cancelled on {server} after {progress.line} lines",
     }
     say(f"tiltprint: interrupted; {said[end]}")
-    return 130
 
 
 class ServerProgress:

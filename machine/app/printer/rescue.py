@@ -1,9 +1,18 @@
-"""Rescue: a printer whose sender has died: its heaters switched off, or stopped at once, by whoever opens its port next."""
+"""Rescue: a printer whose sender has died: its heaters switched off, or stopped at once, by whoever opens its port next.
+
+A print server goes on printing by itself, as it does when a person leaves it: it is only asked what it does, or stopped.
+"""
 
 from machine.link.medium import SERIAL
 from machine.link.port import open_port
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
-from profiles.errors import PortError
+from machine.network.address import is_server_address
+from machine.network.follow import stop_at_once
+from machine.network.server import ACTIVE
+from machine.network.servers import open_server
+from profiles.errors import PortError, UserError
+
+STOPPED = "emergency stop: {server} has taken it; restart the printer before the next print"
 
 
 def rescue(port: str, baud: int, emergency: bool) -> str:
@@ -11,6 +20,8 @@ def rescue(port: str, baud: int, emergency: bool) -> str:
 
     Homing that is under way is cut short, whereupon Marlin halts: its heaters are off then, too.
     """
+    if is_server_address(port):
+        return _stop_server(port) if emergency else _look_at_server(port)
     try:
         with open_port(port, baud) as wire:
             if not emergency:
@@ -28,3 +39,25 @@ _SENTENCES = {
     Heaters.HALTED: "the printer has halted and switched its heaters off by itself",
     Heaters.UNPROVED: "its heaters may still be on: cut the printer's power",
 }
+
+
+def _stop_server(address: str) -> str:
+    try:
+        with open_server(address) as server:
+            stop_at_once(server)
+    except UserError as error:
+        return str(error)
+    return STOPPED.format(server=address)
+
+
+def _look_at_server(address: str) -> str:
+    try:
+        with open_server(address) as server:
+            server.greet()
+            status = server.status()
+    except UserError as error:
+        return f"{error}; what {address} prints goes on without this program: look at the printer"
+    if status.phase in ACTIVE:
+        now = f"{address} is {status.phase.value} {status.file or 'a file'}"
+        return f"{now} and goes on without this program: its own page commands it"
+    return f"{address} prints nothing now ({status.message or status.phase.value})"

@@ -1,5 +1,6 @@
 """Server checks: whether a print server, its printer, a machine's profile and a program belong together, before a byte goes."""
 
+from machine.app.pipeline.programs import refuse_errors
 from machine.app.printer.compatibility import check_printer, check_program, refuse
 from machine.firmware.klipper import stepper_name
 from machine.link.identification import Answer, Kind
@@ -20,9 +21,13 @@ def check_server_machine(address: ServerAddress, greeting: Greeting, machine: Ma
     refuse(lacking_steppers(greeting, machine), force)
 
 
-def check_server_program(greeting: Greeting, program: Program, profile: Profile, file: str, force: bool) -> None:
-    """Refuse a program made for another machine, or that leaves the limits that the server tells. Raises PrinterError."""
+def ready_for_server(greeting: Greeting, program: Program, profile: Profile, file: str, force: bool) -> None:
+    """Refuse a program made for another machine, that leaves the limits that the server tells, or with errors of the dry run.
+
+    Raises PrinterError, MoveError.
+    """
     check_program(_answer(greeting), program, profile, file, force)
+    refuse_errors(program, force)
 
 
 def check_free(server: str, status: JobStatus) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from machine.app.printer.attendance import Observers
 from machine.app.terminal.plain import plain_line
+from machine.app.terminal.progress import Report
 from machine.app.terminal.screen import Course, Words
 from machine.app.workbench.printing.teller import Teller
 from machine.link.pending_commands import Command, Control
@@ -23,6 +24,7 @@ COMMANDS = {
     "feed": Command.FEED,
     "flow": Command.FLOW,
 }
+LEAVE = "leave"  # a print on a server goes on without this program
 
 
 class AtPage:
@@ -30,47 +32,79 @@ class AtPage:
 
     def __init__(self, teller: Teller) -> None:
         self.control, self.stop, self.words = Control(), Flag(), Words(WORDS_KEPT)
+        self.agreed = False  # to what was found: from then on something may move
         self._teller = teller
         self._answers: SimpleQueue[bool] = SimpleQueue()
+        self._gives_up, self._halts = Flag(), Flag()
 
     def hear(self, word: str, value: float = 100.0) -> None:
-        """What the person wants: to begin, or one of COMMANDS."""
+        """What the person wants: to begin, one of COMMANDS, or LEAVE."""
         if word in COMMANDS:
             self.control.ask(COMMANDS[word], value)
+        if word in ("cancel", LEAVE):
+            self._gives_up.set()
+        if word == LEAVE:
+            self.stop.set()
+        if word == "emergency":
+            self._halts.set()
         self._answers.put(word == "begin")
 
     def leave(self) -> None:
-        """The server is gone, and nobody can command any more: the print ends as if it had been cancelled."""
+        """The server is gone, and nobody can command any more: the print ends as if it had been cancelled, but one on a print
+        server goes on there."""
         self.stop.set()
         self._answers.put(False)
 
     def agrees(self) -> bool:
         """Wait for the person's word to begin."""
-        return self._answers.get()
+        self.agreed = self._answers.get()
+        return self.agreed
+
+    @contextmanager
+    def uploading(self) -> Iterator[Report]:
+        """How far the file has been handed over, as its state."""
+        yield lambda text, share=None: self._teller.tell(phase="uploading", upload=(text, share))
+
+    def gives_up(self) -> bool:
+        """Whether there is to be no print on a server, as long as none has begun; an emergency stop is given to the printer."""
+        return (self._gives_up.is_set() or self.stop.is_set()) and not self._halts.is_set()
+
+    def gone(self) -> bool:
+        """Whether a print on a server is left."""
+        return self.stop.is_set()
 
     @contextmanager
     def show(self, observers: Observers, course: Course) -> Iterator["_Shown"]:
         """The print as its state."""
         journal = "" if observers.journal is None else str(observers.journal.path)
         log = "" if observers.log.trouble else str(observers.log.file)
-        self._teller.tell(phase="printing", log=log, journal=journal)
+        self._teller.tell(log=log, journal=journal)
         yield _Shown(self._teller, course, self.words)
 
 
 class _Shown:
-    """A display whose screen is the state that the pages are told."""
+    """A display whose screen is the state that the pages are told. Moments are counted: a print of which nothing changes, as a
+    paused one on a print server, is heard of all the same."""
 
     def __init__(self, teller: Teller, course: Course, words: Words) -> None:
         self._teller, self._course, self._words = teller, course, words
+        self._opened = False  # before, a person is asked
+        self._moments = 0
 
     def open(self) -> None:
-        """The pages show it already."""
+        """The pages show it from now on."""
+        self._opened = True
+        self._teller.tell(phase="printing", upload=None)
 
     def __call__(self, progress: Progress) -> None:
+        if not self._opened:
+            return
         self._words.add(progress.message)
         phase = "leaving" if progress.state == "cancelling" else "printing"
         words = tuple(plain_line(word) for word in self._words.last)
-        self._teller.tell(phase=phase, progress=told(progress, self._course), words=words)
+        self._moments += 1
+        moment = told(progress, self._course) | {"moment": self._moments}
+        self._teller.tell(phase=phase, progress=moment, words=words)
 
 
 def told(progress: Progress, course: Course) -> dict[str, Any]:

@@ -1,13 +1,16 @@
 """Order: what is to be printed where, and the state of a print as its process tells it."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 from machine.app.requests import PrintRequest
+from machine.network.address import is_server_address
 from profiles.profile import Profile
 
-# checking: nothing but a question has gone to the printer; ready: waits for a person's word; leaving: the heaters go off.
-Phase = Literal["checking", "ready", "printing", "leaving", "over"]
+# checking: nothing but a question has gone to the printer; ready: waits for a person's word; uploading: a print server gets the
+# file; leaving: the heaters go off.
+Phase = Literal["checking", "ready", "uploading", "printing", "leaving", "over"]
 State = dict[str, Any]  # of a print, as JSON: order, phase and all that process.py tells
 
 
@@ -23,20 +26,30 @@ class PrintOrder:
     key: str = ""
 
 
-def first_state(order: PrintOrder) -> State:
+@dataclass(frozen=True, eq=False)
+class ResumeOrder:
+    """The rest of a print that was cut off. journal: of it; machine: the profile that tells how the machine is homed with a print
+    on it, a name or a file; "": the journal's own."""
+
+    journal: Path
+    printing: PrintRequest
+    machine: str = ""
+
+
+def first_state(order: PrintOrder | ResumeOrder) -> State:
     """What is known of a print before its process has said anything."""
     printing = order.printing
     return {
         "phase": "checking",
-        "key": order.key,
-        "name": order.name,
+        **_known(order),
         "port": printing.port,
         "baud": printing.baud,
         "sim_speed": printing.sim_speed,
-        "machine": order.profile.machine.name,
-        "force": order.force,
+        "server": is_server_address(printing.port),
         "checks": (),
         "figures": None,
+        "question": "",
+        "upload": None,
         "progress": None,
         "words": (),
         "said": (),
@@ -46,3 +59,10 @@ def first_state(order: PrintOrder) -> State:
         "sentence": "",
         "forcible": False,
     }
+
+
+def _known(order: PrintOrder | ResumeOrder) -> State:
+    """resumes: the journal of the print whose rest it is; key: of the slices."""
+    if isinstance(order, ResumeOrder):
+        return {"resumes": str(order.journal), "name": order.journal.stem, "machine": "", "force": False, "key": ""}
+    return {"resumes": "", "name": order.name, "machine": order.profile.machine.name, "force": order.force, "key": order.key}

@@ -9,20 +9,24 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from threading import Event as Flag
 from typing import Any
 
+from machine.app.printer.journal_folder import ResumableJournal, resumable_journals
 from machine.app.printer.port_reports import PortReport, answer_words, ask_ports, known_ports, port_json
 from machine.app.workbench.bench.planes import is_number
-from machine.app.workbench.printing.order import PrintOrder
+from machine.app.workbench.printing.at_page import LEAVE
+from machine.app.workbench.printing.order import PrintOrder, ResumeOrder
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.news import News
 from machine.link.medium import stable_name
 from machine.link.port import check_baud
+from machine.network.address import is_server_address, parse_server_address
 from profiles.errors import PrinterError
 
 MOST_OVER = 5  # prints that are over stay to be looked at, the newest ones
-WORDS, PERCENTS = ("pause", "resume"), ("feed", "flow")  # what goes to the print as it is
+WORDS, PERCENTS = ("pause", "resume", LEAVE), ("feed", "flow")  # what goes to the print as it is
 
 
 class Prints(News):
@@ -34,6 +38,8 @@ class Prints(News):
         self._numbers = itertools.count(1)
         self._pages: Counter[str] = Counter()
         self._ports: list[dict[str, Any]] | None = None
+        self._journals: list[ResumableJournal] | None = None
+        self._reads_journals = False
         self._over: Flag | None = None  # ends the asking of ports that is under way
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -48,6 +54,7 @@ class Prints(News):
             "version": self.version,
             "ports": self._ports,
             "asking": self._over is not None,
+            "journals": self._journals_told(),
             "prints": [
                 {**each.state, "number": each.number, "holder": each.holder, "held": bool(self._pages[each.holder])}
                 for each in self.prints
@@ -65,12 +72,14 @@ class Prints(News):
             self._pages[page] -= 1
             self.tell()
 
-    def command(self, page: str, asked: dict[str, Any], order: Callable[[dict[str, Any]], PrintOrder]) -> None:
-        """Do what a page asks for; order: makes one of what lies on its workbench. Raises UserError for what cannot be done."""
+    def command(self, page: str, asked: dict[str, Any], order: Callable[[dict[str, Any]], PrintOrder | ResumeOrder]) -> None:
+        """Do what a page asks for; order: makes one of what it asks for. Raises UserError for what cannot be done."""
         word = asked.get("do")
         if word == "ports":
             self._look_for_ports(_whole(asked, "baud", 115200))
-        elif word == "check":
+        elif word == "journals":
+            self._look_for_journals()
+        elif word in ("check", "go_on"):
             self._begin(page, order(asked))
         elif word == "emergency":
             self._stop_at_once(asked.get("print"))
@@ -84,20 +93,22 @@ class Prints(News):
             self._over.set()
 
     async def end_all(self) -> list[str]:
-        """End every print as a cancel does, and wait for it; the last words of each."""
+        """End every print as a cancel does, but leave those on print servers, and wait for that; the last words of each."""
         running = self.running
         for each in running:
-            each.cancel()
+            each.end()
         while any(not each.over for each in running):
             await self.changed(self.version)
         return [
             line for each in running for line in (*each.state["said"][-2:], f"{each.state['port']}: {each.state['sentence']}")
         ]
 
-    def _begin(self, page: str, order: PrintOrder) -> None:
+    def _begin(self, page: str, order: PrintOrder | ResumeOrder) -> None:
         port = order.printing.port
         if any(_same(each.state["port"], port) for each in self.running):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
+        if isinstance(order, ResumeOrder) and str(order.journal) in self._journals_in_use():
+            raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")
         self.prints = [each for each in self.prints if not each.over or not _same(each.state["port"], port)][-MOST_OVER:]
         begun = RunningPrint(next(self._numbers), order, page, self.tell)
         self.prints.append(begun)
@@ -131,7 +142,7 @@ class Prints(News):
             self.prints.remove(named)
         elif word in PERCENTS:
             named.say((word, float(_whole(asked, "percent", 100))))
-        elif word in WORDS:
+        elif word in WORDS and (word != LEAVE or named.state["server"]):
             named.say((word,))
         else:
             raise PrinterError("what the page has sent is no command of a print")
@@ -141,6 +152,29 @@ class Prints(News):
             if each.number == number:
                 return each
         raise PrinterError("this print is not there any more")
+
+    def _journals_told(self) -> list[dict[str, Any]] | None:
+        """Those that can be resumed, None before anybody has asked."""
+        if self._journals is None:
+            return None
+        in_use = self._journals_in_use()
+        return [asdict(each) | {"path": str(each.path)} for each in self._journals if str(each.path) not in in_use]
+
+    def _journals_in_use(self) -> set[str]:
+        """The journals of prints that run, and of those whose rest is printed."""
+        return {path for each in self.running for path in (each.state["journal"], each.state["resumes"]) if path}
+
+    def _look_for_journals(self) -> None:
+        if not self._reads_journals:
+            self._reads_journals = True
+            self._start(self._read_journals())
+
+    async def _read_journals(self) -> None:
+        try:
+            self._journals = await asyncio.to_thread(resumable_journals)
+        finally:
+            self._reads_journals = False
+            self.tell()
 
     def _look_for_ports(self, baud: int) -> None:
         check_baud(baud)
@@ -169,7 +203,9 @@ def _port(report: PortReport) -> dict[str, Any]:
 
 
 def _same(one: str, other: str) -> bool:
-    """Whether two names are those of one port."""
+    """Whether two names are those of one port, or of one print server."""
+    if is_server_address(one) and is_server_address(other):
+        return parse_server_address(one).url == parse_server_address(other).url
     return stable_name(one) == stable_name(other)
 
 

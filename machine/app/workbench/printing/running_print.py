@@ -9,13 +9,15 @@ from contextlib import suppress
 from machine.app.crash import log_bug
 from machine.app.printer.rescue import rescue
 from machine.app.requests import SIMULATED
-from machine.app.workbench.printing.order import PrintOrder, State, first_state
+from machine.app.workbench.printing.at_page import LEAVE
+from machine.app.workbench.printing.order import PrintOrder, ResumeOrder, State, first_state
 from machine.app.workbench.work.lane import end_process
 from machine.app.workbench.work.worker import LENGTH, frame
 from profiles.errors import PrinterError
 
 COMMAND = (sys.executable, "-m", "machine.app.workbench.printing.process")
 EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
+LEAVE_S = 5.0  # so long a print that is not to go on has to let go of its port
 DIED = "the process that printed has ended before the print was done"
 
 
@@ -23,11 +25,12 @@ class RunningPrint:
     """run() once, all else from the event loop too. number: its name among the prints of a workbench; holder: the page that
     commands it, "" for none."""
 
-    def __init__(self, number: int, order: PrintOrder, holder: str, changed: Callable[[], None]) -> None:
+    def __init__(self, number: int, order: PrintOrder | ResumeOrder, holder: str, changed: Callable[[], None]) -> None:
         self.number, self.holder, self.state = number, holder, first_state(order)
         self._order, self._changed = order, changed
         self._process: asyncio.subprocess.Process | None = None
         self._begun = self._emergency = self._given_up = False
+        self._ended = False  # by this program, on purpose
 
     @property
     def over(self) -> bool:
@@ -65,7 +68,7 @@ class RunningPrint:
 
     def begin(self) -> None:
         """A person agrees to what was found. Raises PrinterError as long as that is not known."""
-        if self.state["phase"] != "ready" or not self.asking:
+        if self.state["phase"] != "ready" or not self.asking or self._given_up:
             raise PrinterError("this print cannot begin now: it is not ready, or has begun")
         self._begun = True
         self.say(("begin",))
@@ -78,19 +81,30 @@ class RunningPrint:
         self._become(phase="over", end="failed", sentence=sentence)
 
     def cancel(self) -> None:
-        """End it, heaters off; before it has begun at once."""
-        if self.asking:
-            self._given_up = True
+        """End it, heaters off; before it has begun at once. What has opened a journal to go on with takes it away itself."""
+        asking = self.asking
+        self._given_up = self._given_up or asking
+        if asking and not isinstance(self._order, ResumeOrder):
             self._kill()
+            return
+        self.say(("cancel",))
+        if asking:
+            asyncio.get_running_loop().call_later(LEAVE_S, self._kill)
+
+    def end(self) -> None:
+        """End it because the workbench ends: as a cancel does, but what a print server prints goes on there."""
+        if self.state["server"] and not self.asking:
+            self.say((LEAVE,))
         else:
-            self.say(("cancel",))
+            self.cancel()
 
     def stop_at_once(self) -> None:
-        """The emergency stop, by the print's own process; where that does not do it, without that."""
+        """The emergency stop, by the print's own process; where that does not do it, or still uploads, without that."""
         if self.over:
             return
         self._emergency = True
-        if self.asking:
+        if self.asking or self.state["phase"] == "uploading":
+            self._ended = True
             self._kill()
         else:
             self.say(("emergency",))
@@ -100,8 +114,11 @@ class RunningPrint:
         end_process(self._process)
 
     async def _end_without_process(self) -> None:
-        """The process has died. What it printed on is told to be safe; nothing has been sent to a printer it only asked."""
+        """The process has died. What it printed on is told to be safe; nothing has been sent to a printer it only asked; a print
+        server goes on by itself."""
         printing, moved = self._order.printing, not self.asking
+        if not moved:
+            self._become(journal="")
         if self._given_up and not self._emergency:
             self._become(phase="over", end="left", sentence="nothing was printed")
         elif printing.port == SIMULATED:
@@ -109,7 +126,8 @@ class RunningPrint:
         elif moved or self._emergency:
             self._become(phase="leaving")
             sentence = await asyncio.to_thread(rescue, printing.port, printing.baud, self._emergency)
-            self._become(phase="over", end="failed", sentence=f"{DIED}; {sentence}" if moved else sentence)
+            told = f"{DIED}; {sentence}" if moved and not self._ended else sentence
+            self._become(phase="over", end="failed", sentence=told)
         else:
             self._become(phase="over", end="failed", sentence=f"{DIED}; nothing had moved yet")
 

@@ -14,12 +14,13 @@ from starlette.websockets import WebSocket
 from machine.app.crash import log_bug
 from machine.app.requests import PrintRequest
 from machine.app.workbench.bench.planes import is_number
+from machine.app.workbench.printing.order import PrintOrder, ResumeOrder
 from machine.app.workbench.printing.ordering import order_of
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.line import parsed, until_either_ends
-from machine.network.address import is_server_address
-from profiles.errors import PrinterError, UserError
+from machine.network.address import is_server_address, parse_server_address
+from profiles.errors import JournalError, PrinterError, UserError
 
 MOST_COMMAND = 10_000  # characters
 LONGEST_PORT = 300
@@ -72,7 +73,7 @@ async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) 
         text = await socket.receive_text()
         try:
             asked = parsed(text, MOST_COMMAND)
-            prints.command(page, asked, lambda given: order_of(session, _printing(given), given.get("force") is True))
+            prints.command(page, asked, lambda given: _order(session, given))
         except UserError as error:
             await socket.send_text(json.dumps({"problem": str(error)}))
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
@@ -81,14 +82,23 @@ async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) 
             await socket.send_text(json.dumps({"problem": told}))
 
 
+def _order(session: Session, asked: dict[str, Any]) -> PrintOrder | ResumeOrder:
+    """What a page wants printed: what lies on its bench, or the rest of a print that was cut off. Raises UserError."""
+    if asked.get("do") != "go_on":
+        return order_of(session, _printing(asked), asked.get("force") is True)
+    journal = str(asked.get("journal") or "").strip()
+    if not journal:
+        raise JournalError("no journal is chosen: choose the print that is to go on, or name the journal's file")
+    return ResumeOrder(Path(journal).absolute(), _printing(asked), str(asked.get("machine") or "").strip())
+
+
 def _printing(asked: dict[str, Any]) -> PrintRequest:
     """Where to print, as the options --port, --baud and --sim-speed say. Raises PrinterError."""
     port = str(asked.get("port") or "").strip()
     if not port or len(port) > LONGEST_PORT:
         raise PrinterError("no printer is chosen: choose a port, or sim for the simulated one")
     if is_server_address(port):
-        kind = port.partition(":")[0]
-        raise PrinterError(f"{kind} is a print server, which takes whole files: tiltprint print --port {kind}:HOST prints on it")
+        parse_server_address(port)  # here, for all pages are told of a print's port: a password in it must not come so far
     baud, speed = asked.get("baud", 115200), asked.get("sim_speed", 0.0)
     if not is_number(baud) or not is_number(speed) or baud != int(baud):
         raise PrinterError(f"baud {str(baud)[:40]}, sim_speed {str(speed)[:40]}: numbers are expected, a whole one for the rate")

@@ -100,8 +100,12 @@ async def _serve(
 
 
 async def _end_prints(prints: Prints, then: Callable[[], None]) -> None:
-    ports = " and ".join(each.state["port"] for each in prints.running)
-    say(f"the print at {ports} is stopped and its heaters go off, wait for that; Ctrl-C again does not wait for it")
+    there, here = ([each.state["port"] for each in prints.running if each.state["server"] is server] for server in (True, False))
+    if there:
+        say(f"the print on {' and '.join(there)} goes on there, an upload is broken off")
+    if here:
+        ports = " and ".join(here)
+        say(f"the print at {ports} is stopped and its heaters go off, wait for that; Ctrl-C again does not wait for it")
     try:
         for line in await prints.end_all():
             say(line)

@@ -8,12 +8,15 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
+from machine.app.printer.attendance import AtServerTerminal
 from machine.app.printer.network_print import hand_over
 from machine.app.terminal.server_keys import LEAVING
+from machine.link.pending_commands import CancelledError
 from machine.network import follow
 from machine.network.credentials import VARIABLE
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.octoprint import OctoPrint
+from machine.network.servers import open_server
 from tests.machine.network.stand_ins import KEY, stand_in
 from tests.machine.person import ROOT, Person
 
@@ -216,3 +219,15 @@ def test_an_upload_that_is_broken_off_tells_what_the_server_has(gone: int, kept:
     with pytest.raises(KeyboardInterrupt):
         hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode")  # type: ignore[arg-type]
     assert f"upload broken off: octoprint:host {kept} a.gcode" in capsys.readouterr().err
+
+
+def test_a_person_who_gives_up_breaks_the_upload_off(capsys: pytest.CaptureFixture[str]) -> None:
+    class GivingUp(AtServerTerminal):
+        def gives_up(self) -> bool:
+            return True
+
+    with stand_in("octoprint") as (job, address), open_server(address) as server:
+        with pytest.raises(CancelledError):
+            hand_over(server, GcodeUpload("a.gcode", ("G1 X10",)), "a.gcode", GivingUp(server.name))
+        assert job.files == {}
+    assert f"upload broken off: {address} keeps nothing of a.gcode" in capsys.readouterr().err

@@ -10,7 +10,7 @@ const FEW = 8;
 let shownPhase = "";
 
 function printPanel(bench) {
-  let state = { ports: null, asking: false, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
+  let state = { ports: null, asking: false, journals: null, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
   const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem);
   const follow = followIn(bench, () => print());
   const send = (command) => { problem(""); socket.send(command); };
@@ -20,8 +20,8 @@ function printPanel(bench) {
 
   function show(before) {
     const running = state.prints.filter((each) => each.phase !== "over");
-    const known = before.prints.map((each) => each.number), fresh = state.prints.find((each) => !known.includes(each.number));
-    if (fresh) chosen = fresh.number;
+    const known = before.prints.map((each) => each.number), fresh = state.prints.findLast((each) => !known.includes(each.number));
+    if (fresh && chosen) chosen = fresh.number;
     else if (!print()) chosen = (running.at(-1) || state.prints.at(-1) || { number: 0 }).number;
     const lost = state.prints.find((each) => mine.has(each.number) && each.holder !== OWN_PAGE);
     if (lost) notice(`Another page has taken over the command of the print of ${lost.name}.`, "taken");
@@ -29,6 +29,7 @@ function printPanel(bench) {
     if (!taken) notice("", "taken");
     mine = new Set(state.prints.filter((each) => each.holder === OWN_PAGE).map((each) => each.number));
     showPorts(state, before);
+    showJournals(state.journals, before.journals);
     showWhich(state.prints, chosen);
     showPrint(print(), print()?.holder === OWN_PAGE);
     follow.told();
@@ -44,15 +45,23 @@ function printPanel(bench) {
     showBar(state.prints.filter((each) => each.phase !== "over"), print());
   }, 1000);
   $("ask-ports").addEventListener("click", () => send({ do: "ports", baud: Number($("baud").value) }));
-  $("ports").addEventListener("change", () => { $("sim-speed-line").hidden = port() !== "sim"; $("baud-line").hidden = port() === "sim"; unforce(); });
+  for (const event of ["change", "input"]) $("ports").addEventListener(event, () => { showPort(); unforce(); });
   $("port-typed").addEventListener("focus", () => { $("port-other").checked = true; $("ports").dispatchEvent(new Event("change")); });
   $("check").addEventListener("click", () => {
     send({ do: "check", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value), force: $("force").checked });
     unforce();
   });
+  $("rest-field").addEventListener("toggle", () => { if ($("rest-field").open) send({ do: "journals" }); });
+  $("journal-typed").addEventListener("focus", () => { $("journal-other").checked = true; });
+  $("go-on-with").addEventListener("click", () => {
+    const journal = chosenOr("journal", "journal-typed");
+    send({ do: "go_on", journal, machine: $("rest-machine").value.trim(), port: port(), baud: Number($("baud").value) });
+  });
   $("which").addEventListener("change", () => { chosen = Number($("which").value); sure(false); show(state); });
   $("begin").addEventListener("click", () => command("begin"));
   $("leave").addEventListener("click", () => command("cancel"));
+  $("break-off").addEventListener("click", () => command("cancel"));
+  $("leave-printing").addEventListener("click", () => command("leave"));
   $("pause").addEventListener("click", () => command($("pause").dataset.does));
   $("cancel").addEventListener("click", () => { sure(true); $("go-on").focus(); });
   $("go-on").addEventListener("click", () => sure(false));
@@ -80,7 +89,7 @@ const HEARD = new Map(); // by the number of a print: what was heard of it last,
 
 function hear(prints) {
   for (const { number, phase, progress } of prints) {
-    const word = `${phase} ${progress?.elapsed_s}`;
+    const word = `${phase} ${progress?.moment}`;
     if (HEARD.get(number)?.word !== word) HEARD.set(number, { word, at: performance.now() });
   }
 }
@@ -196,10 +205,20 @@ function followIn(bench, print) {
   };
 }
 
-const port = () => {
-  const value = document.querySelector("#ports input[name=port]:checked")?.value ?? "";
-  return value || $("port-typed").value.trim();
-};
+/** What is chosen of a list whose last entry is another one, typed. */
+const chosenOr = (name, typed) => document.querySelector(`.ports input[name=${name}]:checked`)?.value || $(typed).value.trim();
+
+const port = () => chosenOr("port", "port-typed");
+
+const SERVERS = /^(octoprint|moonraker|duet):/i;
+
+/** What the chosen port is asked for besides. */
+function showPort() {
+  const typed = $("port-other").checked;
+  $("sim-speed-line").hidden = port() !== "sim";
+  $("baud-line").hidden = port() === "sim" || SERVERS.test(port());
+  $("port-hint").hidden = !typed;
+}
 
 function unforce() {
   $("force").checked = false;
@@ -220,6 +239,16 @@ function showPorts({ ports, asking }, before) {
     made("span", {}, made("b", { text: each.port }), made("small", { text: [each.description, each.words].filter(Boolean).join(": ") })))));
 }
 
+/** Prints that were cut off, those of the last run of the program among them. */
+function showJournals(journals, before) {
+  if (JSON.stringify(journals) === JSON.stringify(before)) return;
+  $("journals-told").textContent = journals && !journals.length ? "No print of this computer was cut off or cancelled." : "";
+  const now = chosenOr("journal", "journal-typed");
+  $("journals-found").replaceChildren(...(journals || []).map(({ path, name, machine, line, written_s }) => made("label", { className: "port" },
+    made("input", { type: "radio", name: "journal", value: path, checked: path === now }),
+    made("span", {}, made("b", { text: name }), made("small", { text: `on ${machine}, up to line ${line}, ${new Date(1000 * written_s).toLocaleString()}` })))));
+}
+
 function showWhich(prints, chosen) {
   $("which-line").hidden = prints.length < 2;
   const told = prints.map((each) => `${each.name} at ${each.port}: ${each.phase === "over" ? each.end : each.phase}`);
@@ -232,18 +261,25 @@ function showWhich(prints, chosen) {
 function showPrint(print, commands) {
   $("run").hidden = !print;
   if (!print) return void ($("printer-field").open = true);
-  const { phase, progress, figures, end } = print, over = phase === "over", runs = phase === "printing" || phase === "leaving";
-  $("run-title").textContent = `${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`;
-  $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(print) : { checking: "checking …", ready: "ready to print", printing: "starting", leaving: "ending" }[phase];
+  const { phase, progress, figures, end, upload } = print, uploads = phase === "uploading", over = phase === "over", runs = phase === "printing" || phase === "leaving";
+  $("run-title").textContent = `${print.resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`;
+  $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(print) : uploads && upload ? upload[0] : { checking: "checking …", ready: "ready to print", uploading: "handing the file over", printing: "starting", leaving: "ending" }[phase];
   $("run-state").className = over ? end : "";
   const news = `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`; // a reader need not hear every per cent
   if ($("run-news").textContent !== news) $("run-news").textContent = news;
-  const asking = !runs && (!over || end === "refused");
+  const asking = !runs && !uploads && (!over || end === "refused");
   listIn("run-checks", asking ? [...print.checks, ...(figures && !over ? [figuresTold(figures)] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   $("run-ask").hidden = phase !== "ready" || !commands;
-  $("run-live").hidden = !progress;
+  $("ask-told").textContent = print.question || "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?";
+  $("begin").textContent = print.resumes ? "Go on" : "Print now";
+  $("run-live").hidden = !progress && !uploads;
   if (progress) showProgress(progress, over);
+  else if (uploads) showUpload(upload);
+  $("run-upload").hidden = !uploads || !commands;
+  $("leave-printing").hidden = !print.server;
+  $("sure-told").textContent = print.server ? "Cancel this print? The server ends it, as its own macros say."
+    : "Cancel this print? The heaters go off, and what is printed stays as it is.";
   const paused = progress && ["paused", "pausing"].includes(progress.state);
   $("pause").textContent = paused ? "Resume" : "Pause";
   $("pause").dataset.does = paused ? "resume" : "pause";
@@ -253,12 +289,12 @@ function showPrint(print, commands) {
   $("held-told").textContent = print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.";
   $("words-line").hidden = !print.words.length;
   listIn("run-words", print.words.slice(-FEW));
-  listIn("run-said", runs || over ? print.said.filter((line) => !print.log || !line.includes(print.log)).slice(-FEW) : []);
+  listIn("run-said", runs || uploads || over ? print.said.filter((line) => !print.log || !line.includes(print.log)).slice(-FEW) : []);
   tellIn("run-files", [["journal", print.journal], ["log", print.log]].filter(([, path]) => path));
   $("run-log").hidden = !print.log;
   $("run-log").href = `prints/${print.number}/log`;
   $("forget").hidden = !over || !commands;
-  if (shownPhase !== `${print.number} ${phase}`) $("printer-field").open = over;
+  if (shownPhase !== `${print.number} ${phase}`) { $("printer-field").open = over; $("rest-field").open = false; }
   shownPhase = `${print.number} ${phase}`;
   if (over && print.forcible && commands) $("force-line").hidden = false;
 }
@@ -266,6 +302,11 @@ function showPrint(print, commands) {
 function stateTold(print) {
   const { state, share, left_s: left, message } = print.progress;
   return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message].filter(Boolean).join(" · ");
+}
+
+function showUpload(upload) {
+  $("run-progress").value = upload?.[1] || 0;
+  tellIn("run-told", []);
 }
 
 const figuresTold = ({ lines, time_s: time, filament_mm: filament, errors }) =>

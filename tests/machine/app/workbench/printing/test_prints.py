@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,11 @@ from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.printing.teller import Said
 from machine.link.pending_commands import Command, Control
+from machine.network.credentials import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
 from profiles.profile import load
+from tests.machine.network.stand_ins import KEY, OctoPrintStandIn, stand_in
 
 PROFILE = load()
 HEAT = ["G21", "G90", "M83", "G28", "G92 A0 C0", "M140 S60", "M104 S210", "M109 S210", "G0 Z0.2 F600"]
@@ -31,8 +34,8 @@ def order(port: str, gcode: str = HOUR, force: bool = True) -> PrintOrder:
     return PrintOrder("hour", gcode.encode(), PROFILE, PrintRequest(port), force)
 
 
-def print_until(printer: SimulatedPrinter, end: Callable[[Prints, RunningPrint], None]) -> dict[str, Any]:
-    """The last state of a print that is ended in some way while it lays its strokes."""
+def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable[[Prints, RunningPrint], None]) -> dict[str, Any]:
+    """The last state of a print that is ended in some way when it runs."""
 
     async def run() -> dict[str, Any]:
         prints = Prints()
@@ -42,16 +45,20 @@ def print_until(printer: SimulatedPrinter, end: Callable[[Prints, RunningPrint],
                 await prints.changed(prints.version)
             return prints.prints[0]
 
-        prints.command("me", {"do": "check"}, lambda asked: order(printer.path))
+        prints.command("me", {"do": "check"}, lambda asked: order(port))
         begun = await reach(lambda one: one.state["phase"] == "ready")
         prints.command("me", {"do": "begin", "print": begun.number}, lambda asked: order(""))
-        await reach(lambda one: one.state["progress"] and one.state["progress"]["nozzle_target_c"] == 210.0)
+        await reach(lambda one: one.state["progress"] and runs(one))
         end(prints, begun)
         state = (await reach(lambda one: one.over)).state
         await asyncio.gather(*prints._tasks)
         return state
 
     return asyncio.run(asyncio.wait_for(run(), 60.0))
+
+
+def heats(one: RunningPrint) -> bool:
+    return bool(one.state["progress"]["nozzle_target_c"] == 210.0)
 
 
 def kill(prints: Prints, one: RunningPrint) -> None:
@@ -85,14 +92,70 @@ def test_whoever_dies_the_heaters_go_off(
 ) -> None:
     monkeypatch.setattr(running_print, "EMERGENCY_S", 0.2)
     with SimulatedPrinter(PROFILE.machine, speed=20.0) as printer:
-        state = print_until(printer, end)
+        state = print_until(printer.path, heats, end)
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
     assert state["sentence"] == told
     assert Path(state["journal"]).is_file()
 
 
+GOES_ON = "is printing hour.gcode and goes on without this program: its own page commands it"
+
+
+@pytest.mark.parametrize(("end", "told"), [
+    (kill, f"{DIED}; {{address}} {GOES_ON}"),
+    (hang_up, "hour goes on printing on {address}: this page follows it no more"),
+])  # fmt: skip
+def test_whoever_dies_a_print_server_goes_on_and_its_key_is_told_nowhere(
+    end: Callable[[Prints, RunningPrint], None], told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    with stand_in("octoprint") as (job, address):
+        job.steps = 10_000
+        ended = print_until(address, lambda one: one.state["progress"]["state"] == "printing", end)
+        assert job.state == "printing"
+    assert ended["sentence"] == told.format(address=address)
+    assert job.files["hour.gcode"].decode() == HOUR
+    assert KEY not in f"{ended}{Path(ended['log']).read_text()}"
+
+
+def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_starts_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    uploading = threading.Event()
+
+    class Slow(OctoPrintStandIn):
+        def form(self, body: bytes) -> dict[str, tuple[str, bytes]]:
+            uploading.wait(10.0)
+            return super().form(body)
+
+    async def run(address: str) -> dict[str, Any]:
+        prints = Prints()
+        one = RunningPrint(1, order(address), "me", prints.tell)
+        printing = asyncio.create_task(one.run())
+
+        async def reach(phase: str) -> None:
+            while one.state["phase"] != phase:
+                await prints.changed(prints.version)
+
+        await reach("ready")
+        one.begin()
+        await reach("uploading")
+        one.stop_at_once()
+        await printing
+        uploading.set()
+        return one.state
+
+    with stand_in("octoprint", handler=Slow) as (job, address):
+        ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
+        assert (job.state, job.commands) == ("idle", ["M112"])
+    assert ended["sentence"] == f"emergency stop: {address} has taken it; restart the printer before the next print"
+
+
 class Agreeing:
     """A person who would print whatever is asked."""
+
+    agreed = False
 
     def agrees(self) -> bool:
         raise AssertionError("nobody is asked when something speaks against the print")
@@ -110,6 +173,7 @@ class Heard:
 
 @pytest.mark.parametrize(("wanted", "sentence", "forcible"), [
     (order("/dev/no-such-port"), "port /dev/no-such-port does not exist", False),
+    (order("octoprint:127.0.0.1:9"), "octoprint:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9: is OctoPrint", False),
     (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 errors, the first: X goes to 500 mm", True),
 ])  # fmt: skip
 def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintOrder, sentence: str, forcible: bool) -> None:

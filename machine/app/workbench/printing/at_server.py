@@ -1,0 +1,44 @@
+"""At server: a print on a print server, which is handed the file, as `print --port SERVER` does it."""
+
+from machine.app.printer.attendance import Observers
+from machine.app.printer.network_print import LIMITS, print_there, server_session
+from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
+from machine.app.printer.stream import PrintJob
+from machine.app.workbench.printing.at_page import AtPage
+from machine.app.workbench.printing.checks import CLEAN, DONE, LEFT, STOPPED, Checks, figures, program_of
+from machine.app.workbench.printing.order import PrintOrder, State
+from machine.link.pending_commands import CancelledError
+from machine.network.address import parse_server_address
+from machine.network.follow import End
+from machine.network.server import PrintServer
+
+
+def print_on_server(order: PrintOrder, person: AtPage, checks: Checks) -> State:
+    """Check, ask, hand over, follow; how it ended. Raises UserError."""
+    address = order.printing.port
+    with server_session(address, f"{order.name} to {address}", "print") as (server, log):
+        job = _checked(order, server, checks)
+        checks.teller.tell(phase="ready")
+        if not person.agrees():
+            return LEFT
+        checks.teller.tell(phase="uploading")
+        try:
+            end = print_there(server, job, Observers(log), person)
+        except CancelledError:
+            return LEFT
+    left = {"end": "left", "sentence": f"{order.name} goes on printing on {address}: this page follows it no more"}
+    return {End.DONE: DONE, End.CANCELLED: STOPPED, End.LEFT: left}[end]
+
+
+def _checked(order: PrintOrder, server: PrintServer, checks: Checks) -> PrintJob:
+    """The job, when nothing speaks against it."""
+    profile, greeting = order.profile, server.greet()
+    with checks.that(f"{greeting.text} answers at {server.name}, is free, and prints for {profile.machine.name}"):
+        check_free(server.name, server.status())
+        check_server_machine(parse_server_address(order.printing.port), greeting, profile.machine, order.force)
+    program = program_of(order)
+    checks.teller.tell(figures=figures(program))
+    with checks.that(CLEAN):
+        ready_for_server(greeting, program, profile, order.name, order.force)
+    checks.add(LIMITS)
+    return PrintJob(order.name, program, profile)
