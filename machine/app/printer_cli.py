@@ -129,8 +129,10 @@ def send(
 
 
 def resume(
-    journal: Annotated[Path, typer.Argument(metavar="JOURNAL", help="journal of the print that was cut off")],
-    port: Annotated[str, typer.Option("--port", metavar="PORT", help="serial port")],
+    journal: Annotated[
+        Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the print that was cut off; without it they are listed")
+    ] = None,
+    port: Annotated[str | None, typer.Option("--port", metavar="PORT", help="serial port")] = None,
     baud: Baud = 115200,
     yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
     watch: Watch = False,
@@ -142,8 +144,13 @@ def resume(
     machine: MachineGiven = None,
 ) -> int:
     """Go on with a print after a power cut, a crash or a pulled plug."""
-    from machine.app.commands.resume import resume
+    from machine.app.commands.resume import list_resumable, resume
+    from profiles.errors import JournalError
 
+    if journal is None:
+        return list_resumable()
+    if port is None:
+        raise JournalError(f"journal {journal}: at which port is the printer? --port PORT is expected")
     named = None if machine is None else machine_profile(machine)
     return resume(journal, PrintRequest(port, baud, 0.0, log, further, page_port(watch, watch_port)), named, yes)
 

@@ -1,14 +1,28 @@
 """Resume: go on with a print that was cut off by a power cut, a crash or a pulled plug, as its journal tells."""
 
 import sys
+from datetime import datetime
 from pathlib import Path
 
+from machine.app.printer.journal_folder import resumable_journals
 from machine.app.printer.resumption import print_rest, read_resumption
 from machine.app.requests import PrintRequest
 from machine.app.terminal.interrupts import interrupting
+from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import say, say_lines
 from profiles.errors import JournalError
 from profiles.profile import Profile
+
+
+def list_resumable() -> int:
+    """The prints that can be gone on with, the newest first, on stdout; 0 also when there is none."""
+    journals = resumable_journals()
+    if not journals:
+        say("no print of this computer was cut off or cancelled")
+    for each in journals:
+        what = plain_line(f"{each.name} on {each.machine}, up to line {each.line}")
+        show(f"{plain_line(str(each.path))}\n    {what}, {datetime.fromtimestamp(each.written_s):%Y-%m-%d %H:%M}\n")
+    return 0
 
 
 def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, yes: bool = False) -> int:

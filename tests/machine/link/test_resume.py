@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from machine.app.cli import main
+from machine.app.printer.journal_folder import continue_journal
 from machine.app.printer.serial_log import tap
 from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
@@ -456,6 +457,23 @@ def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
     assert "watch the print at http://" in told
     assert "was resumed already, what became of it is in" in told
     assert record.end[-1, 3:5].tolist() == [-20.0, 360.0]
+
+
+def test_the_command_lists_the_prints_that_can_be_resumed_and_no_others(
+    text: GcodeFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(text.path.parent))
+    states = {"cut-off": Checkpoint(20, 20, 10, 20), "done": Checkpoint(20, 20, 20, 20, state="finished"), "begun": Checkpoint()}
+    for name, state in states.items():
+        with continue_journal(text, PROFILE, name) as journal:
+            journal.write(state)
+    (journal.path.parent / "torn.journal").write_bytes(b"nothing")
+    assert main(["resume"]) == 0
+    path, told = capsys.readouterr().out.splitlines()
+    assert path.endswith("-cut-off.journal")
+    assert told.startswith("    cut-off on generic A/C table, up to line 10, ")
+    assert main(["resume", path]) == 1
+    assert capsys.readouterr().err.endswith("at which port is the printer? --port PORT is expected\n")
 
 
 @pytest.mark.parametrize(("spoil", "words"), [
