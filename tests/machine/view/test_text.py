@@ -32,7 +32,7 @@ def test_the_text_of_another_slicer_is_in_the_page_and_its_numbers_are_not() -> 
     header, found = read(FOREIGN)
     assert text_of(header, found) == FOREIGN.split("\n")
     assert header["text"]["patterns"][6:8] == ["G1 X\x02 Y\x01 E\x05", "G2 X\x02 Y\x02 I-5 J5 E\x05"]
-    assert header["text"]["zeros"] == [[9, 1151000]]
+    assert header["text"]["zeros"] == [[4, 0], [9, 1151000]]
 
 
 def test_a_text_whose_lines_are_all_unlike_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
