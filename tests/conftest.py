@@ -32,10 +32,21 @@ for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler if number == signal.SIGINT else lambda *_: None)
 signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid_signals())
 
+LARGEST = ("slice", "judge", "sweep", "search", "dry-run", "draw")  # the bundles of kernels by the time that compiling takes
 SLOW_IS_NO_FAULT = (HealthCheck.too_slow,)
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=SLOW_IS_NO_FAULT)
 settings.register_profile("explore", print_blob=True, deadline=None, suppress_health_check=SLOW_IS_NO_FAULT)
 settings.load_profile("repeatable")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Before the whole suite is shared out, kernels are compiled, each once: the workers would all compile the same ones."""
+    shares_out = getattr(session.config.option, "numprocesses", None) and not hasattr(session.config, "workerinput")
+    if shares_out and session.config.args_source is pytest.Config.ArgsSource.TESTPATHS:
+        from machine.app.pipeline.compilers import wait_for
+
+        wait_for(LARGEST)
 
 
 @pytest.fixture(autouse=True, scope="session")
