@@ -23,8 +23,9 @@ const TURN_STEP_DEG = 3;
 function linesOf(gl, { places, colours }) {
   const program = programOf(gl, LINE_VERTEX, LINE_FRAGMENT), vao = gl.createVertexArray();
   gl.bindVertexArray(vao);
-  attribute(gl, program.at("place"), bufferOf(gl, places), 3, gl.FLOAT, false);
-  attribute(gl, program.at("colour"), bufferOf(gl, colours), 4, gl.UNSIGNED_BYTE, true);
+  const placed = bufferOf(gl, places), painted = bufferOf(gl, colours);
+  attribute(gl, program.at("place"), placed, 3, gl.FLOAT, false);
+  attribute(gl, program.at("colour"), painted, 4, gl.UNSIGNED_BYTE, true);
   gl.bindVertexArray(null);
   const count = places.length / 3;
   const draw = (toClip, { first = 0, end = count, lift = 0 } = {}) => {
@@ -36,7 +37,7 @@ function linesOf(gl, { places, colours }) {
     gl.drawArrays(gl.LINES, first, end - first);
     gl.bindVertexArray(null);
   };
-  return { draw, corners: count };
+  return { draw, corners: count, free: () => freed(gl, vao, placed, painted) };
 }
 
 /** Pairs of places for every row that moves and lays nothing; turns of the table are arcs. row: of each pair, rising. */

@@ -49,8 +49,8 @@ void main() {
 function solidOf(gl, { places, colours }) {
   const program = programOf(gl, SOLID_VERTEX, SOLID_FRAGMENT), vao = gl.createVertexArray();
   gl.bindVertexArray(vao);
-  attribute(gl, program.at("place"), bufferOf(gl, places), 3, gl.FLOAT, false);
-  const painted = bufferOf(gl, colours, gl.DYNAMIC_DRAW);
+  const placed = bufferOf(gl, places), painted = bufferOf(gl, colours, gl.DYNAMIC_DRAW);
+  attribute(gl, program.at("place"), placed, 3, gl.FLOAT, false);
   attribute(gl, program.at("colour"), painted, 4, gl.UNSIGNED_BYTE, true);
   gl.bindVertexArray(null);
   const paint = (colours) => {
@@ -83,7 +83,7 @@ function solidOf(gl, { places, colours }) {
     gl.disable(gl.BLEND);
     gl.bindVertexArray(null);
   };
-  return { draw, paint, corners: places.length / 3 };
+  return { draw, paint, corners: places.length / 3, free: () => freed(gl, vao, placed, painted) };
 }
 
 /** Corners of triangles put together, all of one colour a piece. */

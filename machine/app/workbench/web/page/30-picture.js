@@ -25,25 +25,33 @@ function pictureOf(canvas, camera, drawn) {
   if (!gl) return null;
   const scene = { model: null, matrix: IDENTITY, box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, pieces: null, shifts: [], walls: null, plane: null, pedestal: null, machine: null, dark: false, marks: null, extras: {} };
   let card = null, asked = false, count = 0;
+  const stale = new Set(); // of what the card holds: made anew before it is drawn, once however often it has changed by then
   const build = () => {
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     card = { frame: frameOf(gl, 4), table: null, solid: null, extras: {} };
-    table();
-    solid();
-    plane();
-    pedestal();
-    pieces();
-    Object.keys(scene.extras).forEach(extra);
-    walls();
+    [table, solid, plane, pedestal, pieces, walls, ...Object.keys(scene.extras)].forEach((each) => stale.add(each));
   };
+  const anew = (...things) => {
+    things.forEach((each) => stale.add(each));
+    ask();
+  };
+  const renew = () => {
+    if (stale.has(solid)) stale.delete(painted); // it has the new colours
+    stale.forEach((each) => (typeof each === "string" ? extra(each) : each()));
+    stale.clear();
+  };
+  const release = (thing) => { if (thing) thing.free(); };
   const table = () => {
     if (!scene.machine) return;
     const { table: body } = bodiesOf(scene.machine, scene.dark);
+    Object.values(card.table || {}).forEach(release);
     card.table = { solid: solidOf(gl, body.solid), lines: linesOf(gl, body.lines) };
   };
   const solid = () => {
+    release(card.solid);
+    card.solid = null;
     if (!scene.model) return;
     const colours = new Uint8Array(12 * scene.model.count);
     card.colours = markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours));
@@ -52,6 +60,7 @@ function pictureOf(canvas, camera, drawn) {
   const draw = () => {
     asked = false;
     if (gl.isContextLost()) return;
+    renew();
     const density = Math.min(devicePixelRatio || 1, 2);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
@@ -79,16 +88,24 @@ function pictureOf(canvas, camera, drawn) {
     document.documentElement.dataset.drawn = ++count;
   };
   const plane = () => {
-    if (!scene.plane) return void (card.plane = null);
+    Object.values(card.plane || {}).forEach(release);
+    card.plane = null;
+    if (!scene.plane) return;
     const { discs, rims } = planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR);
     card.plane = { disc: solidOf(gl, discs), rim: linesOf(gl, rims) };
   };
   const pedestal = () => {
+    release(card.pedestal);
     const colours = scene.pedestal && new Uint8Array(12 * scene.pedestal.count);
     card.pedestal = colours && solidOf(gl, { places: scene.pedestal.corners, colours: paintedRed(scene.pedestal.count, null, PEDESTAL_COLOUR, colours) });
   };
-  const pieces = () => { card.pieces = scene.pieces && piecesOn(gl, scene.pieces, scene.chosen); };
+  const pieces = () => {
+    release(card.pieces);
+    card.pieces = scene.pieces && piecesOn(gl, scene.pieces, scene.chosen);
+  };
+  const chosenPiece = () => { if (card.pieces) card.pieces.paint(scene.chosen); };
   const extra = (name) => {
+    (card.extras[name] || []).forEach(({ solid, lines }) => [solid, lines].forEach(release));
     card.extras[name] = scene.extras[name].map(({ solid, lines, matrix = IDENTITY, strength = 1, over = false }) => ({
       solid: solid && solidOf(gl, solid), lines: lines && linesOf(gl, lines), matrix, strength, over,
     }));
@@ -99,11 +116,14 @@ function pictureOf(canvas, camera, drawn) {
     if (lines) lines.draw(seen.toClip, { lift: 1e-4 });
     gl.depthFunc(gl.LEQUAL);
   };
-  const repaint = () => {
+  const painted = () => {
     if (card.solid) card.solid.paint(markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, card.colours)));
-    ask();
   };
-  const walls = () => { card.walls = scene.walls && scene.walls.map((each) => solidOf(gl, each)); };
+  const walls = () => {
+    const kept = new Map((card.walls || []).map((each) => [each.of, each]));
+    card.walls = scene.walls && scene.walls.map((of) => kept.get(of) || { of, ...solidOf(gl, of) });
+    kept.forEach((each, of) => { if (!(scene.walls || []).includes(of)) each.free(); });
+  };
   const paintPlate = (seen, look = {}) => {
     card.table.solid.draw(seen, look);
     card.table.lines.draw(seen.toClip, { lift: 1e-5 });
@@ -118,18 +138,18 @@ function pictureOf(canvas, camera, drawn) {
   build();
   return {
     ask,
-    machine: (machine, dark) => { Object.assign(scene, { machine, dark }); table(); ask(); },
-    show: (model) => { scene.model = model; scene.red = scene.marks = null; card.solid = null; solid(); ask(); },
+    machine: (machine, dark) => { Object.assign(scene, { machine, dark }); anew(table); },
+    show: (model) => { scene.model = model; scene.red = scene.marks = null; anew(solid); },
     stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
     red: (marks) => {
       if (marks === scene.red) return;
       scene.red = marks;
-      repaint();
+      anew(painted);
     },
     /** A byte of each face: the kinds of zones it is marked for. */
-    marks: (bits) => { scene.marks = bits; repaint(); },
+    marks: (bits) => { scene.marks = bits; anew(painted); },
     /** More to draw under a name: [{solid, lines, matrix, strength, over: before all else}]. */
-    extra: (name, things) => { scene.extras[name] = things; extra(name); ask(); },
+    extra: (name, things) => { scene.extras[name] = things; anew(name); },
     cut: (planes, colours) => {
       const drawable = planes && planes.length <= MOST_CUTS;
       scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;
@@ -139,9 +159,8 @@ function pictureOf(canvas, camera, drawn) {
     pieces: (found, shifts, chosen) => {
       const same = scene.pieces === found, repainted = scene.chosen !== chosen;
       Object.assign(scene, { pieces: found, shifts, chosen });
-      if (!same) pieces();
-      else if (found && repainted) card.pieces.paint(chosen);
-      ask();
+      if (same && !(found && repainted)) ask();
+      else anew(same && card.pieces ? chosenPiece : pieces);
     },
     /** The walls of what is sliced, triangles of each part, with the model as a ghost about them, or without it; null: none. */
     walls: (found, alone) => {
@@ -149,17 +168,15 @@ function pictureOf(canvas, camera, drawn) {
       const same = (scene.walls || []).length === (found || []).length && (found || []).every((each, k) => each === scene.walls[k]);
       if (same && Boolean(found) === Boolean(scene.walls)) return;
       scene.walls = found;
-      walls();
-      ask();
+      anew(walls);
     },
     /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
-    plane: (held) => { scene.plane = held; plane(); ask(); },
+    plane: (held) => { scene.plane = held; anew(plane); },
     /** The triangles of what the model stands on, in the platform's frame, or none. */
     pedestal: (body) => {
       if (body === scene.pedestal) return;
       scene.pedestal = body;
-      pedestal();
-      ask();
+      anew(pedestal);
     },
     /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
     placeOf: (place) => {

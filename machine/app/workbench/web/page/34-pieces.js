@@ -61,6 +61,7 @@ function piecesOn(gl, pieces, chosen) {
       arrows.draw(seen, { range: [k * share, (k + 1) * share] });
     }),
     paint: (number) => solid.paint(pieceColours(pieces, number)),
+    free: () => [solid, arrows].forEach((each) => each.free()),
   };
 }
 
