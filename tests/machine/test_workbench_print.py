@@ -222,10 +222,6 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         page.command("begin")
         ended = page.until(lambda one: one["phase"] == "over")
         assert "the printer restarted in the middle of the print" in ended["sentence"]
-        page.do("go_on", journal=ended["journal"], port="sim")
-        refused = page.until(lambda one: one["resumes"] and one["phase"] == "over")
-        assert refused["sentence"] == "--port sim: a simulated printer ends with its print; the port of a printer is expected"
-
         browser.open(sliced.address)
         browser.click("#tab-printing")
         browser.wait("document.documentElement.dataset.line === 'open'")

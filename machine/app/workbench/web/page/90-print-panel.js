@@ -272,7 +272,8 @@ function showPrint(print, commands) {
   listIn("run-findings", asking && figures ? figures.findings : []);
   $("run-ask").hidden = phase !== "ready" || !commands;
   $("ask-told").textContent = print.question || "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?";
-  $("begin").textContent = print.resumes ? "Go on" : "Print now";
+  $("begin").textContent = print.resumes ? "Yes, go on" : "Print now";
+  $("leave").textContent = print.resumes ? "No, leave it" : "Leave it";
   $("run-live").hidden = !progress && !uploads;
   if (progress) showProgress(progress, over);
   else if (uploads) showUpload(upload);
