@@ -5,97 +5,73 @@ So some thousand patterns, and for each line its place among them, are the whole
 what it takes compressed by itself.
 """
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from machine.view.encoding import Column, whole
 
-MOST_LETTERS = 1_000_000  # in all patterns: with more the page would grow by some hundred kilobytes, and the text is left out
-AXES = "XYZ"
-FILAMENT = "EUVW"
-STEPS = "\x01\x02\x03"  # holes: the number in full; without its last zeros; also without the zero before its point
-SUMS = "\x04\x05\x06"  # the same of filament since the last G92
+MOST_LETTERS = 1_000_000  # in all patterns together; with more the page would grow by some hundred kilobytes
+AXES, FILAMENT = "XYZ", "EUVW"
+AXIS_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point, as the page's rows are stored
+# Holes: the number in full; without its last zeros; without the zero before its point.
+STEPS, SUMS = "\x01\x02\x03", "\x04\x05\x06"
+LONGEST = 15  # letters of a number: its digits fit into 64 bits
+LINES_AT_ONCE = 100_000  # so that the longest print takes little memory
+SPACE, BREAK, MINUS, POINT, ZERO = b" \n-.0"
 NOTHING: tuple[None, dict[str, Column]] = (None, {"text": Column(np.zeros(0), "i32", delta=True)})
+
+Wholes = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """What the rows tell of m lines: moved (m,), whether any is of the line; axes (3, m), step and total of filament (m,)."""
+
+    moved: Mask
+    axes: Wholes
+    step: Wholes
+    total: Wholes
+
+    def between(self, first: int, end: int) -> "_Told":
+        return _Told(self.moved[first:end], self.axes[:, first:end], self.step[first:end], self.total[first:end])
 
 
 def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dict[str, Any] | None, dict[str, Column]]:
     """For the header the patterns and where sums of filament begin anew, and the column of the lines' places among the patterns;
     None and an empty column where the lines are too unlike. rows: from machine.view.paths."""
-    text = "\n".join(lines)
-    if any(hole in text for hole in STEPS + SUMS):
-        return NOTHING
-    zeros: list[list[int]] = []
+    ends = np.searchsorted(rows["line"].values, np.arange(len(lines) + 1), side="right")
+    first, last = ends[:-1], ends[1:]
+    pushed = np.concatenate([[0], whole(rows["filament"])])
+    zeros, zero = _zeros(lines, pushed[last])
+    axes = np.concatenate([np.zeros((1, 3), dtype=np.int64), whole(rows["end"])[:, :3]])[last].T
+    told = _Told(last > first, axes, pushed[last] - pushed[first], pushed[last] - zero)
     places: dict[str, int] = {}
-    numbers, letters = np.zeros(len(lines), dtype=np.int64), 0
-    for k, pattern in enumerate(_patterns(lines, rows, zeros)):
-        if pattern not in places:
-            places[pattern] = len(places)
-            letters += len(pattern)
-            if letters > MOST_LETTERS:
-                return NOTHING
-        numbers[k] = places[pattern]
-    return {"patterns": list(places), "zeros": zeros}, {"text": Column(numbers, "i32", delta=True)}
+    numbers: list[int] = []
+    for begin in range(0, len(lines), LINES_AT_ONCE):
+        end = begin + LINES_AT_ONCE
+        text = "\n".join(lines[begin:end])
+        if any(hole in text for hole in STEPS + SUMS):
+            return NOTHING
+        numbers += [places.setdefault(each, len(places)) for each in _with_holes(text, told.between(begin, end)).split("\n")]
+        if sum(map(len, places)) > MOST_LETTERS:
+            return NOTHING
+    return {"patterns": list(places), "zeros": zeros}, {"text": Column(np.array(numbers), "i32", delta=True)}
 
 
-def _patterns(lines: Sequence[str], rows: Mapping[str, Column], zeros: list[list[int]]) -> Iterator[str]:
-    """The pattern of each line. zeros: takes lines, from 1, and the sums of filament that count as 0 from there on."""
-    ends = np.searchsorted(rows["line"].values, np.arange(len(lines) + 1), side="right").tolist()
-    x, y, z = (whole(rows["end"])[:, :3].T / 1e3).tolist()
-    pushed = [0, *whole(rows["filament"]).tolist()]
-    pattern, fill, zero = "", "", 0
-    for k, (line, (first, last)) in enumerate(zip(lines, pairwise(ends), strict=True)):
-        if line.startswith("G92 "):
-            zero = _zero(line, pushed[last], zero)
-            if not zeros or zeros[-1][1] != zero:
-                zeros.append([k + 1, zero])
-        if first == last:
-            yield line
-            continue
-        place_mm, step_mm = (x[last - 1], y[last - 1], z[last - 1]), (pushed[last] - pushed[first]) / 1e5
-        if not fill or fill.format(*place_mm, step_mm) != line:  # most are of the pattern of the line before
-            pattern = _pattern(line, place_mm, step_mm, (pushed[last] - zero) / 1e5)
-            fill = _filled(pattern)
-        yield pattern
-
-
-def _pattern(line: str, place_mm: tuple[float, ...], step_mm: float, total_mm: float) -> str:
-    return " ".join(_hole(word, place_mm, step_mm, total_mm) for word in line.split(" "))
-
-
-@lru_cache(maxsize=256)
-def _filled(pattern: str) -> str:
-    """A pattern whose numbers are all in full as format() fills it with X, Y, Z and a step of filament; "" of another."""
-    if any(hole in pattern for hole in STEPS[1:] + SUMS):
-        return ""
-    places = {letter: f"{{{place}:.3f}}" for place, letter in enumerate(AXES)} | dict.fromkeys(FILAMENT, "{3:.5f}")
-    plain = pattern.replace("{", "{{").replace("}", "}}")
-    return re.sub(f"([{AXES}{FILAMENT}]){STEPS[0]}", lambda match: match[1] + places[match[1]], plain)
-
-
-def _hole(word: str, place_mm: tuple[float, ...], step_mm: float, total_mm: float) -> str:
-    """A word with a hole instead of its number, where the rows tell it."""
-    letter, number = word[:1], word[1:]
-    if letter and letter in AXES:
-        return letter + _form(number, f"{place_mm[AXES.index(letter)]:.3f}", STEPS)
-    if letter and letter in FILAMENT:
-        form = _form(number, f"{step_mm:.5f}", STEPS)
-        return letter + (form if form != number else _form(number, f"{total_mm:.5f}", SUMS))
-    return word
-
-
-def _form(number: str, full: str, holes: str) -> str:
-    """The hole that gives a number again from all its digits; the number where none does."""
-    if number == full:
-        return holes[0]
-    short = full.rstrip("0").rstrip(".")
-    if number == short:
-        return holes[1]
-    return holes[2] if number == short.replace("0.", ".", 1) and short.lstrip("-").startswith("0.") else number
+def _zeros(lines: Sequence[str], pushed: Wholes) -> tuple[list[list[int]], Wholes]:
+    """Pairs of a line (from 1) and the sum of filament that counts as 0 from there on, and for each line what counts as 0."""
+    zeros, zero, counts = [], 0, np.zeros(len(lines), dtype=np.int64)
+    for k in [k for k, line in enumerate(lines) if line.startswith("G92 ")]:
+        now = _zero(lines[k], int(pushed[k]), zero)
+        if now != zero:
+            zeros.append([k + 1, now])
+        zero = counts[k:] = now
+    return zeros, counts
 
 
 def _zero(line: str, pushed: int, before: int) -> int:
@@ -107,3 +83,74 @@ def _zero(line: str, pushed: int, before: int) -> int:
             except (ValueError, OverflowError):
                 return before
     return before
+
+
+def _with_holes(text: str, told: _Told) -> str:
+    """The lines with a hole instead of every number that the rows tell."""
+    letters = np.frombuffer(text.encode(), dtype=np.uint8)
+    breaks = np.flatnonzero((letters == SPACE) | (letters == BREAK))
+    start, end = np.concatenate([[0], breaks + 1]), np.concatenate([breaks, [len(letters)]])
+    line = np.concatenate([[0], np.cumsum(letters[breaks] == BREAK)])
+    axes, filament = (np.isin(np.append(letters, 0)[start], list(names.encode())) for names in (AXES, FILAMENT))
+    chosen = (axes | filament) & told.moved[line] & (end - start > 1) & (end - start <= LONGEST)
+    start, end, line, filament = start[chosen], end[chosen], line[chosen], filament[chosen]
+    number = _numbers(letters, start + 1, end)
+    axis = np.searchsorted(list(AXES.encode()), letters[start]) % len(AXES)
+    step = _form(number, told.step[line], FILAMENT_DIGITS)
+    total = _form(number, told.total[line], FILAMENT_DIGITS)
+    by_sum = np.where(total > 0, total + len(STEPS), 0)
+    hole = np.where(filament, np.where(step > 0, step, by_sum), _form(number, told.axes[axis, line], AXIS_DIGITS))
+    filled, start, end = hole[hole > 0], start[hole > 0], end[hole > 0]
+    covered = np.zeros(len(letters) + 1, dtype=np.int8)
+    covered[start + 2] += 1
+    covered[end] -= 1
+    holed = letters.copy()
+    holed[start + 1] = filled
+    left: NDArray[np.uint8] = holed[np.cumsum(covered[:-1], dtype=np.int8) == 0]
+    return str(left.tobytes(), "utf-8")
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbers:
+    """Numbers as they are written, all (n,).
+
+    digits: as one whole number with its sign; behind: how many of them are behind the point; sound: it is a number; plain: it has
+    digits before the point, as many as it needs; bare: it has none there; trimmed: it ends with no needless 0.
+    """
+
+    digits: Wholes
+    behind: Wholes
+    sound: Mask
+    plain: Mask
+    bare: Mask
+    trimmed: Mask
+
+
+def _numbers(letters: NDArray[np.uint8], start: Wholes, end: Wholes) -> _Numbers:
+    minus = letters[start] == MINUS
+    first, count = start + minus, len(start)
+    digits, behind, points = (np.zeros(count, dtype=np.int64) for _ in range(3))
+    sound = np.ones(count, dtype=np.bool_)
+    for k in range(LONGEST):
+        inside = first + k < end
+        letter = letters[np.minimum(first + k, len(letters) - 1)].astype(np.int64)
+        point, figure = inside & (letter == POINT), inside & (letter >= ZERO) & (letter <= ZERO + 9)
+        digits = np.where(figure, 10 * digits + letter - ZERO, digits)
+        behind += figure & (points > 0)
+        points += point
+        sound &= point | figure | ~inside
+    before = end - first - behind - points
+    leading = letters[np.minimum(first, len(letters) - 1)] == ZERO
+    sound &= (points == (behind > 0)) & (before + behind > 0) & ~(minus & (digits == 0))
+    trimmed = (behind == 0) | (letters[end - 1] != ZERO)
+    return _Numbers(
+        np.where(minus, -digits, digits), behind, sound, (before == 1) | ((before > 1) & ~leading), before == 0, trimmed
+    )
+
+
+def _form(number: _Numbers, value: Wholes, digits: int) -> Wholes:
+    """In which of the three forms whole values with so many digits behind the point are the numbers, from 1; 0: in none."""
+    scale = 10 ** np.maximum(digits - number.behind, 0)
+    same = number.sound & (number.behind <= digits) & (number.digits * scale == value)
+    full, short = same & number.plain & (number.behind == digits), same & number.trimmed
+    return np.select([full, short & number.plain, short & number.bare], [1, 2, 3], 0)
