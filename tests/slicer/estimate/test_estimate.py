@@ -88,10 +88,13 @@ def test_no_parts_take_no_time() -> None:
     assert estimate((), profile()) == Estimate(0.0, 0.0, 0.0)
 
 
+COARSE = ("process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3", "process.line_width_mm=0.6")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["bracket", "tree"])
 def test_the_dry_run_of_a_demo_takes_as_long_as_estimated(name: str) -> None:
-    settings = profile("search.beam_width=1", "search.most_parts=3")
+    settings = profile("search.beam_width=1", "search.most_parts=3", "search.directions=100", *COARSE)
     decomposition = decompose(read_mesh(locate(f"demo:{name}"))[0], name, settings)
     run = build(decomposition, settings).run
     expected = estimate(decomposition.parts, settings)
