@@ -13,6 +13,7 @@ from tests.machine.workbench import Running
 from tests.shapes import tee
 
 VIEW = "$('print-page').contentDocument"
+DRAWN = f"{VIEW}?.documentElement?.dataset.state === '{'failed' if XVFB is None else 'ready'}'"
 PRINTING = "document.documentElement.dataset.printing"
 SLICED = "!document.body.classList.contains('no-slices') && !document.body.classList.contains('stale')"
 pytestmark = pytest.mark.skipif(FIREFOX is None, reason="Firefox is not installed: the workbench is not tried in it")
@@ -142,7 +143,7 @@ def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: F
     firefox.click("#slice")
     firefox.wait(SLICED)
     firefox.click("#sliced-findings .error")
-    firefox.wait(f"{VIEW}?.documentElement?.dataset.state === '{'failed' if XVFB is None else 'ready'}'")
+    firefox.wait(DRAWN)
     firefox.wait(f"{VIEW}.querySelector('#findings .chosen')")
     line = firefox.value(f"{VIEW}.getElementById('readout-line').textContent")
     assert f"line {line}" in firefox.value("document.querySelector('#sliced-findings .error small').textContent")
@@ -157,8 +158,7 @@ def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: F
     firefox.click("#slice")
     firefox.wait(SLICED)
     firefox.click("#look")
-    firefox.value(f"{VIEW}?.documentElement?.removeAttribute('data-state')")
-    firefox.wait(f"{VIEW}?.documentElement?.dataset.state === '{'failed' if XVFB is None else 'ready'}'")
+    firefox.wait(f"{VIEW}?.location.href.endsWith($('print-page').getAttribute('src')) && {DRAWN}")
     firefox.value(f"{VIEW}.getElementById('tab-code').click()")
     firefox.wait(f"{VIEW}.querySelector('#code-seen .now')")
     put(firefox, f"{VIEW}.getElementById('code-line')", 200)
