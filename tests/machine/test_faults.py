@@ -23,6 +23,7 @@ from slicer.paths import SlicedPart
 from slicer.slice import slice_part
 
 LEANING = np.array([0.0, np.sin(np.radians(25.0)), np.cos(np.radians(25.0))])
+LIGHT = ["process.walls=1", "process.infill_density=0.05"]  # a third of the lines
 
 
 def _tilting(name: str) -> bool:
@@ -50,7 +51,7 @@ def _post(profile: Profile, low_mm: float = 26.0) -> Decomposition:
 
 @cache
 def _made(name: str) -> tuple[Profile, Decomposition, tuple[SlicedPart, ...], MachineProgram]:
-    profile = load(machine=name)
+    profile = load(machine=name, settings=LIGHT)
     decomposition = _post(profile)
     sliced = _sliced(decomposition, profile)
     return profile, decomposition, sliced, plan(decomposition, sliced, profile)

@@ -24,7 +24,7 @@ START = ["G21", "G90", "M83", "M140 S60", "M104 S200", "G28 X Y Z", "G92 A0 C0",
 POSED = ["G0 Z120 F900", "G0 A30 C725 F6000", "G0 X10 Y10 F6000", "G0 Z60 F900", "M204 P800 T1200", "G1 F1500"]
 # strokes with a travel after every tenth, where a pause can begin
 BODY = [
-    f"G1 X{10 + i % 7}.{i:03d} Y{10 + i % 5} E0.05" if i % 10 else f"G0 X{10 + i % 7}.{i:03d} Y{10 + i % 5}" for i in range(400)
+    f"G1 X{10 + i % 7}.{i:03d} Y{10 + i % 5} E0.05" if i % 10 else f"G0 X{10 + i % 7}.{i:03d} Y{10 + i % 5}" for i in range(240)
 ]
 PROGRAM = [*START, *POSED, *BODY, "M104 S0", "M140 S0"]
 
