@@ -2,7 +2,9 @@
 
 import os
 from collections.abc import Iterable, Mapping
+from copy import deepcopy
 from difflib import get_close_matches
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -154,11 +156,17 @@ def _document(kind: str, name: str, seen: tuple[str, ...]) -> tuple[dict[str, An
     if name in own(kind) and not (str(file.resolve()) in seen and name in shipped(kind)):
         return parse(file), str(file.resolve())
     if name in shipped(kind):
-        source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
-        return read_toml(source.read_text(encoding="utf-8")), name
+        return deepcopy(_shipped_document(kind, name)), name
     if is_file_name(name):
         return parse(Path(name)), str(Path(name).resolve())
     raise _unknown(f"{kind} profile", name, known(kind))
+
+
+@cache
+def _shipped_document(kind: str, name: str) -> dict[str, Any]:
+    """The tables of a shipped profile, read once: they stay as they are while a program runs."""
+    source = resources.files("profiles") / KINDS[kind] / f"{name}.toml"
+    return read_toml(source.read_text(encoding="utf-8"))
 
 
 def _unknown(what: str, name: str, names: Iterable[str]) -> ProfileError:
