@@ -23,6 +23,7 @@ JOIN_S = 0.5  # an order that still waits for its answer is left to the server
 BEGIN_S = 15.0  # a server that has taken the order to start shows it by then
 QUIET_S = 15.0  # without an answer or an error for so long, it is said
 LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
+UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
 OnStatus = Callable[[JobStatus, str], None]  # with a message to the person, "" when there is none
 
 
@@ -54,12 +55,12 @@ def follow_print(
     return _Follower(server, file, size, on_status, control, left).run()
 
 
-def stop_at_once(server: PrintServer) -> None:
+def _stop_at_once(server: PrintServer) -> None:
     """The emergency stop. Raises ServerError where it is not confirmed."""
     try:
         server.emergency_stop()
     except ServerError as error:
-        raise ServerError(f"emergency stop: {server.name} did not confirm it: cut the power ({error})") from None
+        raise ServerError(UNCONFIRMED.format(server=server.name, error=error)) from None
 
 
 class _Follower:
@@ -86,18 +87,29 @@ class _Follower:
         self._percents: dict[Command, float] = {}  # that were ordered: not every server tells them
 
     def run(self) -> End:
-        if self._take_requests():  # a stop that was asked for before the start: nothing is started any more
+        """A stop that is asked for before the start leaves nothing to start, and one that comes as the following ends is given
+        all the same."""
+        if self._take_requests():
             return End.STOPPED
+        try:
+            end = self._followed()
+        except ServerError:
+            if self._take_requests():
+                return End.STOPPED
+            raise
+        return End.STOPPED if end is not End.STOPPED and self._take_requests() else end
+
+    def _followed(self) -> End:
         works = (self._poll, self._carry_out)
         threads = [threading.Thread(target=self._guard, args=(work,), name="print server", daemon=True) for work in works]
         for thread in threads:
             thread.start()
         try:
             while True:
-                if self._left():
-                    return End.LEFT
                 if self._take_requests():
                     return End.STOPPED
+                if self._left():
+                    return End.LEFT
                 end = self._look()
                 if end is not None:
                     return end
@@ -170,7 +182,7 @@ class _Follower:
         """Hand on what a person has asked for; True after an emergency stop."""
         while (request := self._control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
-                stop_at_once(self._server)
+                _stop_at_once(self._server)
                 return True
             if order := self._order(request):
                 self._orders.append(order)

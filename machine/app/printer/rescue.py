@@ -7,7 +7,7 @@ from machine.link.medium import SERIAL
 from machine.link.port import open_port
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from machine.network.address import is_server_address
-from machine.network.follow import stop_at_once
+from machine.network.follow import UNCONFIRMED
 from machine.network.server import ACTIVE
 from machine.network.servers import open_server
 from profiles.errors import PortError, UserError
@@ -44,9 +44,9 @@ _SENTENCES = {
 def _stop_server(address: str) -> str:
     try:
         with open_server(address) as server:
-            stop_at_once(server)
+            server.emergency_stop()
     except UserError as error:
-        return str(error)
+        return UNCONFIRMED.format(server=address, error=error)
     return STOPPED.format(server=address)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from machine.app.printer.rescue import rescue
 from machine.link.pending_commands import Command, Control
 from machine.network import duet, follow, http
 from machine.network.credentials import VARIABLE, servers_file
@@ -92,6 +93,29 @@ def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> Non
     assert end is End.CANCELLED
     assert job.state == "cancelled"
     assert phases[:3] == [Phase.PRINTING, Phase.PAUSED, Phase.PRINTING]
+
+
+def test_an_emergency_stop_that_comes_as_the_person_leaves_is_given() -> None:
+    control = Control()
+    with stand_in("octoprint") as (job, address), open_server(address) as server:
+        hand_over(server)
+        job.steps = 10_000
+
+        def left() -> bool:
+            if job.state == "printing":
+                control.ask(Command.EMERGENCY_STOP)
+            return job.state == "printing"
+
+        assert follow_print(server, UPLOAD.name, len(UPLOAD.content), lambda *_: None, control, left) is End.STOPPED
+        assert job.commands == ["M112"]
+
+
+def test_a_stop_for_which_the_key_cannot_be_read_is_told_as_not_confirmed() -> None:
+    servers_file().parent.mkdir(parents=True)
+    servers_file().write_text("key")
+    servers_file().chmod(0o600)
+    told = rescue("octoprint:printer", 115200, emergency=True)
+    assert told.startswith("emergency stop: octoprint:printer did not confirm it: cut the power (file of servers ")
 
 
 @every_kind

@@ -25,6 +25,7 @@ COMMANDS = {
     "flow": Command.FLOW,
 }
 LEAVE = "leave"  # a print on a server goes on without this program
+ANSWERS = ("begin", "cancel", "emergency", LEAVE)  # to the question whether to begin
 
 
 class AtPage:
@@ -47,7 +48,8 @@ class AtPage:
             self.stop.set()
         if word == "emergency":
             self._halts.set()
-        self._answers.put(word == "begin")
+        if word in ANSWERS:
+            self._answers.put(word == "begin")
 
     def leave(self) -> None:
         """The server is gone, and nobody can command any more: the print ends as if it had been cancelled, but one on a print

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from os.path import realpath
 from threading import Event as Flag
 from typing import Any
 
@@ -107,7 +108,7 @@ class Prints(News):
         port = order.printing.port
         if any(_same(each.state["port"], port) for each in self.running):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
-        if isinstance(order, ResumeOrder) and str(order.journal) in self._journals_in_use():
+        if isinstance(order, ResumeOrder) and realpath(order.journal) in map(realpath, self._journals_in_use()):
             raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")
         self.prints = [each for each in self.prints if not each.over or not _same(each.state["port"], port)][-MOST_OVER:]
         begun = RunningPrint(next(self._numbers), order, page, self.tell)

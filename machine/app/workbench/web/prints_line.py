@@ -86,10 +86,13 @@ def _order(session: Session, asked: dict[str, Any]) -> PrintOrder | ResumeOrder:
     """What a page wants printed: what lies on its bench, or the rest of a print that was cut off. Raises UserError."""
     if asked.get("do") != "go_on":
         return order_of(session, _printing(asked), asked.get("force") is True)
-    journal = str(asked.get("journal") or "").strip()
+    journal, machine = (str(asked.get(each) or "").strip() for each in ("journal", "machine"))
     if not journal:
         raise JournalError("no journal is chosen: choose the print that is to go on, or name the journal's file")
-    return ResumeOrder(Path(journal).absolute(), _printing(asked), str(asked.get("machine") or "").strip())
+    for name in (journal, machine):
+        if "\0" in name:
+            raise JournalError(f"{name!r:.100} is no file's name: it has a character that no name has")
+    return ResumeOrder(Path(journal).absolute(), _printing(asked), machine)
 
 
 def _printing(asked: dict[str, Any]) -> PrintRequest:
