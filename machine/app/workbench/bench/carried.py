@@ -7,6 +7,7 @@ import numpy as np
 from mdp.grown import Grown
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import ZONE_KINDS, PlannedPart
+from mdp.plans.reading import MOST_MM
 from mdp.zone import AnyZone, Zone, Zones
 from profiles.frozen import Vector
 
@@ -35,8 +36,17 @@ class Placing:
 
     def after(self, before: "Placing") -> "Placing":
         """What brings places of the same model from where they were before to where they are now."""
-        turn, factor = self.turn @ before.turn.T, self.factor / before.factor
+        turn, factor = _between(before.turn, self.turn), self.factor / before.factor
         return Placing(turn, factor, self.shift_mm - factor * turn @ before.shift_mm)
+
+
+def _between(before: Floats, after: Floats) -> Floats:
+    """The rotation from one turn to another, which a person may have rounded; it is not rounded, so that errors do not add up."""
+    if np.array_equal(before, after):
+        return np.eye(3)
+    left, _, right = np.linalg.svd(after @ before.T)
+    turn: Floats = left @ right
+    return turn
 
 
 def carried_zones(zones: Zones, move: Placing) -> Zones:
@@ -74,6 +84,8 @@ def _carried_box(box: Zone, move: Placing) -> Zone:
 
 
 def _side(values: Floats) -> Vector:
+    """A corner as a plan may have it, which ends a box that reaches farther."""
+    values = np.clip(values, -MOST_MM, MOST_MM)
     return _vector(np.round(values, BOX_DIGITS) + 0.0)
 
 

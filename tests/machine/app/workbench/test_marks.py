@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from machine.app.workbench.bench.bench import Bench, Model, with_profile, with_rotation, with_scaled_model
+from machine.app.workbench.bench.bench import Bench, Model, plan_of_bench, with_profile, with_rotation, with_scaled_model
 from machine.app.workbench.bench.marks import named_faces, standing_mesh
 from mdp.grown import Grown
 from mdp.plans.plan_file import PlannedPart
+from mdp.plans.reading import read_plan
+from mdp.plans.writing import plan_text
 from mdp.pose import about, unit
 from mdp.zone import Zone, Zones
 from profiles.profile import load
@@ -43,6 +45,18 @@ def test_marks_stay_where_they_are_on_the_model_however_often_it_is_turned(angle
 def test_a_box_on_a_model_that_is_laid_down_is_a_plain_one_again() -> None:
     (box,) = with_rotation(BENCH, ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))).zones.keep
     assert box == Zone((-17.0, 2.0, 11.0), (-11.0, 9.0, 19.0))  # the tee is 40 mm wide and tall
+
+
+def test_a_plan_of_boxes_without_end_on_a_model_turned_by_rounded_numbers_is_read_again(tmp_path: Path) -> None:
+    half = Zone((-1e5, -1e5, -1e5), (1e5, 0.0, 1e5))
+    bench, file = replace(BENCH, zones=Zones(keep=(half,)), cuts=()), tmp_path / "plan.toml"
+    for deg in range(10, 60):
+        bench = with_rotation(bench, about(unit([1.0, 0.01 * deg, 0.5]), np.radians(deg)).round(7).tolist())
+    (box,) = bench.zones.keep
+    file.write_text(plan_text(plan_of_bench(replace(bench, cuts=()), "tiltprint")))
+    assert read_plan(file).zones.keep == (box,)
+    assert isinstance(box, Zone)
+    assert (box.touches(standing_mesh(bench)) == half.touches(tee())).all()
 
 
 def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> None:
