@@ -65,12 +65,12 @@ def line_patterns(lines: Sequence[str], rows: Mapping[str, Column]) -> tuple[dic
 
 def _zeros(lines: Sequence[str], pushed: Wholes) -> tuple[list[list[int]], Wholes]:
     """Pairs of a line (from 1) and the sum of filament that counts as 0 from there on, and for each line what counts as 0."""
-    zeros, zero, counts = [], 0, np.zeros(len(lines), dtype=np.int64)
-    for k in [k for k, line in enumerate(lines) if line.startswith("G92 ")]:
-        now = _zero(lines[k], int(pushed[k]), zero)
-        if now != zero:
-            zeros.append([k + 1, now])
-        zero = counts[k:] = now
+    begins = [k for k, line in enumerate(lines) if line.startswith("G92 ")]
+    values = [0]
+    for k in begins:
+        values.append(_zero(lines[k], int(pushed[k]), values[-1]))
+    zeros = [[k + 1, now] for k, before, now in zip(begins, values[:-1], values[1:], strict=True) if now != before]
+    counts = np.repeat(np.array(values, dtype=np.int64), np.diff([0, *begins, len(lines)]))
     return zeros, counts
 
 
