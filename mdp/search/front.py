@@ -70,9 +70,10 @@ def front_row(node: Node, terms: CostTerms) -> FrontRow:
     """A node with what it costs, the cuts apart. Every area counts once in the area that needs support."""
     seams = node.seams
     scars_mm2 = sum(terms.seam_mm * seam.weighted_mm + terms.cut_mm2 for seam in seams)
+    seam_mm = sum((seam.length_mm for seam in seams), 0.0)
     planes = tuple(cut.base for cut in node.cuts)
     over_mm2 = 0.0 if terms.need is None else _excess_mm2(node) + (node.remainder.risky_mm2 - _plain_mm2(node))
-    return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2, sum(seam.length_mm for seam in seams), node.cost_mm2)
+    return FrontRow(planes, node.cost_mm2 - scars_mm2 - over_mm2, seam_mm, node.cost_mm2)
 
 
 def _excess_mm2(node: Node) -> float:

@@ -62,6 +62,9 @@ def test_the_plan_of_a_search_gives_its_parts_again_bit_by_bit(tmp_path: Path, n
     assert [part.pose for part in again.parts] == [part.pose for part in searched.parts]
     assert again.candidates_evaluated == again.rounds == 0
     assert [(row.parts, row.chosen) for row in again.front] == [(row.parts, row.chosen) for row in searched.front]
+    assert [str(row.seam_mm) for row in again.front] == [
+        str(row.seam_mm) for row in searched.front
+    ]  # letter for letter in a page
     assert again.cost_mm2 == pytest.approx(searched.cost_mm2)
 
 

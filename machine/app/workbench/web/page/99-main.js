@@ -74,8 +74,9 @@ function main() {
     bench.triangles = null;
     if (key && bench.state.model.drawn) {
       const answer = await fetch(`model/${key}`);
-      if (!answer.ok || bench.key !== key) return;
-      bench.triangles = trianglesFrom(await answer.arrayBuffer());
+      const content = answer.ok ? await answer.arrayBuffer() : null;
+      if (!content || bench.key !== key) return;
+      bench.triangles = trianglesFrom(content);
     }
     if (picture) picture.show(bench.triangles);
     stand(bench.state.rotation, false);
@@ -104,12 +105,14 @@ function showPedestal(bench, turning = false) {
 async function fetchPedestal(bench) {
   const key = bench.state.pedestal;
   if ((bench.pedestal?.of || "") === key || !bench.picture) return;
-  bench.pedestal = { of: key, body: null };
-  const answer = key ? await fetch(`pedestal/${key}`) : null;
-  if (bench.pedestal.of !== key) return;
-  bench.pedestal.body = answer && answer.status === 200 ? trianglesFrom(await answer.arrayBuffer()) : null;
+  const asked = { of: key, body: null };
+  bench.pedestal = asked;
+  const answer = key ? await fetch(`pedestal/${key}`).catch(() => null) : null;
+  if (answer?.status === 200) asked.body = trianglesFrom(await answer.arrayBuffer());
+  if (bench.pedestal !== asked) return;
+  if (key && !asked.body) bench.pedestal = null; // another one stands there by now, or the line is lost: the next state asks again
   showPedestal(bench);
-  document.documentElement.dataset.pedestal = key;
+  document.documentElement.dataset.pedestal = asked.body ? key : "";
 }
 
 /** A click on the model: the face is laid down or the plane takes its place when that was asked for; else a part is chosen. */
