@@ -72,6 +72,16 @@ def test_what_is_no_port_of_a_printer_is_told(sliced: Running, port: str, senten
         assert page.refused().startswith(sentence)
 
 
+@pytest.mark.parametrize(("journal", "sentence"), [
+    (" ", "no journal is chosen: choose the print that is to go on, or name the journal's file"),
+    ("a\0b", r"'a\x00b' is no file's name: it has a character that no name has"),
+])  # fmt: skip
+def test_what_is_no_journal_is_told(sliced: Running, journal: str, sentence: str) -> None:
+    with prints_line(sliced, "first") as page:
+        page.do("go_on", journal=journal, port="/dev/none")
+        assert page.refused() == sentence
+
+
 def listen_to_nothing(running: Running) -> socket.socket:
     """A page's line to the prints that is opened and never read."""
     own = socket.create_connection(("127.0.0.1", running.port))
@@ -134,6 +144,12 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.click("#tab-printing")
         other.command("pause")  # so that it is not done before it is stopped, however slow this computer
         browser.wait(f"{PRINTING} === 'paused'")
+        other.do("check", port="/dev/none")
+        browser.wait("$('which').options.length === 2")
+        assert browser.value(PRINTING) == "paused"  # the print that is looked at stays, and so does the one that the button stops
+        other.until(lambda one: one["phase"] == "over")
+        other.command("forget")
+        other.until(lambda one: one["phase"] == "printing")
         browser.value("{ $('printer-field').open = true; $('port-typed').focus(); }")
         browser.key("e")  # a letter of the port's name
         assert browser.value("$('port-typed').value") == "e"
@@ -156,6 +172,9 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert browser.value("$('stop-words').textContent").startswith("box.stl: emergency stop: the printer has halted")
         assert browser.value("$('run-state').textContent").startswith("emergency stop: the printer has halted")
         assert "M112" in commands_sent(Path(other.until(lambda one: one["phase"] == "over")["log"]))
+        other.command("forget")
+        browser.wait(f"{PRINTING} === ''")
+        assert browser.value("$('stop-words').checkVisibility()")  # until it is noted, whatever becomes of the print
         assert browser.complaints == []
 
 
@@ -235,8 +254,9 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         asked = browser.value("$('ask-told').textContent").splitlines()
         assert "the printer has restarted" in asked[0]
         assert asked[1].startswith("look first: all must stand as it was cut off, tip at X")
-        page.do("go_on", journal=ended["journal"], port="/dev/another")
-        assert page.refused() == f"journal {ended['journal']}: its print goes on already, or has not ended"
+        by_another_name = "{0}/../{0.name}/{1}".format(Path(ended["journal"]).parent, Path(ended["journal"]).name)
+        page.do("go_on", journal=by_another_name, port="/dev/another")
+        assert page.refused() == f"journal {by_another_name}: its print goes on already, or has not ended"
         browser.click("#leave")
         browser.wait(f"{PRINTING} === 'over'")
         assert browser.value("$('run-state').textContent") == "nothing was moved or heated"
