@@ -70,6 +70,11 @@ class Bench:
         return 0 if self.cuts is None else len(self.cuts) + 1
 
     @property
+    def planned(self) -> bool:
+        """Whether there is anything on it that only a plan's file says: how it is cut, or what is marked."""
+        return self.cuts is not None or self.zones != NO_ZONES
+
+    @property
     def turned(self) -> Floats | None:
         """(3, 3) how the model is turned; None: it stands as it is read, so a plan needs not say it."""
         return None if self.rotation == STANDING else np.array(self.rotation)

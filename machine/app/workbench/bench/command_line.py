@@ -26,19 +26,19 @@ def plain_name(name: str) -> str:
 
 
 def export_command(bench: Bench) -> str:
-    """The line for a shell; "" without a model. A plan, as the workbench saves it, holds how the model is cut and turned and what
-    single parts have of their own."""
+    """The line for a shell; "" without a model. A plan, as the workbench saves it, holds how the model is cut and turned, what is
+    marked on it, and what single parts have of their own."""
     if bench.model is None:
         return ""
     given, stem = bench.given, file_stem(bench)
     named = [(kind, getattr(given, kind)) for kind in DEFAULTS if getattr(given, kind) != DEFAULTS[kind]]
     words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
     settings = list(given.settings)
-    if bench.cuts is None and bench.turned is not None:
+    if not bench.planned and bench.turned is not None:
         settings = [each for each in settings if each.partition("=")[0].strip() != "process.rotate_deg"]
         settings.append(f"process.rotate_deg=[{', '.join(f'{angle:.12g}' for angle in turns_deg(bench))}]")
     words += [word for setting in settings for word in ("--set", setting)]
-    if bench.cuts is not None:
+    if bench.planned:
         words += ["--plan", f"{stem}-plan.toml"]
     else:
         words += ["--parts", "1"]

@@ -145,7 +145,7 @@ class Session(Desk):
 
     async def files(self) -> Files:
         """What can be saved of the parts on the bench. Raises UserError where they cannot be cut."""
-        if self.bench.model is None or self.bench.cuts is None:
+        if self.bench.model is None or not self.bench.planned:
             raise PlanError("there are no parts to save yet: find them first")
         with self.waiting("cutting the parts"):
             files: Files = await self.quick.run("make_files", self.bench)

@@ -173,6 +173,23 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
         assert page.until(lambda state: not state["sliced"])["compared"] == []
 
 
+def test_what_is_marked_on_a_model_in_one_piece_is_in_a_plan_that_its_command_takes(bench: Running, folder: Path) -> None:
+    (folder / "box.stl").write_bytes(stl(box(8, 8, 2)))
+    with bench.line() as page:
+        bench.send(folder / "box.stl")
+        page.do("mark", kind="no_seam", min_mm=[-5, 3, 0], max_mm=[5, 5, 2])
+        page.until(lambda state: state["zones"])
+        page.do("turn", axis="z", deg=30)
+        page.until(lambda state: state["zones"] and state["zones"][0]["axes"])
+        page.do("slice")
+        page.until(lambda state: state["sliced"] and not state["slicing"])
+        command = json.loads(bench.ask("settings.json?part=0")[1])["command"]
+        assert command.endswith(" --plan box-plan.toml -o box.gcode")
+        (folder / "box-plan.toml").write_bytes(bench.ask("plan.toml")[1])
+        assert main(split(command)[1:]) == 0
+        assert bench.ask("print.gcode")[1] == (folder / "box.gcode").read_bytes()
+
+
 def test_copies_and_pauses_are_those_of_the_command_line_and_so_are_their_sentences(bench: Running, folder: Path) -> None:
     (folder / "box.stl").write_bytes(stl(box(8, 8, 4)))
     with bench.line() as page:

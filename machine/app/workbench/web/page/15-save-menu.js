@@ -32,8 +32,8 @@ function saveMenu(bench) {
     $(id).querySelector("small").textContent = why || otherwise;
   };
   return {
-    told: ({ model, parts, sliced, compared, given }) => {
-      const uncut = !model ? "no model yet" : parts ? "" : "no parts yet: find them, or add a plane";
+    told: ({ model, parts, zones, sliced, compared, given }) => {
+      const uncut = !model ? "no model yet" : parts || zones.length ? "" : "no parts yet: find them, or add a plane";
       const unsliced = !model ? "no model yet" : !sliced ? "not sliced yet" : sliced.stale ? "out of date: slice again" : "";
       tell("save-plan", uncut, "the command line takes it with --plan");
       tell("save-parts", uncut, "zip of an STL each, a coloured 3MF and the plan");
