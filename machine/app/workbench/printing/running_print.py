@@ -67,9 +67,12 @@ class RunningPrint:
             process.stdin.write(frame(value))
 
     def begin(self) -> None:
-        """A person agrees to what was found. Raises PrinterError as long as that is not known."""
+        """A person agrees to what was found; said twice, as by a double click, it is one word. Raises PrinterError as long as that
+        is not known."""
+        if self._begun and not self.over:
+            return
         if self.state["phase"] != "ready" or not self.asking or self._given_up:
-            raise PrinterError("this print cannot begin now: it is not ready, or has begun")
+            raise PrinterError("this print cannot begin now: it is not ready, or over")
         self._begun = True
         self.say(("begin",))
 

@@ -203,6 +203,18 @@ def test_an_emergency_stop_goes_before_all_that_was_asked_earlier() -> None:
     assert [asked.command for asked in iter(control.take, None)] == [Command.EMERGENCY_STOP, Command.PAUSE]
 
 
+def test_a_print_that_is_begun_twice_is_begun_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[object] = []
+    monkeypatch.setattr(RunningPrint, "say", lambda one, value: said.append(value))
+    one = RunningPrint(1, order("sim"), "me", lambda: None)
+    with pytest.raises(PrinterError, match="cannot begin now"):
+        one.begin()
+    one.state["phase"] = "ready"
+    one.begin()
+    one.begin()
+    assert said == [("begin",)]
+
+
 def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.MonkeyPatch) -> None:
     stopped: list[int] = []
     monkeypatch.setattr(RunningPrint, "stop_at_once", lambda one: stopped.append(one.number))
