@@ -217,6 +217,8 @@ def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(fir
         firefox.key("e")
         firefox.wait(f"{PRINTING} === 'over' && $('emergency').hidden")
         assert "emergency stop: the printer has halted" in firefox.value("$('stop-words').textContent")
+        firefox.click("#stop-noted")
+        assert firefox.value("$('print-bar').hidden")
 
 
 def test_firefox_prints_to_the_end(firefox: Firefox) -> None:

@@ -67,8 +67,8 @@ class RunningPrint:
             process.stdin.write(frame(value))
 
     def begin(self) -> None:
-        """A person agrees to what was found; said twice, as by a double click, it is one word. Raises PrinterError as long as that
-        is not known."""
+        """A person agrees to what was found; said twice, as by a double click, it is one word. Raises PrinterError as long as
+        that is not known."""
         if self._begun and not self.over:
             return
         if self.state["phase"] != "ready" or not self.asking or self._given_up:
