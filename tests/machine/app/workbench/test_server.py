@@ -188,6 +188,8 @@ def test_what_is_marked_on_a_model_in_one_piece_is_in_a_plan_that_its_command_ta
         (folder / "box-plan.toml").write_bytes(bench.ask("plan.toml")[1])
         assert main(split(command)[1:]) == 0
         assert bench.ask("print.gcode")[1] == (folder / "box.gcode").read_bytes()
+        bench.send(folder / "box.stl")
+        page.until(lambda state: not state["sliced"])
 
 
 def test_copies_and_pauses_are_those_of_the_command_line_and_so_are_their_sentences(bench: Running, folder: Path) -> None:
