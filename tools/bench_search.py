@@ -17,7 +17,7 @@ import mdp.kernels.threads
 from mdp.cut import mesh_of, solid_of
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright, threshold
-from mdp.ranking.candidates import Bounds, bounds
+from mdp.ranking.candidates import Bounds, bounds_of, directions, platform_disc
 from mdp.read import locate, read_mesh
 from mdp.search.search import decompose
 from mdp.sweep.sweep import Remainder, gains, sweep
@@ -96,9 +96,15 @@ def growth(mesh: Mesh, profile: Profile, largest: int) -> None:
         shape = subdivided(shape)
 
 
+def sampled_bounds(mesh: Mesh, profile: Profile) -> Bounds:
+    """The bounds of the sampled directions, as a search has them."""
+    search = profile.search
+    return bounds_of(directions(search), platform_disc(mesh, search), mesh.volume_mm3, profile.machine, search)
+
+
 def all_candidates(mesh: Mesh, profile: Profile) -> tuple[Callable[[], object], int]:
     """One evaluation of a solid's candidates, and how many they are."""
-    limits: Bounds = bounds(mesh, profile.machine, profile.search)
+    limits = sampled_bounds(mesh, profile)
     angle_deg, step_mm = profile.process.self_supporting_angle_deg, profile.search.offset_step_mm
     remainder = Remainder(mesh, risky_upright(mesh, angle_deg, profile.search.count_platform_faces))
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
-from mdp.ranking.candidates import bounds
 from mdp.read import locate, read_mesh
 from mdp.sweep.components import View, count_pieces, find_critical
 from mdp.sweep.contact_area import find_contact_areas
@@ -29,7 +28,7 @@ from mdp.sweep.integrals import (
 from mdp.sweep.slivers import find_slivers
 from mdp.sweep.sweep import Remainder, gains, sweep
 from profiles.profile import Profile, load
-from tools.bench_search import on_cores
+from tools.bench_search import on_cores, sampled_bounds
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -45,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def kernels(mesh: Mesh, profile: Profile) -> None:
     """One row a kernel, on one thread."""
-    angle_deg, limits = profile.process.self_supporting_angle_deg, bounds(mesh, profile.machine, profile.search)
+    angle_deg, limits = profile.process.self_supporting_angle_deg, sampled_bounds(mesh, profile)
     remainder, angle = Remainder(mesh, risky_upright(mesh, angle_deg)), threshold(angle_deg)
     directions, step = limits.directions, profile.search.offset_step_mm
     count = int(gains(remainder, directions, step, angle).columns.sum())

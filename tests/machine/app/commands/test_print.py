@@ -53,7 +53,7 @@ def test_a_print_is_watched_paused_resumed_and_cancelled_by_keys(hours: str) -> 
         assert person.end() == 130
     assert "heaters off" in person.seen
     assert not int(str(while_printing[3])) & 2  # ICANON: keys come as they are pressed
-    assert person.raw.count("\x1b[?25l") == person.raw.count("\x1b[?25h") == 1
+    assert person.raw.count("\x1b[?25l") == person.raw.count("\x1b[?25h") >= 1
 
 
 @pytest.mark.slow
