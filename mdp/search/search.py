@@ -17,7 +17,7 @@ from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
-from mdp.plans.plan_file import PlanFile
+from mdp.plans.plan_file import PlanFile, PlannedRow
 from mdp.ranking.candidates import REASONS
 from mdp.ranking.ranker import Ranker, ranker_named
 from mdp.ranking.record import Trace
@@ -140,10 +140,12 @@ def cut_by_plan(
 ) -> Decomposition:
     """The parts of a closed mesh by the planes of a plan, without a search; parts: of its row with at most so many.
 
-    The rows of the front are those of the plan, the one that is cut measured anew; price: as for a search. Raises PlanError for
+    The rows of the front are those of the plan, its own parts in place of the row of their number, the one that is cut measured
+    anew; price: as for a search. Raises PlanError for
     a plan of another model and for a plane that cannot be cut.
     """
     began = perf_counter()
+    own = plan
     if parts is not None:
         check_part_count(parts)
         plan = replace(plan, parts=plan.row(parts))
@@ -156,6 +158,8 @@ def cut_by_plan(
     check_zones(plan, mesh, name)
     problem = Problem(mesh, profile, plan.zones)
     node = cut_by_hand(problem, plan)
+    if own.parts != plan.parts:
+        plan = replace(plan, front=_with_own_row(problem, own))
     made = make_parts(node, problem.machine, profile)
     others = {len(row.parts): row for row in plan.front}
     rows = {count: FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2) for count, row in others.items()}
@@ -166,6 +170,18 @@ def cut_by_plan(
     notes = _fewer_parts(parts, len(plan.parts) + 1, f"the plan {plan.name} holds")
     taken = Taken(node, made, tuple(front))
     return _decomposition(problem, taken, profile, Outcome(name, ranker, 0, perf_counter() - began, notes))
+
+
+def _with_own_row(problem: Problem, plan: PlanFile) -> tuple[PlannedRow, ...]:
+    """The front of a plan with its own parts, which a person may have changed, measured as the row of their number where they can
+    be cut."""
+    rows = {len(row.parts): row for row in plan.front}
+    known = rows.get(len(plan.parts))
+    if all(part.plane is not None for part in plan.parts) and (known is None or known.parts != plan.parts):
+        with suppress(PlanError):
+            row = front_row(cut_by_hand(problem, plan), problem.terms)
+            rows[len(plan.parts)] = PlannedRow(plan.parts, row.support_area_mm2, row.seam_mm, row.cost_mm2)
+    return tuple(rows.values())
 
 
 def _price_plan(

@@ -85,6 +85,15 @@ def test_a_plan_takes_another_row_of_its_front_without_a_search() -> None:
     assert many.notes == (f"--parts 50: the plan plan.toml holds no more than {len(searched.front)}",)
 
 
+def test_planes_that_a_person_has_changed_stay_a_row_of_the_plan_when_another_row_is_cut() -> None:
+    searched = plan_of(decompose(_two_arms(), "shape", _profile()))
+    mine = replace(searched, parts=_by_hand((UP, 35.0), (UP, 40.0)).parts)
+    for front in (searched.front, tuple(row for row in searched.front if len(row.parts) < 2)):
+        saved = plan_of(cut_by_plan(_two_arms(), "shape", _profile(), replace(mine, front=front), parts=2))
+        assert saved.row(3) == mine.parts
+        assert saved.front[2].cost_mm2 == pytest.approx(cut_by_plan(_two_arms(), "shape", _profile(), mine).cost_mm2)
+
+
 def test_a_search_for_so_many_parts_takes_that_row_of_the_front() -> None:
     free, two, many = (decompose(_two_arms(), "shape", _profile(), parts=parts) for parts in (None, 2, 50))
     assert len(free.parts) > len(two.parts) == 2

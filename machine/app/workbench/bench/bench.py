@@ -169,20 +169,34 @@ def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
     return _with_places_of(bare, bench, factor)
 
 
+def with_model_turned_as_read(bench: Bench, model: Model, turn: Floats, factor: float = 1.0) -> Bench:
+    """The same model turned otherwise, (3, 3), and scaled as it is read, with its zones; its cuts were for the way before."""
+    anew = replace(with_model_anew(bench, model), profile=bench.profile.of_all_parts, rotation=bench.rotation)
+    return _uncut(_with_places_of(anew, bench, factor, turn))
+
+
 def with_rotation(bench: Bench, rotation: Sequence[Sequence[float]]) -> Bench:
     """The model turned otherwise, with its zones; its cuts were for the way that it stood before."""
     rows = tuple(_vector(row) for row in rotation)
     if rows == bench.rotation:
         return bench
     turned = replace(with_model_anew(bench, bench.model), rotation=rows)
-    return replace(_with_places_of(turned, bench), cuts=None, locked=frozenset())
+    return _uncut(_with_places_of(turned, bench))
 
 
-def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0) -> Bench:
-    """The planes and zones of a bench before on the same places of its model, which is so many times as large now."""
+def _uncut(bench: Bench) -> Bench:
+    return replace(bench, cuts=None, locked=frozenset())
+
+
+def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floats | None = None) -> Bench:
+    """The planes and zones of a bench before on the same places of its model, which is so many times as large now, and turned so
+    as it is read. Raises PlanError where a box would leave what a plan may have."""
     if before.model is None or bench.model is None:
         return bench
-    move = _placing(bench, factor).after(_placing(before))
+    start = _placing(before)
+    if turn is not None:
+        start = start.after(Placing.of(before.model.mesh, turn, 0.0))
+    move = _placing(bench, factor).after(start)
     planes = {part: carried_part(part, move) for part in before.cuts or ()}
     cuts = None if before.cuts is None else tuple(planes[part] for part in before.cuts)
     locked = frozenset(planes[part] for part in before.locked)

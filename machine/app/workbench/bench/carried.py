@@ -9,6 +9,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import ZONE_KINDS, PlannedPart
 from mdp.plans.reading import MOST_MM
 from mdp.zone import AnyZone, Zone, Zones
+from profiles.errors import PlanError
 from profiles.frozen import Vector
 
 POINT_DIGITS, BOX_DIGITS = 3, 9  # of the mm of a mark's place and of a box's sides
@@ -50,8 +51,11 @@ def _between(before: Floats, after: Floats) -> Floats:
 
 
 def carried_zones(zones: Zones, move: Placing) -> Zones:
-    """The zones on the same places of the model."""
-    kinds = {kind: tuple(_carried(zone, move) for zone in getattr(zones, kind)) for kind in ZONE_KINDS}
+    """The zones on the same places of the model. Raises PlanError for a box that a plan could not have there."""
+    kinds = {
+        kind: tuple(_carried(zone, move, f"{kind} {number}") for number, zone in enumerate(getattr(zones, kind), start=1))
+        for kind in ZONE_KINDS
+    }
     return Zones(**kinds)
 
 
@@ -63,28 +67,38 @@ def carried_part(part: PlannedPart, move: Placing) -> PlannedPart:
     return replace(part, normal=_vector(normal), offset_mm=move.factor * part.offset_mm + float(normal @ move.shift_mm))
 
 
-def _carried(zone: AnyZone, move: Placing) -> AnyZone:
+def _carried(zone: AnyZone, move: Placing, label: str) -> AnyZone:
     if isinstance(zone, Zone):
-        return _carried_box(zone, move)
+        return _carried_box(zone, move, label)
     if isinstance(zone, Grown):
         place = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
         return replace(zone, point_mm=_vector(np.round(place, POINT_DIGITS)))
     return zone
 
 
-def _carried_box(box: Zone, move: Placing) -> Zone:
+def _carried_box(box: Zone, move: Placing, label: str) -> Zone:
     axes = box.along(move.turn).T  # the box's own, which go along, as rows
     low, high = (move.factor * np.array(corner) + axes @ move.shift_mm for corner in (box.min_mm, box.max_mm))
     level = np.round(axes)
     if np.abs(axes - level).max() > LEVEL:
         x, y, z = (_vector(row) for row in axes)
-        return Zone(_side(low), _side(high), (x, y, z))
+        return Zone(*_sides(low, high, label), (x, y, z))
     low, high = level.T @ low, level.T @ high
-    return Zone(_side(np.minimum(low, high)), _side(np.maximum(low, high)))
+    return Zone(*_sides(np.minimum(low, high), np.maximum(low, high), label))
+
+
+def _sides(low: Floats, high: Floats, label: str) -> tuple[Vector, Vector]:
+    """The corners as a plan may have them, which end a box that reaches farther. Raises PlanError where nothing is left of it."""
+    least, most = (_side(corner) for corner in (low, high))
+    if not all(x < y for x, y in zip(least, most, strict=True)):
+        corners = " and ".join(f"{key} [{', '.join(f'{x:g}' for x in at)}]" for key, at in (("min_mm", low), ("max_mm", high)))
+        raise PlanError(
+            f"{label}: its box would have {corners}: {-MOST_MM:g} to {MOST_MM:g} is allowed, and it must have a volume"
+        )
+    return least, most
 
 
 def _side(values: Floats) -> Vector:
-    """A corner as a plan may have it, which ends a box that reaches farther."""
     values = np.clip(values, -MOST_MM, MOST_MM)
     return _vector(np.round(values, BOX_DIGITS) + 0.0)
 

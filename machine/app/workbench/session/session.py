@@ -13,11 +13,12 @@ from machine.app.workbench.bench.bench import (
     Model,
     with_cuts,
     with_model,
-    with_model_anew,
+    with_model_turned_as_read,
     with_plan,
     with_profile,
     with_scaled_model,
 )
+from machine.app.workbench.bench.command_line import turned_by
 from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.marks import MARKS
@@ -177,7 +178,8 @@ class Session(Desk):
                 model = await self.quick.run("read_model", model.path, model.name, bench.profile.of_all_parts)
             self._begin_ranking(model)
             if new.rotate_deg != old.rotate_deg:
-                return replace(with_model_anew(bench, model), rotation=bench.rotation), ""
+                turn = turned_by(new.rotate_deg) @ turned_by(old.rotate_deg).T
+                return with_model_turned_as_read(bench, model, turn, new.scale / old.scale), ""
             bench = with_scaled_model(bench, model, new.scale / old.scale)
         if bench.cuts is not None and effect_of_change(before.profile, bench.profile) == Effect.FRONT:
             trial = await self.trying.attempt(bench, bench.cuts)

@@ -6,19 +6,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from machine.app.workbench.bench.bench import Bench, Model, plan_of_bench, with_profile, with_rotation, with_scaled_model
+from machine.app.workbench.bench.bench import (
+    Bench,
+    Model,
+    plan_of_bench,
+    with_model_turned_as_read,
+    with_profile,
+    with_rotation,
+    with_scaled_model,
+)
+from machine.app.workbench.bench.command_line import turned_by
 from machine.app.workbench.bench.marks import named_faces, standing_mesh
 from mdp.grown import Grown
 from mdp.plans.plan_file import PlannedPart
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.pose import about, unit
+from mdp.search.orientation import standing_still
 from mdp.zone import Zone, Zones
+from profiles.errors import PlanError
 from profiles.profile import load
 from tests.shapes import tee
 
 ARM = Grown((-12.0, 1.0, 30.0), 1.0)
 BOX = Zone((1.0, 2.0, 3.0), (9.0, 9.0, 9.0))
+LIFTED = load(settings=["search.pedestal_mm=10"])
 BENCH = replace(
     Bench(load(), Model("tee.stl", Path("tee.stl"), tee())),
     zones=Zones(keep=(BOX,), no_support=(ARM,)),
@@ -66,6 +78,30 @@ def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> N
     lifted = with_profile(larger, larger.given, load(settings=["search.pedestal_mm=10"]))
     assert lifted.cuts == (PlannedPart((0.6, 0.0, 0.8), 48.0),)
     assert lifted.zones == Zones(keep=(Zone((2.0, 4.0, 16.0), (18.0, 18.0, 28.0)),), no_support=(Grown((-24.0, 2.0, 70.0), 1.0),))
+
+
+def test_marks_go_along_with_a_model_that_is_read_turned_otherwise_and_larger() -> None:
+    turn = turned_by((0.0, 90.0, 0.0))
+    assert BENCH.model is not None
+    again = replace(BENCH.model, mesh=standing_still(tee(), turn).transform(2.0 * np.eye(3)))
+    cut = with_profile(replace(BENCH, cuts=(PlannedPart((0.6, 0.0, 0.8), 20.0),)), BENCH.given, LIFTED)
+    turned = with_model_turned_as_read(with_rotation(cut, about(unit([1.0, 2.0, 0.5]), 0.7).tolist()), again, turn, 2.0)
+    stood = with_model_turned_as_read(cut, again, turn, 2.0)
+    assert (stood.cuts, stood.zones.keep) == (None, (Zone((-34.0, 4.0, 32.0), (-22.0, 18.0, 48.0)),))
+    for bench in (turned, stood):
+        (box,), (zone,) = bench.zones.keep, bench.zones.no_support
+        assert isinstance(box, Zone)
+        assert (box.touches(standing_mesh(bench)) == BOX.touches(tee())).all()
+        assert isinstance(zone, Grown)
+        assert zone.away_mm(standing_mesh(bench)) < 0.005
+
+
+def test_what_would_carry_a_box_beyond_what_a_plan_may_have_is_refused() -> None:
+    far = replace(BENCH, zones=Zones(no_seam=(BOX, Zone((9e4, 0.0, 0.0), (9.5e4, 1.0, 1.0)))))
+    assert far.model is not None
+    said = r"no_seam 2: its box would have min_mm \[180000, 0, 0\] and max_mm \[190000, 2, 2\]: -100000 to 100000 is allowed"
+    with pytest.raises(PlanError, match=said):
+        with_scaled_model(far, far.model, 2.0)
 
 
 def test_faces_of_several_kinds_are_told_of_each() -> None:
