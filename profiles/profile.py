@@ -112,6 +112,15 @@ def section(name: str, table: Any) -> Frozen:
         raise ProfileError("; ".join(sentences(error.errors(), SECTIONS[name], f"{name}."))) from None
 
 
+def profile_of_tables(tables: dict[str, Any]) -> Profile:
+    """A profile made of plain tables, as one that was dumped to JSON. Raises ProfileError."""
+    sections = {name: section(name, tables.get(name)) for name in SECTIONS}
+    try:
+        return Profile.model_validate(sections | {"parts": tables.get("parts", [])})
+    except ValidationError as error:
+        raise ProfileError("; ".join(sentences(error.errors(), Profile))) from None
+
+
 def sound_section(name: str, table: Any) -> Frozen | None:
     """The same; None where the table makes no valid section."""
     try:

@@ -2,13 +2,17 @@
 
 A file of lines: eight hexadecimal digits of a CRC-32, a blank, a JSON value. The first holds what is printed and for which
 machine, every other one a state of its own, so that the last good one is enough. Lines are only ever appended, each in one piece.
+The file is locked as long as its print runs; the system lets go of it when the program dies, however it does.
 """
 
+import errno
 import json
 import os
+import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from os.path import isdir, isfile, lexists
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -16,12 +20,21 @@ from zlib import crc32
 
 from profiles.errors import JournalError, OutputError
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+if sys.platform == "win32":
+    import msvcrt
+
 FORMAT = 1
 FINISHED, LEFT, RESUMED = "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
 EVERY_LINES = 16  # the sender never gets so many lines ahead of the newest record,
 EVERY_S = 0.1  # which is not older than this when something has happened since
 SYNC_S = 1.0  # so old may the disk be after a power cut of the computer
 LONGEST_BYTES = 1_000_000  # of one record; the first one holds the resolved profile
+BEYOND_MM = 1e9  # and deg: no machine has such a place, and no filament such a length
+LOCKED_BYTE = 1 << 30  # on Windows, where nobody else can read what is locked: far behind the end, which LockFileEx allows
 PRIVATE = 0o600  # what a person prints concerns nobody else
 # Windows would write carriage returns into a file that is not opened as binary.
 _FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | getattr(os, "O_BINARY", 0)
@@ -92,6 +105,7 @@ class Journal:
             raise OutputError(f"journal {path} exists already: each print has one of its own, choose another name") from None
         except OSError as error:
             raise OutputError(f"journal {path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+        _lock(self._file)  # before the heading: whoever can read that sees the lock
         self._write({"format": FORMAT} | asdict(heading))
         self._sync_thread = threading.Thread(target=self._sync, name="journal", daemon=True)
         self._sync_thread.start()
@@ -152,6 +166,28 @@ class Journal:
             self.trouble = self.trouble or (error.strerror or str(error)).lower()
 
 
+def is_being_printed(path: Path) -> bool:
+    """Whether the print of a journal that was read runs now; False where that cannot be known, as on a disk without locks."""
+    try:
+        with path.open("rb") as file:
+            return not _lock(file.fileno(), shared=True)
+    except OSError:
+        return False
+
+
+def _lock(descriptor: int, shared: bool = False) -> bool:
+    """Lock an open journal until it is closed; False when another process holds it. shared: with others who only look."""
+    try:
+        if sys.platform == "win32":
+            os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        elif fcntl is not None:
+            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno not in (errno.EAGAIN, errno.EACCES)
+    return True
+
+
 def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:
     """Note in a journal which one goes on with its print; a torn end is cut off. Raises JournalError."""
     try:
@@ -196,28 +232,42 @@ def read_journal(path: Path) -> JournalContents:
 
 
 def _records(path: Path) -> Iterator[tuple[Any, int]]:
-    """The value and size of each line, None where its checksum is wrong or its end is missing."""
+    """The value and size of each line, None where its checksum is wrong, its end is missing or it is no JSON."""
+    if lexists(path) and not isfile(path) and not isdir(path):  # a pipe would be waited for
+        raise JournalError(f"journal {path} cannot be read: it is no file")
     try:
         with path.open("rb") as file:
             while line := file.readline(LONGEST_BYTES):
-                text = line[9:-1]
-                whole = line.endswith(b"\n") and line[:9] == b"%08x " % crc32(text)
-                yield (json.loads(text) if whole else None), len(line)
+                yield _value(line), len(line)
     except OSError as error:
         raise JournalError(f"journal {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
 
 
-def _heading(path: Path, value: Any) -> JournalHeading:
-    if not isinstance(value, dict) or value.pop("format", None) != FORMAT:
-        raise JournalError(f"journal {path} is of another version of this program: this one reads format {FORMAT}")
+def _value(line: bytes) -> Any:
+    text = line[9:-1]
+    if not line.endswith(b"\n") or line[:9] != b"%08x " % crc32(text):
+        return None
     try:
-        return JournalHeading(**value)
-    except TypeError:
-        raise JournalError(f"journal {path} is damaged: its heading does not tell program and profile") from None
+        return json.loads(text)
+    except (ValueError, RecursionError):  # not written by this program: its checksum is right
+        return None
+
+
+def _heading(path: Path, value: Any) -> JournalHeading:
+    if not isinstance(value, dict) or value.get("format") != FORMAT:
+        raise JournalError(f"journal {path} is of another version of this program: this one reads format {FORMAT}")
+    match value:
+        case {"program": str(program), "sha256": str(sha256), "name": str(name), "profile": dict(profile)}:
+            return JournalHeading(program, sha256, name, profile)
+    raise JournalError(f"journal {path} is damaged: its heading does not tell program and profile")
 
 
 def _checkpoint(path: Path, value: Any, number: int) -> Checkpoint:
-    if not isinstance(value, list) or len(value) != 6:
-        raise JournalError(f"journal {path} is damaged: record {number} holds no state of a print")
-    sent, acknowledged, executed, wire, pose, state = value
-    return Checkpoint(sent, acknowledged, executed, wire, tuple(pose), state)
+    match value:
+        case [int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(state)] if _is_pose(pose):
+            return Checkpoint(sent, acknowledged, executed, wire, tuple(pose), state)
+    raise JournalError(f"journal {path} is damaged: record {number} holds no state of a print")
+
+
+def _is_pose(values: list[Any]) -> bool:
+    return all(each is None or (isinstance(each, int | float) and abs(each) < BEYOND_MM) for each in values)

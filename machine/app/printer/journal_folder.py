@@ -4,12 +4,12 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
-from os.path import lexists
+from os.path import isfile, lexists
 from pathlib import Path
 
 from machine.app.file_roles import PROGRAM, program_beside
 from machine.app.output import write_lines
-from machine.link.journal import Checkpoint, Journal, JournalHeading, read_journal
+from machine.link.journal import LONGEST_BYTES, Checkpoint, Journal, JournalHeading, is_being_printed, read_journal
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import JournalError, OutputError
 from profiles.folders import state_folder
@@ -62,8 +62,9 @@ class ResumableJournal:
 
 
 def resumable_journals() -> list[ResumableJournal]:
-    """The newest first; those that cannot be read, are resumed already or have lost their program are left out."""
-    found = (_resumable(path) for path in sorted(_folder().glob("*.journal"), reverse=True))
+    """The newest first; those that cannot be read, are being printed, are resumed already or have lost their program are left
+    out."""
+    found = map(_resumable, _newest_first(_folder()))
     return [each for each in found if each is not None]
 
 
@@ -73,14 +74,21 @@ def _resumable(path: Path) -> ResumableJournal | None:
     except (JournalError, OSError):
         return None
     last, heading = story.last, story.heading
-    if story.finished or story.continued_in is not None or last == Checkpoint() or not Path(heading.program).is_file():
+    if story.finished or story.continued_in is not None or last == Checkpoint() or not isfile(heading.program):
         return None
-    machine = heading.profile.get("machine", {}).get("name", "")
-    return ResumableJournal(path, heading.name, str(machine), last.executed, written_s)
+    if is_being_printed(path):
+        return None
+    machine = heading.profile.get("machine")
+    name = machine.get("name", "") if isinstance(machine, dict) else ""
+    return ResumableJournal(path, heading.name, str(name), last.executed, written_s)
 
 
 def _folder() -> Path:
     return state_folder() / "journals"
+
+
+def _newest_first(folder: Path) -> list[Path]:
+    return sorted((path for path in folder.glob("*.journal") if isfile(path)), reverse=True)
 
 
 def _new_path(name: str) -> Path:
@@ -96,10 +104,17 @@ def _new_path(name: str) -> Path:
 
 
 def _thin(folder: Path) -> None:
-    """Leave room for one more: delete all but the newest; a program goes when no journal beside it is left that names it."""
-    for old in sorted(folder.glob("*.journal"), reverse=True)[KEPT - 1 :]:
-        old.unlink(missing_ok=True)
-    headings = b"".join(file.open("rb").readline() for file in folder.glob("*.journal"))
+    """Leave room for one more: delete all but the newest and those being printed; a program goes when no journal beside it is
+    left that names it."""
+    for old in _newest_first(folder)[KEPT - 1 :]:
+        if not is_being_printed(old):
+            old.unlink(missing_ok=True)
+    headings = b"".join(map(_first_line, _newest_first(folder)))
     for program in folder.glob(f"*{PROGRAM}"):
         if program.name.encode() not in headings:
             program.unlink(missing_ok=True)
+
+
+def _first_line(journal: Path) -> bytes:
+    with journal.open("rb") as file:
+        return file.readline(LONGEST_BYTES)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import hypot
+from os.path import isfile
 from pathlib import Path
 
 from machine.app.file_roles import check_roles, printing_files
@@ -22,7 +23,15 @@ from machine.app.requests import SIMULATED, PrintRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.firmware import dialect_of
-from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, mark_resumed, read_journal
+from machine.link.journal import (
+    Checkpoint,
+    Journal,
+    JournalContents,
+    JournalHeading,
+    is_being_printed,
+    mark_resumed,
+    read_journal,
+)
 from machine.link.pending_commands import CancelledError
 from machine.link.resume import (
     PARKED,
@@ -37,8 +46,8 @@ from machine.link.resume import (
 from machine.link.status import PrinterStatus
 from machine.reader.gcode_file import GcodeFile
 from machine.view.program import Program
-from profiles.errors import JournalError
-from profiles.profile import SECTIONS, Profile, section
+from profiles.errors import JournalError, ProfileError
+from profiles.profile import Profile, profile_of_tables
 
 UNSURE_MM = 0.005
 NOTHING, STOPPED = 1, 130  # what a resume ends with besides 0: the answer was no; a person has stopped the rest
@@ -82,6 +91,10 @@ def read_resumption(journal: Path, printing: PrintRequest, named: Profile | None
         raise JournalError("--port sim: a simulated printer ends with its print; the port of a printer is expected")
     check_no_server(printing.port)
     story = read_journal(journal)
+    if is_being_printed(journal):
+        raise JournalError(
+            f"journal {journal}: its print runs now, in another terminal or page: it can be resumed when it has ended"
+        )
     profile = _profile(journal, story.heading, named)
     check_dialect(profile.machine)
     text = _program(journal, story)
@@ -138,10 +151,12 @@ def _further_journal(cut_off: Resumption, printing: PrintRequest) -> Iterator[Jo
 def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> Profile:
     """The journal's own profile, homed and after a restart believed as the machine says that was named.
 
-    Raises JournalError when that is another machine, ProfileError when the journal's profile is not valid.
+    Raises JournalError when that is another machine, or when the journal's profile is not valid.
     """
-    sections = {name: section(name, table) for name, table in heading.profile.items() if name in SECTIONS}
-    profile = Profile.model_validate(sections | {"parts": heading.profile.get("parts", [])})
+    try:
+        profile = profile_of_tables(heading.profile)
+    except ProfileError as error:
+        raise JournalError(f"journal {journal} holds a profile that is not valid: {error}") from None
     if named is None:
         return profile
     old, new = profile.machine, named.machine
@@ -163,7 +178,7 @@ def _program(journal: Path, story: JournalContents) -> GcodeFile:
     if story.finished:
         raise JournalError(f"journal {journal}: this print ran to its end, there is nothing to resume")
     program = GcodeFile(Path(story.heading.program))
-    if not program.path.is_file():
+    if not isfile(program.path):
         raise JournalError(f"journal {journal}: its program {program.path} is gone")
     if program.sha256() != story.heading.sha256:
         raise JournalError(f"journal {journal} is of another program: {program.path} has changed since it was printed")
