@@ -11,7 +11,7 @@ from machine.app.printer.rescue import rescue
 from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.at_page import LEAVE
 from machine.app.workbench.printing.order import PrintOrder, ResumeOrder, State, first_state
-from machine.app.workbench.work.lane import end_process
+from machine.app.workbench.work.processes import Process, end_process, start_process
 from machine.app.workbench.work.worker import LENGTH, frame
 from profiles.errors import PrinterError
 
@@ -28,7 +28,7 @@ class RunningPrint:
     def __init__(self, number: int, order: PrintOrder | ResumeOrder, holder: str, changed: Callable[[], None]) -> None:
         self.number, self.holder, self.state = number, holder, first_state(order)
         self._order, self._changed = order, changed
-        self._process: asyncio.subprocess.Process | None = None
+        self._process: Process | None = None
         self._begun = self._emergency = self._given_up = False
         self._ended = False  # by this program, on purpose
 
@@ -44,9 +44,7 @@ class RunningPrint:
 
     async def run(self) -> None:
         """Have it printed by a process of its own, to the end."""
-        pipe, nowhere = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
-        process = await asyncio.create_subprocess_exec(*COMMAND, stdin=pipe, stdout=pipe, stderr=nowhere, start_new_session=True)
-        self._process = process
+        self._process = process = await start_process(COMMAND)
         self.say(self._order)
         if self._given_up or self._emergency:
             self._kill()

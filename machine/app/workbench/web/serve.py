@@ -15,9 +15,10 @@ from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.guard import HOST
 from machine.app.workbench.web.server import application
+from machine.app.workbench.work.processes import hear_the_ends
 from profiles.errors import OutputError
 
-GRACE_S = 1  # for answers under way when it ends
+GRACE_S = 1  # for answers under way when it ends, and for its processes
 MOST_SENT = 1 << 20  # bytes of one message of a page; files come by another way
 
 
@@ -97,6 +98,7 @@ async def _serve(
     finally:
         workbench.close_all()
         prints.close()
+        await hear_the_ends(GRACE_S)
 
 
 async def _end_prints(prints: Prints, then: Callable[[], None]) -> None:

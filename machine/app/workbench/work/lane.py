@@ -2,14 +2,13 @@
 another."""
 
 import asyncio
-import os
 import pickle
-import signal
 import sys
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from typing import Any
 
+from machine.app.workbench.work.processes import Process, end_process, start_process
 from machine.app.workbench.work.worker import DONE, LENGTH, TELLS, frame
 from profiles.errors import UserError
 
@@ -21,7 +20,7 @@ class Lane:
     """One process for one task at a time. All methods from the event loop."""
 
     def __init__(self) -> None:
-        self._process: asyncio.subprocess.Process | None = None
+        self._process: Process | None = None
         self._free = asyncio.Lock()
         self._resting: asyncio.TimerHandle | None = None
         self._closed = False
@@ -56,7 +55,7 @@ class Lane:
         end_process(process)
 
     @asynccontextmanager
-    async def _held(self) -> AsyncIterator[asyncio.subprocess.Process]:
+    async def _held(self) -> AsyncIterator[Process]:
         """The process for one task; when none has followed for a while, it goes."""
         async with self._free:
             if self._resting is not None:
@@ -67,17 +66,14 @@ class Lane:
                 if not self._closed:
                     self._resting = asyncio.get_running_loop().call_later(REST_AFTER_S, self.stop)
 
-    async def _ready(self) -> asyncio.subprocess.Process:
+    async def _ready(self) -> Process:
         if self._closed:
             raise UserError("this bench is closed: nothing is worked out for it any more")
         if self._process is None or self._process.returncode is not None:
-            pipe, nowhere = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
-            self._process = await asyncio.create_subprocess_exec(
-                *COMMAND, stdin=pipe, stdout=pipe, stderr=nowhere, start_new_session=True
-            )
+            self._process = await start_process(COMMAND)
         return self._process
 
-    async def _ask(self, process: asyncio.subprocess.Process, asked: Any, tell: Callable[[Any], None]) -> Any:
+    async def _ask(self, process: Process, asked: Any, tell: Callable[[Any], None]) -> Any:
         assert process.stdin is not None
         assert process.stdout is not None
         process.stdin.write(frame(asked))
@@ -91,14 +87,3 @@ class Lane:
                 return value
             else:
                 raise UserError(value)
-
-
-def end_process(process: asyncio.subprocess.Process | None) -> None:
-    """Kill a process that leads a session of its own, with all that it has started, if it still runs."""
-    if process is None or process.returncode is not None:
-        return
-    with suppress(ProcessLookupError, PermissionError):
-        if hasattr(os, "killpg"):
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()

@@ -1,0 +1,64 @@
+"""Processes: those that the workbench starts, each leading a session of its own, so that Ctrl-C at the terminal reaches the
+workbench alone, and one signal ends it with all that it has started."""
+
+import asyncio
+import os
+import signal
+from contextlib import suppress
+
+Process = asyncio.subprocess.Process
+_starting: set[asyncio.Task[Process]] = set()
+_started: set[Process] = set()  # whoever has ended one need not hold it: its pipes are still open
+
+
+async def start_process(command: tuple[str, ...]) -> Process:
+    """A process that hears and answers through pipes. Whoever is cancelled while it starts need not end it."""
+    starting = asyncio.create_task(_start(command))
+    _starting.add(starting)
+    starting.add_done_callback(_starting.discard)
+    try:
+        return await asyncio.shield(starting)
+    except asyncio.CancelledError:
+        starting.add_done_callback(lambda started: end_process(started.result()))
+        raise
+
+
+def end_process(process: Process | None) -> None:
+    """Kill a process with all that it has started, if it still runs."""
+    if process is None or process.returncode is not None:
+        return
+    with suppress(ProcessLookupError, PermissionError):
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+
+
+async def hear_the_ends(within_s: float) -> None:
+    """Wait until all that have been started are gone and their pipes closed, at most so long: an event loop that closes before
+    leaves them to the interpreter, whose complaint would be the program's last words."""
+    with suppress(TimeoutError):
+        async with asyncio.timeout(within_s):
+            await asyncio.gather(*_starting, return_exceptions=True)
+            await asyncio.gather(*(_hear_the_end(each) for each in _started))
+
+
+async def _start(command: tuple[str, ...]) -> Process:
+    pipe, nowhere = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
+    process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, stderr=nowhere, start_new_session=True)
+    _started.difference_update([each for each in _started if _is_heard(each)])
+    _started.add(process)
+    return process
+
+
+async def _hear_the_end(process: Process) -> None:
+    assert process.stdout is not None
+    while not _is_heard(process):
+        with suppress(RuntimeError):  # somebody listens still, who is cancelled or will hear the end, too
+            await process.stdout.read()
+        await asyncio.sleep(0.01)
+
+
+def _is_heard(process: Process) -> bool:
+    """Whether it has ended and its pipe is read to the end."""
+    return process.returncode is not None and process.stdout is not None and process.stdout.at_eof()
