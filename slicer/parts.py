@@ -48,8 +48,9 @@ class SlicingProgress:
 
     @property
     def share(self) -> float:
-        """What of all layers is done, 0 to 1, an estimate."""
-        return min(1.0, sum(self.layers) / max(sum(self.expected), 1))
+        """What of all layers is done, 0 to 1, an estimate that never falls: a part that is ready may have fewer than expected."""
+        pieces = zip(self.layers, self.expected, self.ready, strict=True)
+        return sum(of if piece else min(count, of) for count, of, piece in pieces) / max(sum(self.expected), 1)
 
 
 OnProgress = Callable[[SlicingProgress], None]
