@@ -10,8 +10,8 @@ import numpy as np
 from machine.app.requests import Given
 from machine.app.workbench.bench.carried import Placing, carried_part, carried_zones
 from machine.app.workbench.bench.effect import Effect, effect_of_change
-from machine.app.workbench.bench.following import following_stops, gone_in_words
-from machine.app.workbench.bench.part_settings import following
+from machine.app.workbench.bench.following import following_stops, gone_in_words, part_after
+from machine.app.workbench.bench.part_settings import following, option
 from machine.app.workbench.bench.settings import USUAL
 from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
@@ -21,6 +21,7 @@ from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow
 from mdp.search.front import choose, pays, price_of_second_mm2
 from mdp.zone import NO_ZONES, Zones
 from profiles.frozen import Vector
+from profiles.part_settings import PartSettings
 from profiles.profile import Profile
 
 MOST_STEPS = 200  # that can be undone
@@ -116,7 +117,10 @@ class History:
         """A further step; pauses go with their parts, and what was undone is forgotten."""
         kept, gone = following_stops(bench.stops, self.now.bench.cuts or (), bench.cuts or ())
         after = bench if kept == bench.stops else replace(bench, stops=kept)
-        return History(Step(word, after, gone_in_words(word, gone)), _kept((*self.before, self.now)[-MOST_STEPS:]))
+        lost = [(stop.part, stop.option) for stop in gone] + [
+            (own.part, f"--part {option(own)}") for own in _gone(self.now.bench, bench)
+        ]
+        return History(Step(word, after, gone_in_words(word, lost)), _kept((*self.before, self.now)[-MOST_STEPS:]))
 
     def undo(self) -> "History":
         """One step back, or the same where there is none."""
@@ -148,6 +152,16 @@ def _kept(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     return steps
 
 
+def _gone(before: Bench, after: Bench) -> list[PartSettings]:
+    """The settings of single parts that are not there any more where the same model is turned or cut otherwise."""
+    if before.model is None or after.model is None or before.model.path != after.model.path:
+        return []
+    if (before.cuts, before.rotation) == (after.cuts, after.rotation):
+        return []  # a person has taken them back
+    left = {own.part for own in after.profile.parts}
+    return [own for own in before.profile.parts if part_after(before.cuts or (), after.cuts or (), own.part) not in left]
+
+
 def emptied(bench: Bench) -> Bench:
     """The bench without its model."""
     return Bench(bench.profile.of_all_parts, given=bench.given)
@@ -159,8 +173,9 @@ def with_model(bench: Bench, model: Model) -> Bench:
 
 
 def with_model_anew(bench: Bench, model: Model | None) -> Bench:
-    """The same model read, turned or cut anew: pauses and copies stay."""
-    return replace(emptied(bench), model=model, stops=bench.stops, copies=bench.copies)
+    """The same model read, turned or cut anew: pauses and copies stay, and what part 1 has of its own."""
+    profile = following(bench.profile, bench.cuts or (), ())
+    return replace(emptied(bench), model=model, profile=profile, stops=bench.stops, copies=bench.copies)
 
 
 def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:

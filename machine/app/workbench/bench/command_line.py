@@ -7,6 +7,7 @@ from shlex import join
 import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.part_settings import option
 from mdp.mesh import Floats
 from mdp.pose import about
 from profiles.profile import DEFAULTS
@@ -43,15 +44,11 @@ def export_command(bench: Bench) -> str:
     else:
         words += ["--parts", "1"]
         for each in bench.profile.parts:
-            words += ["--part", f"{each.part}:{','.join(f'{key}={_typed(value)}' for key, value in each.process.items())}"]
+            words += ["--part", option(each)]
     if bench.copies != 1:
         words += ["--copies", str(bench.copies)]
     words += [word for stop in bench.stops for word in stop.option.split()]
     return join([*words, "-o", f"{stem}.gcode"])
-
-
-def _typed(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def turns_deg(bench: Bench) -> tuple[float, float, float]:

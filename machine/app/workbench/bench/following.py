@@ -34,9 +34,10 @@ def following_stops(stops: Sequence[Stop], before: Cuts, after: Cuts) -> tuple[t
     return tuple(kept), tuple(gone)
 
 
-def gone_in_words(word: str, gone: Sequence[Stop]) -> str:
-    """What a step has taken away with its parts; "" for nothing."""
+def gone_in_words(word: str, gone: Sequence[tuple[int, str]]) -> str:
+    """What a step has taken away with its parts, each with the number of its part, as options spell it; "" for nothing."""
     if not gone:
         return ""
-    parts = "their parts" if len({stop.part for stop in gone}) > 1 else f"part {gone[0].part}"
-    return f"{word}: taken away with {parts}: {', '.join(stop.option for stop in gone)}"
+    numbers, options = {part for part, _ in gone}, ", ".join(option for _, option in gone)
+    parts = "their parts" if len(numbers) > 1 else f"part {gone[0][0]}"
+    return f"{word}: taken away with {parts}: {options} (Undo brings {'them' if len(gone) > 1 else 'it'} back)"

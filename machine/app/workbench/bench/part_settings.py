@@ -36,6 +36,15 @@ def check_part(part: object, parts: int) -> int:
     return part
 
 
+def option(own: PartSettings) -> str:
+    """What `--part` is given for them: `2:walls=5,seam=rear`."""
+    return f"{own.part}:{','.join(f'{key}={_typed(value)}' for key, value in own.process.items())}"
+
+
+def _typed(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 def following(profile: Profile, before: Cuts, after: Cuts) -> Profile:
     """The profile with settings for the parts that they were made for, among other planes; what a part that is gone had goes with
     it."""

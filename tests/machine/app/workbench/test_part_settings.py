@@ -55,7 +55,7 @@ def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
     [
         ((LOW, HIGH, MIDDLE), "--pause 1:3 --pause 4:15 --filament-change 9:1", ""),
         ((HIGH, MIDDLE), "--pause 1:3 --pause 3:15 --filament-change 9:1", ""),
-        ((LOW,), "--pause 1:3 --filament-change 9:1", "cut: taken away with part 3: --pause 3:15"),
+        ((LOW,), "--pause 1:3 --filament-change 9:1", "cut: taken away with part 3: --pause 3:15 (Undo brings it back)"),
     ],
 )
 def test_a_pause_goes_with_its_part_and_says_so_and_undo_brings_it_back(
@@ -74,6 +74,20 @@ def test_settings_follow_the_plane_of_their_part_and_go_with_it() -> None:
     assert own(with_cuts(bench, (MIDDLE,))) == {2: {"walls": 5}}
     assert own(with_cuts(bench, (LOW, HIGH))) == {3: {"walls": 5}}
     assert own(with_cuts(bench, (LOW,))) == {}
+
+
+def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_brings_it_back() -> None:
+    bench = obeyed(
+        obeyed(BENCH, do="set_part", part=3, key="ironing", value="true"), do="set_part", part=1, key="walls", value="5"
+    )
+    steps = History(Step("", replace(bench, stops=parse_stops(["3:15"], []))))
+    after = steps.do("cut", with_cuts(steps.now.bench, (LOW,)))
+    assert after.now.told == "cut: taken away with part 3: --pause 3:15, --part 3:ironing=true (Undo brings them back)"
+    assert own(after.undo().now.bench) == {1: {"walls": 5}, 3: {"ironing": True}}
+    turned = obey(steps, {"do": "turn", "axis": "x", "deg": 90}).now
+    assert own(turned.bench) == {1: {"walls": 5}}
+    assert "--part 3:ironing=true" in turned.told
+    assert obey(steps, {"do": "reset_part", "part": 3}).now.told == ""
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,9 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
 
     session = when_done(work)
     assert [stop.option for stop in session.bench.stops] == ["--pause 1:3"]
-    assert session.problem.startswith("turn the model: taken away with part 2: --pause 2:8.4mm; slicing has ended")
+    assert session.problem.startswith(
+        "turn the model: taken away with part 2: --pause 2:8.4mm (Undo brings it back); slicing has ended"
+    )
 
 
 def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:
