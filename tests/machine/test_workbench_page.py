@@ -95,6 +95,11 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     metres = f"{told['front'][0]['filament_mm'] / 1000:.1f} m"
     assert browser.value("$('front-told').textContent").endswith(f"plastic{metres}")
     assert browser.value("$('legend').querySelectorAll('span.swatch').length") == 1
+    sent = "function (text) { sending.call(this, text.replace('\"parts\":1', '\"parts\":99')); }"
+    browser.value(f"window.sending = WebSocket.prototype.send; WebSocket.prototype.send = {sent}")
+    drag_slider(browser, "front", 0, "change")
+    browser.wait("$('problem').textContent.startsWith('parts is 99: ') && $('front').value === $('front').max")
+    browser.value("{ WebSocket.prototype.send = sending; }")
     drag_slider(browser, "front", 0, "change")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: take another number of parts'")
     browser.key("1")  # a view, not a step
@@ -184,6 +189,26 @@ def test_a_broken_model_is_told_and_the_one_before_it_stays(browser: Browser, be
     told = "is cut short: it holds 6 of the 28 facets that its header announces"
     assert browser.value("$('problem').textContent") == f"<img onerror=alert(1)>.stl: {told}"
     assert browser.value("$('title').textContent") == "tee.stl"
+
+
+def test_a_picture_whose_model_or_card_goes_says_so_and_comes_back(browser: Browser, bench: Running) -> None:
+    browser.open(bench.address)
+    browser.wait("document.documentElement.dataset.version")
+    deaf = "(at, ...more) => window.deaf && `${at}`.startsWith('model/') ? Promise.reject(new TypeError()) : asking(at, ...more)"
+    browser.value(f"{{ window.deaf = true; const asking = window.fetch; window.fetch = {deaf}; }}")
+    choose(browser, "tee.stl", stl(tee()))
+    browser.wait("$('notice').textContent.startsWith('The model has not come') && $('title').textContent === 'tee.stl'")
+    browser.value("window.deaf = false")
+    browser.click("[data-turn=x]")
+    browser.wait("document.documentElement.dataset.shown && $('notice').hidden")
+    browser.value("{ window.card = $('canvas').getContext('webgl2').getExtension('WEBGL_lose_context'); card.loseContext(); }")
+    browser.wait("$('notice').textContent.startsWith('The graphics card has let go')")
+    browser.click("#undo")
+    browser.wait("$('redo').getAttribute('aria-label') === 'redo: turn the model'")
+    before = browser.value("Number(document.documentElement.dataset.drawn)")
+    browser.value("card.restoreContext()")
+    browser.wait(f"$('notice').hidden && document.documentElement.dataset.drawn > {before}")
+    assert area(browser) > 0.0
 
 
 def test_a_page_without_a_workbench_says_so_and_above_all_that_a_stop_has_not_arrived(browser: Browser) -> None:

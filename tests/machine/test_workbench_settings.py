@@ -38,18 +38,26 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     browser.click("#tab-settings")
     put(browser, "machine.tilt.limits_deg", "-45, 45")
     browser.wait(changed("machine.tilt.limits_deg"))
-    put(browser, "process.walls", -3)
+    browser.value("window.both = ['process.walls', 'process.top_layers'].map((key) => `[data-key=\"${key}\"] input`)")
+    browser.value(
+        "both.map((field) => document.querySelector(field)).forEach((input, k) => "
+        "{ input.value = [-3, 7][k]; input.dispatchEvent(new Event('change')); })"
+    )
     wrong = "document.querySelector('[data-key=\"process.walls\"] .wrong')"
     browser.wait(f"{wrong} && {wrong}.textContent")
     assert browser.value(f"{wrong}.textContent").startswith("process.walls is -3")
-    assert browser.value("$('problem').hidden")
+    browser.wait(changed("process.top_layers"))
+    assert browser.value("$('problem').hidden && document.querySelectorAll('.wrong:not([hidden])').length") == 1
     choose_part(browser, 1)
     browser.wait("!document.querySelector('[data-key=\"machine.tilt.limits_deg\"]')")
     put(browser, "process.walls", 5)
     browser.wait(changed("process.walls"))
     assert browser.value("$('settings-part').selectedOptions[0].text") == "part 1 (1 of its own)"
     told = browser.value("$('command-line').textContent")
-    assert "--set 'machine.tilt.limits_deg=[-45, 45]' --parts 1 --part 1:walls=5 -o settings.gcode" in told
+    assert (
+        "--set 'machine.tilt.limits_deg=[-45, 45]' --set process.top_layers=7 --parts 1 --part 1:walls=5 -o settings.gcode"
+        in told
+    )
     browser.click("#reset-settings")
     browser.wait("$('reset-settings').disabled && $('settings-part').selectedOptions[0].text === 'part 1'")
     choose_part(browser, 0)

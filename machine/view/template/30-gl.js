@@ -62,3 +62,17 @@ function attribute(gl, place, buffer, count, type, normalized) {
   gl.enableVertexAttribArray(place);
   gl.vertexAttribPointer(place, count, type, normalized, 0, 0);
 }
+
+/** The graphics card may take its memory back at any time; the picture returns when it is given again. */
+function outlive(gl, drop, build) {
+  gl.canvas.addEventListener("webglcontextlost", (event) => {
+    event.preventDefault();
+    PROGRAMS.delete(gl);
+    drop();
+    notice("The graphics card has let go of the picture; it returns as soon as the card is ready.", "card");
+  });
+  gl.canvas.addEventListener("webglcontextrestored", () => {
+    build();
+    notice("", "card");
+  });
+}

@@ -43,7 +43,7 @@ function pictureOf(gl, print, scene, camera, bells, showMarkers) {
   bells.on("row layers look", pace.ask);
   bells.on("moving", pace.moved);
   new ResizeObserver(() => { if (painter.outgrown()) pace.ask(); }).observe(canvas);
-  outlive(canvas, () => { painter.drop(); PROGRAMS.delete(gl); }, build);
+  outlive(gl, painter.drop, build);
   addEventListener("beforeprint", () => {
     painter.begin();
     painter.step(Infinity);
@@ -112,13 +112,3 @@ function painterOf(gl, print, scene, camera, showMarkers) {
 const redOf = ({ risky, tried }) => (tried && risky === "printed" ? "none" : risky);
 
 const countRows = (ranges) => ranges.reduce((sum, range) => sum + range.endRow - range.firstRow, 0);
-
-/** The graphics card may take its memory back at any time; the picture returns when it is given again. */
-function outlive(canvas, drop, build) {
-  canvas.addEventListener("webglcontextlost", (event) => {
-    event.preventDefault();
-    drop();
-    notice("The graphics card has let go of the picture; it returns as soon as the card is ready.", "card");
-  });
-  canvas.addEventListener("webglcontextrestored", () => { notice("", "card"); build(); });
-}

@@ -19,19 +19,25 @@ from profiles.errors import UserError
 UNSAFE = re.compile(r"[^\w .()+-]")
 LONGEST_NAME = 100
 LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
+LONGEST_ASK, MOST_ANSWERS = (
+    80,
+    20,
+)  # letters of the name of a command; of the last commands with a name it is told what became of them
 
 
 class Desk(News):
     """All from the event loop; the pages wait for `changed`.
 
-    problem: what could not be done last; busy: what the pages wait for. The lanes: quick for what a person waits for, long for
-    searches and slices, hand for planes in hand. followers: called after every change of the bench.
+    problem: what could not be done last; answers: to the last commands that a page gave a name, by that: why they were refused,
+    "" for those that are done; busy: what the pages wait for. The lanes: quick for what a person waits for, long for searches and
+    slices, hand for planes in hand. followers: called after every change of the bench.
     """
 
     def __init__(self, bench: Bench) -> None:
         super().__init__()
         self.history = History(Step("", bench))
         self.problem = ""
+        self.answers: dict[str, str] = {}
         self.busy = ""
         self.closed = False
         self.quick, self.long, self.hand = Lane(), Lane(), Lane()
@@ -55,16 +61,17 @@ class Desk(News):
         self._folder.cleanup()
         self.tell()
 
-    def start(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
-        """Have work done beside the pages; what it is refused becomes the sentence that they show."""
+    def start(self, work: Coroutine[Any, Any, None], ask: object = None) -> "asyncio.Task[None]":
+        """Have work done beside the pages; what it is refused becomes the sentence that they show. ask: name of its command."""
 
         async def attempt() -> None:
+            refusal = ""
             try:
                 await work
             except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
-                self.refuse(error)
+                refusal = self.refuse(error)
             finally:
-                self.tell()
+                self.answer(ask, refusal)
 
         task = asyncio.create_task(attempt())
         self._tasks.add(task)
@@ -88,6 +95,12 @@ class Desk(News):
             self.problem = f"{self.problem[:LONGEST_SENTENCE]} ..."
         self.tell()
         return self.problem
+
+    def answer(self, ask: object, refusal: str = "") -> None:
+        """Tell the pages what became of a command, the one that gave it by the name that it gave it, if it did."""
+        if isinstance(ask, str) and len(ask) <= LONGEST_ASK:
+            self.answers = dict([*self.answers.items(), (ask, refusal)][-MOST_ANSWERS:])
+        self.tell()
 
     def do(self, word: str, bench: Bench, told: str = "") -> None:
         """Take a further step, which can be undone. told: what it has taken away, beside what its step says itself."""

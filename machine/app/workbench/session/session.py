@@ -108,6 +108,7 @@ class Session(Desk):
     def command(self, asked: dict[str, Any]) -> None:
         """Do what a page asks for. Raises UserError for what cannot be done."""
         self.problem = ""
+        ask = asked.get("ask")
         match asked.get("do"):
             case "search":
                 self.finding.begin()
@@ -123,13 +124,13 @@ class Session(Desk):
                 value = asked.get("value")
                 key = str(asked.get("key"))
                 text = None if value is None else str(value)
-                self.take_given(f"set {key}", lambda given: with_typed(given, key, text, self.bench.profile), key)
+                self.take_given(f"set {key}", lambda given: with_typed(given, key, text, self.bench.profile), key, ask)
             case "reset":
-                self.take_given("take all changes back", lambda given: replace(given, settings=()))
+                self.take_given("take all changes back", lambda given: replace(given, settings=()), ask=ask)
             case "profile":
                 name = str(asked.get("name"))
                 kind = str(asked.get("kind"))
-                self.take_given(f"take {name}", lambda given: with_name(given, kind, name))
+                self.take_given(f"take {name}", lambda given: with_name(given, kind, name), ask=ask)
             case "try":
                 self.trying.move(edited(self.bench, {**asked, "do": "move"})[1])
             case name if name in EDITS:
@@ -142,6 +143,7 @@ class Session(Desk):
                 self.start(self.open_demo(str(asked.get("name"))))
             case _:
                 self.advance(obey(self.history, asked))
+                self.answer(ask)
         self.tell()
 
     async def files(self) -> Files:
@@ -152,11 +154,11 @@ class Session(Desk):
             files: Files = await self.quick.run("make_files", self.bench)
         return files
 
-    def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> None:
+    def take_given(self, word: str, change: Callable[[Given], Given], key: str = "", ask: object = None) -> None:
         """Take other names and settings; those of the bench by then, for several may be asked for at once. key: the one that is
-        set."""
+        set; ask: name of the command."""
         check_block(profile_as_given(change(self.bench.given), self.bench.profile), key)  # refused at once
-        self.start(self._settle(word, change))
+        self.start(self._settle(word, change), ask)
 
     async def _settle(self, word: str, change: Callable[[Given], Given]) -> None:
         async with self._settling:

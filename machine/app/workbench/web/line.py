@@ -55,11 +55,12 @@ def _state(session: Session) -> str:
 
 async def _hear(session: Session, socket: WebSocket) -> None:
     while True:
-        text = await socket.receive_text()
+        text, asked = await socket.receive_text(), dict[str, Any]()
         try:
-            session.command(parsed(text, MOST_COMMAND))
+            asked = parsed(text, MOST_COMMAND)
+            session.command(asked)
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench goes on
-            session.refuse(error)
+            session.answer(asked.get("ask"), session.refuse(error))
 
 
 def parsed(text: str, most: int) -> dict[str, Any]:

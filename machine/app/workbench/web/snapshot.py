@@ -35,6 +35,7 @@ def snapshot(session: Session) -> dict[str, Any]:
     return {
         "version": session.version,
         "problem": session.problem,
+        "answers": session.answers,
         "busy": session.busy,
         "preparing": session.readiness.preparing > 0,
         "undo": history.now.word if history.before else "",

@@ -2,14 +2,28 @@
 
 const AGAIN_MS = 1000;
 
-/** {send(command)}: follow(state) is called with every new state, lost(whether) when the line goes and comes, closed() when the
- * bench has been closed. */
+const NOT_SENT = "the line to tiltprint is lost, so this was not done";
+
+/** {send(command), ask(command, answered)}: follow(state) is called with every new state, lost(whether) when the line goes and comes,
+ * closed() when the bench has been closed; answered(refusal) after the state by which a command is done ("") or refused. */
 function lineTo(follow, lost, closed) {
   let socket = null;
+  const page = crypto.randomUUID(), asked = new Map(); // by a name that no other page has
+  const answer = ({ answers }) => {
+    for (const [name, refusal] of Object.entries(answers)) {
+      const answered = asked.get(name);
+      asked.delete(name);
+      answered?.(refusal);
+    }
+  };
   const open = () => {
     socket = new WebSocket(new URL("line", location.href.replace(/^http/, "ws")));
     socket.onopen = () => lost(false);
-    socket.onmessage = (event) => follow(JSON.parse(event.data));
+    socket.onmessage = (event) => {
+      const state = JSON.parse(event.data);
+      follow(state);
+      answer(state);
+    };
     socket.onclose = ({ code }) => {
       if (code === CLOSED_CODE) return closed();
       lost(true);
@@ -17,7 +31,17 @@ function lineTo(follow, lost, closed) {
     };
   };
   open();
-  return { send: (command) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command)); } };
+  const send = (command) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command)); };
+  let count = 0;
+  return {
+    send,
+    ask: (command, answered) => {
+      if (socket.readyState !== WebSocket.OPEN) return answered(NOT_SENT);
+      const name = `${page} ${++count}`;
+      asked.set(name, answered);
+      send({ ...command, ask: name });
+    },
+  };
 }
 
 /** Sends a file of the person's to a bench; what is wrong with it comes back by the line. */

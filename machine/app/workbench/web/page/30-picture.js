@@ -132,8 +132,7 @@ function pictureOf(canvas, camera, drawn) {
     if (!asked) requestAnimationFrame(draw);
     asked = true;
   };
-  canvas.addEventListener("webglcontextlost", (event) => { event.preventDefault(); PROGRAMS.delete(gl); });
-  canvas.addEventListener("webglcontextrestored", () => { build(); ask(); });
+  outlive(gl, () => {}, () => { build(); draw(); });
   new ResizeObserver(ask).observe(canvas);
   build();
   return {

@@ -40,7 +40,7 @@ function partsPanel(bench) {
   $("front").addEventListener("change", () => {
     const { parts } = (held || bench.state.front)[$("front").value];
     held = bench.rowInHand = null;
-    bench.send({ do: "take", parts });
+    bench.ask({ do: "take", parts }, (refusal) => { if (refusal && !held && bench.state.front.length) show(bench.state); });
   });
   $("recommended").addEventListener("click", () => bench.send({ do: "take", parts: bench.state.recommended }));
   return {

@@ -36,9 +36,10 @@ function apartPanel(bench) {
     pieces = null;
     show();
     tellParts(null, 0, choose);
-    const answer = key ? await fetch("pieces") : null;
+    const answer = key ? await fetch("pieces").catch(() => null) : null;
     const found = answer && answer.ok ? await piecesIn(new Uint8Array(await answer.arrayBuffer())) : null;
     if (asked !== key) return;
+    if (!answer) asked = ""; // the line is lost: the next state asks again
     pieces = found;
     if (pieces && bench.chosen > pieces.parts.length) bench.chosen = 0;
     $("parts-fit").textContent = pieces ? pieces.header.fit : "";

@@ -34,8 +34,10 @@ function wallsOf(bench) {
   };
   const fetchPart = async (part, of) => {
     bands.set(part, null);
-    const answer = await fetch(`walls/${of}/${part}`);
-    if (!answer.ok || number !== of) return;
+    const answer = await fetch(`walls/${of}/${part}`).catch(() => null);
+    if (number !== of) return;
+    if (!answer) bands.delete(part); // the line is lost: the next state asks again
+    if (!answer?.ok) return;
     bands.set(part, bandsOf(await answer.arrayBuffer(), bench.state.colours[part - 1] || PLAIN));
     show();
   };

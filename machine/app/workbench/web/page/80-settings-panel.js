@@ -2,11 +2,23 @@
 
 function settingsPanel(bench) {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
-  let settings = [], pending = null;
+  let settings = [], missed = false; // missed: they have not come
   const part = () => Number($("settings-part").value) || 0;
   const send = (key, value, typed) => {
-    pending = { key, typed };
-    bench.send(part() ? { do: "set_part", part: part(), key, value } : { do: "set", key, value });
+    const of = part();
+    bench.ask(of ? { do: "set_part", part: of, key, value } : { do: "set", key, value }, (refusal) => {
+      if (of !== part()) return;
+      if (refusal) {
+        wrongs.set(key, { text: refusal, typed });
+        tellBeside();
+        list();
+      } else if (wrongs.delete(key)) fetchAll();
+    });
+  };
+  /** What is refused stands beside its field, whatever is told next. */
+  const tellBeside = () => {
+    const beside = [...wrongs.values()].some(({ text }) => text === bench.state.problem);
+    if (beside && bench.tab === "settings") $("problem").hidden = true;
   };
   const shown = ({ key, meaning, about, changed }) => {
     const words = $("search-settings").value.toLowerCase().split(/\s+/), text = `${key} ${meaning} ${about}`.toLowerCase();
@@ -22,8 +34,9 @@ function settingsPanel(bench) {
     }));
   };
   const fetchAll = async () => {
-    const asked = part(), answer = await fetch(`settings.json?part=${asked}`);
-    if (!answer.ok || asked !== part()) return;
+    const asked = part(), answer = await fetch(`settings.json?part=${asked}`).catch(() => null);
+    missed = !answer; // the line is lost: the next state asks again
+    if (!answer?.ok || asked !== part()) return;
     const told = await answer.json();
     settings = told.settings;
     showProfiles(told.profiles, bench);
@@ -49,14 +62,8 @@ function settingsPanel(bench) {
     told: (state, before) => {
       const fresh = !before || !alike(ofSettings(state), ofSettings(before));
       if (fresh) partsToChoose(state);
-      const refused = pending && state.problem;
-      if (refused) wrongs.set(pending.key, { text: state.problem, typed: pending.typed });
-      else if (fresh && pending) wrongs.delete(pending.key);
-      if (refused || fresh) pending = null;
-      const beside = [...wrongs.values()].some(({ text }) => text === state.problem);
-      if (beside && bench.tab === "settings") $("problem").hidden = true; // it stands beside its field, whatever is told next
-      if (fresh) fetchAll();
-      else if (refused) list();
+      tellBeside();
+      if (fresh || missed) fetchAll();
     },
   };
 }
@@ -64,7 +71,7 @@ function settingsPanel(bench) {
 function showProfiles(profiles, bench) {
   const rows = Object.entries(profiles).map(([kind, { names, name }]) => {
     const select = made("select", {}, ...names.map((text) => made("option", { text, value: text, selected: text === name })));
-    select.addEventListener("change", () => bench.send({ do: "profile", kind, name: select.value }));
+    select.addEventListener("change", () => bench.ask({ do: "profile", kind, name: select.value }, (refusal) => { if (refusal) select.value = name; }));
     return { id: kind, told: JSON.stringify([names, name]), make: () => made("label", {}, kind, select) };
   });
   putRows(rows, $("profiles-list"));

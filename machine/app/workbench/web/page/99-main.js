@@ -1,5 +1,7 @@
 // Main: the line to the server, the picture and the panels put together.
 
+const MISSING = "The model has not come from tiltprint, so it is not drawn; it is asked for again with the next news.";
+
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => { bench.placeHandles(); bench.placeRings(); bench.placeMarks(); }), root = document.documentElement;
   const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, rowInHand: null, placeHandles: () => {}, placeRings: () => {}, placeMarks: () => {} };
@@ -11,7 +13,7 @@ function main() {
     root.dataset.line = "closed";
     notice("This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.", "line");
   });
-  bench.send = line.send;
+  [bench.send, bench.ask] = [line.send, line.ask];
   bench.lay = (whether) => {
     bench.laying = whether;
     $("lay").setAttribute("aria-pressed", whether);
@@ -73,11 +75,16 @@ function main() {
     bench.key = key;
     bench.triangles = null;
     if (key && bench.state.model.drawn) {
-      const answer = await fetch(`model/${key}`);
-      const content = answer.ok ? await answer.arrayBuffer() : null;
-      if (!content || bench.key !== key) return;
+      const answer = await fetch(`model/${key}`).catch(() => null), content = answer?.ok ? await answer.arrayBuffer().catch(() => null) : null;
+      if (bench.key !== key) return;
+      if (!content) {
+        bench.key = ""; // the next state asks again, as that of a line that is back
+        if (picture) picture.show(null);
+        return answer && !answer.ok ? undefined : notice(MISSING, "model"); // another model lies there by now, or none has come
+      }
       bench.triangles = trianglesFrom(content);
     }
+    notice("", "model");
     if (picture) picture.show(bench.triangles);
     stand(bench.state.rotation, false);
     if (picture) picture.fit();
