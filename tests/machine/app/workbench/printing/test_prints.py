@@ -4,6 +4,7 @@ import asyncio
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,14 @@ import pytest
 
 from machine.app.requests import PrintRequest
 from machine.app.workbench.printing import running_print
+from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.order import PrintOrder, ResumeOrder
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.printing.teller import Said
 from machine.link.pending_commands import Command, Control
+from machine.network import follow
 from machine.network.credentials import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
@@ -183,6 +186,53 @@ def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintOrder | Re
     end = carry_out(wanted, Agreeing(), Checks(heard, Said(heard)))  # type: ignore[arg-type]
     assert end["sentence"].startswith(sentence)
     assert (end["end"], end["forcible"]) == ("refused", forcible)
+
+
+class Attended:
+    """A print on a server that a person at a page attends, in a thread of its own."""
+
+    def __init__(self, wanted: PrintOrder) -> None:
+        self.heard = Heard()
+        self.person = AtPage(self.heard)  # type: ignore[arg-type]
+        checks = Checks(self.heard, Said(self.heard))  # type: ignore[arg-type]
+        threading.Thread(target=lambda: self.heard.tell(**carry_out(wanted, self.person, checks)), daemon=True).start()
+        self.until(lambda state: "phase" in state)
+        self.person.hear("begin")
+        self.until(lambda state: state.get("progress", {}).get("state") == "printing")
+
+    def until(self, condition: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
+        end_s = time.monotonic() + 20.0
+        while not condition(self.heard.state):
+            assert time.monotonic() < end_s, f"that never came, only {self.heard.state}"
+            time.sleep(0.01)
+        return self.heard.state
+
+
+def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    monkeypatch.setattr(follow, "POLL_S", 0.05)
+    stopped = "emergency stop: {0} has taken it; restart the printer before the next print"
+    left = "hour goes on printing on {0}: this page follows it no more"
+    with stand_in("duet") as (job, address):
+        job.steps = 10_000
+        wanted = PrintOrder("hour", HOUR.encode(), load("gen5x"), PrintRequest(address), force=True)
+        one = Attended(wanted)
+        assert job.files["hour.gcode"].decode() == HOUR
+        one.person.hear("feed", 150.0)
+        one.person.hear("pause")
+        one.until(lambda state: (state["progress"]["state"], state["progress"]["feed_percent"]) == ("paused", 150.0))
+        assert (job.state, job.commands) == ("paused", ["M220 S150"])
+        one.person.hear("resume")
+        one.until(lambda state: state["progress"]["state"] == "printing")
+        for word, sentence, state in (("cancel", "the print was stopped", "cancelled"), ("leave", left, "printing")):
+            one.person.hear(word)
+            assert one.until(lambda told: told.get("end"))["sentence"] == sentence.format(address)
+            assert job.state == state
+            job.state = "idle"
+            one = Attended(wanted)
+        one.person.hear("emergency")
+        assert one.until(lambda told: told.get("end"))["sentence"] == stopped.format(address)
+        assert job.halted
 
 
 @pytest.mark.parametrize("percent", [float("inf"), float("nan"), "fast", True, 99.5, [1]])
