@@ -8,10 +8,12 @@ from machine.link.port import open_port
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
 from machine.network.address import is_server_address
 from machine.network.follow import UNCONFIRMED
+from machine.network.gcode_upload import server_name
 from machine.network.server import ACTIVE
 from machine.network.servers import open_server
 from profiles.errors import PortError, UserError
 
+STOP = "emergency stop: "  # begins all that is told of one
 STOPPED = "emergency stop: {server} has taken it; restart the printer before the next print"
 
 
@@ -48,6 +50,17 @@ def _stop_server(address: str) -> str:
     except UserError as error:
         return UNCONFIRMED.format(server=address, error=error)
     return STOPPED.format(server=address)
+
+
+def cancel_on_server(address: str, file: str) -> bool:
+    """Cancel the print of a file on a server that nobody follows any more; whether nothing of it is printed. Raises UserError."""
+    with open_server(address) as server:
+        server.greet()
+        status = server.status()
+        ours = status.file in ("", server_name(file))
+        if ours and status.phase in ACTIVE:
+            server.cancel()
+        return ours
 
 
 def _look_at_server(address: str) -> str:

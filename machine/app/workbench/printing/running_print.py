@@ -7,13 +7,13 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from machine.app.crash import log_bug
-from machine.app.printer.rescue import rescue
+from machine.app.printer.rescue import STOP, cancel_on_server, rescue
 from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.at_page import LEAVE
 from machine.app.workbench.printing.order import PrintOrder, ResumeOrder, State, first_state
 from machine.app.workbench.work.processes import Process, end_process, start_process
 from machine.app.workbench.work.worker import LENGTH, frame
-from profiles.errors import PrinterError
+from profiles.errors import PrinterError, UserError
 
 COMMAND = (sys.executable, "-m", "machine.app.workbench.printing.process")
 EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
@@ -29,7 +29,8 @@ class RunningPrint:
         self.number, self.holder, self.state = number, holder, first_state(order)
         self._order, self._changed = order, changed
         self._process: Process | None = None
-        self._begun = self._emergency = self._given_up = False
+        self._late: asyncio.Task[None] | None = None
+        self._begun = self._emergency = self._given_up = self._cancelled = False
         self._ended = False  # by this program, on purpose
 
     @property
@@ -49,13 +50,18 @@ class RunningPrint:
         if self._given_up or self._emergency:
             self._kill()
         assert process.stdout is not None
+        ended = lost = False
         with suppress(asyncio.IncompleteReadError, ConnectionError):
             while True:
                 (length,) = LENGTH.unpack(await process.stdout.readexactly(LENGTH.size))
                 state: State = pickle.loads(await process.stdout.readexactly(length))
-                self._become(**state)
+                ended = state["phase"] == "over"
+                lost = ended and self._has_lost_an_order(state)
+                self._become(**state | ({"phase": "leaving"} if lost else {}))
         await process.wait()
-        if not self.over:
+        if lost:
+            await self._order_anew()
+        elif not ended:
             await self._end_without_process()
 
     def say(self, value: object) -> None:
@@ -83,12 +89,17 @@ class RunningPrint:
 
     def cancel(self) -> None:
         """End it, heaters off; before it has begun at once. What has opened a journal to go on with takes it away itself."""
+        if self.over:
+            self._cancelled = True
+            self._order_late()
+            return
         asking = self.asking
         self._given_up = self._given_up or asking
         if asking and not isinstance(self._order, ResumeOrder):
             self._kill()
             return
         self.say(("cancel",))
+        self._cancelled = not asking
         if asking:
             asyncio.get_running_loop().call_later(LEAVE_S, self._kill)
 
@@ -102,6 +113,8 @@ class RunningPrint:
     def stop_at_once(self) -> None:
         """The emergency stop, by the print's own process; where that does not do it, or still uploads, without that."""
         if self.over:
+            self._emergency = _goes_on(self.state)
+            self._order_late()
             return
         self._emergency = True
         if self.asking or self.state["phase"] == "uploading":
@@ -113,6 +126,32 @@ class RunningPrint:
 
     def _kill(self) -> None:
         end_process(self._process)
+
+    def _has_lost_an_order(self, ended: State) -> bool:
+        """Whether the following of a print on a server has ended before it took what it was told last."""
+        stop_lost = self._emergency and not ended["sentence"].startswith(STOP)
+        return bool(ended["server"] and self._begun and (stop_lost or (self._cancelled and _goes_on(ended))))
+
+    def _order_late(self) -> None:
+        """The same for what comes when the print has just been left."""
+        if _goes_on(self.state):
+            self._become(phase="leaving")
+            self._late = asyncio.get_running_loop().create_task(self._order_anew())
+
+    async def _order_anew(self) -> None:
+        """Give the stop or the cancel on a connection of its own."""
+        port, sentence = self._order.printing.port, self.state["sentence"]
+        if self._emergency:
+            told = await asyncio.to_thread(rescue, port, 0, True)
+            self._become(phase="over", end="failed", sentence=told)
+            return
+        try:
+            cancelled = await asyncio.to_thread(cancel_on_server, port, self.state["name"])
+        except UserError as error:
+            self._become(phase="over", end="left", sentence=f"{sentence}; it was not cancelled: {error}")
+            return
+        stopped = {"end": "stopped", "sentence": "the print was stopped"} if cancelled else {}
+        self._become(phase="over", **stopped)
 
     async def _end_without_process(self) -> None:
         """The process has died. What it printed on is told to be safe; nothing has been sent to a printer it only asked; a print
@@ -135,3 +174,8 @@ class RunningPrint:
     def _become(self, **values: object) -> None:
         self.state = {**self.state, **values}
         self._changed()
+
+
+def _goes_on(ended: State) -> bool:
+    """Whether a print was left that its server goes on with."""
+    return bool(ended["server"] and ended["end"] == "left" and ended["progress"])

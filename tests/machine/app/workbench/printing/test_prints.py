@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.printing.teller import Said
+from machine.app.workbench.work.worker import LENGTH
 from machine.link.pending_commands import Command, Control
 from machine.network import follow
 from machine.network.credentials import VARIABLE
@@ -153,6 +155,59 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
         ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
         assert (job.state, job.commands) == ("idle", ["M112"])
     assert ended["sentence"] == f"emergency stop: {address} has taken it; restart the printer before the next print"
+
+
+# A print's process that is left and does nothing any more of what it hears.
+LEAVES = """
+import pickle, struct, sys
+length = struct.Struct(sys.argv[1])
+told = {"phase": "printing", "server": True, "progress": {"state": "printing"}, "end": "left", "sentence": "it goes on"}
+for phase in ("printing", "over"):
+    text = pickle.dumps(told | {"phase": phase})
+    sys.stdout.buffer.write(length.pack(len(text)) + text)
+    sys.stdout.flush()
+    for heard in range(2 if sys.argv[2] == phase else 0):
+        sys.stdin.buffer.read(*length.unpack(sys.stdin.buffer.read(length.size)))
+"""
+
+
+@pytest.mark.parametrize("waits_for", ["printing", "over"])
+@pytest.mark.parametrize(("kind", "give", "told", "halted", "state"), [
+    ("octoprint", RunningPrint.stop_at_once, "emergency stop: {0} has taken it; ", True, "printing"),
+    ("duet", RunningPrint.cancel, "the print was stopped", False, "cancelled"),
+])  # fmt: skip
+def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_own(
+    waits_for: str,
+    kind: str,
+    give: Callable[[RunningPrint], None],
+    told: str,
+    halted: bool,
+    state: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    monkeypatch.setattr(running_print, "COMMAND", (sys.executable, "-c", LEAVES, LENGTH.format, waits_for.replace("over", "")))
+
+    async def run(address: str) -> dict[str, Any]:
+        prints = Prints()
+        one = RunningPrint(1, order(address), "me", prints.tell)
+        one._begun = True
+        printing = asyncio.create_task(one.run())
+        while one.state["phase"] != waits_for:
+            await prints.changed(prints.version)
+        give(one)
+        await printing
+        while not one.over:
+            await prints.changed(prints.version)
+        return one.state
+
+    with stand_in(kind) as (job, address):
+        job.files["hour.gcode"] = HOUR.encode()
+        job.start("hour.gcode")
+        job.steps = 10_000
+        ended = asyncio.run(asyncio.wait_for(run(address), 60.0))
+        assert (job.halted, job.state) == (halted, state)
+    assert ended["sentence"].startswith(told.format(address))
 
 
 class Agreeing:
