@@ -31,6 +31,7 @@ MOVES = {
 }  # fmt: skip
 UNTOLD = "not told"
 COMPARED = "Compared"
+COSTS = ("time", "filament m", "plastic g", "support cm³", "interfaces cm³", "seams mm", "findings", "risky mm²")
 STANDS_ON = "base cm³"
 CUT = "base: plastic where the part stands on earlier ones that one piece would not have"
 RISKY = "risky: faces that would need support if the model were printed straight up; left: as the part is printed"
@@ -166,8 +167,8 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
 
 
 def _alternatives(alternatives: Sequence[Alternative]) -> Table:
-    """This print beside the model in one part: time, filament, support, seams, findings, risky area."""
-    rows = []
+    """This print beside the model in one part, a row for each cost: a row for each way would be broader than a phone."""
+    columns = []
     for each in alternatives:
         costs = ["-"] * 7
         if each.time_s is not None:
@@ -175,11 +176,10 @@ def _alternatives(alternatives: Sequence[Alternative]) -> Table:
             volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(each.interface_mm3.values()) / 1000:.2f}"]
             scars = [f"{each.seam_mm:.0f}", str(each.findings)]
             costs = [duration(each.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
-        rows.append([each.name, *costs, f"{max(each.risky_mm2, 0.0):.1f}"])
+        columns.append([*costs, f"{max(each.risky_mm2, 0.0):.1f}"])
     notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
-    return _table(
-        COMPARED, ["print", "time", "m", "g", "support cm³", "interfaces cm³", "seams mm", "findings", "risky mm²"], rows, notes
-    )
+    rows = [[cost, *values] for cost, *values in zip(COSTS, *columns, strict=True)]
+    return _table(COMPARED, ["", *(each.name for each in alternatives)], rows, notes)
 
 
 def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
