@@ -1,4 +1,4 @@
-"""The command line of printers: print, resume, ports, console, simulator. Heavy imports stay inside the commands."""
+"""The command line of printers: print, send, follow, resume, ports, console, simulator. Heavy imports stay in the commands."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -128,6 +128,19 @@ def send(
     return send(request, SendRequest(to, start, log))
 
 
+def follow(
+    server: Annotated[str, typer.Argument(metavar="SERVER", help="octoprint:HOST, moonraker:HOST or duet:HOST")],
+    log: LogFile = None,
+) -> int:
+    """Follow and command what a print server prints already.
+
+    Keys at a terminal are those of print; l, or Ctrl-C and no answer, leaves it printing. Ctrl-C twice cancels.
+    """
+    from machine.app.commands.follow import follow
+
+    return follow(server, log)
+
+
 def resume(
     journal: Annotated[
         Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the print that was cut off; without it they are listed")
@@ -210,6 +223,7 @@ def simulator(
 COMMANDS: dict[str, Callable[..., int]] = {
     "print": print_,
     "send": send,
+    "follow": follow,
     "resume": resume,
     "ports": ports,
     "console": console,

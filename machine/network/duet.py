@@ -82,6 +82,7 @@ class Duet:
 
     def status(self) -> JobStatus:
         """From what the object model calls frequently changing, and what the firmware has said since."""
+        before = self._last  # an answer that was on its way when the print began is none of its end
         model = table(table(self._value("/rr_model", {"flags": "d99fn"})).get("result"))
         job, state = table(model.get("job")), str(table(model.get("state")).get("status") or "")
         elapsed_s = number(job.get("duration"))
@@ -90,18 +91,19 @@ class Duet:
         said = self._get("/rr_reply")
         words = plain(said.body.decode("utf-8", "replace")) if said.status == 200 else ""
         return JobStatus(
-            self._since_start(phase),
+            self._since_start(phase, before),
             bytes_read=whole(job.get("filePosition")),
             elapsed_s=elapsed_s,
             temperature=self._temperature(table(model.get("heat")).get("heaters")),
             message=words or (f"it is {state}" if phase is Phase.OFFLINE else ""),
         )
 
-    def _since_start(self, phase: Phase) -> Phase:
-        """The phase, with idle after a print as its end: a cancelled one was paused before."""
+    def _since_start(self, phase: Phase, before: Phase | None) -> Phase:
+        """The phase, with idle after a print as its end: a cancelled one was paused before. before: what it was last, as it was
+        asked."""
         if phase in ACTIVE:
             self._last = phase
-        if phase is not Phase.READY or self._last is None:
+        if phase is not Phase.READY or before is None or self._last is None:
             return phase
         return Phase.CANCELLED if self._last in STOPPED else Phase.DONE
 

@@ -55,6 +55,12 @@ def follow_print(
     return _Follower(server, file, size, on_status, control, left).run()
 
 
+def follow_running(server: PrintServer, now: JobStatus, on_status: OnStatus, control: Control, left: Callable[[], bool]) -> End:
+    """Follow the print that a server is at already to its end. now: an active status of it. Raises ServerError when it fails or
+    is lost."""
+    return _Follower(server, now.file, 0, on_status, control, left, now).run()
+
+
 def _stop_at_once(server: PrintServer) -> None:
     """The emergency stop. Raises ServerError where it is not confirmed."""
     try:
@@ -65,8 +71,16 @@ def _stop_at_once(server: PrintServer) -> None:
 
 class _Follower:
     def __init__(
-        self, server: PrintServer, file: str, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]
+        self,
+        server: PrintServer,
+        file: str,
+        size: int,
+        on_status: OnStatus,
+        control: Control,
+        left: Callable[[], bool],
+        running: JobStatus | None = None,
     ) -> None:
+        """running: of a print that is not to be started, for the server is at it."""
         self._server, self._file, self._size, self._on_status, self._control, self._left = (
             server,
             file,
@@ -78,7 +92,8 @@ class _Follower:
         self._heard, self._over = _Heard(), threading.Event()
         self._orders: deque[Callable[[], None]] = deque()
         self._message = ""
-        self._last_active: Phase | None = None
+        self._starts = running is None
+        self._last_active: Phase | None = running.phase if running else None
         self._read = 0
         self._began_s: float | None = None  # since when the server has been told to start
         self._failed: Exception | None = None  # of the start, or of a thread
@@ -153,7 +168,7 @@ class _Follower:
             self._last_active, self._read = status.phase, max(self._read, status.bytes_read or 0)
             return None
         if status.phase is Phase.OFFLINE or (status.phase is Phase.FAILED and self._last_active is not None):
-            where = f" at {100 * self._read / self._size:.0f} %" if self._read else ""
+            where = f" at {100 * self._read / self._size:.0f} %" if self._read and self._size else ""
             raise ServerError(f"{self._server.name}: the print has failed{where}: {status.message or status.phase.value}")
         if self._last_active is None:
             return self._end_unseen(status, time.monotonic() - self._began_s)
@@ -214,8 +229,9 @@ class _Follower:
 
         A start without an answer may have been taken: whether it was is seen by the status.
         """
-        with suppress(NoAnswerError):
-            self._server.start(self._file)
+        if self._starts:
+            with suppress(NoAnswerError):
+                self._server.start(self._file)
         self._began_s = time.monotonic()
         while not self._over.wait(TURN_S):
             while self._orders:

@@ -77,6 +77,7 @@ class Moonraker:
             None if feed is None else 100.0 * feed,
             None if flow is None else 100.0 * flow,
             str(job.get("message") or ""),
+            number(card.get("progress")),
         )
 
     def _trouble(self, server: Mapping[str, Any]) -> str:

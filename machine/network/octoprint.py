@@ -50,6 +50,7 @@ class OctoPrint:
         progress, file = table(job.get("progress")), table(table(job.get("job")).get("file"))
         reply = self._http.get("/api/printer", {"exclude": "sd"})
         printer = {} if reply.status == 409 else table(self._http.check(reply, "to tell of its printer"))
+        done = number(progress.get("completion"))
         return JobStatus(
             _phase(table(table(printer.get("state")).get("flags")), progress),
             str(file.get("path") or ""),
@@ -57,6 +58,7 @@ class OctoPrint:
             number(progress.get("printTime")),
             _temperature(table(printer.get("temperature"))),
             message=str(job.get("error") or ("" if printer else f"its printer is not connected ({job.get('state')})")),
+            share=None if done is None else done / 100.0,
         )
 
     def has(self, file: str) -> bool:

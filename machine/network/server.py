@@ -31,7 +31,7 @@ ACTIVE = frozenset({Phase.PRINTING, Phase.PAUSING, Phase.PAUSED, Phase.RESUMING,
 class JobStatus:
     """A moment of a server. file: what it prints or has printed last; bytes_read: how far into the file; message: its own words.
 
-    None: not told. feed_percent and flow_percent: its overrides.
+    None: not told. feed_percent and flow_percent: its overrides; share: of the file that it has read, 0 to 1.
     """
 
     phase: Phase
@@ -42,6 +42,7 @@ class JobStatus:
     feed_percent: float | None = None
     flow_percent: float | None = None
     message: str = ""
+    share: float | None = None
 
 
 @dataclass(frozen=True)

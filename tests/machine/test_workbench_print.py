@@ -184,7 +184,9 @@ def type_port(browser: Browser, port: str) -> None:
     browser.value("$('port-typed').dispatchEvent(new Event('input', { bubbles: true }))")
 
 
-def test_a_page_prints_on_a_print_server_finds_the_print_again_and_leaves_it_printing(sliced: Running, browser: Browser) -> None:
+def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printing_and_follows_it_again(
+    sliced: Running, browser: Browser
+) -> None:
     with stand_in("octoprint") as (job, address), prints_line(sliced, "other") as other:
         job.steps = 200
         browser.open(sliced.address)
@@ -223,6 +225,14 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_and_leaves_it_pri
             browser.value("$('run-state').textContent") == f"box.stl goes on printing on {address}: this page follows it no more"
         )
         assert job.state == "printing"
+        type_port(browser, address)
+        browser.click("#follow-server")
+        browser.wait(f"{PRINTING} === 'printing' && $('run-title').textContent.startsWith('box.stl.gcode at octoprint:')")
+        assert browser.value("/nozzle209.6 of 210 .C.*so far/.test($('run-told').textContent) && $('run-ask').hidden")
+        browser.click("#cancel")
+        browser.click("#cancel-surely")
+        browser.wait(f"{PRINTING} === 'over'")
+        assert (browser.value("$('run-state').textContent"), job.state) == ("the print was stopped", "cancelled")
         assert KEY not in json.dumps(other.state)
         assert browser.complaints == []
 

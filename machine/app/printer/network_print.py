@@ -1,8 +1,8 @@
-"""Network print: a program handed over to a print server, started there and followed to its end."""
+"""Network print: a program handed over to a print server, started there and followed to its end; one that runs there followed."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 
 from machine.app.printer.attendance import Observers, ServerAttendance
@@ -12,15 +12,15 @@ from machine.app.printer.server_checks import check_free
 from machine.app.printer.stream import PrintJob
 from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import reporting, say
-from machine.app.terminal.screen import Course
+from machine.app.terminal.screen import Course, UnknownCourse
 from machine.link.pending_commands import CancelledError
 from machine.link.progress import ProgramPosition, Progress
-from machine.network.follow import End, follow_print
+from machine.network.follow import End, OnStatus, follow_print, follow_running
 from machine.network.gcode_upload import GcodeUpload
-from machine.network.server import JobStatus, PrintServer
+from machine.network.server import ACTIVE, JobStatus, PrintServer
 from machine.network.servers import open_server
 from machine.view.quantities import duration
-from profiles.errors import FirmwareError
+from profiles.errors import FirmwareError, ServerError
 
 LIMITS = (
     "the server prints its own copy: this computer may go, but there is no journal to resume from after a power cut, "
@@ -79,6 +79,44 @@ def print_there(server: PrintServer, job: PrintJob, observers: Observers, person
     say(LIMITS)
     course = Course(job.program.run)
     progress = ServerProgress(upload, job.program.lines, course.remaining_s)
+    with _shown(person, observers, course, progress) as on_status:
+        end = follow_print(server, file, len(upload.content), on_status, person.control, person.gone)
+    _report_end(end, file, server.name, progress)
+    return end
+
+
+def running_print(server: PrintServer) -> JobStatus:
+    """Where the print stands that a server is at. Raises ServerError when there is none."""
+    status = server.status()
+    if status.phase not in ACTIVE:
+        raise ServerError(
+            f"{server.name} prints nothing now ({status.message or status.phase.value}): there is nothing to follow"
+        )
+    return status
+
+
+def follow_there(server: PrintServer, now: JobStatus, observers: Observers, person: ServerAttendance) -> End:
+    """Show a print that a server is at already until it ends or the person leaves; says how it ended. now: of running_print().
+
+    Raises ServerError, FirmwareError after an emergency stop.
+    """
+    progress = ProgressToldByServer()
+    with _shown(person, observers, UnknownCourse(), progress) as on_status:
+        end = follow_running(server, now, on_status, person.control, person.gone)
+    _report_end(end, file_name(now), server.name, progress)
+    return end
+
+
+def file_name(status: JobStatus) -> str:
+    """What a server prints, as a person is told."""
+    return status.file or "its file"
+
+
+@contextmanager
+def _shown(
+    person: ServerAttendance, observers: Observers, course: Course, progress: "ProgressToldByServer"
+) -> Iterator[OnStatus]:
+    """Takes what the server tells, and shows it."""
     with person.show(observers, course) as display:
         display.open()
 
@@ -89,53 +127,76 @@ def print_there(server: PrintServer, job: PrintJob, observers: Observers, person
                 observers.follow(now)
 
         try:
-            end = follow_print(server, file, len(upload.content), on_status, person.control, person.gone)
+            yield on_status
         except KeyboardInterrupt:
             say("ended at once: whether the print has been cancelled is not known, look at the printer")
             raise
-    _report_end(end, file, server.name, progress)
-    return end
 
 
-def _report_end(end: End, file: str, server: str, progress: "ServerProgress") -> None:
+def _report_end(end: End, file: str, server: str, progress: "ProgressToldByServer") -> None:
     if end is End.STOPPED:
         raise FirmwareError(STOPPED.format(server=server))
     if end is End.DONE:
         show(f"printed {file} on {server} in {duration(progress.elapsed_s)}\n")
         return
+    after = f" after {progress.line} lines" if progress.line else ""
     said = {
         End.LEFT: f"{file} goes on printing on {server}",
-        End.CANCELLED: f"the print was cancelled on {server} after {progress.line} lines",
+        End.CANCELLED: f"the print was cancelled on {server}{after}",
     }
     say(f"tiltprint: interrupted; {said[end]}")
 
 
-class ServerProgress:
-    """What a server tells, as the progress of a print; part and layer are those of the place up to which it has read the file."""
+class ProgressToldByServer:
+    """What a server tells of a print whose program is not known here, as the progress of a print."""
 
-    def __init__(self, upload: GcodeUpload, lines: tuple[str, ...], remaining_s: Callable[[int], float]) -> None:
-        self._line_at, self._lines, self._remaining_s = upload.line_at, lines, remaining_s
-        self._place = ProgramPosition()
+    def __init__(self) -> None:
         self.line, self.elapsed_s = 0, 0.0
 
     def at(self, status: JobStatus, message: str) -> Progress:
         """The progress at a moment. message: goes before the server's own."""
         self.elapsed_s = max(self.elapsed_s, status.elapsed_s or 0.0)
-        self._read_to(self._line_at(status.bytes_read or 0))
-        feed = status.feed_percent or 100.0
-        make = partial(Progress, sent=self.line, acknowledged=self.line, total=len(self._lines), file_line=self.line)
-        return make(
+        return Progress(
+            sent=0,
+            acknowledged=0,
+            total=None,
             elapsed_s=self.elapsed_s,
-            left_s=self._remaining_s(self.line) * 100.0 / feed,
-            share=self._place.share(self.line, len(self._lines)),
+            left_s=None,
+            share=status.share,
             temperature=status.temperature,
+            part=None,
+            parts=None,
+            layer=None,
+            state=status.phase.value,
+            feed_percent=status.feed_percent or 100.0,
+            flow_percent=status.flow_percent or 100.0,
+            message=plain_line(message or status.message),
+        )
+
+
+class ServerProgress(ProgressToldByServer):
+    """The same of a known program; part and layer are those of the place up to which the server has read the file."""
+
+    def __init__(self, upload: GcodeUpload, lines: tuple[str, ...], remaining_s: Callable[[int], float]) -> None:
+        super().__init__()
+        self._line_at, self._lines, self._remaining_s = upload.line_at, lines, remaining_s
+        self._place = ProgramPosition()
+
+    def at(self, status: JobStatus, message: str) -> Progress:
+        """The progress at a moment. message: goes before the server's own."""
+        told = super().at(status, message)
+        self._read_to(self._line_at(status.bytes_read or 0))
+        return replace(
+            told,
+            sent=self.line,
+            acknowledged=self.line,
+            total=len(self._lines),
+            file_line=self.line,
+            left_s=self._remaining_s(self.line) * 100.0 / told.feed_percent,
+            share=self._place.share(self.line, len(self._lines)),
             part=self._place.part,
             parts=self._place.parts,
             layer=self._place.layer,
-            state=status.phase.value,
-            feed_percent=feed,
-            flow_percent=status.flow_percent or 100.0,
-            message=plain_line(message or status.message),
         )
 
     def _read_to(self, line: int) -> None:

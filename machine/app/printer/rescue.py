@@ -57,7 +57,7 @@ def cancel_on_server(address: str, file: str) -> bool:
     with open_server(address) as server:
         server.greet()
         status = server.status()
-        ours = status.file in ("", server_name(file))
+        ours = status.file in ("", file, server_name(file))
         if ours and status.phase in ACTIVE:
             server.cancel()
         return ours

@@ -69,7 +69,9 @@ class _StatusLines:
 
 def status(progress: Progress) -> str:
     """One line that tells where a print stands."""
-    phrases = [f"{100 * progress.share:.0f} %" if progress.share is not None else f"line {progress.acknowledged}"]
+    phrases = [f"{100 * progress.share:.0f} %"] if progress.share is not None else []
+    if progress.share is None and (progress.total is not None or progress.acknowledged):
+        phrases.append(f"line {progress.acknowledged}")
     if progress.part is not None:
         phrases.append(f"part {progress.part}" + (f" of {progress.parts}" if progress.parts else ""))
     if progress.layer is not None:

@@ -31,6 +31,8 @@ KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? mor
 class Course:
     """What a dry run knows about the way of a print: where the table stands at a line, what is left to do, layers of a part."""
 
+    beginning = "starting"  # as long as there is no part
+
     def __init__(self, run: DryRun) -> None:
         program = run.program
         self.letters = run.letters
@@ -62,6 +64,29 @@ class Course:
     def layers(self, part: int | None) -> int | None:
         """Layers of a part."""
         return None if part is None else self._layers.get(part)
+
+
+class UnknownCourse(Course):
+    """Of a program that is not here: nothing is known of it."""
+
+    beginning = "a file that is not known here"
+
+    def __init__(self) -> None:
+        self.letters = ()
+
+    def pose_deg(self, file_line: int) -> None:
+        """None."""
+
+    def at(self, file_line: int) -> dict[str, float]:
+        """{}."""
+        return {}
+
+    def remaining_s(self, file_line: int) -> float:
+        """0."""
+        return 0.0
+
+    def layers(self, part: int | None) -> None:
+        """None."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +183,7 @@ def _place(state: ScreenState) -> Text:
     if pose is not None:
         phrases.append(f"tilt {course.letters[3]} {pose[0]:.1f} deg")
         phrases.append(f"turn {course.letters[4]} {pose[1]:.1f} deg")
-    return _phrases_line(phrases or ["starting"])
+    return _phrases_line(phrases or [course.beginning])
 
 
 def _of(count: int | None) -> str:
@@ -194,7 +219,8 @@ def _times(progress: Progress, now: datetime) -> Text:
         end = now + timedelta(seconds=progress.left_s)
         day = "" if end.date() == now.date() else f"{end:%a %d %b} "
         phrases += [f"{duration(progress.left_s)} left", f"done at {day}{end:%H:%M}"]
-    phrases.append(f"line {progress.acknowledged}{_of(progress.total)}")
+    if progress.total is not None or progress.acknowledged:
+        phrases.append(f"line {progress.acknowledged}{_of(progress.total)}")
     return _phrases_line(phrases)
 
 

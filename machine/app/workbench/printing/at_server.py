@@ -1,12 +1,13 @@
-"""At server: a print on a print server, which is handed the file, as `print --port SERVER` does it."""
+"""At server: a print on a print server, which is handed the file, as `print --port SERVER` does it, or one that it
+is at already, as `follow` does."""
 
 from machine.app.printer.attendance import Observers
-from machine.app.printer.network_print import LIMITS, print_there, server_session
+from machine.app.printer.network_print import LIMITS, file_name, follow_there, print_there, running_print, server_session
 from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
 from machine.app.printer.stream import PrintJob
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.checks import CLEAN, DONE, LEFT, STOPPED, Checks, figures, program_of
-from machine.app.workbench.printing.order import PrintOrder, State
+from machine.app.workbench.printing.order import FollowOrder, PrintOrder, State
 from machine.link.pending_commands import CancelledError
 from machine.network.address import parse_server_address
 from machine.network.follow import End
@@ -26,7 +27,23 @@ def print_on_server(order: PrintOrder, person: AtPage, checks: Checks) -> State:
             end = print_there(server, job, Observers(log), person)
         except CancelledError:
             return LEFT
-    left = {"end": "left", "sentence": f"{order.name} goes on printing on {address}: this page follows it no more"}
+    return _ended(end, order.name, address)
+
+
+def follow_on_server(order: FollowOrder, person: AtPage, checks: Checks) -> State:
+    """Follow what a server prints already; how it ended. Raises UserError."""
+    address = order.printing.port
+    with server_session(address, f"what {address} prints", "print") as (server, log):
+        server.greet()
+        now = running_print(server)
+        person.agreed, name = True, file_name(now)  # from now on it may be stopped
+        checks.teller.tell(name=name)
+        end = follow_there(server, now, Observers(log), person)
+    return _ended(end, name, address)
+
+
+def _ended(end: End, name: str, address: str) -> State:
+    left = {"end": "left", "sentence": f"{name} goes on printing on {address}: this page follows it no more"}
     return {End.DONE: DONE, End.CANCELLED: STOPPED, End.LEFT: left}[end]
 
 

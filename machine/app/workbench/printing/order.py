@@ -36,7 +36,17 @@ class ResumeOrder:
     machine: str = ""
 
 
-def first_state(order: PrintOrder | ResumeOrder) -> State:
+@dataclass(frozen=True, eq=False)
+class FollowOrder:
+    """What a print server, the port, prints already."""
+
+    printing: PrintRequest
+
+
+Order = PrintOrder | ResumeOrder | FollowOrder
+
+
+def first_state(order: Order) -> State:
     """What is known of a print before its process has said anything."""
     printing = order.printing
     return {
@@ -61,8 +71,10 @@ def first_state(order: PrintOrder | ResumeOrder) -> State:
     }
 
 
-def _known(order: PrintOrder | ResumeOrder) -> State:
+def _known(order: Order) -> State:
     """resumes: the journal of the print whose rest it is; key: of the slices."""
+    if isinstance(order, FollowOrder):
+        return {"resumes": "", "name": "what it prints", "machine": "", "force": False, "key": ""}
     if isinstance(order, ResumeOrder):
         return {"resumes": str(order.journal), "name": order.journal.stem, "machine": "", "force": False, "key": ""}
     return {"resumes": "", "name": order.name, "machine": order.profile.machine.name, "force": order.force, "key": order.key}

@@ -18,7 +18,7 @@ from machine.app.printer.journal_folder import ResumableJournal, resumable_journ
 from machine.app.printer.port_reports import PortReport, answer_words, ask_ports, known_ports, port_json
 from machine.app.workbench.bench.planes import is_number
 from machine.app.workbench.printing.at_page import LEAVE
-from machine.app.workbench.printing.order import PrintOrder, ResumeOrder
+from machine.app.workbench.printing.order import Order, ResumeOrder
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.news import News
 from machine.link.medium import stable_name
@@ -73,14 +73,14 @@ class Prints(News):
             self._pages[page] -= 1
             self.tell()
 
-    def command(self, page: str, asked: dict[str, Any], order: Callable[[dict[str, Any]], PrintOrder | ResumeOrder]) -> None:
+    def command(self, page: str, asked: dict[str, Any], order: Callable[[dict[str, Any]], Order]) -> None:
         """Do what a page asks for; order: makes one of what it asks for. Raises UserError for what cannot be done."""
         word = asked.get("do")
         if word == "ports":
             self._look_for_ports(_whole(asked, "baud", 115200))
         elif word == "journals":
             self._look_for_journals()
-        elif word in ("check", "go_on"):
+        elif word in ("check", "go_on", "follow"):
             self._begin(page, order(asked))
         elif word == "emergency":
             self._stop_at_once(asked.get("print"))
@@ -104,7 +104,7 @@ class Prints(News):
             line for each in running for line in (*each.state["said"][-2:], f"{each.state['port']}: {each.state['sentence']}")
         ]
 
-    def _begin(self, page: str, order: PrintOrder | ResumeOrder) -> None:
+    def _begin(self, page: str, order: Order) -> None:
         port = order.printing.port
         if any(_same(each.state["port"], port) for each in self.running):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")

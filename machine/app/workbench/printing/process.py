@@ -18,9 +18,9 @@ from machine.app.crash import log_bug
 from machine.app.requests import FORCE_GOES_ON
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.at_port import print_at_port
-from machine.app.workbench.printing.at_server import print_on_server
+from machine.app.workbench.printing.at_server import follow_on_server, print_on_server
 from machine.app.workbench.printing.checks import Checks
-from machine.app.workbench.printing.order import PrintOrder, ResumeOrder, State, first_state
+from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
 from machine.app.workbench.printing.rest import go_on
 from machine.app.workbench.printing.teller import Said, Teller
 from machine.app.workbench.work.worker import LENGTH
@@ -34,7 +34,7 @@ def main() -> None:
     with open(os.devnull, "r+b") as nowhere:  # what libraries print must not reach the pipe
         os.dup2(nowhere.fileno(), 0)
         os.dup2(nowhere.fileno(), 1)
-    order: PrintOrder | ResumeOrder = _read(asked)
+    order: Order = _read(asked)
     teller = Teller(answers, first_state(order))
     person = AtPage(teller)
     Thread(target=_listen, args=(asked, person), daemon=True).start()
@@ -45,11 +45,13 @@ def main() -> None:
     teller.close()
 
 
-def carry_out(order: PrintOrder | ResumeOrder, person: AtPage, checks: Checks) -> State:
+def carry_out(order: Order, person: AtPage, checks: Checks) -> State:
     """Check, ask, print; how it ended."""
     try:
         if isinstance(order, ResumeOrder):
             return go_on(order, person, checks)
+        if isinstance(order, FollowOrder):
+            return follow_on_server(order, person, checks)
         if is_server_address(order.printing.port):
             return print_on_server(order, person, checks)
         return print_at_port(order, person, checks)

@@ -10,7 +10,7 @@ from machine.app.crash import log_bug
 from machine.app.printer.rescue import STOP, cancel_on_server, rescue
 from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.at_page import LEAVE
-from machine.app.workbench.printing.order import PrintOrder, ResumeOrder, State, first_state
+from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
 from machine.app.workbench.work.processes import Process, end_process, start_process
 from machine.app.workbench.work.worker import LENGTH, frame
 from profiles.errors import PrinterError, UserError
@@ -25,12 +25,13 @@ class RunningPrint:
     """run() once, all else from the event loop too. number: its name among the prints of a workbench; holder: the page that
     commands it, "" for none."""
 
-    def __init__(self, number: int, order: PrintOrder | ResumeOrder, holder: str, changed: Callable[[], None]) -> None:
+    def __init__(self, number: int, order: Order, holder: str, changed: Callable[[], None]) -> None:
         self.number, self.holder, self.state = number, holder, first_state(order)
         self._order, self._changed = order, changed
         self._process: Process | None = None
         self._late: asyncio.Task[None] | None = None
-        self._begun = self._emergency = self._given_up = self._cancelled = False
+        self._begun = isinstance(order, FollowOrder)  # by somebody else
+        self._emergency = self._given_up = self._cancelled = False
         self._ended = False  # by this program, on purpose
 
     @property

@@ -14,7 +14,7 @@ from starlette.websockets import WebSocket
 from machine.app.crash import log_bug
 from machine.app.requests import PrintRequest
 from machine.app.workbench.bench.planes import is_number
-from machine.app.workbench.printing.order import PrintOrder, ResumeOrder
+from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder
 from machine.app.workbench.printing.ordering import order_of
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
@@ -82,8 +82,13 @@ async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) 
             await socket.send_text(json.dumps({"problem": told}))
 
 
-def _order(session: Session, asked: dict[str, Any]) -> PrintOrder | ResumeOrder:
-    """What a page wants printed: what lies on its bench, or the rest of a print that was cut off. Raises UserError."""
+def _order(session: Session, asked: dict[str, Any]) -> Order:
+    """What a page wants: what lies on its bench printed, the rest of a print that was cut off, or to follow what a server prints.
+
+    Raises UserError.
+    """
+    if asked.get("do") == "follow":
+        return FollowOrder(_server(asked))
     if asked.get("do") != "go_on":
         return order_of(session, _printing(asked), asked.get("force") is True)
     journal, machine = (str(asked.get(each) or "").strip() for each in ("journal", "machine"))
@@ -93,6 +98,12 @@ def _order(session: Session, asked: dict[str, Any]) -> PrintOrder | ResumeOrder:
         if "\0" in name:
             raise JournalError(f"{name!r:.100} is no file's name: it has a character that no name has")
     return ResumeOrder(Path(journal).absolute(), _printing(asked), machine)
+
+
+def _server(asked: dict[str, Any]) -> PrintRequest:
+    printing = _printing(asked)
+    parse_server_address(printing.port)
+    return printing
 
 
 def _printing(asked: dict[str, Any]) -> PrintRequest:

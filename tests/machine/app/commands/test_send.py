@@ -64,6 +64,21 @@ def test_a_print_on_a_server_is_followed_to_its_end(kind: str, file: Path, capsy
     assert job.state == "complete"
 
 
+@pytest.mark.parametrize("kind", ["octoprint", "moonraker", "duet"])
+def test_a_print_that_a_server_is_at_already_is_followed_to_its_end(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with stand_in(kind) as (job, address):
+        assert main(["follow", address]) == 1
+        assert f"{address} prints nothing now (ready): there is nothing to follow" in capsys.readouterr().err.replace("\n", " ")
+        job.files["vase.gcode"] = bytes(100)
+        job.start("vase.gcode")
+        assert main(["follow", address]) == 0
+    told = capsys.readouterr()
+    file = "its file" if kind == "duet" else "vase.gcode"  # a Duet tells no name with its state
+    assert f"it is printing {file}" in told.err
+    assert told.out.startswith(f"printed {file} on {address} in ")
+    assert not any(asked.endswith(("upload", "/start")) for asked in job.asked)
+
+
 @pytest.mark.parametrize(
     ("kind", "file", "sentence"),
     [

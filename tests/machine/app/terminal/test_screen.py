@@ -71,7 +71,7 @@ def test_the_table_stands_where_the_last_move_before_a_line_has_left_it(line: in
 def test_what_is_not_known_is_left_out() -> None:
     unknown = Progress(0, 0, None, 0.0, None, None, Temperature(), None, None, None)
     _, place, heat, bar, times, _ = lines(unknown)
-    assert (place, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far   line 0")
+    assert (place, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far")
     assert "%" not in bar
 
 

@@ -45,6 +45,7 @@ function printPanel(bench) {
     send({ do: "check", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value), force: $("force").checked });
     unforce();
   });
+  $("follow-server").addEventListener("click", () => send({ do: "follow", port: port() }));
   $("rest-field").addEventListener("toggle", () => { if ($("rest-field").open) send({ do: "journals" }); });
   $("journal-typed").addEventListener("focus", () => { $("journal-other").checked = true; });
   $("go-on-with").addEventListener("click", () => {

@@ -96,7 +96,7 @@ function showProgress(progress, over) {
     progress.nozzle_c != null && ["nozzle", heat(progress.nozzle_c, progress.nozzle_target_c)],
     progress.bed_c != null && ["bed", heat(progress.bed_c, progress.bed_target_c)],
     Object.keys(progress.at).length && ["position", Object.entries(progress.at).map(([letter, value]) => `${letter} ${value.toFixed(1)}`).join("  ")],
-    ["line", of(progress.acknowledged, progress.total)],
+    (progress.total != null || progress.acknowledged) && ["line", of(progress.acknowledged, progress.total)],
     [over ? "took" : "so far", duration(progress.elapsed_s)],
     !over && progress.left_s != null && ["done at", new Date(Date.now() + 1000 * progress.left_s).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" })],
   ].filter(Boolean));

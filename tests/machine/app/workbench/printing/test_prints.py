@@ -15,7 +15,7 @@ import pytest
 from machine.app.requests import PrintRequest
 from machine.app.workbench.printing import running_print
 from machine.app.workbench.printing.at_page import AtPage
-from machine.app.workbench.printing.order import PrintOrder, ResumeOrder
+from machine.app.workbench.printing.order import FollowOrder, Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.printing.running_print import RunningPrint
@@ -233,10 +233,11 @@ class Heard:
     (order("/dev/no-such-port"), "port /dev/no-such-port does not exist", False),
     (ResumeOrder(Path("gone.journal"), PrintRequest("/dev/none")), "journal gone.journal cannot be read: no such file", False),
     (ResumeOrder(Path("any.journal"), PrintRequest("sim")), "--port sim: a simulated printer ends with its print", False),
+    (FollowOrder(PrintRequest("duet:127.0.0.1:9")), "duet:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9", False),
     (order("octoprint:127.0.0.1:9"), "octoprint:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9: is OctoPrint", False),
     (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 errors, the first: X goes to 500 mm", True),
 ])  # fmt: skip
-def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintOrder | ResumeOrder, sentence: str, forcible: bool) -> None:
+def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence: str, forcible: bool) -> None:
     heard = Heard()
     end = carry_out(wanted, Agreeing(), Checks(heard, Said(heard)))  # type: ignore[arg-type]
     assert end["sentence"].startswith(sentence)
