@@ -200,6 +200,10 @@ def test_faces_and_boxes_are_marked_by_clicks_moved_and_taken_away(browser: Brow
         assert "faces up to 20°" in browser.value("$('marks').textContent")
         browser.key("Escape")
         assert browser.value("$('mark-faces').getAttribute('aria-pressed')") == "false"
+        browser.click("#mark-faces")
+        browser.click("#tab-model")  # where nothing is marked, so a click there marks nothing
+        assert browser.value("$('notice').hidden")
+        browser.click("#tab-parts")
         browser.click("#marks input[type=radio]")
         browser.value("{ $('mark-angle').value = 95; $('mark-angle').dispatchEvent(new Event('change')); }")
         browser.wait("$('marks').textContent.includes('faces up to 95°')")

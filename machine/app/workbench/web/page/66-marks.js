@@ -82,6 +82,7 @@ function marksPanel(bench) {
   for (const what of ["faces", "box"]) $(`mark-${what}`).addEventListener("click", () => bench.mark(bench.marking === what ? "" : what));
   $("mark-kind").addEventListener("change", () => bench.mark(bench.marking || ""));
   $("mark-middle").addEventListener("click", () => {
+    bench.mark("");
     const [x, y, z] = bench.state.standing.size_mm, low = bench.state.pedestal_mm;
     addBox([-x / 6, -y / 6, low + z / 3], [x / 6, y / 6, low + (2 * z) / 3]);
   });

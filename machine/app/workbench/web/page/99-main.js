@@ -90,7 +90,7 @@ function main() {
     if (picture) picture.fit();
     root.dataset.shown = key;
   };
-  tabsOf((tab) => { bench.tab = tab; if (bench.state) bench.fetchPieces(); bench.look(); bench.showPlane(); });
+  tabsOf((tab) => { if (tab !== bench.tab) endClicks(bench); bench.tab = tab; if (bench.state) bench.fetchPieces(); bench.look(); bench.showPlane(); });
   $("undo").addEventListener("click", () => bench.send({ do: "undo" }));
   $("redo").addEventListener("click", () => bench.send({ do: "redo" }));
   if (picture) {
@@ -122,6 +122,13 @@ async function fetchPedestal(bench) {
   document.documentElement.dataset.pedestal = asked.body ? key : "";
 }
 
+/** What the next click on the model was asked for is not wanted any more. */
+function endClicks(bench) {
+  bench.mark("");
+  bench.lay(false);
+  bench.snap(false);
+}
+
 /** A click on the model: the face is laid down or the plane takes its place when that was asked for; else a part is chosen. */
 function press(event, bench, picture) {
   if (!bench.triangles) return;
@@ -146,13 +153,16 @@ function tellState({ model, problem, busy, undo, redo, search, slicing, preparin
   document.body.classList.toggle("no-model", !model);
   document.body.classList.toggle("has-model", Boolean(model));
   $("drop").hidden = Boolean(model);
-  $("problem").textContent = problem;
+  if ($("problem").textContent !== problem) $("problem").replaceChildren(...withWholeOptions(problem)); // read aloud once
   $("problem").hidden = !problem;
   for (const [id, word] of [["undo", undo], ["redo", redo]]) {
     $(id).disabled = !word;
     $(id).setAttribute("aria-label", word ? `${id}: ${word}` : id);
   }
 }
+
+/** A sentence whose options are not broken at their hyphens. */
+const withWholeOptions = (text) => text.split(/(?<=\s)(--[\w-]+)/).map((piece, k) => (k % 2 ? made("span", { text: piece, className: "option" }) : piece));
 
 function legend(colours) {
   const entries = (colours || []).slice(0, 24).map((colour, k) => made("span", {}, swatch(colour), `${k + 1}`));
@@ -193,7 +203,7 @@ function keysOf(bench, camera, picture) {
   const keys = {
     ArrowLeft: arrow(-1, 0), ArrowRight: arrow(1, 0), ArrowUp: arrow(0, 1), ArrowDown: arrow(0, -1),
     "+": () => camera.zoom(0.85), "=": () => camera.zoom(0.85), "-": () => camera.zoom(1 / 0.85),
-    f: () => $("fit").click(), d: () => $("theme").click(), r: () => $("show-rings").click(), n: () => $("neck").click(), Escape: () => { bench.mark(""); bench.lay(false); bench.snap(false); bench.select(0); },
+    f: () => $("fit").click(), d: () => $("theme").click(), r: () => $("show-rings").click(), n: () => $("neck").click(), Escape: () => { endClicks(bench); bench.select(0); },
   };
   ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
   addEventListener("keydown", (event) => {
