@@ -99,6 +99,9 @@ function groupTitle({ group, about }) {
   return { id: `group ${group}`, told: text, make: () => made("h3", { text }) };
 }
 
+/** A key that is broken between its words where it is too long for a line. */
+const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [made("wbr"), word] : [word]));
+
 /** again(): called when a person leaves what was typed in, for what has been told meanwhile. */
 function settingRow(setting, wrong, send, again) {
   const { key, meaning, kind, least, most, value, changed, placeholders = [], optional } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
@@ -109,7 +112,7 @@ function settingRow(setting, wrong, send, again) {
   const back = made("button", { type: "button", text: "↺", title: "As it was", ariaLabel: `${key} as it was`, hidden: !changed && !wrong });
   back.addEventListener("click", () => send(key, null));
   const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
-  const row = settingBox(setting, [made("label", {}, made("span", { text: key }), input, back), refused, told, named]);
+  const row = settingBox(setting, [made("label", {}, made("span", {}, ...breakable(key)), input, back), refused, told, named]);
   input.addEventListener("input", () => { row.dataset.typing = kind; });
   input.addEventListener("change", () => send(key, typedIn(input, kind, optional), typedAs(input, kind)));
   for (const done of ["change", "blur"]) {
