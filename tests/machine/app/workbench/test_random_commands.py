@@ -32,7 +32,7 @@ COMMANDS = 500
 SETTINGS = {
     "process.walls": ("3", "0", ""),
     "process.scale": ("1", "0.5", "2", "30", "1e9"),
-    "process.rotate_deg": ("0, 0, 0", "90, 0, 0", "12, -30, 45", "no"),
+    "process.rotate_deg": ("[0, 0, 0]", "[90, 0, 0]", "[12, -30, 45]", "no"),
     "search.pedestal_mm": ("0", "5"),
     "machine.gcode.start": ('"G28\\nM104 S{nozzle_c}"', '"{nobody}"'),
     "machine.gcode.resume": ('"G0 Z{clear_z_mm}"',),
