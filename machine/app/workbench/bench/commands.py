@@ -28,7 +28,7 @@ def obey(history: History, asked: dict[str, Any]) -> History:
     if name == "redo":
         return history.redo()
     if not isinstance(name, str) or name not in COMMANDS:
-        raise PlanError(f"{name!r} is no command of the workbench: {', '.join(('undo', 'redo', *COMMANDS))} are known")
+        raise PlanError(f"{name!r} is no command of the workbench: docs/workbench.md lists them")
     bench = history.now.bench
     if bench.model is None:
         raise PlanError("there is no model on the workbench yet: choose a file first")
