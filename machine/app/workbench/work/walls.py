@@ -6,15 +6,17 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from slicer.paths import Kind, Layer, SlicedPart
 
-SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN, Kind.SUPPORT)
+SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN, Kind.BRIDGE, Kind.GAP, Kind.SUPPORT)
+BEHIND = (*SEEN, Kind.INNER_WALL)  # on shallow slopes inner walls are free, too; drawn where all are few enough
 MOST_PIECES = 60_000  # of a part: with more, only every second layer is drawn, or every third, as high as so many
 
 
 def walls(part: Part, sliced: SlicedPart, most: int = MOST_PIECES) -> bytes:
     """The straight pieces of its outer paths: 3 float32, the direction of printing, then 7 a piece: where it begins and ends, mm
     in the workpiece frame, in the middle of its height, and its height; all little-endian."""
-    step = 1 + sum(_count(layer) for layer in sliced.layers) // most
-    rows = [_pieces(layer, step) for layer in sliced.layers[step - 1 :: step]]
+    kinds = BEHIND if _count(sliced, BEHIND) < most else SEEN
+    step = 1 + _count(sliced, kinds) // most
+    rows = [_pieces(layer, kinds, step) for layer in sliced.layers[step - 1 :: step]]
     flat = np.concatenate([np.zeros((0, 7)), *rows])
     back = part.rotation
     for ends in (slice(0, 3), slice(3, 6)):
@@ -22,15 +24,15 @@ def walls(part: Part, sliced: SlicedPart, most: int = MOST_PIECES) -> bytes:
     return np.asarray(part.direction, "<f4").tobytes() + flat.astype("<f4").tobytes()
 
 
-def _count(layer: Layer) -> int:
-    return sum(len(path.points) - 1 for path in layer.paths if path.kind in SEEN)
+def _count(sliced: SlicedPart, kinds: tuple[Kind, ...]) -> int:
+    return sum(len(path.points) - 1 for layer in sliced.layers for path in layer.paths if path.kind in kinds)
 
 
-def _pieces(layer: Layer, step: int) -> Floats:
+def _pieces(layer: Layer, kinds: tuple[Kind, ...], step: int) -> Floats:
     """(n, 7) in the part frame: two ends and the height, which is that of so many layers."""
     rows, high = [np.zeros((0, 7))], layer.height_mm * step
     for path in layer.paths:
-        if path.kind in SEEN:
+        if path.kind in kinds:
             points = np.column_stack([path.points, layer.z_mm + path.z_mm - high / 2.0])
             rows.append(np.column_stack([points[:-1], points[1:], np.full(len(points) - 1, high)]))
     return np.concatenate(rows)
