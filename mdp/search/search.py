@@ -141,8 +141,7 @@ def cut_by_plan(
     """The parts of a closed mesh by the planes of a plan, without a search; parts: of its row with at most so many.
 
     The rows of the front are those of the plan, its own parts in place of the row of their number, the one that is cut measured
-    anew; price: as for a search. Raises PlanError for
-    a plan of another model and for a plane that cannot be cut.
+    anew; price: as for a search. Raises PlanError for a plan of another model and for a plane that cannot be cut.
     """
     began = perf_counter()
     own = plan

@@ -52,7 +52,7 @@ class Compilers:
             return
         if not self._told:
             self._told = True
-            say("compiling the kernels (only the first run does)")
+            say("compiling the kernels (only the first run that needs them does)")
         with nullcontext(report) if report is not None else reporting() as show:
             while not self._ready(bundles):
                 show(f"compiling the kernels: {self._kernels} done")

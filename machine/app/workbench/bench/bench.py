@@ -186,7 +186,7 @@ def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
 
 def with_model_turned_as_read(bench: Bench, model: Model, turn: Floats, factor: float = 1.0) -> Bench:
     """The same model turned otherwise, (3, 3), and scaled as it is read, with its zones; its cuts were for the way before."""
-    anew = replace(with_model_anew(bench, model), profile=bench.profile.of_all_parts, rotation=bench.rotation)
+    anew = replace(with_model_anew(bench, model), rotation=bench.rotation)
     return _uncut(_with_places_of(anew, bench, factor, turn))
 
 

@@ -19,10 +19,8 @@ from profiles.errors import UserError
 UNSAFE = re.compile(r"[^\w .()+-]")
 LONGEST_NAME = 100
 LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
-LONGEST_ASK, MOST_ANSWERS = (
-    80,
-    20,
-)  # letters of the name of a command; of the last commands with a name it is told what became of them
+LONGEST_ASK = 80  # letters of the name of a command
+MOST_ANSWERS = 20  # the pages are told what became of so many commands with a name, the last ones
 
 
 class Desk(News):

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from machine.app.requests import Given
-from machine.app.workbench.bench.bench import Bench, History, Model, Step, with_cuts
+from machine.app.workbench.bench.bench import Bench, History, Model, Step, with_cuts, with_model_turned_as_read
 from machine.app.workbench.bench.command_line import export_command, turned_by, turns_deg
 from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.settings import settings_list, with_setting
 from machine.planning.stops import parse_stops
 from mdp.plans.plan_file import PlannedPart
+from mdp.pose import UP, about
 from profiles.errors import PlanError, ProfileError
 from profiles.profile import load
 from tests.shapes import tee
@@ -87,6 +88,8 @@ def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_
     turned = obey(steps, {"do": "turn", "axis": "x", "deg": 90}).now
     assert own(turned.bench) == {1: {"walls": 5}}
     assert "--part 3:ironing=true" in turned.told
+    assert bench.model is not None
+    assert own(with_model_turned_as_read(bench, bench.model, about(UP, 1.0))) == {1: {"walls": 5}}
     assert obey(steps, {"do": "reset_part", "part": 3}).now.told == ""
 
 
