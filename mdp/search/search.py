@@ -93,7 +93,7 @@ def decompose(
     if on_record is not None and trace is not None:
         on_record(trace.to_bytes())
     taken = _take(problem, front, best, profile, parts, price)
-    notes = (*_notes(problem, taken, parts), *_zone_notes(problem))
+    notes = (*_notes(problem, taken, parts), *_zone_notes(problem), *_front_note(planned))
     return _decomposition(problem, taken, profile, Outcome(name, ranker, rounds, perf_counter() - began, notes))
 
 
@@ -338,6 +338,12 @@ def _notes(problem: Problem, taken: Taken, wanted: int | None) -> tuple[str, ...
 
 def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
     return (f"--parts {wanted}: {where} no more than {parts}",) if wanted is not None and parts < wanted else ()
+
+
+def _front_note(planned: PlanFile) -> tuple[str, ...]:
+    """Rows that were found without these planes."""
+    text = f"the [[front]] of {planned.name} is not kept: planes by hand have the others found anew, for every number of parts"
+    return (text,) if planned.front else ()
 
 
 def _zone_notes(problem: Problem) -> tuple[str, ...]:

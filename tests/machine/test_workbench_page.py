@@ -105,6 +105,11 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.key("1")  # a view, not a step
     browser.click("#undo")
     browser.wait("$('front').value === $('front').max && !$('redo').disabled")
+    assert "find parts and lay it down, too" in browser.value("$('front-notes').textContent")
+    browser.click("#orient")
+    browser.value("$('ranker').value = 'learned'")
+    browser.click("#find")
+    browser.wait("$('front-notes').textContent.includes('the model is turned')")
 
 
 def test_red_follows_the_model_while_it_turns_and_the_server_says_the_same(browser: Browser, bench: Running) -> None:

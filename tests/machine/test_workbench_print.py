@@ -233,6 +233,15 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printin
         browser.click("#cancel-surely")
         browser.wait(f"{PRINTING} === 'over'")
         assert (browser.value("$('run-state').textContent"), job.state) == ("the print was stopped", "cancelled")
+        job.files.clear()
+        browser.click("#send-only")
+        browser.click("#check")
+        browser.wait("$('begin').textContent === 'Hand it over' && !$('run-ask').hidden")
+        assert "nothing prints before somebody starts it there" in browser.value("$('ask-told').textContent")
+        browser.click("#begin")
+        browser.wait(f"{PRINTING} === 'over'")
+        assert (browser.value("$('run-state').textContent"), job.state) == (f"box.stl.gcode waits on {address}", "cancelled")
+        assert job.files["box.stl.gcode"] == sliced.ask("print.gcode")[1]
         assert KEY not in json.dumps(other.state)
         assert browser.complaints == []
 

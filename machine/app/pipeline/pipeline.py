@@ -12,6 +12,7 @@ from machine.app.pictures.thumbnail import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.copies import check_copies, in_copies
 from machine.app.pipeline.given_plan import check_parts_named, read_given_plan, with_plan_settings
+from machine.app.pipeline.lying import better_in_words, laid_in_words
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import Report, reporting, say
@@ -24,7 +25,6 @@ from machine.planning.plan import plan
 from machine.planning.purge import has_purge
 from machine.planning.stops import Stop
 from machine.view.program import Program
-from machine.view.quantities import minutes
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
@@ -32,7 +32,7 @@ from mdp.ranking.ranker import ranker_named
 from mdp.read import locate, read_mesh
 from mdp.search.front import price_of_second_mm2
 from mdp.search.laying import OtherWay, find_better_way, lay_down
-from mdp.search.orientation import in_words, side_in_words, standing_still
+from mdp.search.orientation import standing_still
 from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
@@ -82,11 +82,11 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
             lying = lay_down(mesh, profile, pricing, asked.search)
             decomposition, chosen = lying.decomposition, lying.orientation
             orientation = None if chosen is None else chosen.rotation
-            notes = ("the model is best printed as it stands" if chosen is None else f"the model is {in_words(chosen)}",)
+            notes = (laid_in_words(chosen),)
         else:
             decomposition = asked.search(mesh)
             better = find_better_way(mesh, decomposition, profile, pricing) if given is None else None
-            notes = _hint(decomposition, better)
+            notes = tuple(f"{advice}: try --orient" for advice in [better_in_words(decomposition, better)] if advice)
     if record_file is not None:
         write_bytes(record_file, asked.record_of(decomposition))
     check_parts_named(profile, len(decomposition.parts))
@@ -137,19 +137,6 @@ class _Search:
             return
         left = f"{100 * progress.best_share:.1f} % of the risky area left"
         self._report(f"searching parts: stage {progress.stage}, {progress.beam} in the beam, {left}")
-
-
-def _hint(decomposition: Decomposition, better: OtherWay | None) -> tuple[str, ...]:
-    """What costs much less than these parts."""
-    chosen = decomposition.chosen
-    if better is None or chosen is None:
-        return ()
-    side = side_in_words(better.orientation)
-    lying = f"{side} ({in_words(better.orientation)})" if side else in_words(better.orientation)
-    figures = [f"leaves {better.row.cost_mm2:.0f} mm2 of scars instead of {chosen.cost_mm2:.0f}"]
-    if better.row.time_s is not None and chosen.time_s is not None:
-        figures.append(f"takes {minutes(better.row.time_s)} instead of {minutes(chosen.time_s)}")
-    return (f"{lying} in one piece it {' and '.join(figures)}: try --orient",)
 
 
 def build(

@@ -225,6 +225,9 @@ def test_planes_by_hand_stay_and_the_others_are_found() -> None:
     assert len(both.parts) == 3
     assert both.reduction > 0.9
     assert [row.parts for row in both.front] == list(range(2, len(both.front) + 2))
+    again = decompose(arms, "shape", profile, by_hand=replace(by_hand, front=plan_of(both).front))
+    kept = "the [[front]] of mine.toml is not kept: planes by hand have the others found anew, for every number of parts"
+    assert again.notes == (*both.notes, kept)
     with pytest.raises(PlanError, match=r"--parts 1: the planes by hand of mine.toml alone make 2 parts"):
         decompose(arms, "shape", profile, by_hand=by_hand, parts=1)
 

@@ -7,6 +7,7 @@ from threading import Event as Flag
 from typing import Any
 
 from machine.app.printer.attendance import Observers
+from machine.app.printer.serial_log import SerialLog
 from machine.app.terminal.plain import plain_line
 from machine.app.terminal.progress import Report
 from machine.app.terminal.screen import Course, Words
@@ -79,9 +80,13 @@ class AtPage:
     def show(self, observers: Observers, course: Course) -> Iterator["_Shown"]:
         """The print as its state."""
         journal = "" if observers.journal is None else str(observers.journal.path)
-        log = "" if observers.log.trouble else str(observers.log.file)
-        self._teller.tell(log=log, journal=journal)
+        self._teller.tell(log=log_told(observers.log), journal=journal)
         yield _Shown(self._teller, course, self.words)
+
+
+def log_told(log: SerialLog) -> str:
+    """The file of a log for the pages; "" for one that is not written."""
+    return "" if log.trouble else str(log.file)
 
 
 class _Shown:

@@ -1,29 +1,41 @@
-"""At server: a print on a print server, which is handed the file, as `print --port SERVER` does it, or one that it
-is at already, as `follow` does."""
+"""At server: a print on a print server, which is handed the file, as `print --port SERVER` or `send` does it, or
+one that it is at already, as `follow` does."""
 
 from machine.app.printer.attendance import Observers
-from machine.app.printer.network_print import LIMITS, file_name, follow_there, print_there, running_print, server_session
+from machine.app.printer.network_print import (
+    LIMITS,
+    file_name,
+    follow_there,
+    hand_over,
+    print_there,
+    running_print,
+    server_session,
+)
 from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
 from machine.app.printer.stream import PrintJob
-from machine.app.workbench.printing.at_page import AtPage
+from machine.app.workbench.printing.at_page import AtPage, log_told
 from machine.app.workbench.printing.checks import CLEAN, DONE, LEFT, STOPPED, Checks, figures, program_of
 from machine.app.workbench.printing.order import FollowOrder, PrintOrder, State
 from machine.link.pending_commands import CancelledError
 from machine.network.address import parse_server_address
 from machine.network.follow import End
+from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import PrintServer
 
 
 def print_on_server(order: PrintOrder, person: AtPage, checks: Checks) -> State:
     """Check, ask, hand over, follow; how it ended. Raises UserError."""
     address = order.printing.port
-    with server_session(address, f"{order.name} to {address}", "print") as (server, log):
+    with server_session(address, f"{order.name} to {address}", "print" if order.starts else "send") as (server, log):
         job = _checked(order, server, checks)
         checks.teller.tell(phase="ready")
         if not person.agrees():
             return LEFT
-        checks.teller.tell(phase="uploading")
+        checks.teller.tell(phase="uploading", log=log_told(log))
         try:
+            if not order.starts:
+                file = hand_over(server, GcodeUpload(job.name, job.program.lines), job.name, person)
+                return {"end": "done", "sentence": f"{file} waits on {address}"}
             end = print_there(server, job, Observers(log), person)
         except CancelledError:
             return LEFT
@@ -50,12 +62,15 @@ def _ended(end: End, name: str, address: str) -> State:
 def _checked(order: PrintOrder, server: PrintServer, checks: Checks) -> PrintJob:
     """The job, when nothing speaks against it."""
     profile, greeting = order.profile, server.greet()
-    with checks.that(f"{greeting.text} answers at {server.name}, is free, and prints for {profile.machine.name}"):
-        check_free(server.name, server.status())
+    free = ", is free," if order.starts else ""
+    with checks.that(f"{greeting.text} answers at {server.name}{free} and prints for {profile.machine.name}"):
+        if order.starts:
+            check_free(server.name, server.status())
         check_server_machine(parse_server_address(order.printing.port), greeting, profile.machine, order.force)
     program = program_of(order)
     checks.teller.tell(figures=figures(program))
     with checks.that(CLEAN):
         ready_for_server(greeting, program, profile, order.name, order.force)
-    checks.add(LIMITS)
+    if order.starts:
+        checks.add(LIMITS)
     return PrintJob(order.name, program, profile)

@@ -16,7 +16,8 @@ State = dict[str, Any]  # of a print, as JSON: order, phase and all that process
 
 @dataclass(frozen=True, eq=False)
 class PrintOrder:
-    """gcode: the file that `export` writes of the same parts; force: go on as `print --force` does; key: of the slices."""
+    """gcode: the file that `export` writes of the same parts; force: go on as `print --force` does; key: of the slices; starts:
+    False where a print server is only to keep the file, as of `send`."""
 
     name: str
     gcode: bytes
@@ -24,6 +25,7 @@ class PrintOrder:
     printing: PrintRequest
     force: bool = False
     key: str = ""
+    starts: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,7 @@ def first_state(order: Order) -> State:
     return {
         "phase": "checking",
         **_known(order),
+        "starts": not isinstance(order, PrintOrder) or order.starts,
         "port": printing.port,
         "baud": printing.baud,
         "sim_speed": printing.sim_speed,

@@ -6,7 +6,7 @@ from machine.app.workbench.session.session import Session
 from profiles.errors import PlanError
 
 
-def order_of(session: Session, printing: PrintRequest, force: bool) -> PrintOrder:
+def order_of(session: Session, printing: PrintRequest, force: bool, starts: bool = True) -> PrintOrder:
     """The G-code that the session would save, for the profile that it was made with. Raises PlanError where there is none."""
     bench = session.bench
     if session.closed:
@@ -14,4 +14,4 @@ def order_of(session: Session, printing: PrintRequest, force: bool) -> PrintOrde
     if bench.model is None:
         raise PlanError("there is no model on the workbench yet: choose a file first")
     sliced = session.slicing.needed()
-    return PrintOrder(bench.model.name, sliced.gcode, bench.profile, printing, force, sliced.key)
+    return PrintOrder(bench.model.name, sliced.gcode, bench.profile, printing, force, sliced.key, starts)

@@ -18,7 +18,7 @@ from machine.app.printer.journal_folder import ResumableJournal, resumable_journ
 from machine.app.printer.port_reports import PortReport, answer_words, ask_ports, known_ports, port_json
 from machine.app.workbench.bench.planes import is_number
 from machine.app.workbench.printing.at_page import LEAVE
-from machine.app.workbench.printing.order import Order, ResumeOrder
+from machine.app.workbench.printing.order import Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.news import News
 from machine.link.medium import stable_name
@@ -106,7 +106,8 @@ class Prints(News):
 
     def _begin(self, page: str, order: Order) -> None:
         port = order.printing.port
-        if any(_same(each.state["port"], port) for each in self.running):
+        starts = not isinstance(order, PrintOrder) or order.starts
+        if starts and any(each.state["starts"] and _same(each.state["port"], port) for each in self.running):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
         if isinstance(order, ResumeOrder) and realpath(order.journal) in map(realpath, self._journals_in_use()):
             raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")

@@ -2,11 +2,17 @@
 
 import asyncio
 from dataclasses import dataclass, replace
+from typing import Any
 
-from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench, with_front
+import numpy as np
+
+from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench, with_front, with_rotation
 from machine.app.workbench.session.desk import Desk
-from machine.app.workbench.work.cutting import Searched
+from machine.app.workbench.work.cutting import LAY_TOO, Found, Searched, SearchWay
+from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
+
+BY_DEFAULT = SearchWay()
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,6 +21,14 @@ class Search:
 
     bench: Bench
     searched: Searched
+
+
+def search_way(asked: dict[str, Any]) -> SearchWay:
+    """How a page wants parts sought. Raises PlanError."""
+    orient, ranker = asked.get("orient", BY_DEFAULT.orient), asked.get("ranker", BY_DEFAULT.ranker)
+    if not isinstance(orient, bool) or not isinstance(ranker, str):
+        raise PlanError(f"orient is {orient!r} and ranker {ranker!r}: true or false and a name are allowed")
+    return SearchWay(orient, ranker.strip() or BY_DEFAULT.ranker)
 
 
 class Finding:
@@ -28,16 +42,22 @@ class Finding:
         self._pricing: asyncio.Task[None] | None = None  # of the best of a search that was stopped
         desk.followers.append(self._follow)
 
-    def begin(self) -> None:
-        """Search for the parts of what lies on the bench, if no search is under way. Raises PlanError without a model."""
+    def begin(self, way: SearchWay = BY_DEFAULT) -> None:
+        """Search for the parts of what lies on the bench, if no search is under way. Raises PlanError without a model, and where
+        it is to be laid down although planes or marks belong to it as it lies."""
         bench = self._desk.bench
         if bench.model is None:
             raise PlanError("there is no model on the workbench yet: choose a file first")
+        if way.orient and (bench.locked or bench.zones != NO_ZONES):
+            raise PlanError(
+                f"{LAY_TOO}: locked planes and marks belong to the model as it lies; unlock them and take the marks away, or find"
+                " parts for it as it lies"
+            )
         if self.search is None:
             if self._pricing is not None:
                 self._pricing.cancel()
             self.search = Search(bench, Searched("beginning"))
-            self._task = self._desk.start(self._find(bench))
+            self._task = self._desk.start(self._find(bench, way))
 
     def stop(self) -> None:
         """End the search; the best that it has met so far is taken, and what its parts take to print told when that is known."""
@@ -51,15 +71,18 @@ class Finding:
             self._desk.do("stop the search", with_front(self._desk.bench, [replace(best, chosen=True)]))
             self._pricing = self._desk.start(self._price(self._desk.bench))
 
-    async def _find(self, bench: Bench) -> None:
+    async def _find(self, bench: Bench, way: SearchWay) -> None:
         def follow(searched: Searched) -> None:
             if self.search is not None and self.search.bench is bench:
                 self.search = Search(bench, searched)
                 self._desk.tell()
 
         try:
-            rows, self.notes = await self._desk.long.run("find_parts", bench, tell=follow)
-            self._desk.do("find parts", with_front(self._desk.bench, rows))
+            found: Found = await self._desk.long.run("find_parts", bench, way, tell=follow)
+            self.notes = found.notes
+            now = self._desk.bench
+            laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
+            self._desk.do("find parts", with_front(laid, found.front))
         finally:
             if self.search is not None and self.search.bench is bench:
                 self.search = None

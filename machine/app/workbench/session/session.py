@@ -26,7 +26,7 @@ from machine.app.workbench.bench.planes import EDITS, edited, instead_of
 from machine.app.workbench.bench.settings import check_block, profile_as_given, with_name, with_typed
 from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.desk import Desk
-from machine.app.workbench.session.finding import Finding
+from machine.app.workbench.session.finding import Finding, search_way
 from machine.app.workbench.session.marking import Marking
 from machine.app.workbench.session.open_bench import OpenBench
 from machine.app.workbench.session.pedestal import Pedestal
@@ -111,7 +111,7 @@ class Session(Desk):
         ask = asked.get("ask")
         match asked.get("do"):
             case "search":
-                self.finding.begin()
+                self.finding.begin(search_way(asked))
             case "stop":
                 self.finding.stop()
                 self.slicing.stop()

@@ -90,7 +90,9 @@ def _order(session: Session, asked: dict[str, Any]) -> Order:
     if asked.get("do") == "follow":
         return FollowOrder(_server(asked))
     if asked.get("do") != "go_on":
-        return order_of(session, _printing(asked), asked.get("force") is True)
+        sends_only = asked.get("send_only") is True
+        printing = _server(asked) if sends_only else _printing(asked)
+        return order_of(session, printing, asked.get("force") is True, not sends_only)
     journal, machine = (str(asked.get(each) or "").strip() for each in ("journal", "machine"))
     if not journal:
         raise JournalError("no journal is chosen: choose the print that is to go on, or name the journal's file")

@@ -8,19 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machine.app.pipeline import compilers
+from machine.app.pipeline.lying import better_in_words, laid_in_words
 from machine.app.pipeline.pricing import pricing
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.worker import Tell
 from mdp.decomposition import Decomposition, FrontRow
-from mdp.mesh import Mesh
+from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
+from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
+from mdp.search.laying import find_better_way, lay_down
 from mdp.search.orientation import standing_still
 from mdp.search.search import Progress, cut_by_plan, decompose
+from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
 
 PLAN_NAME = "plan.toml"
+LAY_TOO = "lay it down, too"  # as the page words it
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
 
 
@@ -33,6 +38,24 @@ class Searched:
 
 
 @dataclass(frozen=True)
+class SearchWay:
+    """How parts are sought, beside what the profile says. orient: laid down the way that costs least, chosen with them; ranker: a
+    name for `ranker_named`."""
+
+    orient: bool = False
+    ranker: str = CLASSIC
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The front of a search and what it says; turn: (3, 3) how the model on the bench is turned further for it."""
+
+    front: tuple[FrontRow, ...]
+    notes: tuple[str, ...]
+    turn: Floats | None = None
+
+
+@dataclass(frozen=True)
 class Files:
     """What is saved: the plan's text, and the folder of `decompose -o` as a zip."""
 
@@ -40,21 +63,36 @@ class Files:
     folder: bytes
 
 
-def find_parts(tell: Tell, bench: Bench) -> tuple[tuple[FrontRow, ...], tuple[str, ...]]:
-    """The front of a search as `decompose` makes it, and its notes."""
-
-    def show(progress: Progress) -> None:
-        if progress.stage == 0:
-            compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text)))
-            return
-        left = f"{100 * progress.best_share:.1f} % of the risky area left"
-        tell(Searched(f"stage {progress.stage}, {progress.beam} in the beam, {left}", progress.measure()))
-
-    mesh, name = standing_mesh(bench), _name(bench)
+def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
+    """What a search as `decompose` makes it has found, or one as `decompose --orient` does. Raises RankerError."""
+    ranker_named(way.ranker)
+    mesh, name, profile, locked = standing_mesh(bench), _name(bench), bench.profile, locked_plan(bench)
     compilers.wait_for(compilers.JUDGE, lambda text, share=None: tell(Searched(text)))
-    locked, price = locked_plan(bench), pricing(bench.profile.of_all_parts)
-    found = decompose(mesh, name, bench.profile, on_stage=show, by_hand=locked, price=price)
-    return found.front, found.notes
+    price, best = pricing(profile.of_all_parts), None
+
+    def search(lying: Mesh) -> Decomposition:
+        def show(progress: Progress) -> None:
+            nonlocal best
+            if progress.stage == 0:
+                compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text, best)))
+                return
+            left = f"{100 * progress.best_share:.1f} % of the risky area left"
+            if lying is mesh:
+                best = progress.measure()  # planes of a model that lies otherwise are none of the one in the picture
+            otherwise = "" if lying is mesh else "laid down otherwise: "
+            tell(Searched(f"{otherwise}stage {progress.stage}, {progress.beam} in the beam, {left}", best))
+
+        return decompose(lying, name, profile, way.ranker, show, by_hand=locked, price=price)
+
+    if way.orient:
+        lying = lay_down(mesh, profile, pricing, search)
+        turn = None if lying.orientation is None else lying.orientation.rotation
+        found = lying.decomposition
+        return Found(found.front, (*found.notes, laid_in_words(lying.orientation)), turn)
+    found = search(mesh)
+    better = None if locked.parts or locked.zones != NO_ZONES else find_better_way(mesh, found, profile, pricing)
+    advice = better_in_words(found, better)
+    return Found(found.front, (*found.notes, *([f"{advice}: find parts and {LAY_TOO}"] if advice else [])))
 
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:

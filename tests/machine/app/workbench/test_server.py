@@ -100,6 +100,31 @@ def test_a_model_becomes_the_plan_and_the_parts_of_the_command_line(bench: Runni
         assert page.until(lambda state: state["parts"] == found["parts"])["front"] == found["front"]
 
 
+def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: Running, folder: Path) -> None:
+    (folder / "tee.stl").write_bytes(stl(tee()))
+    assert main(["decompose", "tee.stl", *QUICK, "--ranker", "learned", "--orient", "-o", "parts"]) == 0
+    with bench.line() as page:
+        bench.send(folder / "tee.stl")
+        page.do("search", orient=True, ranker="none")
+        assert "--ranker none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
+        page.do("add", normal=[1, 0, 0], offset_mm=8.0)
+        page.until(lambda state: state["undo"] == "add a plane")
+        page.do("lock", part=2, locked=True)
+        page.do("search", orient=True)
+        refused = page.until(lambda state: state["problem"])["problem"]
+        assert refused.startswith("lay it down, too: locked planes and marks belong to the model as it lies")
+        page.do("undo")
+        page.do("search")
+        as_it_lies = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
+        assert any(note.endswith(": find parts and lay it down, too") for note in as_it_lies["notes"])
+        page.do("search", orient=True, ranker="learned")
+        laid = page.until(lambda state: state["rotation"] != as_it_lies["rotation"] and not state["search"])
+        assert laid["front"][0]["support_area_mm2"] < as_it_lies["front"][0]["support_area_mm2"]
+        assert bench.ask("plan.toml")[1] == (folder / "parts" / "plan.toml").read_bytes()
+        page.do("undo")
+        page.until(lambda state: state["rotation"] == as_it_lies["rotation"] and state["front"] == as_it_lies["front"])
+
+
 def test_a_plan_that_is_dropped_cuts_the_model_and_one_of_another_model_is_refused(bench: Running, folder: Path) -> None:
     (folder / "other.stl").write_bytes(stl(tee(8.0)))
     assert main(["decompose", "other.stl", *QUICK, "--plan", "plan.toml"]) == 0

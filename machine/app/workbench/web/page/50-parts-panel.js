@@ -4,7 +4,7 @@ const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
 const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
 
 function partsPanel(bench) {
-  $("find").addEventListener("click", () => bench.send({ do: "search" }));
+  $("find").addEventListener("click", () => bench.send({ do: "search", orient: $("orient").checked, ranker: $("ranker").value }));
   $("stop").addEventListener("click", () => bench.send({ do: "stop" }));
   let shown = ""; // of which front the slider is
   const told = ({ front, parts, recommended, cuts, priced }) => JSON.stringify([front, parts, recommended, cuts, priced]);

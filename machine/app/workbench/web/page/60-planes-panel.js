@@ -64,7 +64,7 @@ function planesPanel(bench) {
   const bySelected = (id, act) => $(id).addEventListener("click", () => { if (bench.plane()) act(bench.selected); });
   bySelected("remove", (part) => bench.send({ do: "remove", part }));
   bySelected("neck", (part) => bench.send({ do: "neck", part }));
-  $("find-others").addEventListener("click", () => bench.send({ do: "search" }));
+  $("find-others").addEventListener("click", () => bench.send({ do: "search", ranker: $("ranker").value }));
   bySelected("earlier", (part) => { if (part > 2) reorder(bench, part, part - 1); });
   bySelected("later", (part) => { if (part < bench.state.parts) reorder(bench, part, part + 1); });
   $("snap").addEventListener("click", () => bench.snap(!bench.snapping));

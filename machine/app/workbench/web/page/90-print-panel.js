@@ -42,7 +42,8 @@ function printPanel(bench) {
   for (const event of ["change", "input"]) $("ports").addEventListener(event, () => { showPort(); unforce(); });
   $("port-typed").addEventListener("focus", () => { $("port-other").checked = true; $("ports").dispatchEvent(new Event("change")); });
   $("check").addEventListener("click", () => {
-    send({ do: "check", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value), force: $("force").checked });
+    const sendOnly = SERVERS.test(port()) && $("send-only").checked;
+    send({ do: "check", port: port(), baud: Number($("baud").value), sim_speed: Number($("sim-speed").value), send_only: sendOnly, force: $("force").checked });
     unforce();
   });
   $("follow-server").addEventListener("click", () => send({ do: "follow", port: port() }));

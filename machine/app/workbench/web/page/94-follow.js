@@ -20,9 +20,10 @@ function followIn(bench, print) {
   addEventListener("message", ({ data, origin }) => { if (origin === location.origin && data?.tiltprint === "ready") { shown = 0; tell(); } });
   return {
     told: () => {
-      $("follow").hidden = !same() || !print().progress;
-      if (on && ($("look").getAttribute("aria-pressed") !== "true" || !same())) { on = false; $("follow").setAttribute("aria-pressed", false); }
+      const runs = same() && print().progress && print().phase !== "over";
+      $("follow").hidden = !runs;
       tell();
+      if (on && ($("look").getAttribute("aria-pressed") !== "true" || !runs)) { on = false; $("follow").setAttribute("aria-pressed", false); }
     },
   };
 }

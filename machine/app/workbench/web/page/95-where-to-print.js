@@ -14,7 +14,7 @@ function showPort() {
   const typed = $("port-other").checked;
   $("sim-speed-line").hidden = port() !== "sim";
   $("baud-line").hidden = port() === "sim" || SERVERS.test(port());
-  $("follow-server").hidden = !SERVERS.test(port());
+  $("follow-server").hidden = $("send-only-line").hidden = !SERVERS.test(port());
   $("port-hint").hidden = !typed;
 }
 

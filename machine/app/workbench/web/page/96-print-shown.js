@@ -36,7 +36,7 @@ function showPrint(print, commands) {
   if (!print) return void ($("printer-field").open = true);
   const { phase, progress, figures, end, upload } = print, uploads = phase === "uploading", over = phase === "over", runs = phase === "printing" || phase === "leaving";
   $("run-title").textContent = `${print.resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`;
-  $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(print) : uploads && upload ? upload[0] : { checking: "checking …", ready: "ready to print", uploading: "handing the file over", printing: "starting", leaving: "ending" }[phase];
+  $("run-state").textContent = over ? print.sentence : runs && progress ? stateTold(print) : uploads && upload ? upload[0] : { checking: "checking …", ready: print.starts ? "ready to print" : "ready to be handed over", uploading: "handing the file over", printing: "starting", leaving: "ending" }[phase];
   $("run-state").className = over ? end : "";
   const news = `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`; // a reader need not hear every per cent
   if ($("run-news").textContent !== news) $("run-news").textContent = news;
@@ -44,8 +44,9 @@ function showPrint(print, commands) {
   listIn("run-checks", asking ? [...print.checks, ...(figures && !over ? [figuresTold(figures)] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   $("run-ask").hidden = phase !== "ready" || !commands;
-  $("ask-told").textContent = print.question || "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?";
-  $("begin").textContent = print.resumes ? "Yes, go on" : "Print now";
+  $("ask-told").textContent = print.question || (print.starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
+    : "The server keeps the file; nothing prints before somebody starts it there.");
+  $("begin").textContent = print.resumes ? "Yes, go on" : print.starts ? "Print now" : "Hand it over";
   $("leave").textContent = print.resumes ? "No, leave it" : "Leave it";
   $("run-live").hidden = !progress && !uploads;
   if (progress) showProgress(progress, over);

@@ -65,8 +65,10 @@ function main() {
     if (picture && !before) picture.machine(state.machine, dark());
     const key = state.model ? state.model.key : "";
     if (key !== bench.key) await fetchModel(key);
-    else if (standingOf(state.rotation) !== stood) stand(state.rotation, false);
-    else bench.look();
+    else if (standingOf(state.rotation) !== stood) {
+      stand(state.rotation, false);
+      if (picture && before && !alike(state.front, before.front)) picture.fit(); // laid down by a search, nobody's hand chose what is seen
+    } else bench.look();
     bench.showPlane();
     fetchPedestal(bench);
     if (bench.state.version === state.version) root.dataset.version = state.version;

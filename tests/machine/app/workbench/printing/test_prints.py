@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from machine.network import follow
 from machine.network.credentials import VARIABLE
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import PrinterError
-from profiles.profile import load
+from profiles.profile import Profile, load
 from tests.machine.network.stand_ins import KEY, OctoPrintStandIn, stand_in
 
 PROFILE = load()
@@ -242,6 +243,28 @@ def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence
     end = carry_out(wanted, Agreeing(), Checks(heard, Said(heard)))  # type: ignore[arg-type]
     assert end["sentence"].startswith(sentence)
     assert (end["end"], end["forcible"]) == ("refused", forcible)
+
+
+@pytest.mark.parametrize(("kind", "profile"), [("octoprint", PROFILE), ("duet", load("gen5x"))])
+def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_another(
+    kind: str, profile: Profile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, KEY)
+    heard = Heard()
+    person = AtPage(heard)  # type: ignore[arg-type]
+    person.hear("begin")
+    with stand_in(kind) as (job, address):
+        job.files["vase.gcode"] = bytes(100)
+        job.start("vase.gcode")
+        job.steps = 10_000
+        kept = replace(order(address), profile=profile, starts=False)
+        end = carry_out(kept, person, Checks(heard, Said(heard)))  # type: ignore[arg-type]
+        assert (job.state, job.files["hour.gcode"].decode()) == ("printing", HOUR)
+        assert not any(asked.endswith("/start") for asked in job.asked)
+        log = Path(heard.state["log"]).read_text()
+    assert (end["end"], end["sentence"]) == ("done", f"hour.gcode waits on {address}")
+    assert "hour.gcode" in log
+    assert KEY not in log
 
 
 class Attended:
