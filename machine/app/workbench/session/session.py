@@ -148,11 +148,19 @@ class Session(Desk):
 
     async def files(self) -> Files:
         """What can be saved of the parts on the bench. Raises UserError where they cannot be cut."""
+        files: Files = await self._made("cutting the parts", "make_files")
+        return files
+
+    async def pictures(self) -> bytes:
+        """A zip of their drawings. Raises the same."""
+        drawn: bytes = await self._made("drawing the parts", "make_pictures")
+        return drawn
+
+    async def _made(self, word: str, task: str) -> Any:
         if self.bench.model is None or not self.bench.planned:
             raise PlanError("there are no parts to save yet: find them first")
-        with self.waiting("cutting the parts"):
-            files: Files = await self.quick.run("make_files", self.bench)
-        return files
+        with self.waiting(word):
+            return await self.quick.run(task, self.bench)
 
     def take_given(self, word: str, change: Callable[[Given], Given], key: str = "", ask: object = None) -> None:
         """Take other names and settings; those of the bench by then, for several may be asked for at once. key: the one that is

@@ -38,6 +38,11 @@ async def folder(session: Session, request: Request) -> Response:
     return _download(files.folder, "application/zip", f"{file_stem(session.bench)}-parts.zip")
 
 
+async def pictures(session: Session, request: Request) -> Response:
+    """The drawings of the parts as a zip."""
+    return _download(await session.pictures(), "application/zip", f"{file_stem(session.bench)}-pictures.zip")
+
+
 async def print_page(session: Session, request: Request) -> Response:
     """The page of the last slices as `view` writes it, with its own content security policy in it."""
     slices = _slices(session, request)

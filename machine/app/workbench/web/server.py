@@ -18,7 +18,17 @@ from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.benches import bench_routes
-from machine.app.workbench.web.downloads import folder, gcode, plan, print_page, print_text, print_walls, profile, shared_page
+from machine.app.workbench.web.downloads import (
+    folder,
+    gcode,
+    pictures,
+    plan,
+    print_page,
+    print_text,
+    print_walls,
+    profile,
+    shared_page,
+)
 from machine.app.workbench.web.guard import Guard
 from machine.app.workbench.web.line import CLOSED, CLOSED_CODE, talk
 from machine.app.workbench.web.page import workbench_page
@@ -50,6 +60,7 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int) -> 
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces),
         route("parts.zip", folder),
+        route("pictures.zip", pictures),
         route("print/{key}", print_page),
         route("print/{key}/text", print_text),
         route("walls/{number:int}/{part:int}", print_walls),

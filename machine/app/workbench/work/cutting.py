@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -112,14 +113,19 @@ def make_files(tell: Tell, bench: Bench) -> Files:
     """The files of the parts as the bench has them."""
     made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     plan = plan_text(plan_of(made, bench.zones, bench.turned, bench.profile.parts))
+    parts = [(part_file(part.index), stl(part.mesh)) for part in made.parts]
+    return Files(plan, zipped([*parts, (FOLDER_FILES[0], threemf(made)), (PLAN_NAME, plan.encode())]))
+
+
+def zipped(files: Sequence[tuple[str, bytes]]) -> bytes:
+    """Files by their names as a zip, the same bytes whenever it is made."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as archive:
-        parts = [(part_file(part.index), stl(part.mesh)) for part in made.parts]
-        for name, text in (*parts, (FOLDER_FILES[0], threemf(made)), (PLAN_NAME, plan.encode())):
+        for name, text in files:
             entry = zipfile.ZipInfo(name, ZIP_DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, text)
-    return Files(plan, content.getvalue())
+    return content.getvalue()
 
 
 def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:

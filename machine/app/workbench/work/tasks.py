@@ -7,6 +7,7 @@ from typing import Any
 from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan, price_row
 from machine.app.workbench.work.models import rank_resting, read_model
 from machine.app.workbench.work.pedestal import stand_on_pedestal
+from machine.app.workbench.work.pictures import make_pictures
 from machine.app.workbench.work.pieces import draw_pieces
 from machine.app.workbench.work.slices import compare_bench, slice_bench
 from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, try_cuts
@@ -20,6 +21,7 @@ TASKS: dict[str, Callable[..., Any]] = {
         measure_plan,
         price_row,
         make_files,
+        make_pictures,
         draw_pieces,
         stand_on_pedestal,
         slice_bench,

@@ -90,6 +90,12 @@ def test_a_model_becomes_the_plan_and_the_parts_of_the_command_line(bench: Runni
     made = zipfile.ZipFile(io.BytesIO(bench.ask("parts.zip")[1]))
     assert sorted(made.namelist()) == sorted(path.name for path in (folder / "parts").iterdir() if path.suffix != ".json")
     assert all(made.read(name) == (folder / "parts" / name).read_bytes() for name in made.namelist())
+    pictures = ["--png", "parts.png", "--sheet", "order.png", "--front", "front.png"]
+    assert main(["decompose", "tee.stl", *QUICK, "--plan", "parts/plan.toml", *pictures]) == 0
+    drawn = zipfile.ZipFile(io.BytesIO(bench.ask("pictures.zip")[1]))
+    assert {name: drawn.read(name) for name in drawn.namelist()} == {
+        name: (folder / name).read_bytes() for name in pictures[1::2]
+    }
     with bench.line() as page:
         page.do("take", parts=1)
         page.until(lambda state: state["parts"] == 1)

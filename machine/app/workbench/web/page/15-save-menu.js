@@ -22,6 +22,7 @@ function saveMenu(bench) {
   addEventListener("pointerdown", (event) => { if (!menu.hidden && !menu.contains(event.target) && event.target !== button) show(false); });
   $("save-plan").addEventListener("click", saving("plan.toml"));
   $("save-parts").addEventListener("click", saving("parts.zip"));
+  $("save-pictures").addEventListener("click", saving("pictures.zip"));
   $("save-page").addEventListener("click", saving("print.html"));
   $("save-gcode").addEventListener("click", () => { close(); if (bench.state.sliced.errors.length) confirm(); else save("print.gcode"); });
   $("save-errors").addEventListener("click", () => { dialog.close(); save("print.gcode?force=yes"); });
@@ -37,6 +38,7 @@ function saveMenu(bench) {
       const unsliced = !model ? "no model yet" : !sliced ? "not sliced yet" : sliced.stale ? "out of date: slice again" : "";
       tell("save-plan", uncut, "the command line takes it with --plan");
       tell("save-parts", uncut, "zip of an STL each, a coloured 3MF and the plan");
+      tell("save-pictures", uncut, "zip of PNGs: the parts, the print order, every number of parts");
       tell("save-gcode", unsliced, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
       for (const [kind, sections] of Object.entries(SECTIONS_OF)) {
         const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length;
