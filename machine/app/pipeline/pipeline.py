@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -16,7 +16,7 @@ from machine.app.pipeline.lying import better_in_words, laid_in_words
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import Report, reporting, say
-from machine.dryrun.dryrun import dry_run
+from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
 from machine.gcode.writer import write_gcode
 from machine.planning.limits import check_parts
@@ -174,7 +174,16 @@ def build(
             lines = with_thumbnails(lines, decomposition, profile)
         told("dry run")
         run = dry_run(lines, profile)
-    return Program(lines, run, decomposition, sliced)
+    return Program(lines, run, _with_own_figures(decomposition, run), sliced)
+
+
+def _with_own_figures(decomposition: Decomposition, run: DryRun) -> Decomposition:
+    """The row of the front that is printed with the print's own time and filament where it has no estimate."""
+    chosen = decomposition.chosen
+    if chosen is None or chosen.time_s is not None or chosen.parts != len(decomposition.parts):
+        return decomposition
+    row = replace(chosen, time_s=run.time_s, filament_mm=float(np.max(run.program.filament_mm, initial=0.0)))
+    return replace(decomposition, front=tuple(row if each is chosen else each for each in decomposition.front))
 
 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:

@@ -50,9 +50,13 @@ def test_the_simulated_printer_lays_the_plastic_where_the_model_is(machine: str,
 
 @pytest.mark.slow
 def test_the_plastic_is_what_the_sliced_paths_say() -> None:
-    profile = load(settings=[*QUICK, "material.prime_extra_mm=0"])  # what is pushed after a turn is no path's
-    found = decompose_model(ModelRequest("demo:tree", profile)).decomposition
+    free = "search.second_mm2=0"  # so that no part is estimated
+    profile = load(settings=[*QUICK, "material.prime_extra_mm=0", free])  # what is pushed after a turn is no path's
+    found = decompose_model(ModelRequest("demo:tree", profile), to_build=True).decomposition
     planned = sum(part.volume_mm3 for part in slice_parts(found.parts, profile))
-    run = build(found, profile).run
+    built = build(found, profile)
+    run = built.run
+    assert built.decomposition is not None
+    assert [row.time_s for row in built.decomposition.front if row.chosen] == [run.time_s]
     of_parts = run.program.part[run.segment_row] > 0  # not the purge line
     assert run.segment_mm3[of_parts].sum() == pytest.approx(planned, rel=1e-3)
