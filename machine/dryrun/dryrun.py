@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from machine.dryrun import clearance, contents, extrusion, heat, layering, motion, placement, provenance, sequence
 from machine.dryrun.findings import Finding
-from machine.dryrun.replay import Contacts, beads_of, replay
+from machine.dryrun.replay import Contacts, replay
+from machine.dryrun.strokes import beads_of
 from machine.kinematics.table import workpiece_path
 from machine.planning.limits import axis_limits
 from machine.planning.timing import move_times

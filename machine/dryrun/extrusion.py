@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row
-from machine.dryrun.replay import Beads
+from machine.dryrun.strokes import Beads
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.profile import Profile

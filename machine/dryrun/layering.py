@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_row
-from machine.dryrun.replay import Beads, Contacts
+from machine.dryrun.replay import Contacts
+from machine.dryrun.strokes import Beads
 from machine.reader.parsed import ParsedProgram
 from mdp.mesh import Floats
 from slicer.paths import Kind
@@ -55,7 +56,10 @@ def _too_high(program: ParsedProgram, deposited: Beads) -> list[Finding]:
 
 
 def _gaps(program: ParsedProgram, rows: NDArray[np.int64]) -> Floats:
-    """(m,) by how much the underside of each bead of a part lies above the highest one before it; support keeps its distance."""
+    """(m,) by how much the underside of each bead of a part lies above all of the layers before; support keeps its distance.
+
+    What its own layer has laid does not count: support laid first would hide a layer that is raised with it.
+    """
     ends = np.stack([program.start[rows, 2], program.end[rows, 2]])
     underside, top = ends.min(axis=0) - program.height_mm[rows], ends.max(axis=0)
     objects = np.cumsum(np.diff(top, prepend=top[0]) < -NEW_OBJECT_MM)
@@ -65,7 +69,9 @@ def _gaps(program: ParsedProgram, rows: NDArray[np.int64]) -> Floats:
         own = np.flatnonzero(objects == each)
         highest = np.maximum.accumulate(top[own])
         of_part = np.maximum.accumulate(np.where(support[own], -np.inf, top[own]))
-        before, part_before = (np.concatenate([[np.inf], values[:-1]]) for values in (highest, of_part))
+        begins = np.diff(program.layer[rows[own]], prepend=-1) != 0
+        first = np.maximum.accumulate(np.where(begins, np.arange(len(own)), 0))
+        before, part_before = (np.concatenate([[np.inf], values])[first] for values in (highest, of_part))
         gap = underside[own] - before
         stands_off = (support[own] | (part_before < before - SLACK_MM)) & (gap < STAND_OFF_MM)
         gaps[own] = np.where(stands_off, 0.0, gap)
@@ -82,12 +88,14 @@ def _begins(program: ParsedProgram, rows: NDArray[np.int64]) -> NDArray[np.bool_
 
 
 def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
-    """In every part the first layer of which more than half has nothing under it, though it is no bridge and no overhang."""
+    """In every part the first layer of which more than half has nothing under it, though it is no bridge and no overhang.
+
+    What spans the cells of sparse infill is a bridge, however much of a layer that is (machine.dryrun.replay).
+    """
     rows = deposited.rows
     low = np.minimum(deposited.segments_mm[:, 0, 2], deposited.segments_mm[:, 1, 2]) - deposited.height_mm < ON_PLATE_MM
     counted = ~program.rows_of_types(*LOOSE)[rows] & ~low & ~_begins(program, rows)
-    rows = rows[counted]
-    length = deposited.length_mm[counted]
+    rows, length = rows[counted], deposited.length_mm[counted]
     group = program.part[rows] * (int(program.layer.max(initial=0)) + 1) + program.layer[rows]
     loose = np.bincount(group, weights=(contacts.air_mm + contacts.beside_mm)[rows])
     air = np.bincount(group, weights=contacts.air_mm[rows])
@@ -100,8 +108,8 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
         if part not in seen:
             seen.add(part)
             message = (
-                f"{loose[each]:.1f} mm of the {whole[each]:.1f} mm of layer {program.layer[row]} have nothing under them, "
-                f"at most {100 * FLOATING_SHARE:g} % are allowed: a layer below it is missing"
+                f"{loose[each]:.1f} mm of the {whole[each]:.1f} mm of layer {program.layer[row]} have nothing under them, in "
+                f"stretches longer than sparse infill's cells are wide: a layer below it is missing"
             )
             problems.append(at_row(program, row, "error", "gap", message))
     return problems

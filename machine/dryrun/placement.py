@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, Severity, at_row, per_part
-from machine.dryrun.replay import CROSSING_MM, Beads, Contacts
+from machine.dryrun.replay import Contacts
+from machine.dryrun.strokes import CROSSING_MM, Beads
 from machine.reader.parsed import ParsedProgram
 from mdp.mesh import Floats
 from profiles.machine import Table

@@ -6,51 +6,36 @@ moment; it overlaps when plastic already reaches its top along its middle and to
 """
 
 from dataclasses import dataclass
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.height_field import NOTHING, Field, Head, depth_of, empty_field, lay_bead
+from machine.dryrun.strokes import Beads, Moves, Strokes, moves_of, strokes_of
 from machine.kinematics.table import machine_points
 from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
+from mdp.kernels.arrays import table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
 from profiles.profile import Profile
-from slicer.paths import Kind
 
 STEP_MM = 0.5
 ROUGH = 0.5  # of half a bead: by how much earlier plastic, seen from another side, may seem to stand higher than it does
-SLACK_MM = 0.4  # the head may dip so deep without a finding: beads are round, their places rounded
-LEVEL_SLACK_MM = 0.05  # a travel below the bead that was just laid; what lies there was laid at the same pose
-CROSSING_MM = 0.2  # on the way to a turn of the table, or from it to the next bead, the tip keeps so far above the print
-ACROSS_MM, WAY_MM = 0.5, 3.0  # a shorter way next to a bead is a wipe
-FEWEST_LEVELS = 3  # of beads, for a file's layers to be known by them
 INNER = 0.35  # of the bead's width: where what lies under it is looked for
 OWN = 3.0  # so many widths back along its path the plastic is the bead's own beginning
 MOST_TURNED = 100_000_000  # segments turned into the frames of all runs together
-STANDS_OFF = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value, Kind.SKIRT.value)
-
-
-@dataclass(frozen=True, eq=False)
-class Beads:
-    """What was deposited: (m, 2, 3) segments in the workpiece frame, (m,) their rows, widths, heights and lengths."""
-
-    segments_mm: Floats
-    rows: NDArray[np.int64]
-    width_mm: Floats
-    height_mm: Floats
-    length_mm: Floats
+FREE_END = 0.5  # of a span: so far a bead that is held at one end only may reach
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
     """(n,) for the rows of a program: depth of the head in earlier plastic, lengths in air and of overlapping extrusion, mm.
 
-    beside_mm: lengths that only what lies beside them carries.
+    beside_mm: lengths that only what lies beside them carries. Neither counts what spans from line to line of the sparse infill
+    or support below, which is bridged.
 
     close_mm: by how much less than CROSSING_MM the tip stays above the plastic on a way to or from a turn of the table.
 
@@ -63,30 +48,6 @@ class Contacts:
     beside_mm: Floats
     close_mm: Floats
     untested_row: int
-
-
-class Strokes(NamedTuple):
-    """(n,) of each row: half its bead's width and its height (0: no bead), the path it belongs to, how far along all moves it
-    ends, and whether it is support, which stands off by a gap.
-    """
-
-    half: Floats
-    height: Floats
-    path: NDArray[np.int32]
-    way: Floats
-    stands_off: NDArray[np.bool_]
-
-
-class Moves(NamedTuple):
-    """(n, 5) start and end of each row; (n,) how deep the head may dip during it, and by how much lower it is tried too.
-
-    Apart from Strokes, which the innermost functions take: each array more there slows all of it down.
-    """
-
-    start: Floats
-    end: Floats
-    slack: Floats
-    lower: Floats
 
 
 class Surroundings(NamedTuple):
@@ -108,32 +69,6 @@ class Measured(NamedTuple):
     close: Floats
 
 
-def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Beads:
-    """Widths and heights as the program's comments tell, else by its layers or the profile's, and the filament pushed."""
-    told = program.height_mm[rows]
-    first_mm, layer_mm = _layers_mm(segments[:, :, 2], bool((told > 0).any()), profile)
-    usual = np.where(np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
-    height = np.where(told > 0, told, usual)
-    length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
-    area = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
-    by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
-    width = np.where(program.width_mm[rows] > 0, program.width_mm[rows], by_flow)
-    return Beads(segments, rows, width, height, length)
-
-
-def _layers_mm(z_mm: Floats, told: bool, profile: Profile) -> tuple[float, float]:
-    """Heights of the first layer and of others for beads that tell none: the profile's, and in a file that tells none at all
-    those of its own level beads; z_mm: (m, 2) of the beads' ends.
-    """
-    process, most = profile.process, profile.machine.head.nozzle_mm  # a higher step is no layer's
-    first, usual = process.first_layer_height_mm, process.layer_height_mm
-    levels = np.unique(np.round(z_mm[z_mm[:, 0] == z_mm[:, 1], 1], 3))
-    if told or len(levels) < FEWEST_LEVELS:
-        return first, usual
-    step = float(np.median(np.diff(levels)))
-    return (float(levels[0]) if 0.0 < levels[0] <= most else first), (step if step <= most else usual)
-
-
 def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contacts:
     """Go through all moves of a program in order."""
     machine, count = profile.machine, len(program.line)
@@ -141,8 +76,8 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
     if not len(deposited.rows):
         return Contacts(*measured, untested_row=-1)
     extruded = program.kind == MoveKind.EXTRUDE
-    strokes, head = _strokes(program, deposited, extruded), head_of(machine)
-    moves = _moves(program, extruded, strokes.half)
+    strokes, head = strokes_of(program, deposited, extruded), head_of(machine)
+    moves = moves_of(program, extruded, strokes.half, profile)
     ups, turned = np.zeros((len(deposited.rows), 3)), 0
     process = profile.process
     gap = max(process.support_gap_mm, process.support_bottom_gap_mm, process.pedestal_gap_mm, process.brim_gap_mm)
@@ -157,48 +92,6 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
             about = Surroundings(field, int(run.rows[0]), gap, _plate(machine, run.pose))
             _replay_run(run.rows, moves, strokes, about, head, measured)
     return Contacts(*measured, untested_row=-1)
-
-
-def _strokes(program: ParsedProgram, deposited: Beads, extruded: NDArray[np.bool_]) -> Strokes:
-    half, height = np.zeros(len(extruded)), np.zeros(len(extruded))
-    half[deposited.rows], height[deposited.rows] = 0.5 * deposited.width_mm, deposited.height_mm
-    goes_on = np.all(program.start[1:] == program.end[:-1], axis=1) & extruded[1:] & extruded[:-1]
-    path = np.cumsum(np.concatenate([[True], ~goes_on])).astype(np.int32)
-    way = np.cumsum(np.linalg.norm((program.end - program.start)[:, :3], axis=1))
-    stands_off = np.array([name in STANDS_OFF for name in program.types], dtype=np.bool_)[program.type]
-    return Strokes(half, height, path, way, stands_off)
-
-
-def _moves(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats) -> Moves:
-    across = np.hypot(*(program.end - program.start)[:, :2].T)
-    slack, lower = _slacks(program, extruded, half, across), _ways_to_turns(program, extruded, across)
-    return Moves(program.start, program.end, slack, lower)
-
-
-def _slacks(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats, across: Floats) -> Floats:
-    """(n,) how deep the head may dip: a stroke by its bead's width, a travel below the last bead of its pose next to nothing."""
-    rows = np.flatnonzero(~extruded & (across > ACROSS_MM))
-    last = np.maximum.accumulate(np.where(extruded, np.arange(len(extruded)), -1))[rows]
-    height = np.maximum(program.start[last, 2], program.end[last, 2])
-    same_pose = (last >= 0) & (program.end[rows, 3] == program.end[last, 3]) & (program.end[rows, 4] == program.end[last, 4])
-    low = same_pose & (np.minimum(program.start[rows, 2], program.end[rows, 2]) < height - LEVEL_SLACK_MM)
-    slack = np.where(extruded, 2.0 * half, SLACK_MM)
-    slack[rows[low]] = LEVEL_SLACK_MM
-    return slack
-
-
-def _ways_to_turns(program: ParsedProgram, extruded: NDArray[np.bool_], across: Floats) -> Floats:
-    """(n,) CROSSING_MM for travels between the last bead before a turn of the table and the first one after it, else 0."""
-    lower, strokes = np.zeros(len(extruded)), np.flatnonzero(extruded)
-    if not (program.kind == MoveKind.ROTATE).any():
-        return lower
-    turns = np.cumsum(program.kind == MoveKind.ROTATE)
-    rows = np.flatnonzero((program.kind == MoveKind.TRAVEL) & (program.e_mm >= 0.0) & (across > WAY_MM))
-    after = np.searchsorted(strokes, rows)
-    within = (after > 0) & (after < len(strokes))
-    rows, after = rows[within], after[within]
-    lower[rows[turns[strokes[after]] > turns[strokes[after - 1]]]] = CROSSING_MM
-    return lower
 
 
 def head_of(machine: Machine) -> Head:
@@ -301,6 +194,25 @@ def _classify_support(
     return 0
 
 
+@part
+def _free_mm(most: float, held: float) -> float:
+    """How long the last stretch of a path may be; a path that lies on nothing anywhere spans nothing."""
+    return FREE_END * most if held == 1.0 else 0.0
+
+
+@part
+def _settle(stretch: tuple[int, int, float], rows: NDArray[np.int64], pending: Floats, measured: Measured) -> None:
+    """Ends a stretch of beads with nothing under them; stretch: the places in rows of its first and last row, and how much longer
+    it is than it may span. pending: (n, 2) of each place what hangs in air there, and what only has a neighbour.
+    """
+    first, last, over_mm = stretch
+    for at in range(first, last + 1):
+        if over_mm > 0.0:
+            measured.air[rows[at]] += pending[at, 0]
+            measured.beside[rows[at]] += pending[at, 1]
+        pending[at, 0] = pending[at, 1] = 0.0
+
+
 @kernel
 def _replay_run(
     rows: NDArray[np.int64],
@@ -311,7 +223,9 @@ def _replay_run(
     measured: Measured,
 ) -> None:
     """Try each row of a run against the field, then lay it."""
-    for row in rows:
+    pending, first, open_mm, most, held = table(len(rows), 2), 0, 0.0, 0.0, FREE_END
+    for at in range(len(rows)):
+        row = rows[at]
         a, b = moves.start[row], moves.end[row]
         extruded = strokes.height[row] > 0.0
         measured.depth[row] = depth_of(a, b, moves.slack[row], about.field, head)
@@ -320,6 +234,9 @@ def _replay_run(
             measured.close[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, head)
         if not extruded:
             continue
+        if at and strokes.path[row] != strokes.path[rows[at - 1]]:
+            _settle((first, at, open_mm - _free_mm(most, held)), rows, pending, measured)
+            first, open_mm, held = at, 0.0, FREE_END
         dx, dy = b[0] - a[0], b[1] - a[1]
         across = np.sqrt(dx * dx + dy * dy)
         length = np.sqrt(across * across + (b[2] - a[2]) ** 2)
@@ -328,14 +245,17 @@ def _replay_run(
             side = (-dy / across, dx / across)
             for k in range(count):
                 t = (k + 0.5) / count
-                at = strokes.way[row] - (1.0 - t) * length
+                way = strokes.way[row] - (1.0 - t) * length
                 carried = _classify_support(
-                    (a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]), at), side, row, strokes, about
+                    (a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]), way), side, row, strokes, about
                 )
-                if carried == 0:
-                    measured.air[row] += length / count
-                elif carried == 2:
-                    measured.overlapping[row] += length / count
-                elif carried == 3:
-                    measured.beside[row] += length / count
+                if carried in (0, 3):
+                    most = moves.span[row] if open_mm == 0.0 else min(most, moves.span[row])
+                    pending[at, carried // 3] += length / count
+                    open_mm += length / count
+                else:
+                    _settle((first, at, open_mm - held * most), rows, pending, measured)
+                    first, open_mm, held = at, 0.0, 1.0
+                    measured.overlapping[row] += length / count if carried == 2 else 0.0
         lay_bead(a, b, strokes.half[row], row, about.field)
+    _settle((first, len(rows) - 1, open_mm - _free_mm(most, held)), rows, pending, measured)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
-from machine.dryrun.replay import beads_of
+from machine.dryrun.strokes import beads_of
 from machine.firmware import dialect_of
 from machine.kinematics.table import workpiece_path
 from machine.reader.parsed import MoveKind, ParsedProgram

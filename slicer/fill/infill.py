@@ -15,8 +15,16 @@ from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.paths import Kind
 
 RANK = 3
+FAMILIES = {"grid": 2, "triangles": 3, "cubic": 3, "gyroid": 3, "honeycomb": 3}  # directions that share the lines; curves: cells
 SAMPLES = 6  # layers from which the plastic of anchors is judged
 MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas are mostly border
+
+
+def infill_cell_mm(process: Process) -> float:
+    """How far apart lines of the sparse infill lie at most, mm: what solid lines laid over it have to span; 0 without infill."""
+    width = process.infill_line_width_mm or process.line_width_mm
+    spacing, density = spacing_mm(width, process.layer_height_mm), process.infill_density
+    return FAMILIES.get(process.infill_pattern, 1) * spacing / density if density > 0.0 else 0.0
 
 
 def infill_beads(area: Polygons, process: Process, density: float, layer: int, z_mm: float, height_mm: float) -> list[Bead]:

@@ -12,6 +12,12 @@ JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
 SEAM = 0.1  # of a line width: lines overlap the outline by this and so hold on to it
 
 
+def support_cell_mm(process: Process) -> float:
+    """How far apart the sparse lines of support lie, mm: what dense lines laid over it have to span."""
+    spacing = spacing_mm(process.support_line_width_mm or process.line_width_mm, process.layer_height_mm)
+    return (1.0 if process.support_pattern == "lines" else 2.0) * spacing / process.support_density
+
+
 def support_beads(area: Polygons, dense: Polygons, process: Process, height_mm: float, first: bool) -> list[Bead]:
     """The beads of a layer's support, its dense places as an interface; first: the first layer on the platform."""
     if area.is_empty():

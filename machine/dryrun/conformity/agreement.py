@@ -10,7 +10,7 @@ from machine.dryrun.conformity.filling import filled_share
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding
 from machine.dryrun.placement import unsupported_mm
-from machine.dryrun.replay import beads_of
+from machine.dryrun.strokes import beads_of
 from mdp.mesh import Mesh
 from profiles.profile import Profile
 from slicer.finish.compensation import reach_mm

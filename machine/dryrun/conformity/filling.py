@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from machine.dryrun.conformity.deposit import AROUND, inside
 from machine.dryrun.dryrun import DryRun
-from machine.dryrun.replay import beads_of
+from machine.dryrun.strokes import beads_of
 from machine.reader.parsed import pose_runs
 from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import kernel, part

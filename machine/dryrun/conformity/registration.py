@@ -15,7 +15,7 @@ from machine.dryrun.conformity.deposit import nearest_faces, signed
 from machine.dryrun.conformity.filling import printing_directions
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding, at_row
-from machine.dryrun.replay import beads_of
+from machine.dryrun.strokes import beads_of
 from mdp.mesh import Floats, Mesh
 from profiles.profile import Profile
 from slicer.paths import Kind

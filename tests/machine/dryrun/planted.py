@@ -3,6 +3,8 @@
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import pairwise
+from math import hypot
 
 Lines = list[str]
 Edit = Callable[[Lines], Lines]
@@ -93,8 +95,9 @@ def insert(places: Callable[[Lines], Iterable[int]], *added: str) -> Edit:
 
 
 def before_turn(lines: Lines, index: int) -> int:
-    """The place of the line that lifts the tip after a part's last bead."""
+    """The place of the line that lifts the tip after a part's last bead, when the table turns to the next one."""
     stop = part_of(lines, index).stop
+    part_of(lines, index + 1)
     return max(k for k in range(stop) if lines[k] == ";WIPE_END") + 1
 
 
@@ -103,8 +106,13 @@ def everywhere(lines: Lines) -> Iterable[int]:
 
 
 def amid(index: int, layer: int) -> Callable[[Lines], Iterable[int]]:
-    """A place behind the first lines of a layer."""
-    return lambda lines: [layers_of(lines, index)[layer - 1][8]]
+    """A place between two strokes, behind the first lines of a layer."""
+
+    def places(lines: Lines) -> Iterable[int]:
+        begun = layers_of(lines, index)[layer - 1][8:]
+        return [next(k for k in begun if STROKE.match(lines[k - 1]) and STROKE.match(lines[k]))]
+
+    return places
 
 
 def end_of(index: int, layer: int) -> Callable[[Lines], Iterable[int]]:
@@ -121,8 +129,43 @@ def purged_at_middle(lines: Lines) -> Lines:
     return on(lambda _: range(part_of(lines, 1).start), word("Y", lambda _: 0.0))(lines)
 
 
+def turn_to(index: int) -> Callable[[Lines], Iterable[int]]:
+    """The place of the line that turns the table to a part's pose."""
+
+    def places(lines: Lines) -> Iterable[int]:
+        begin = part_of(lines, index).start
+        pose = lines[begin + 1].removeprefix(";POSE:")
+        return [max(k for k in range(begin) if pose in lines[k])]
+
+    return places
+
+
 def turned_on(line: str) -> str:
-    return re.sub(r"([CV])([0-9.]+)", lambda told: f"{told[1]}{float(told[2]) + 10:.4f}", line)
+    return re.sub(r"([CV])(-?[0-9.]+)", lambda told: f"{told[1]}{float(told[2]) + 10:.4f}", line)
+
+
+def tilted_back(line: str) -> str:
+    return re.sub(r" ([AU])(-?[0-9.]+)", lambda told: f" {told[1]}{-float(told[2]):.4f}", line)
+
+
+def into_the_air(lines: Lines) -> Lines:
+    """A bead of 45 mm beside part 1, above its layer 20."""
+    reach = float(re.findall(r"X\S+ (\S+)", lines[part_of(lines, 1).start + 2])[0])
+    way = (f"G0 X{reach + 10:.3f} Y0", f"G1 X{reach + 55:.3f} Y0 E1.5 F600", "G0 X0 Y0")
+    return insert(end_of(1, 20), *way)(lines)
+
+
+def along_a_bead(lines: Lines) -> Lines:
+    """A travel 0.15 mm low along the longest stroke of layer 20 of part 1, when that is printed."""
+    layer = layers_of(lines, 1)[19]
+    height = float(next(lines[k] for k in layer if lines[k].startswith(";Z:")).removeprefix(";Z:"))
+    corners = [re.match(r"G[01] X(\S+) Y(\S+)", lines[k]) for k in layer]
+    ends = [
+        (float(corner[1]), float(corner[2]), STROKE.match(lines[k])) for k, corner in zip(layer, corners, strict=True) if corner
+    ]
+    begin, end = max((p for p in pairwise(ends) if p[1][2]), key=lambda p: hypot(p[1][0] - p[0][0], p[1][1] - p[0][1]))
+    low = (f"G0 X{begin[0]} Y{begin[1]}", f"G0 Z{height - 0.15:.3f}", f"G0 X{end[0]} Y{end[1]}", f"G0 Z{height:.3f}")
+    return insert(end_of(1, 20), *low)(lines)
 
 
 def still(line: str) -> str | None:
@@ -228,12 +271,12 @@ FAULTS = (
     Fault("M221 S60 for a part", "extrusion", 2, 1, insert(nth(";PART:2"), "M221 S60")),
     Fault("40 travels that ooze", "extrusion", 1, 0, extruding_travels(lambda mm: 0.05)),
     Fault("40 travels that extrude", "extruding-travel", 1, 0, extruding_travels(lambda mm: 0.035 * mm)),
-    Fault("no lift before a turn", "low-travel", 1, 47, on(lambda t: [before_turn(t, 1)], lambda _: None)),
+    Fault("no lift before a turn", "low-travel", 1, 48, on(lambda t: [before_turn(t, 1)], lambda _: None)),
     Fault("across after the turn at the height of the first bead", "low-travel", 3, 0, crossed_low),
     Fault("no fans", "fan", 1, 6, on(everywhere, drop("M106"))),
     Fault("no fan for a part", "fan", 2, 6, on(part(2), fan_off)),
     Fault("the fan off amid a part", "fan", 1, 20, on(layers(1, 20, 6), still)),
-    Fault("45 mm laid in the air", "air", 1, 20, insert(end_of(1, 20), "G0 X40 Y0", "G1 X85 Y0 E1.5 F600", "G0 X0 Y0")),
+    Fault("45 mm laid in the air", "air", 1, 20, into_the_air),
     Fault("a nozzle of 170 deg C", "temperature", 2, 1, insert(IN_2_1, "M104 S170")),
     Fault("a nozzle of 255 deg C", "temperature", 2, 1, insert(IN_2_1, "M104 S255")),
     Fault("the nozzle off amid the print", "cold-extrusion", 1, 20, insert(IN_1_20, "M104 S0")),
@@ -249,16 +292,16 @@ FAULTS = (
     Fault("no pulling back before a turn", "retraction", 2, 34, not_pulled),
     Fault("a blob of 5 mm of filament", "retraction", 1, 20, insert(IN_1_20, "G1 E5 F300")),
     Fault("30 mm pulled back", "retraction", 1, 20, insert(IN_1_20, "G1 E-30 F300", "G1 E30 F300")),
-    Fault("another turn", "pose", 2, 1, on(nth("G0 [AU]15"), turned_on)),
-    Fault("a tilt to the other side", "pose", 2, 1, on(nth("G0 [AU]15"), lambda line: line.replace("15.0000", "-15.0000"))),
-    Fault("filament while the table turns", "turning-stroke", 1, 47, on(nth("G0 [AU]15"), lambda line: line + " E1")),
+    Fault("another turn", "pose", 2, 1, on(turn_to(2), turned_on)),
+    Fault("a tilt to the other side", "pose", 2, 1, on(turn_to(2), tilted_back)),
+    Fault("filament while the table turns", "turning-stroke", 1, 48, on(turn_to(2), lambda line: line + " E1")),
     Fault("speeds ten times as high", "flow", 2, 1, on(part(2), word("F", lambda f: 10 * f, "G1 .*[XY].*E[0-9]")), "warning"),
     Fault("M220 S1000", "axis-speed", 1, 0, insert(IN_1_20, "M220 S1000"), "warning"),
     Fault("relative moves from a layer on", "axis-limit", 1, 0, insert(IN_1_20, "G91")),
     Fault("inches from a layer on", "gap", 1, 20, insert(IN_1_20, "G20")),
     Fault("filament told absolutely", "contents", 1, 0, on(everywhere, lambda line: "M82" if line == "M83" else line)),
     Fault("a plunge below the plate", "collision", 1, 20, insert(IN_1_20, "G0 Z-1", "G0 Z4")),
-    Fault("a travel 0.15 mm too low", "contact", 1, 0, insert(end_of(1, 20), "G0 X0 Y0", "G0 Z3.85", "G0 X2 Y3", "G0 Z4")),
+    Fault("a travel 0.15 mm too low", "contact", 1, 0, along_a_bead),
     Fault("a plunge into an earlier part", "contact", 3, 5, insert(amid(3, 5), "G91", "G0 Z-3", "G0 Z3", "G90", "M83")),
     Fault("homing amid the print", "homing-over-print", 1, 20, insert(IN_1_20, "G28"), "warning"),
     Fault("no homing", "not-homed", 0, 0, on(everywhere, drop("G28|G92 [A-Z]0 "))),

@@ -1,0 +1,62 @@
+"""Layers: what spans sparse infill or support is no finding, a layer whose beads are gone is one, whatever lies above it."""
+
+import re
+from functools import cache
+
+import manifold3d as m3
+import pytest
+
+from machine.dryrun import dry_run
+from machine.gcode.writer import write_gcode
+from machine.planning.plan import plan
+from mdp.decomposition import Decomposition
+from profiles.profile import Profile, load
+from slicer.parts import slice_parts
+from tests.machine.dryrun.planted import layers_of, word
+from tests.shapes import standing
+from tests.slicer.hand import whole
+
+SETTINGS = [
+    *((f"process.infill_pattern={pattern}",) for pattern in ("grid", "rectilinear", "triangles", "cubic", "gyroid", "honeycomb")),
+    *((f"process.infill_density={density}",) for density in (0.0, 0.05, 0.1, 0.45, 0.6, 1.0)),
+    ("process.walls=1",), ("process.wall_generator=classic",), ("process.layer_height_mm=0.3",), ("process.top_layers=1",),
+]  # fmt: skip
+
+
+@cache
+def stepped(settings: tuple[str, ...]) -> tuple[Profile, tuple[str, ...]]:
+    """A plate with a pocket and a table on it: floors over infill, walls that begin on a floor, a slot, a roof on support."""
+    plate, pocket = m3.Manifold.cube((36, 30, 5)), m3.Manifold.cube((14, 20, 5)).translate((4, 5, 2.4))
+    slot = m3.Manifold.cube((10, 40, 0.2)).translate((22, -5, 3.2))
+    stem, roof = m3.Manifold.cube((8, 8, 5)).translate((22, 11, 4)), m3.Manifold.cube((34, 14, 2)).translate((1, 8, 9))
+    part = whole(standing(plate - pocket - slot + stem + roof))
+    profile = load(settings=settings)
+    sliced = slice_parts([part], profile)
+    program = plan(Decomposition("stepped", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0), sliced, profile)
+    return profile, tuple(write_gcode(program, profile))
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=lambda settings: settings[0])
+def test_a_sound_print_has_no_finding_whatever_it_spans(settings: tuple[str, ...]) -> None:
+    profile, lines = stepped(settings)
+    assert [f.message for f in dry_run(lines, profile).errors] == []
+    assert not {"air", "gap"} & {f.code for f in dry_run(lines, profile).findings}
+
+
+@pytest.mark.parametrize("settings", SETTINGS[::3], ids=lambda settings: settings[0])
+@pytest.mark.parametrize("layer", range(3, 24, 4))
+def test_a_layer_without_its_beads_is_found_at_the_next_one(settings: tuple[str, ...], layer: int) -> None:
+    profile, lines = stepped(settings)
+    gone = layers_of(list(lines), 1)[layer - 1]
+    edited = [line for k, line in enumerate(lines) if k not in gone or not re.match("G1 .*E", line)]
+    assert (layer + 1) in {f.layer for f in dry_run(edited, profile).errors if f.code == "gap"}
+
+
+@pytest.mark.parametrize("layer", [20, 30, 40])
+@pytest.mark.parametrize("rise_mm", [0.1, -0.1])
+def test_a_layer_at_the_wrong_height_is_found_though_support_is_laid_before_the_part(layer: int, rise_mm: float) -> None:
+    profile, lines = stepped(("process.support_least_mm2=2",))
+    moved = layers_of(list(lines), 1)[layer - 1]
+    assert any(";TYPE:Support material" in lines[k] for k in moved)
+    edited = [word("Z", lambda z: z + rise_mm)(line) if k in moved else line for k, line in enumerate(lines)]
+    assert {layer, layer + 1} & {f.layer for f in dry_run(edited, profile).errors if f.code == "gap"}
