@@ -33,12 +33,29 @@ def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
 
 def offset(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Polygons:
     """Every boundary moved outward (negative: inward) by the distance, corners mitred up to so many distances."""
-    return polygons.offset(distance_mm, JoinType.Miter, mitre)
+    return _moved(polygons, distance_mm, JoinType.Miter, mitre, 0)
 
 
 def offset_round(polygons: Polygons, distance_mm: float, segments: int = ARC_SEGMENTS) -> Polygons:
     """Every boundary moved outward (negative: inward) by the distance, corners round, a full turn in so many segments."""
-    return polygons.offset(distance_mm, JoinType.Round, MITRE, segments)
+    return _moved(polygons, distance_mm, JoinType.Round, MITRE, segments)
+
+
+def _moved(polygons: Polygons, distance_mm: float, corners: JoinType, mitre: float, segments: int) -> Polygons:
+    """The offset, also where Clipper2 takes the polygons for inside out.
+
+    It tells outside from inside by the contour that reaches farthest along y (ClipperOffset, GetLowestClosedPathInfo); where that
+    is a hole which touches its outer contour there, or a speck whose sign has been rounded away, nothing is left. A square
+    beyond it settles the question.
+    """
+    moved = polygons.offset(distance_mm, corners, mitre, segments)
+    if polygons.is_empty() or moved.area() >= (polygons.area() if distance_mm > 0.0 else 1e-9):
+        return moved
+    x0, _, _, y1 = polygons.bounds()
+    reach = 2.0 * mitre * abs(distance_mm) + 1.0
+    square = Polygons.square((reach, reach)).translate((x0, y1 + 2.0 * reach))
+    beyond = Polygons.square((3.0 * reach, 3.0 * reach)).translate((x0 - reach, y1 + reach))
+    return (polygons + square).offset(distance_mm, corners, mitre, segments) - beyond
 
 
 def opening(polygons: Polygons, radius_mm: float) -> Polygons:
