@@ -17,8 +17,9 @@ from slicer.geometry.segments import Segment, nearest_share, orientation
 from slicer.geometry.triangulation import Triangulation
 
 SLOPE = 0.2164  # sine of 12.5 deg: sides that meet at less than 25 deg enclose a place that narrows, others a corner
-
 OPPOSITE = -0.8  # cosine of the angle between the ways to opposite sides, at most
+ON_SIDE_MM2 = 1e-9  # rounding: a node on a side is in both triangles
+MOST_STEPS = 1000  # triangles on the way from one to its centre; usually none
 
 
 class Skeleton(NamedTuple):
@@ -66,17 +67,33 @@ def skeleton_of(triangulation: Triangulation) -> Skeleton:
             out.radii[t] = _away(out, near)
             if turn == 0:
                 _centre(out, near, far)
-        for h in range(3 * t, 3 * t + 3):
-            a, b = tails[h], tails[after(h)]
-            side = Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1])
-            if across[h] < 0 and orientation(side, out.centres[t, 0], out.centres[t, 1]) <= 0.0:
-                out.radii[t] = 0.0
+        if _leaves(triangulation, t, out.centres[t, 0], out.centres[t, 1]):
+            out.radii[t] = 0.0
     for h in range(len(tails)):
         other = across[h]
         if other > h:
             out.central[h] = 0.5 * (_slope2(out, h) + _slope2(out, other)) < SLOPE * SLOPE
             out.central[other] = out.central[h]
     return out
+
+
+@part
+def _leaves(triangulation: Triangulation, t: int, x: float, y: float) -> bool:
+    """Whether a node lies beyond the boundary, seen from its triangle: needles in a neck have their centres anywhere."""
+    points, tails, across = triangulation
+    for _ in range(MOST_STEPS):
+        onward = -1
+        for h in range(3 * t, 3 * t + 3):
+            a, b = tails[h], tails[after(h)]
+            beside = orientation(Segment(points[a, 0], points[a, 1], points[b, 0], points[b, 1]), x, y)
+            if beside <= 0.0 and across[h] < 0:
+                return True
+            if beside < -ON_SIDE_MM2:
+                onward = across[h]
+        if onward < 0:
+            return False
+        t = onward // 3
+    return True
 
 
 @part

@@ -157,3 +157,12 @@ def test_a_comb_gets_its_volume_within_its_walls_the_same_every_time() -> None:
     widths = [path.width_mm for path in of_kind(sliced, Kind.OUTER_WALL)]
     assert min(widths) == pytest.approx(0.3, abs=0.01)
     assert content(sliced) == content(slice_part(part, chosen))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(1e-6, 1e-3), st.floats(-1e-3, 1e-3), st.floats(0.1, 0.5), st.floats(1.0, 6.0))
+def test_walls_stay_inside_a_plate_that_a_notch_all_but_cuts_through(neck: float, lean: float, wide: float, deep: float) -> None:
+    tip = [(5.5, neck), (5.5 + wide, max(neck + lean, 1e-6))]
+    notch = Polygons([np.array([(5.3, deep + 1.0), *tip, (6.5, deep + 1.0)])])
+    plate_with_notch = plate(deep) - notch
+    assert farthest_out_mm(variable_walls(plate_with_notch, RULE), plate_with_notch) < 0.1
