@@ -8,16 +8,19 @@ from profiles.process import Process
 from slicer.geometry.polygons import Polygons, islands, offset, opening, union
 
 THIN = 0.2  # of the line width: a narrower strip beside the wall along a cut needs no skin, the walls of two layers meet
+BESIDE = 0.8  # of the line width: a wall that lies so far beside the one below, as on slopes, still hangs on to it
+ANCHOR = 2.0  # line widths that solid layers under walls reach into the infill around, as a bridge reaches over its banks
 FEW_MM2 = 25.0  # of the line width squared: a smaller place that a cut leaves of the sparse infill becomes solid
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A layer's inside: top is skin with nothing above it, solid is all other skin, sparse takes the infill.
+    """A layer's inside: top is skin that is seen, as far as it reaches under walls; solid other skin; sparse takes the infill.
 
-    uncut: what would be sparse if the model were in one piece, not clipped to the part.
+    bare: what of top has nothing above it. uncut: what would be sparse if the model were in one piece, not clipped to the part.
     """
 
+    bare: Polygons
     top: Polygons
     solid: Polygons
     sparse: Polygons
@@ -30,7 +33,7 @@ class Region:
             left = polygons - area
             return left if left.is_empty() or left.area() == polygons.area() else opening(left, 0.25 * width_mm)
 
-        return Region(rest(self.top), rest(self.solid), rest(self.sparse), self.uncut)
+        return Region(self.bare, rest(self.top), rest(self.solid), rest(self.sparse), self.uncut)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +57,7 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
 
     A place is solid when one of the model's next top_layers sections above or bottom_layers below does not cover it: so every
     vertical line meets that many layers of wall or skin below a surface, on slopes too. It is also solid where a later part
-    will lie less than interface_top_layers away, and in the first interface_bottom_layers on plastic.
+    will lie less than interface_top_layers away, in the first interface_bottom_layers on plastic, and under walls that begin.
     """
     empty = Polygons()
     top, bottom = shell_layers(process)
@@ -62,17 +65,40 @@ def regions(insides: Sequence[Polygons], cover: Cover, on_plastic: bool, process
     first = len(cover.below)
     above = _common(stacked, top)[first + 1 :] if top else insides
     below = _common(stacked[::-1], bottom)[::-1][first - 1 :] if bottom else insides
+    hollow = _without_footings([_sparse(i, cover, above[i], below[i], process) for i in range(len(insides))], cover, process)
     layers = []
     for i, inside in enumerate(insides):
         if inside.is_empty():
-            layers.append(Region(empty, empty, empty, empty))
+            layers.append(Region(empty, empty, empty, empty, empty))
             continue
-        dense = process.infill_density >= 1.0
-        uncut = empty if dense else sparse_area(cover.insides[i], above[i], below[i], process)
+        uncut = hollow[i]
         sparse = empty if on_plastic and i < solid_bottom_layers(process) else _beside_cuts(inside, uncut, cover, i, process)
         next_section = stacked[first + i + 1] if first + i + 1 < len(stacked) else empty
-        layers.append(_region(inside, sparse, uncut, next_section if top else inside, process.line_width_mm))
+        layers.append(_region(inside, sparse, uncut, next_section if top else inside, process))
     return layers
+
+
+def _sparse(layer: int, cover: Cover, above: Polygons, below: Polygons, process: Process) -> Polygons:
+    inside = cover.insides[layer]
+    return Polygons() if process.infill_density >= 1.0 or inside.is_empty() else sparse_area(inside, above, below, process)
+
+
+def _without_footings(sparse: Sequence[Polygons], cover: Cover, process: Process) -> list[Polygons]:
+    """The sparse places without those under walls which begin on them: a pocket's on its floor, a pillar's on its plate.
+
+    The solid layers below such walls are as many as under a top, and reach ANCHOR lines farther into the infill.
+    """
+    width_mm, deep = process.line_width_mm, max(shell_layers(process)[0], 1)
+    footings = [
+        opening((place ^ section) - inside, 0.5 * BESIDE * width_mm) if not place.is_empty() else place
+        for place, section, inside in zip(sparse, cover.sections[1:], cover.insides[1:], strict=False)
+    ]
+    left = list(sparse)
+    for i, place in enumerate(sparse):
+        begun = [footing for footing in footings[i : i + deep] if not footing.is_empty()]
+        if begun and not place.is_empty():
+            left[i] = _large(opening(place - offset(union(begun), ANCHOR * width_mm), width_mm), process)
+    return left
 
 
 def solid_bottom_layers(process: Process) -> int:
@@ -110,6 +136,11 @@ def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Pro
     if inside.area() - covered.area() > 1e-6:
         skin = opening(inside - covered, 0.25 * width_mm)
         sparse = inside if skin.is_empty() else opening(inside - offset(skin, width_mm), width_mm)
+    return _large(sparse, process)
+
+
+def _large(sparse: Polygons, process: Process) -> Polygons:
+    """The sparse pieces that are worth leaving sparse; without infill all are."""
     if process.infill_density <= 0.0 or sparse.is_empty():
         return sparse
     pieces = islands(sparse)
@@ -117,20 +148,24 @@ def sparse_area(inside: Polygons, above: Polygons, below: Polygons, process: Pro
     return sparse if len(large) == len(pieces) else Polygons.compose(large) if large else Polygons()
 
 
-def _region(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, width_mm: float) -> Region:
-    """Splits what is not sparse into what is bare above and the rest."""
+def _region(inside: Polygons, sparse: Polygons, uncut: Polygons, next_section: Polygons, process: Process) -> Region:
+    """Splits what is not sparse into top skin and the rest.
+
+    The lines of a top go on under the walls around it and as far as its anchor: a frame of its own there would be all line ends.
+    """
+    empty, width_mm = Polygons(), process.line_width_mm
     if sparse.is_empty():
         solid = inside
     elif abs(sparse.area() - inside.area()) < 1e-6:
-        return Region(Polygons(), Polygons(), sparse, uncut)
+        return Region(empty, empty, empty, sparse, uncut)
     else:
         solid = inside - sparse
-    top = solid - next_section
-    top = top if top.is_empty() else opening(top, width_mm)
-    if top.is_empty():
-        return Region(top, solid, sparse, uncut)
-    under = opening(solid - top, 0.25 * width_mm)
-    return Region(solid - under, under, sparse, uncut)
+    bare = solid - next_section
+    bare = bare if bare.is_empty() else opening(bare, width_mm)
+    if bare.is_empty():
+        return Region(bare, bare, solid, sparse, uncut)
+    under = opening(solid - offset(bare, (process.walls + ANCHOR) * width_mm), width_mm)
+    return Region(bare, solid - under, under, sparse, uncut)
 
 
 def _common(layers: Sequence[Polygons], count: int) -> list[Polygons]:

@@ -40,6 +40,15 @@ def hollow() -> Mesh:
     return standing(m3.Manifold.cube((20, 20, 20), True) - m3.Manifold.cube((10, 10, 10), True))
 
 
+def hollow_tee() -> Mesh:
+    """The tee with a closed 4 mm cubic void in each arm."""
+    solid = m3.Manifold.cube((10, 10, 40), True).translate((0, 0, 20)) + m3.Manifold.cube((40, 10, 10), True).translate(
+        (0, 0, 35)
+    )
+    voids = [m3.Manifold.cube((4, 4, 4), True).translate((x, 0, 35)) for x in (-14, 14)]
+    return standing(solid - voids[0] - voids[1])
+
+
 def bowl() -> Mesh:
     """A cup: its inner floor is a local minimum of the surface with solid beneath."""
     return standing(m3.Manifold.cylinder(20, 15, 15, 48) - m3.Manifold.cylinder(20, 12, 12, 48).translate((0, 0, 4)))

@@ -29,7 +29,7 @@ def ironed_areas(
     above = sections_of(later, part, above_mm) if later else [Polygons()] * len(regions)
     width = process.line_width_mm
     tops = [
-        region.top if other.is_empty() else region.top - offset(other, width)
+        region.bare if other.is_empty() else region.bare - offset(other, width)
         for region, other in zip(regions, above, strict=True)
     ]
     return [_worth_it(opening(top, 0.5 * width)) for top in tops]

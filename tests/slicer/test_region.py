@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, offset, opening
 from slicer.region import Cover, Region, _common, regions, shell_layers
-from tests.slicer.hand import profile
+from tests.slicer.hand import as_shapely, profile
 
 WIDTH = 0.45
 
@@ -44,11 +46,33 @@ def test_a_tower_is_solid_at_both_ends_and_sparse_between() -> None:
 
 def test_a_step_is_top_skin_where_it_is_bare_and_solid_below_it() -> None:
     found = areas([square(20)] * 4 + [square(10)] * 6, bottom=0)
-    assert found[3][0] == 300.0
-    assert found[3][1:] == pytest.approx((0, 100), abs=25)
+    assert found[3][0] == pytest.approx(300, abs=25)
+    assert found[3][1] == 0
     assert found[2][0] == 0
     assert found[2][1] == pytest.approx(300, abs=25)
     assert found[1] == (0, 0, 400)
+
+
+def test_what_is_bare_goes_on_as_top_skin_under_the_walls_around_it() -> None:
+    floor = [square(20)] * 6 + [square(20) - square(8)] * 4
+    insides = [offset(section, -3 * WIDTH) for section in floor]
+    region = alone(floor, insides, None, process(top=2, walls=3))[5]
+    assert region.bare.area() == pytest.approx(64)
+    assert region.top.area() == pytest.approx((8 + 2 * 5 * WIDTH) ** 2, rel=0.01), "three walls, and two lines of anchor"
+    assert region.solid.area() == 0
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(3, 12), st.floats(0, 3), st.integers(1, 5), st.booleans())
+def test_no_wall_begins_on_sparse_infill(side: float, aside: float, walls: int, pillar: bool) -> None:
+    place = square(side).translate((aside, -aside))
+    above = place if pillar else square(24) - place
+    sections = [square(24)] * 6 + [above] * 4
+    insides = [offset(section, -walls * WIDTH) for section in sections]
+    below = alone(sections, insides, None, process(top=2, walls=walls))
+    for i in range(len(sections) - 1):
+        walled = as_shapely(sections[i + 1]) - as_shapely(insides[i + 1])
+        assert as_shapely(below[i].sparse).intersection(walled).area < 0.05
 
 
 def test_an_overhang_gets_bottom_layers() -> None:
