@@ -16,7 +16,7 @@ from slicer.interface.interface import interface_edges, strengthen_interface
 from slicer.interface.model import model_around
 from slicer.interface.plastic import interface_mm3
 from slicer.region import Region, regions
-from slicer.support.overhang import Overhang
+from slicer.support.overhang import Overhang, bridge_unheld
 from slicer.support.support import Supports
 from slicer.walls.overhang import strengthen_overhangs
 from slicer.walls.walls import Walls
@@ -77,7 +77,7 @@ def build_stack(site: Site, supports: Supports) -> Stack:
         walls=[each.walls for each in wall_layers],
         ending=[each.ending for each in wall_layers],
         regions=region_layers,
-        overhangs=site.overhangs,
+        overhangs=bridge_unheld(site.overhangs, site.outlines, site.beneath, supports.areas, heights, process),
         ironed=ironed_areas(region_layers, part, later, heights, process),
         processes=processes,
         supports=supports,

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdp.kernels.arrays import floats, table
-from mdp.kernels.kernel import kernel
+from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 from mdp.support_need.spans import ROUNDING_MM
 from profiles.process import Process
 from slicer.bead import Bead
 from slicer.fill.skin import skin_beads
-from slicer.geometry.polygons import Polygons, edges, offset, opening
+from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, strips
 from slicer.geometry.scanlines import scan_lines
 from slicer.geometry.segments import inside as is_inside
 from slicer.paths import Kind
@@ -24,6 +24,7 @@ ANCHOR = 2.0  # line widths that the lines of a bridge reach over its banks
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
 ADRIFT = 10.0  # and one held nowhere like this
 TOLERATED = 0.02  # share of a bridge's length that may have a loose end: corners of the place
+RIM_MM = 0.02  # neighbouring lines overlap by this so that they unite
 NEAR_MM = 1e-6  # more than rounding moves the end of a line off the side it lies on
 GAIN = 0.01  # a direction is better only by this share, more than where the lines happen to lie; else the place's own sides win
 
@@ -55,8 +56,44 @@ def find_bridge(hanging: Polygons, banks: Floats, width_mm: float) -> Bridge | N
         return None
     sides = edges(hanging)
     angles = _angles(sides)
-    best, longest_mm, loose = _least_sag(sides, _edges_near(banks, sides), np.array(angles), width_mm)
+    best, longest_mm, loose, _ = _least_sag(sides, _edges_near(banks, sides), np.array(angles), width_mm)
     return None if best < 0 else Bridge(hanging, float(np.degrees(angles[best])), longest_mm, loose)
+
+
+def find_bridges(hanging: Polygons, banks: Floats, width_mm: float) -> list[Bridge]:
+    """Lines over one connected hanging place, each piece of it in the direction in which most of them reach from bank to bank.
+
+    Where no direction holds all of the place, what the best one holds is bridged so, and the rest in its turn.
+    """
+    bridges: list[Bridge] = []
+    left = [hanging]
+    while left:
+        place = left.pop()
+        bridge = find_bridge(place, banks, width_mm)
+        held = None if bridge is None or bridge.loose <= TOLERATED else _held_piece(place, banks, width_mm)
+        if held is None:
+            bridges += [bridge] if bridge is not None else []
+        else:
+            bridges.append(held)
+            left += islands(opening(place - held.place, 0.25 * width_mm))
+    return bridges
+
+
+def _held_piece(place: Polygons, banks: Floats, width_mm: float) -> Bridge | None:
+    """What of a place has lines from bank to bank in the direction that has most of them; None where that is next to nothing."""
+    sides = edges(place)
+    angles, near = np.array(_angles(sides)), _edges_near(banks, sides)
+    held_mm = _least_sag(sides, near, angles, width_mm)[3]
+    angle = float(angles[int(np.argmax(held_mm))])
+    rows = _held_rows(sides, near, angle, width_mm)
+    if not len(rows):
+        return None
+    cos, sin = np.cos(angle), np.sin(angle)
+    ends = rows[:, [0, 2, 1, 2]].reshape(-1, 2, 2) @ np.array([[cos, sin], [-sin, cos]])
+    piece = opening(strips(list(ends), 0.5 * width_mm + RIM_MM) ^ place, 0.5 * width_mm)
+    if piece.area() < LEAST * width_mm**2:
+        return None
+    return Bridge(piece, float(np.degrees(angle)), float((rows[:, 1] - rows[:, 0]).max()), 0.0)
 
 
 def _edges_near(banks: Floats, sides: Floats) -> Floats:
@@ -78,37 +115,65 @@ def _angles(sides: Floats) -> list[float]:
     return [*np.unique(own).tolist(), *(np.pi * np.arange(TURNS) / TURNS).tolist()]
 
 
+@part
+def _rows_at(sides: Floats, angle: float, width_mm: float) -> Floats:
+    """(n, 3) lines of a width across a place at an angle, begin, end and height in the frame turned by it."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    turned, low, high = table(len(sides), 4), np.inf, -np.inf
+    for e in range(len(sides)):
+        for k in range(0, 4, 2):
+            x, y = sides[e, k], sides[e, k + 1]
+            turned[e, k], turned[e, k + 1] = x * cos + y * sin, y * cos - x * sin
+        low, high = min(low, turned[e, 1]), max(high, turned[e, 1])
+    heights = floats(max(int(np.ceil((high - low) / width_mm - 0.5)), 0), 0.0)
+    for k in range(len(heights)):
+        heights[k] = low + (k + 0.5) * width_mm
+    rows: Floats = scan_lines(turned, heights)
+    return rows
+
+
+@part
+def _held_ends(row: Floats, banks: Floats, angle: float) -> int:
+    """How many ends of a line lie on a bank."""
+    cos, sin, held = np.cos(angle), np.sin(angle), 0
+    for end in range(2):
+        held += is_inside(banks, cos * row[end] - sin * row[2], sin * row[end] + cos * row[2])
+    return held
+
+
 @kernel
-def _least_sag(sides: Floats, banks: Floats, angles: Floats, width_mm: float) -> tuple[int, float, float]:
-    """Which angle sags least (-1: none is held), its longest span and the share of its lines that is loose."""
+def _least_sag(sides: Floats, banks: Floats, angles: Floats, width_mm: float) -> tuple[int, float, float, Floats]:
+    """Which angle sags least (-1: none is held), its longest span and the share of its lines that is loose; of every angle the
+    length of its lines that are held at both ends."""
     best, least, longest_mm, loose = -1, np.inf, 0.0, 0.0
-    turned, sag_of = table(len(sides), 4), np.array([ADRIFT**2, LOOSE**2, 1.0])
+    sag_of, held_mm = np.array([ADRIFT**2, LOOSE**2, 1.0]), floats(len(angles), 0.0)
     for a in range(len(angles)):
-        cos, sin = np.cos(angles[a]), np.sin(angles[a])
-        low, high = np.inf, -np.inf
-        for e in range(len(sides)):
-            for k in range(0, 4, 2):
-                x, y = sides[e, k], sides[e, k + 1]
-                turned[e, k], turned[e, k + 1] = x * cos + y * sin, y * cos - x * sin
-            low, high = min(low, turned[e, 1]), max(high, turned[e, 1])
-        heights = floats(max(int(np.ceil((high - low) / width_mm - 0.5)), 0), 0.0)
-        for k in range(len(heights)):
-            heights[k] = low + (k + 0.5) * width_mm
-        rows = scan_lines(turned, heights)
+        rows = _rows_at(sides, angles[a], width_mm)
         total = sagging = free = longest = 0.0
         any_held = False
         for r in range(len(rows)):
-            held, y = 0, rows[r, 2]
-            for end in range(2):
-                x = rows[r, end]
-                held += is_inside(banks, cos * x - sin * y, sin * x + cos * y)
+            held = _held_ends(rows[r], banks, angles[a])
             span = rows[r, 1] - rows[r, 0]
             total, longest, any_held = total + span, max(longest, span), any_held or held > 0
             sagging += sag_of[held] * span * span
             free += span if held < 2 else 0.0
+        held_mm[a] = total - free
         if any_held and sagging < least * (1.0 - GAIN) * total:
             best, least, longest_mm, loose = a, sagging / total, longest, free / total
-    return best, longest_mm, loose
+    return best, longest_mm, loose, held_mm
+
+
+@kernel
+def _held_rows(sides: Floats, banks: Floats, angle: float, width_mm: float) -> Floats:
+    """(n, 3) the lines at an angle that are held at both ends, as _rows_at."""
+    rows = _rows_at(sides, angle, width_mm)
+    n = 0
+    for r in range(len(rows)):
+        if _held_ends(rows[r], banks, angle) == 2:
+            for k in range(3):
+                rows[n, k] = rows[r, k]
+            n += 1
+    return rows[:n].copy()
 
 
 def bridge_area(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:

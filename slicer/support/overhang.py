@@ -1,7 +1,7 @@
 """Overhangs: the places of each layer that hang over nothing and are too flat to carry themselves, and which of them bridge."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -10,18 +10,22 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import UP, Mask, facing_down
 from mdp.support_need.need import needs_support
 from profiles.process import Process
-from slicer.fill.bridge import LEAST, Bridge, find_bridge
-from slicer.geometry.polygons import Polygons, edges, islands, offset
+from slicer.fill.bridge import LEAST, Bridge, find_bridge, find_bridges
+from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, union
+from slicer.heights import Heights
 
 RIM_MM = 0.04  # neighbouring strips of a slope overlap by this so that they unite
+
+EMPTY = Polygons()
 
 
 @dataclass(frozen=True, eq=False)
 class Overhang:
-    """Of one layer: hanging wants support, bridges carry themselves."""
+    """Of one layer: hanging wants support, bridges carry themselves, ledges do, too, but no line reaches all over them."""
 
     hanging: Polygons
     bridges: tuple[Bridge, ...]
+    ledges: Polygons = EMPTY
 
 
 def detect_overhangs(
@@ -68,7 +72,8 @@ def _sort_islands(
             spans.append(span)
         else:
             rest.append(island)
-    return Overhang(Polygons.compose(rest) ^ need if rest else Polygons(), tuple(spans))
+    left = Polygons.compose(rest) if rest else Polygons()
+    return Overhang(left ^ need, tuple(spans), left - need)
 
 
 def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
@@ -81,3 +86,34 @@ def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[
         for layer in range(a, b + 1):
             masks.setdefault(layer, []).append(corner)
     return masks
+
+
+def bridge_unheld(
+    overhangs: Sequence[Overhang],
+    outlines: Sequence[Polygons],
+    below: Polygons | None,
+    supports: Sequence[Polygons],
+    heights: Heights,
+    process: Process,
+) -> list[Overhang]:
+    """The overhangs with what hangs over no support printed as bridges too, as well as they can be.
+
+    Such places are ledges, a slot with no room for support, or what support could not reach (Supports.missed tells of these).
+    """
+    bridged = list(overhangs)
+    for i, overhang in enumerate(overhangs):
+        free = overhang.hanging + overhang.ledges
+        if free.is_empty() or (i == 0 and below is None):
+            continue
+        bottom_mm = float(heights.bottom_mm[i])
+        lowest = int(np.searchsorted(heights.tip_mm, bottom_mm - process.support_gap_mm - 2.0 * process.layer_height_mm))
+        held = union([area for area in supports[lowest:i] if not area.is_empty()])
+        held = held if held.is_empty() else offset(held, 0.5 * process.line_width_mm)
+        bare = opening(free - held, 0.25 * process.line_width_mm)
+        if bare.is_empty():
+            continue
+        bank = outlines[i - 1] if i else offset(below or Polygons(), RIM_MM)
+        banks = edges(offset(bank + held, 0.25 * process.line_width_mm))
+        spans = [span for island in islands(bare) for span in find_bridges(island, banks, process.line_width_mm)]
+        bridged[i] = replace(overhang, bridges=(*overhang.bridges, *spans))
+    return bridged

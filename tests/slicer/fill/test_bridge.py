@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely.affinity import rotate
 
 from mdp.mesh import Mesh
-from slicer.fill.bridge import Bridge, find_bridge
+from slicer.fill.bridge import Bridge, find_bridge, find_bridges
 from slicer.geometry.polygons import Polygons, edges, offset
 from slicer.paths import Kind, Path
 from slicer.slice import slice_part
@@ -53,6 +53,22 @@ def test_no_direction_has_shorter_squared_spans(corners: list[tuple[float, float
     over = bridge_over(hanging, offset(hanging, 5) - hanging)
     shape = as_shapely(hanging)
     assert mean_span(shape, over.angle_deg) <= 1.02 * min(mean_span(shape, angle) for angle in range(0, 180, 3))
+
+
+def test_a_ring_of_bridges_between_four_legs_is_bridged_arm_by_arm() -> None:
+    legs = Polygons.compose([Polygons.square((8, 8), True).translate((x, y)) for x in (-8, 8) for y in (-8, 8)])
+    ring = Polygons.square((24, 24), True) - Polygons.square((6, 6), True)
+    pieces = find_bridges(ring - legs, edges(offset(legs, 0.25 * WIDTH)), WIDTH)
+    by_angle = {round(piece.angle_deg) % 180: piece.place.area() for piece in pieces if piece.loose == 0.0}
+    assert by_angle == {0: pytest.approx(2 * 8 * 8, rel=0.03), 90: pytest.approx(2 * 8 * 8, rel=0.03)}
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(3, 30), st.floats(2, 30), st.floats(0, 180))
+def test_a_place_that_one_direction_holds_is_one_bridge(length: float, span: float, turn: float) -> None:
+    hanging, banks = gap(length, span, turn)
+    (piece,) = find_bridges(hanging, edges(offset(banks, 0.25 * WIDTH)), WIDTH)
+    assert piece.place.area() == pytest.approx(hanging.area())
 
 
 def mean_span(shape: shapely.Geometry, angle: float) -> float:

@@ -24,8 +24,8 @@ LEDGE = 2.0  # line widths that carry themselves
 
 def supported(part: Part, *settings: str, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> tuple[Any, Supports]:
     """What the support of a part is made from, and the support."""
-    process, mesh = profile(*settings).process, part.in_part_frame()
-    heights = layer_heights(mesh, process, part.index == 1)
+    given, mesh = profile(*settings), part.in_part_frame()
+    process, heights = given.process, layer_heights(mesh, given, part.index == 1)
     outlines = [clean(loops) for loops in sections(mesh, heights.cut_mm)]
     below = plastic_beneath(part, earlier, outlines[0])
     blocked = blocked_areas(part, later, heights, process.support_distance_mm, far_mm(mesh))
