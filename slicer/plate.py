@@ -1,16 +1,18 @@
 """Plate: its outline, how well part 1 holds on it, and the first layer without the elephant's foot."""
 
-from math import inf
+from collections.abc import Sequence
 
 import numpy as np
 
 from mdp.mesh import Floats
+from mdp.overhang import PLATFORM_TOLERANCE_MM
+from mdp.support_need.patches import NARROW
+from mdp.sweep.section_moments import greatest_stress_per_moment
 from profiles.machine import Table
-from slicer.geometry.polygons import Polygons, contours, offset
+from slicer.geometry.polygons import Polygons, edges, offset, opening
 
 PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
 ADHESION_N_MM2 = 0.2  # of plastic to a clean warm plate, a few times less than published peel tests of PLA and PETG give
-TURNS = 36  # directions in which it may tip
 
 
 def plate_outline(table: Table) -> Polygons:
@@ -31,33 +33,23 @@ def tips_over(base: Polygons, height_mm: float) -> bool:
 
 
 def section_modulus_mm3(base: Polygons) -> float:
-    """Least section modulus of an area over all axes through its centroid: second moment over the farthest point."""
-    loops = contours(base)
-    if not loops:
-        return 0.0
-    area, first, second = 0.0, np.zeros(2), np.zeros((2, 2))
-    for a in loops:
-        b = np.roll(a, -1, axis=0)
-        cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
-        area += 0.5 * float(cross.sum())
-        first += (cross[:, None] * (a + b)).sum(axis=0) / 6.0
-        pairs = 2.0 * (_outer(a, a) + _outer(b, b)) + _outer(a, b) + _outer(b, a)
-        second += (cross[:, None, None] * pairs).sum(axis=0) / 24.0
-    if area <= 0.0:
-        return 0.0
-    middle = first / area
-    second -= area * np.outer(middle, middle)
-    points, least = np.concatenate(loops) - middle, inf
-    for turn in np.pi * np.arange(TURNS) / TURNS:
-        across = np.array([np.cos(turn), np.sin(turn)])
-        least = min(least, float(across @ second @ across) / float(np.abs(points @ across).max()))
-    return least
+    """Least section modulus of an area over all directions of bending, 0 of an empty one."""
+    return 1.0 / greatest_stress_per_moment(edges(base))
 
 
-def _outer(a: Floats, b: Floats) -> Floats:
-    """(n, 2, 2) products of rows."""
-    products: Floats = a[:, :, None] * b[:, None, :]
-    return products
+def lay_on_plate(outlines: Sequence[Polygons], cuts_mm: Floats, base: Polygons, width_mm: float) -> list[Polygons]:
+    """The sections of part 1, its lowest ones with all that stands on the platform.
+
+    base: the section at PLATFORM_TOLERANCE_MM, below which surfaces stand by the search's definition (mdp.overhang.standing).
+    Without it the rest of a base that is not quite level would lie in the second layer, in the air. What reaches no farther than
+    a ledge carries itself and stays as it is: fillets and chamfers keep their form.
+    """
+    ledge_mm = NARROW * width_mm
+    wide = opening(base - offset(outlines[0], ledge_mm), 0.5 * width_mm)
+    if wide.is_empty():
+        return list(outlines)
+    laid, low = offset(wide, ledge_mm + 0.5 * width_mm) ^ base, int(np.searchsorted(cuts_mm, PLATFORM_TOLERANCE_MM))
+    return [*(outline + laid for outline in outlines[:low]), *outlines[low:]]
 
 
 def compensate_elephant_foot(outline: Polygons, elephant_foot_mm: float, width_mm: float) -> Polygons:

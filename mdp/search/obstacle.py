@@ -93,6 +93,8 @@ def _lowest(solid: Solid, upward: Floats, ground_mm: float) -> Obstacle | None:
     """The lowest place, along a direction, of every piece of a solid that does not reach down to the ground."""
     places = []
     for piece in solid.decompose():
+        if piece.volume() <= 0.0:
+            continue  # a closed void
         vertices = mesh_of(piece).vertices
         heights = vertices @ upward
         if heights.min() > ground_mm:

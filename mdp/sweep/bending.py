@@ -1,9 +1,13 @@
 """Bending: how much the base of what lies above a plane is stressed when its top is pushed sideways (a numba kernel).
 
-Every piece above the plane is a beam held at its section. A push F at its top, lever L above the plane, in the worst direction,
-stresses the point p of the section (from the section's centroid) by F L |J^-1 p|, J the second moments of area: the general
-formula of unsymmetric bending. The section's moments are sums over its outline by Green's theorem.
+Every piece above the plane is a beam held at its section. A push F at its top, lever L above the plane, bends it there by F L, in
+the worst direction (mdp.sweep.section_moments).
+
+The surface above the plane falls into shells. One that bounds solid from outside encloses a positive volume between itself and
+the plane, the wall of a void or of a hole from below a negative one: it belongs to the piece in whose section its own lies.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +15,16 @@ from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.plane import Plane
+from mdp.sweep.components import UNKNOWN, root
+from mdp.sweep.section_moments import MOMENTS, add_edge, stress_per_moment
 
-AREA, X, Y, XX, YY, XY = range(6)  # columns of the sums over a piece's section
+
+class Section(NamedTuple):
+    """The segments in which k faces cross the plane, x, y, x, y, the solid on the left of each seen from above (k, 4), and the
+    shell that each belongs to (k,)."""
+
+    segments: Floats
+    shells: Ints
 
 
 def stress_per_newton(mesh: Mesh, plane: Plane, crumb_mm: float) -> float:
@@ -26,94 +38,127 @@ def stress_per_newton(mesh: Mesh, plane: Plane, crumb_mm: float) -> float:
 
 @kernel
 def _most_stress(faces: Ints, heights: Floats, across: Floats, crumb: float) -> float:
-    piece, sums, ends = _find_pieces(faces, heights), table(len(heights), 6), table(2, 2)
-    tops, farthest = floats(len(heights), 0.0), floats(len(heights), 0.0)
+    shells = _find_shells(faces, heights)
+    volumes, section = _measure(faces, heights, across, shells)
+    moments, tops, stressed = table(len(heights), len(MOMENTS)), floats(len(heights), -1.0), floats(len(heights), 0.0)
     for v in range(len(heights)):
-        if heights[v] > 0.0:
-            tops[piece[v]] = max(tops[piece[v]], heights[v])
-    for f in range(len(faces)):
-        v = _cross(faces, f, heights, across, ends)
-        if v >= 0:
-            _add(ends, sums[piece[v]])
-    for f in range(len(faces)):
-        v = _cross(faces, f, heights, across, ends)
-        if v >= 0:
-            root = piece[v]
-            for end in range(2):
-                farthest[root] = max(farthest[root], _stress(sums[root], ends[end, 0], ends[end, 1]))
+        if shells[v] >= 0 and volumes[shells[v]] > 0.0:
+            tops[shells[v]] = max(tops[shells[v]], heights[v])
+    _find_pieces(section, volumes)
+    segments, pieces = section
+    for k in range(len(pieces)):
+        if pieces[k] >= 0:
+            add_edge(segments[k], moments[pieces[k]])
+    for k in range(len(pieces)):
+        if pieces[k] >= 0:
+            stress = stress_per_moment(moments[pieces[k]], segments[k, 0], segments[k, 1])
+            stressed[pieces[k]] = max(stressed[pieces[k]], stress)
     most = 0.0
     for v in range(len(heights)):
-        if piece[v] == v and tops[v] >= crumb:
-            most = max(most, tops[v] * farthest[v] if farthest[v] > 0.0 else np.inf)
+        if tops[v] > 0.0 and tops[v] >= crumb:
+            most = max(most, tops[v] * stressed[v] if stressed[v] > 0.0 else np.inf)
     return most
 
 
 @part
-def _find_pieces(faces: Ints, heights: Floats) -> Ints:
+def _find_shells(faces: Ints, heights: Floats) -> Ints:
     """(n,) for vertices above 0 one that stands for all that edges above 0 join them with, -1 for the others."""
-    piece = ints(len(heights), -1)
+    shells = ints(len(heights), -1)
     for v in range(len(heights)):
         if heights[v] > 0.0:
-            piece[v] = v
+            shells[v] = v
     for f in range(len(faces)):
         for k in range(3):
             v, w = faces[f, k], faces[f, k - 2]
-            if piece[v] >= 0 and piece[w] >= 0:
-                a, b = _root(piece, v), _root(piece, w)
-                piece[max(a, b)] = min(a, b)
+            if shells[v] >= 0 and shells[w] >= 0:
+                a, b = root(shells, v), root(shells, w)
+                shells[max(a, b)] = min(a, b)
     for v in range(len(heights)):
-        if piece[v] >= 0:
-            piece[v] = _root(piece, v)
-    return piece
+        if shells[v] >= 0:
+            shells[v] = root(shells, v)
+    return shells
 
 
 @part
-def _root(piece: Ints, v: int) -> int:
-    while piece[v] != v:
-        piece[v] = piece[piece[v]]
-        v = piece[v]
-    return int(v)
+def _measure(faces: Ints, heights: Floats, across: Floats, shells: Ints) -> tuple[Floats, Section]:
+    """(n,) the volume between each shell and the plane, below 0 where the solid lies outside, and the section."""
+    volumes, count = floats(len(heights), 0.0), 0
+    for f in range(len(faces)):
+        shell, crosses = -1, False
+        for k in range(3):
+            shell = max(shell, shells[faces[f, k]])
+            crosses = crosses or heights[faces[f, k]] <= 0.0
+        if shell >= 0:
+            volumes[shell] += _volume(faces, f, heights, across)
+            count += int(crosses)
+    section, count = Section(table(count, 4), ints(count, -1)), 0
+    for f in range(len(faces)):
+        count += _cross(faces, f, heights, across, shells, section, count)
+    return volumes, section
 
 
 @part
-def _cross(faces: Ints, f: int, heights: Floats, across: Floats, ends: Floats) -> int:
-    """Put the segment in which a face crosses height 0 into `ends`, the solid on its left seen from above; a vertex of the face
-    above 0, -1 where it does not cross."""
-    found = -1
+def _volume(faces: Ints, f: int, heights: Floats, across: Floats) -> float:
+    """What a face adds to the volume above the plane: its area seen along the normal times the heights of what lies above."""
+    total, alone, above = 0.0, 0.0, 0
+    for k in range(3):
+        p, q, r = heights[faces[f, k]], heights[faces[f, k - 1]], heights[faces[f, k - 2]]
+        total += p
+        above += int(p > 0.0)
+        if (p > 0.0) != (q > 0.0) and (p > 0.0) != (r > 0.0):
+            alone = p * (p / (p - q)) * (p / (p - r))
+    a, b, c = across[faces[f, 0]], across[faces[f, 1]], across[faces[f, 2]]
+    twice = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+    return float(twice * (alone if above == 1 else total - alone) / 6.0)
+
+
+@part
+def _cross(faces: Ints, f: int, heights: Floats, across: Floats, shells: Ints, section: Section, at: int) -> int:
+    """Put the segment in which a face crosses height 0 at a place of the section; 1 where it does, else 0."""
+    crosses = 0
     for k in range(3):
         v, w = faces[f, k], faces[f, k - 2]
         if (heights[v] > 0.0) != (heights[w] > 0.0):
+            crosses, rising = 1, heights[w] > 0.0
             share = heights[v] / (heights[v] - heights[w])
-            rising = heights[w] > 0.0
-            found = int(w) if rising else int(v)
+            section.shells[at] = shells[w] if rising else shells[v]
             for axis in range(2):
-                ends[int(rising), axis] = across[v, axis] + share * (across[w, axis] - across[v, axis])
-    return found
+                section.segments[at, 2 * int(rising) + axis] = across[v, axis] + share * (across[w, axis] - across[v, axis])
+    return crosses
 
 
 @part
-def _add(ends: Floats, sums: Floats) -> None:
-    """Add a segment's share of a section's area and of its first and second moments."""
-    p, q, r, s = ends[0, 0], ends[0, 1], ends[1, 0], ends[1, 1]
-    twice = p * s - r * q
-    sums[AREA] += twice / 2.0
-    sums[X] += (p + r) * twice / 6.0
-    sums[Y] += (q + s) * twice / 6.0
-    sums[XX] += (p * p + p * r + r * r) * twice / 12.0
-    sums[YY] += (q * q + q * s + s * s) * twice / 12.0
-    sums[XY] += (p * s + 2.0 * p * q + 2.0 * r * s + r * q) * twice / 24.0
+def _find_pieces(section: Section, volumes: Floats) -> None:
+    """Give the segments of every void to the piece around it, -1 where there is none: of the shells in whose section the void's
+    lies the one with the least."""
+    segments, shells = section
+    holders, areas, around = ints(len(volumes), UNKNOWN), floats(len(volumes), 0.0), ints(len(volumes), 0)
+    for k in range(len(shells)):
+        areas[shells[k]] += 0.5 * (segments[k, 0] * segments[k, 3] - segments[k, 2] * segments[k, 1])
+    for k in range(len(shells)):
+        void = shells[k]
+        if volumes[void] >= 0.0:
+            holders[void] = void
+        elif holders[void] == UNKNOWN:
+            holders[void] = _find_holder(section, volumes, areas, around, k)
+    for k in range(len(shells)):
+        shells[k] = holders[shells[k]]
 
 
 @part
-def _stress(sums: Floats, x: float, y: float) -> float:
-    """|J^-1 p| of a point p of a section, 1/mm3; infinite where the section has no second moments."""
-    area = sums[AREA]
-    if area <= 0.0:
-        return np.inf
-    a, b = sums[X] / area, sums[Y] / area
-    xx, yy, xy = sums[XX] - area * a * a, sums[YY] - area * b * b, sums[XY] - area * a * b
-    determinant = xx * yy - xy * xy
-    if determinant <= 0.0:
-        return np.inf
-    u, v = x - a, y - b
-    return float(np.sqrt((yy * u - xy * v) ** 2 + (xx * v - xy * u) ** 2) / determinant)
+def _find_holder(section: Section, volumes: Floats, areas: Floats, around: Ints, own: int) -> int:
+    """The shell of positive volume and least area whose outline runs around the middle of a segment. around: zeros, (n,)."""
+    segments, shells = section
+    x, y = 0.5 * (segments[own, 0] + segments[own, 2]), 0.5 * (segments[own, 1] + segments[own, 3])
+    for k in range(len(shells)):
+        p, q, r, s = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
+        if (q > y) != (s > y) and p + (y - q) / (s - q) * (r - p) > x:
+            around[shells[k]] += 1 if s > y else -1
+    holder = -1
+    for k in range(len(shells)):
+        shell = shells[k]
+        if around[shell] != 0 and volumes[shell] > 0.0 and (holder < 0 or areas[shell] < areas[holder]):
+            holder = shell
+    for k in range(len(shells)):
+        around[shells[k]] = 0
+    return int(holder)

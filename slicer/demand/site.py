@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from mdp.decomposition import Part
+from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import first_layer_process, with_line_width
@@ -16,7 +17,7 @@ from slicer.geometry.polygons import Polygons, clean, union
 from slicer.heights import Heights, layer_heights
 from slicer.interface.interface import plastic_beneath
 from slicer.interface.interlock import cut_grooves
-from slicer.plate import compensate_elephant_foot, plate_outline
+from slicer.plate import compensate_elephant_foot, lay_on_plate, plate_outline
 from slicer.section import sections
 from slicer.support.blocker import blocked_areas, far_mm
 from slicer.support.missed import drop_small
@@ -100,9 +101,12 @@ def survey(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequenc
     profile = vase_profile(profile.of_part(part.index))
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
-    heights = layer_heights(mesh, process, on_platform, pedestal_mm)
+    heights = layer_heights(mesh, profile, on_platform, pedestal_mm)
     pedestal_count = pedestal_layers(heights.tip_mm, pedestal_mm)
     outlines = [clean(loops, process.slit_closing_mm) for loops in sections(mesh, heights.cut_mm)]
+    if on_platform and not pedestal_count:
+        base = clean(sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
+        outlines = lay_on_plate(outlines, heights.cut_mm, base, process.line_width_mm)
     outlines = compensate(outlines, part, later, heights.cut_mm, process)
     if on_platform:
         outlines[0] = compensate_elephant_foot(outlines[0], process.elephant_foot_mm, first_layer_process(process).line_width_mm)

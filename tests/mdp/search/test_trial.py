@@ -9,7 +9,7 @@ from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.search.search import cut_by_plan
 from mdp.search.trial import Trials
 from profiles.profile import load
-from tests.shapes import box, tee
+from tests.shapes import box, hollow_tee, tee
 
 PROFILE = load(settings=["search.directions=60"])
 ARMS = (Plane(np.array([1.0, 0.0, 0.0]), 8.0), Plane(np.array([-1.0, 0.0, 0.0]), 8.0))
@@ -115,6 +115,13 @@ def test_what_would_float_is_marked_at_its_lowest_place() -> None:
     assert tried.obstacle is not None
     ((x, _, z),) = tried.obstacle.places_mm
     assert (x, z) == (-20.0, 30.0)
+
+
+def test_a_void_is_not_marked_as_floating() -> None:
+    tried = trials(hollow_tee()).attempt((Plane(np.array([0.8, 0.0, 0.6]), 13.0),))  # the void at -x reaches up to 12.6 mm
+    assert "would not stand on the platform" in tried.refused
+    assert tried.obstacle is not None
+    assert [place[2] for place in tried.obstacle.places_mm] == [30.0]
 
 
 def test_the_neck_is_that_of_what_the_parts_printed_later_leave() -> None:

@@ -3,10 +3,15 @@
 import manifold3d as m3
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from mdp.cut import Solid, mesh_of
+from mdp.cut import Solid, above, mesh_of, solid_of
+from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.sweep.bending import stress_per_newton
+from tests import shapes
+from tests.mdp.solids import random_direction, random_solid
 
 LEVEL = Plane(np.array([0.0, 0.0, 1.0]), 5.0)
 
@@ -50,3 +55,76 @@ def test_an_arch_is_one_piece_on_two_feet() -> None:
 
 def test_a_crumb_may_stand_on_anything() -> None:
     assert _stress(m3.Manifold.cube((1.0, 1.0, 6.9))) == 0.0
+
+
+def _box(size_mm: float, x: float, y: float, z: float) -> Solid:
+    """A cube about a point."""
+    return m3.Manifold.cube((size_mm,) * 3, True).translate((x, y, z))
+
+
+def _corner_stress(lever_mm: float, width_mm: float, xx: float, yy: float) -> float:
+    """At the corner of a square section of that width about its centroid, its axes the principal ones."""
+    return lever_mm * float(np.hypot(0.5 * width_mm / xx, 0.5 * width_mm / yy))
+
+
+def test_a_closed_void_is_missing_from_the_section_around_it() -> None:
+    hollow = solid_of(shapes.hollow())  # 20 mm, the void from 5 to 15 mm
+    inertia = (20.0**4 - 10.0**4) / 12.0
+    assert _stress(hollow, Plane(LEVEL.normal, 9.0)) == pytest.approx(_corner_stress(11.0, 20.0, inertia, inertia))
+    whole = 20.0**4 / 12.0
+    assert _stress(hollow, Plane(LEVEL.normal, 3.0)) == pytest.approx(_corner_stress(17.0, 20.0, whole, whole))
+    assert _stress(hollow, Plane(LEVEL.normal, 16.0)) == pytest.approx(_corner_stress(4.0, 20.0, whole, whole))
+
+
+def test_an_eccentric_void_moves_the_centroid() -> None:
+    pierced = _box(20.0, 0.0, 0.0, 10.0) - _box(8.0, 4.0, 0.0, 10.0)
+    shift = -64.0 * 4.0 / (400.0 - 64.0)  # of the centroid along x
+    xx = 20.0**4 / 12.0 + 400.0 * shift**2 - 8.0**4 / 12.0 - 64.0 * (4.0 - shift) ** 2
+    yy = (20.0**4 - 8.0**4) / 12.0
+    expected = 10.0 * np.hypot((10.0 - shift) / xx, 10.0 / yy)
+    assert _stress(pierced, Plane(LEVEL.normal, 10.0)) == pytest.approx(expected)
+
+
+def test_a_hole_from_below_is_missing_from_the_section() -> None:
+    drilled = _box(20.0, 0.0, 0.0, 10.0) - _box(10.0, 0.0, 0.0, 5.0)
+    inertia = (20.0**4 - 10.0**4) / 12.0
+    assert _stress(drilled) == pytest.approx(_corner_stress(15.0, 20.0, inertia, inertia))
+
+
+def test_a_void_belongs_to_the_piece_around_it_and_what_is_loose_inside_hangs_on_nothing() -> None:
+    """Boxes in each other about one middle: solid, void, a second solid, its void."""
+    outer, inner = _box(40.0, 0, 0, 20) - _box(30.0, 0, 0, 20), _box(20.0, 0, 0, 20) - _box(10.0, 0, 0, 20)
+    both = m3.Manifold.compose([outer, inner])
+    tube = (20.0**4 - 10.0**4) / 12.0
+    assert _stress(both, Plane(LEVEL.normal, 20.0)) == pytest.approx(_corner_stress(10.0, 20.0, tube, tube))
+    assert _stress(both, Plane(LEVEL.normal, 7.0)) == np.inf
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.integers(1, 999), st.integers(1, 999), st.floats(0.1, 0.9))
+def test_random_solids_are_stressed_as_their_exact_pieces(seed: int, height: int, around: int, share: float) -> None:
+    mesh, normal = random_solid(seed), random_direction(height, around)
+    low, high = (mesh.vertices @ normal).min(), (mesh.vertices @ normal).max()
+    plane = Plane(normal, float(low + share * (high - low)))
+    assert stress_per_newton(mesh, plane, 2.0) == pytest.approx(_greatest_stress(mesh, plane, 2.0), rel=1e-4)
+
+
+def _greatest_stress(mesh: Mesh, plane: Plane, crumb_mm: float) -> float:
+    """Every piece cut off exactly, the moments of its base face by face, pushed in 720 directions."""
+    pieces = [mesh_of(piece) for piece in above(solid_of(mesh), plane).decompose() if piece.volume() > 0.0]
+    tops = [float(plane.heights_mm(piece.vertices).max()) for piece in pieces]
+    return max(
+        (top * _base_stress(piece, plane) for piece, top in zip(pieces, tops, strict=True) if top >= crumb_mm), default=0.0
+    )
+
+
+def _base_stress(piece: Mesh, plane: Plane) -> float:
+    side = np.linalg.svd(plane.normal[None])[2][1:]
+    base = np.abs(plane.heights_mm(piece.vertices)[piece.faces]).max(axis=1) < 1e-7
+    corners, areas = piece.vertices[piece.faces[base]] @ side.T, piece.areas_mm2[base]
+    corners = corners - (areas[:, None] * corners.mean(axis=1)).sum(axis=0) / areas.sum()
+    middles = 0.5 * (corners + np.roll(corners, 1, axis=1))  # their mean is exact for what is quadratic
+    moments: Floats = np.einsum("f,fki,fkj->ij", areas / 3.0, middles, middles)
+    turns = np.pi * np.arange(720) / 720
+    pushes = np.linalg.solve(moments, np.stack([np.cos(turns), np.sin(turns)]))
+    return float(np.abs(corners.reshape(-1, 2) @ pushes).max())
