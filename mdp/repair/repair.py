@@ -10,7 +10,17 @@ from mdp.repair.edges import edges_of
 from mdp.repair.holes import fill_holes
 from mdp.repair.overlap import overlaps_itself, resolve_overlap
 from mdp.repair.sheets import cancel_opposite_faces, drop_duplicate_faces, drop_loose_sheets
-from mdp.repair.shells import drop_specks, orient_outward, shells_of, solid_of, surface_of, unite, volume_of
+from mdp.repair.shells import (
+    FLAT_SHEETS,
+    check_count,
+    drop_specks,
+    orient_outward,
+    shells_of,
+    solid_of,
+    surface_of,
+    unite,
+    volume_of,
+)
 from mdp.repair.weld import drop_collapsed_faces, drop_unused_vertices, merge_rim_vertices, merge_vertices
 from mdp.repair.winding import format_point, orient_faces, split_shared_edges, split_touching_fans
 from profiles.errors import MeshError
@@ -54,7 +64,7 @@ def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
         raise MeshError(f"cannot be made a valid solid: the closed part of it lacks {lost:.3g} mm of its extent of {size:.4g} mm")
     solid, whole = _read_as_solid(solid, notes)
     if whole.volume() <= 0:
-        raise MeshError("encloses no volume")
+        raise MeshError(f"encloses no volume: {FLAT_SHEETS}")
     return (_count_once(solid, whole, notes) if overlaps_itself(whole) else solid), notes
 
 
@@ -172,6 +182,7 @@ def _unite_shells(closed: list[Surface], size: float, notes: list[str]) -> Surfa
     """The shells of closed surfaces turned outwards and united; the surfaces as they are when nothing of that is needed."""
     shells = [shell for surface in closed for shell in shells_of(surface)]
     shells, specks = drop_specks(shells)
+    check_count(shells)
     shells, turned = orient_outward(shells)
     solid, fused = unite(shells, WELD_SHARES[0] * size)
     repairs = [*specks, *turned, *fused]

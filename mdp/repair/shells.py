@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     import manifold3d as m3
 
 NEGLIGIBLE = 1e-7  # of the volume of all shells: 0.1 mm across beside a 20 mm cube
+FLAT_SHEETS = "its faces lie in one plane or on each other; give it a thickness (Blender: Solidify)"
 FLAT = 1e-9  # of the cube of a shell's diagonal
+MOST_BODIES = 2000  # of which each takes its time in every step, 20 s of export for so many cubes of 1 mm
 SAMPLES = 24  # vertices of a shell that must all lie inside another for it to count as contained
 
 
@@ -88,9 +90,19 @@ def drop_specks(shells: list[Shell]) -> tuple[list[Shell], list[str]]:
         if abs(shell.volume) > max(NEGLIGIBLE * total, FLAT * float(np.linalg.norm(shell.high - shell.low)) ** 3)
     ]
     if not sizeable:
-        raise MeshError(f"encloses no volume: its {sum(len(shell.faces) for shell in shells)} faces are flat")
+        raise MeshError(f"encloses no volume: {FLAT_SHEETS}")
     gone = len(shells) - len(sizeable)
     return sizeable, [f"left out {gone} shell{'s' * (gone > 1)} with next to no volume"] if gone else []
+
+
+def check_count(shells: list[Shell]) -> None:
+    """Raises MeshError for more bodies than are taken; voids are none."""
+    bodies = sum(shell.volume > 0 for shell in shells) or len(shells)
+    if bodies > MOST_BODIES:
+        raise MeshError(
+            f"is {bodies} separate bodies, at most {MOST_BODIES} are taken: unite those that belong together (Blender: Boolean, "
+            "Union), or save them in several files"
+        )
 
 
 def orient_outward(shells: list[Shell]) -> tuple[list[Shell], list[str]]:

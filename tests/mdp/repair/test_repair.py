@@ -196,7 +196,10 @@ def test_a_one_sided_surface_is_refused() -> None:
 
 def test_flat_faces_enclose_no_volume() -> None:
     flat = Mesh(box().vertices * [1, 1, 0], box().faces)
-    assert "encloses no volume" in refusal(flat)
+    assert "encloses no volume: its faces lie in one plane or on each other; give it a thickness" in refusal(flat)
+    sheet = placed(20, 0.5, 20)
+    doubled = Mesh(sheet.vertices[:3], np.array([[0, 1, 2], [2, 1, 0]]))
+    assert "give it a thickness" in refusal(doubled)
     assert "lie in one point (0, 0, 0)" in refusal(Mesh(box().vertices * 0, box().faces))
 
 
