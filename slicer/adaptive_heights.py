@@ -58,10 +58,11 @@ def _worst(z: Floats, faces: Ints, leaning: Floats, bin_mm: float, bins: int) ->
 
 
 def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float) -> list[float]:
-    """Heights of layers from one height up to another, each as high as the surface beside it allows; mesh: part frame.
+    """Heights of layers from one height up towards another, each as high as the surface beside it allows; mesh: part frame.
 
-    Layers end at level surfaces and at the top. None is lower than least_layer_height_mm (but one that is all there is);
-    where what is left under a level is less than two of the least, one layer takes all of it.
+    Layers end at level surfaces and at the top, none is lower than least_layer_height_mm or higher than most_layer_height_mm:
+    where what is left under a level is less than two of the least, one layer takes all of it, or the level is passed over where
+    that one would be too high. What is left so under the top is not taken.
     """
     slopes, least_mm = _measure_slopes(mesh, process), process.least_layer_height_mm
     stops = [level for level in slopes.levels_mm.tolist() if from_mm < level < top_mm - least_mm] + [top_mm]
@@ -72,6 +73,8 @@ def adaptive_heights(mesh: Mesh, process: Process, from_mm: float, top_mm: float
             continue
         while stop - z > 1e-9:
             height, left = _highest(slopes, z), stop - z
+            if process.most_layer_height_mm + 1e-9 < left < 2.0 * least_mm:
+                break
             if left <= height + 1e-9 or left < 2.0 * least_mm:
                 height = left
             elif left < height + least_mm:

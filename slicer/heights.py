@@ -1,18 +1,18 @@
 """Heights: where the layers of a part lie and where its mesh is cut for them."""
 
 from dataclasses import dataclass
-from math import floor
+from math import ceil, floor
 
 import numpy as np
 
 from mdp.mesh import Floats, Mesh
 from profiles.errors import SliceError
 from profiles.process import Process
+from profiles.profile import Profile
 from slicer.adaptive_heights import adaptive_heights
 
-LEAST_SHARE = 0.25  # a layer thinner than this share of the layer height does not come out of the nozzle evenly
+LEAST_SHARE = 0.25  # by which a layer may differ from its neighbours: thinner than this share of them it comes out unevenly
 MOST_LAYERS = 50_000  # ten metres of 0.2 mm; beyond that a unit or the scale is wrong
-MOST_SHARE = 0.9  # of the line width: a higher bead does not stick, the bound of the process profile
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,52 +29,69 @@ class Heights:
         return self.tip_mm - self.height_mm
 
 
-def layer_heights(mesh: Mesh, process: Process, on_platform: bool, pedestal_mm: float = 0.0) -> Heights:
+def layer_heights(mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: float = 0.0) -> Heights:
     """Layers of a part's mesh in its own frame, adaptive where process.adaptive_cusp_mm asks for it.
 
     A pedestal is sliced for itself and ends pedestal_gap_mm below the model. Raises SliceError as equal_heights().
     """
-    top = float(mesh.bounds_mm[1, 2])
-    if process.pedestal_gap_mm < pedestal_mm < top:
-        low, high = (
-            equal_heights(pedestal_mm - process.pedestal_gap_mm, process, True),
-            _heights_on_pedestal(mesh, process, pedestal_mm, process.first_layer_height_mm),
-        )
+    process, nozzle_mm, top = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
+    roof_mm = pedestal_mm - process.pedestal_gap_mm
+    if pedestal_mm < top and roof_mm >= process.least_layer_height_mm:
+        low = equal_heights(roof_mm, process, True, nozzle_mm)
+        high = _heights_from(mesh, process, nozzle_mm, pedestal_mm, pedestal_mm, process.first_layer_height_mm)
         both = ((low.tip_mm, high.tip_mm), (low.height_mm, high.height_mm), (low.cut_mm, high.cut_mm))
         return Heights(*(np.concatenate(two) for two in both))
-    if process.adaptive_cusp_mm <= 0.0:
-        return equal_heights(top, process, on_platform)
-    _check(top, process)
     overlap, first = _first(process, on_platform)
-    if top + overlap <= first + process.least_layer_height_mm:
-        return equal_heights(top, process, on_platform)
-    thick = [first, *adaptive_heights(mesh, process, first - overlap, top)]
-    return _stack_layers(np.array(thick), -overlap, 0.0, top)
+    return _heights_from(mesh, process, nozzle_mm, -overlap, 0.0, first)
 
 
-def equal_heights(top_mm: float, process: Process, on_platform: bool) -> Heights:
+def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm: float) -> Heights:
     """Equal layers of a part that reaches from its base plane up to top_mm.
 
     A part on plastic begins pressed into it by the interface overlap: the tip of layer i = 1, 2, ... is at
     i * height - overlap. Each section is taken in the middle of what its layer fills above the base plane. The last
-    layer meets the top: it is lower, or the one below is stretched when less than a quarter layer remains.
+    layer meets the top: it is lower, or, where that would make it lower than least_layer_height_mm or a quarter layer, the
+    last few share what remains. A part lower than the least layer is one of that height.
     Raises SliceError for a part that is too high to be meant.
     """
     _check(top_mm, process)
     overlap, first = _first(process, on_platform)
-    thick = _thicknesses(top_mm + overlap, first, process.layer_height_mm, MOST_SHARE * process.line_width_mm)
-    return _stack_layers(thick, -overlap, 0.0, top_mm)
+    return _equal_from(top_mm, process, nozzle_mm, -overlap, 0.0, first)
 
 
-def _heights_on_pedestal(mesh: Mesh, process: Process, from_mm: float, first_mm: float) -> Heights:
-    """Layers of what stands on a pedestal."""
-    top = float(mesh.bounds_mm[1, 2])
+def _heights_from(mesh: Mesh, process: Process, nozzle_mm: float, from_mm: float, base_mm: float, first_mm: float) -> Heights:
+    """Layers from one height up to the mesh's top, the first of a given height; base_mm: where the mesh begins."""
+    top, least = float(mesh.bounds_mm[1, 2]), process.least_layer_height_mm
     _check(top, process)
-    if process.adaptive_cusp_mm > 0.0 and top - from_mm > first_mm + process.least_layer_height_mm:
-        thick = [first_mm, *adaptive_heights(mesh, process, from_mm + first_mm, top)]
-        return _stack_layers(np.array(thick), from_mm, from_mm, top)
-    most = MOST_SHARE * process.line_width_mm
-    return _stack_layers(_thicknesses(top - from_mm, first_mm, process.layer_height_mm, most), from_mm, from_mm, top)
+    adaptive = process.adaptive_cusp_mm > 0.0 and top - from_mm > first_mm + least
+    thick = adaptive_heights(mesh, process, from_mm + first_mm, top) if adaptive else []
+    if not thick:
+        return _equal_from(top, process, nozzle_mm, from_mm, base_mm, first_mm)
+    rest = top - from_mm - first_mm - sum(thick)
+    if rest > 1e-6:
+        thick = _spread(thick, rest, least, process.most_layer_height_mm)
+    return _stack_layers(np.array([first_mm, *thick]), from_mm, base_mm, top)
+
+
+def _equal_from(top_mm: float, process: Process, nozzle_mm: float, from_mm: float, base_mm: float, first_mm: float) -> Heights:
+    """The same of equal layers. What is no higher than a layer and a little is one layer, pressed in less deep if need be."""
+    layer, total, most = process.layer_height_mm, top_mm - from_mm, min(process.highest_layer_mm, nozzle_mm)
+    count = max(floor((total - first_mm) / layer + 1e-9), 0)
+    rest = total - first_mm - count * layer
+    least = min(max(process.least_layer_height_mm, LEAST_SHARE * layer), layer)
+    thick = [layer] * count
+    if rest <= 0.0 and not count:
+        first_mm = max(total, min(process.least_layer_height_mm, first_mm))
+    elif rest >= least - 1e-9:
+        thick.append(rest)
+    elif count:
+        thick = _spread(thick, rest, least, most)
+    elif from_mm < base_mm:
+        first_mm = min(total, most)
+        from_mm = top_mm - first_mm
+    else:
+        first_mm, *thick = _spread([first_mm], rest, least, most)
+    return _stack_layers(np.array([first_mm, *thick]), from_mm, base_mm, top_mm)
 
 
 def _first(process: Process, on_platform: bool) -> tuple[float, float]:
@@ -100,16 +117,15 @@ def _check(top_mm: float, process: Process) -> None:
         )
 
 
-def _thicknesses(total: float, first: float, layer: float, most: float) -> Floats:
-    if total <= first:
-        return np.array([max(total, LEAST_SHARE * first)])
-    count = floor((total - first) / layer + 1e-9)
-    thick = [first] + [layer] * count
-    rest = total - first - count * layer
-    if rest > LEAST_SHARE * layer:
-        thick.append(rest)
-    elif thick[-1] + rest <= most:
-        thick[-1] += rest
-    else:
-        thick[-1:] = [0.5 * (thick[-1] + rest)] * 2
-    return np.array(thick)
+def _spread(thick: list[float], rest: float, least: float, most: float) -> list[float]:
+    """Layers with the last few made alike, so that they take a rest too: as few as stay between least and most and are not much
+    higher than they were. All of them, none above most, where there are too few."""
+    total = rest
+    for tail, last in enumerate(reversed(thick), 1):
+        total += last
+        highest = min(most, (1.0 + LEAST_SHARE) * max(thick[-tail:]))
+        count = ceil(total / highest - 1e-9)
+        if total / count >= least - 1e-9:
+            return [*thick[:-tail], *[total / count] * count]
+    count = ceil(total / most - 1e-9)
+    return [total / count] * count

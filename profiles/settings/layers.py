@@ -25,7 +25,11 @@ class Layers(Frozen):
         description="layers are made as thick as steps of the surface no deeper than this allow, mm; 0: all layers alike",
     )
     least_layer_height_mm: float = Field(
-        0.08, ge=0.02, le=2, description="adaptive layers are not thinner: below a fifth of the nozzle a bead flows unevenly, mm"
+        0.08,
+        ge=0.02,
+        le=2,
+        description="no layer is thinner, adaptive or the last under a top, unless layer_height_mm is: below a fifth of the "
+        "nozzle a bead flows unevenly, mm",
     )
     most_layer_height_mm: float = Field(
         0.28, ge=0.02, le=2, description="adaptive layers are not thicker: seven tenths of the nozzle still bond well, mm"

@@ -85,7 +85,7 @@ def sample_part(part: Part, profile: Profile, later: Sequence[Part] = ()) -> Sam
     """
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     pedestal_mm = profile.search.pedestal_mm if on_platform else 0.0
-    heights = layer_heights(mesh, process, on_platform, pedestal_mm)
+    heights = layer_heights(mesh, profile, on_platform, pedestal_mm)
     count = len(heights.tip_mm)
     pedestal = pedestal_layers(heights.tip_mm, pedestal_mm)
     choice = choose_layers(mesh, heights, process, max(1 if on_platform else process.interface_layers, pedestal))
