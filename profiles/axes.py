@@ -1,10 +1,11 @@
 """Axes: the linear axes of a machine, and the rotary ones that tilt and turn its table."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterable
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from profiles.frozen import Frozen, Limits, Vector, refuse
+from profiles.frozen import Frozen, Limits, Vector
 
 Letter = Annotated[str, Field(pattern=r"^[ABCUVWIJK]$")]
 
@@ -25,10 +26,8 @@ class LinearAxis(Frozen):
         "mm; left out: the least of limits_mm for X and Y, the greatest for Z",
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        refuse(_reversed(self.limits_mm, "limits_mm"))
-        return self
+    def _problems(self) -> Iterable[str]:
+        return _reversed(self.limits_mm, "limits_mm")
 
 
 class RotaryAxis(Frozen):
@@ -74,15 +73,13 @@ class RotaryAxis(Frozen):
         least, most = self.limits_deg
         return max(least, self.zero_deg - self.budget_deg), min(most, self.zero_deg + self.budget_deg)
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _problems(self) -> Iterable[str]:
         problems = _reversed(self.limits_deg, "limits_deg") if not isinstance(self, StillAxis) else []
         if sum(x * x for x in self.axis) < 1e-12:
             problems.append(f"axis is {list(self.axis)}: a direction must not be zero")
         if not problems and not self.limits_deg[0] <= self.zero_deg <= self.limits_deg[1]:
             problems.append(f"zero_deg is {self.zero_deg:g}: it must lie inside limits_deg {list(self.limits_deg)}")
-        refuse(problems)
-        return self
+        return problems
 
 
 class StillAxis(RotaryAxis):

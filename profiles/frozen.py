@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable
 from types import NoneType
-from typing import Any, get_args
+from typing import Any, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 Vector = tuple[float, float, float]
 Limits = tuple[float, float]
+KEY_BY_KEY = "key by key"  # context of a validation that leaves out what keys must be together
 
 
 class Frozen(BaseModel):
@@ -30,14 +31,19 @@ class Frozen(BaseModel):
             raise PydanticCustomError("truth_as_number", "true and false are no numbers")
         return value
 
+    def _problems(self) -> Iterable[str]:
+        """What the keys must be together and are not, each one sentence."""
+        return ()
+
+    @model_validator(mode="after")
+    def _check(self, info: ValidationInfo) -> Self:
+        """Raise all problems of the table at once, one a line: profiles.wording makes a sentence of each."""
+        sentences = () if info.context == KEY_BY_KEY else tuple(self._problems())
+        if sentences:
+            raise ValueError("\n".join(sentences))
+        return self
+
 
 def may_be_left_out(annotation: Any) -> bool:
     """Whether a key of this type may have no value."""
     return NoneType in get_args(annotation)
-
-
-def refuse(problems: Iterable[str]) -> None:
-    """Raise all problems of a table at once, one a line: profiles.wording makes a sentence of each."""
-    sentences = list(problems)
-    if sentences:
-        raise ValueError("\n".join(sentences))

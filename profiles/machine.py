@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable
 from math import acos, cos, degrees, hypot, radians
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from profiles.axes import STANDING, LinearAxis, RotaryAxis
 from profiles.dialects import FOLLOWS_TABLE
-from profiles.frozen import Frozen, Vector, refuse
+from profiles.frozen import Frozen, Vector
 from profiles.wording import keys, nearest
 
 if TYPE_CHECKING:
@@ -30,13 +30,11 @@ class Box(Frozen):
     min_mm: Vector = Field(description="least x, y, z relative to the tip, mm")
     max_mm: Vector = Field(description="greatest x, y, z relative to the tip, mm")
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _problems(self) -> Iterable[str]:
         problems = _inverted(self.name, self.min_mm, self.max_mm)
         if self.min_mm[2] < 0:
             problems.append(f"box {self.name}: min_mm z is {self.min_mm[2]:g}: no body may hang below the tip")
-        refuse(problems)
-        return self
+        return problems
 
 
 def _inverted(name: str, least_mm: Vector, most_mm: Vector) -> list[str]:
@@ -51,10 +49,8 @@ class CradleBox(Frozen):
     min_mm: Vector = Field(description="least x, y, z from the workpiece origin at tilt 0, mm; the plate's surface is z = 0")
     max_mm: Vector = Field(description="greatest x, y, z from the workpiece origin at tilt 0, mm")
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        refuse(_inverted(self.name, self.min_mm, self.max_mm))
-        return self
+    def _problems(self) -> Iterable[str]:
+        return _inverted(self.name, self.min_mm, self.max_mm)
 
     @property
     def nearest_mm(self) -> float:
@@ -72,8 +68,7 @@ class Head(Frozen):
     )
     boxes: list[Box] = Field(default=[], description="fan duct, carriage, gantry beam")
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _problems(self) -> Iterable[str]:
         problems = [
             f"silhouette_mm: [{r1:g}, {h1:g}] follows [{r0:g}, {h0:g}]: radii must rise and heights must not fall"
             for (r0, h0), (r1, h1) in zip(self.silhouette_mm, self.silhouette_mm[1:], strict=False)
@@ -81,8 +76,7 @@ class Head(Frozen):
         ]
         if self.silhouette_mm[0][0] < 0 or self.silhouette_mm[0][1] < 0:
             problems.append("silhouette_mm: radius and height must not be negative")
-        refuse(problems)
-        return self
+        return problems
 
 
 class Table(Frozen):
@@ -102,11 +96,9 @@ class Table(Frozen):
         numbers = isinstance(size, list | tuple) and all(isinstance(x, int | float) for x in size)
         return given | {"radius_mm": hypot(*size) / 2.0} if size and numbers else given
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def _problems(self) -> Iterable[str]:
         if self.size_mm is not None and min(self.size_mm) <= 0:
-            refuse([f"size_mm is {list(self.size_mm)}: both numbers must be above 0"])
-        return self
+            yield f"size_mm is {list(self.size_mm)}: both numbers must be above 0"
 
 
 class Blocks(Frozen):
@@ -207,10 +199,8 @@ class Machine(Frozen):
             return given
         return given | STANDING
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        refuse([*self._words(), *(self._axes() if self.tilts else []), *self._named(), *self._in_the_plate()])
-        return self
+    def _problems(self) -> Iterable[str]:
+        return [*self._words(), *(self._axes() if self.tilts else []), *self._named(), *self._in_the_plate()]
 
     def _words(self) -> Iterable[str]:
         if self.coordinates == "workpiece" and not FOLLOWS_TABLE[self.dialect]:

@@ -3,15 +3,16 @@
 from collections.abc import Iterable
 from typing import Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from profiles.errors import ProfileError
 from profiles.frozen import Frozen
+from profiles.problems.of_several import unfit_for_nozzle
+from profiles.problems.of_table import table_problems
 from profiles.process import Process
 from profiles.settings.plate import Plate
 from profiles.settings.support import Support
 from profiles.toml_text import read_value
-from profiles.wording import sentences
 
 MOST_PARTS = 1000
 # What decides where a model is cut or what stands on other parts, what only the plate knows, what moves between parts share.
@@ -71,15 +72,18 @@ def parse_part_settings(text: str) -> PartSettings:
     return PartSettings(part=int(number), process=values)
 
 
-def merge_part_settings(process: Process, given: Iterable[PartSettings]) -> list[PartSettings]:
+def merge_part_settings(process: Process, given: Iterable[PartSettings], nozzle_mm: float) -> list[PartSettings]:
     """One entry a part, in print order, values as the process's own keys have them; what is given later wins.
 
-    Raises ProfileError with every key that is none, that holds for the whole print, or whose value is not allowed.
+    Raises ProfileError with every key that is none, that holds for the whole print, or whose value is not allowed, also by the
+    nozzle's diameter.
     """
     merged: dict[int, dict[str, Any]] = {}
     for each in given:
         merged[each.part] = merged.get(each.part, {}) | each.process
-    problems = [f"part {part}: {problem}" for part in sorted(merged) for problem in _problems(process, part, merged[part])]
+    problems = [
+        f"part {part}: {problem}" for part in sorted(merged) for problem in _problems(process, part, merged[part], nozzle_mm)
+    ]
     if problems:
         raise ProfileError("; ".join(problems))
     settled = {part: process_of_part(process, own).model_dump() for part, own in sorted(merged.items())}
@@ -91,13 +95,13 @@ def process_of_part(process: Process, own: dict[str, Any]) -> Process:
     return Process.model_validate(process.model_dump() | own)
 
 
-def _problems(process: Process, part: int, own: dict[str, Any]) -> Iterable[str]:
+def _problems(process: Process, part: int, own: dict[str, Any], nozzle_mm: float) -> Iterable[str]:
     for key in own:
         if key in OF_THE_PRINT:
             yield f"process.{key} holds for the whole print: --set process.{key}=... sets it"
         elif part == 1 and key in OF_PARTS_ON_PLASTIC:
             yield f"process.{key} holds for parts that stand on plastic: part 1 stands on the platform"
-    try:
-        process_of_part(process, own)
-    except ValidationError as error:
-        yield from sentences(error.errors(), Process, "process.")
+    table = process.model_dump()
+    checked = table_problems(Process, "process.", table | own, table)
+    yield from checked.problems
+    yield from (text for text in unfit_for_nozzle(checked.value, nozzle_mm) if not checked.tells_of_mended(text))

@@ -25,6 +25,11 @@ def shipped(kind: str) -> list[str]:
     return sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
 
 
+def shipped_of_dialect(dialect: str) -> list[str]:
+    """Names of the shipped machines whose firmware is written so, sorted."""
+    return [name for name in shipped("machine") if _shipped_document("machine", name)["machine"]["dialect"] == dialect]
+
+
 def own_folder(kind: str) -> Path:
     """The user's folder for profiles of a kind: in $XDG_CONFIG_HOME, else where the platform keeps settings."""
     return settings_folder() / "profiles" / KINDS[kind]

@@ -1,8 +1,6 @@
 """The process: how a part is sliced and printed."""
 
-from typing import Self
-
-from pydantic import model_validator
+from collections.abc import Iterable
 
 from profiles.settings.finish import Finish
 from profiles.settings.infill import Infill
@@ -23,26 +21,38 @@ WIDTHS = (
     "support_line_width_mm",
 )
 
+MOST_SHARE = 0.9  # of a line's width: a higher bead does not stick
+
 
 class Process(Motion, Interface, Plate, Support, Infill, Finish, Shell, Layers):
     """Slicing and printing settings: those of all its bases, the last one's first."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        adaptive = ("least_layer_height_mm", "most_layer_height_mm") if self.adaptive_cusp_mm > 0 else ()
+    @property
+    def heights(self) -> tuple[str, ...]:
+        """The keys of the heights that layers are made with."""
+        return (*HEIGHTS, *(("least_layer_height_mm", "most_layer_height_mm") if self.adaptive_cusp_mm > 0 else ()))
+
+    @property
+    def highest_layer_mm(self) -> float:
+        """The highest layer that all lines but those of the first layer can be."""
+        widths: list[float | None] = [getattr(self, key) for key in WIDTHS if key != "first_layer_line_width_mm"]
+        return MOST_SHARE * min(width for width in widths if width is not None)
+
+    def _problems(self) -> Iterable[str]:
         for wide, width in ((wide, getattr(self, wide)) for wide in WIDTHS):
             first = wide == "first_layer_line_width_mm"
-            for key in ("first_layer_height_mm",) if first else (*HEIGHTS, *adaptive):
-                if width is not None and getattr(self, key) > 0.9 * width:
-                    raise ValueError(f"{key} is {getattr(self, key):g} mm: at most 0.9 of {wide} ({0.9 * width:g} mm) is allowed")
-        if self.interlock_mm > self.line_width_mm - self.layer_height_mm + 1e-9:
-            raise ValueError(
+            for key in ("first_layer_height_mm",) if first else self.heights:
+                if width is not None and getattr(self, key) > MOST_SHARE * width:
+                    allowed = f"at most {MOST_SHARE:g} of {wide} ({MOST_SHARE * width:g} mm) is allowed"
+                    yield f"{key} is {getattr(self, key):g} mm: {allowed}"
+        deepest_mm = max(self.line_width_mm - self.layer_height_mm, 0.0)
+        if self.interlock_mm > deepest_mm + 1e-9:
+            yield (
                 f"interlock_mm is {self.interlock_mm:g} mm: at most line_width_mm less layer_height_mm "
-                f"({self.line_width_mm - self.layer_height_mm:g} mm) is filled by one bead"
+                f"({deepest_mm:g} mm) is filled by one bead"
             )
-        if adaptive and self.least_layer_height_mm > self.most_layer_height_mm:
-            raise ValueError(
+        if self.adaptive_cusp_mm > 0 and self.least_layer_height_mm > self.most_layer_height_mm:
+            yield (
                 f"least_layer_height_mm is {self.least_layer_height_mm:g} mm: at most most_layer_height_mm "
                 f"({self.most_layer_height_mm:g} mm) is allowed"
             )
-        return self

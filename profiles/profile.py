@@ -11,7 +11,9 @@ from profiles.machine import Machine
 from profiles.material import Material
 from profiles.part_settings import PartSettings, merge_part_settings, process_of_part
 from profiles.places import KINDS, OF_KIND, kind_of, known, shipped, tables
-from profiles.process import HEIGHTS, WIDTHS, Process
+from profiles.problems.of_several import too_hot, unfit_for_nozzle
+from profiles.problems.of_table import TableProblems, table_problems
+from profiles.process import Process
 from profiles.search import Search
 from profiles.toml_text import read_value
 from profiles.wording import sentences
@@ -20,7 +22,7 @@ __all__ = ["DEFAULTS", "KINDS", "OF_KIND", "SECTIONS", "Profile", "kind_of", "kn
 
 DEFAULTS = {"machine": "generic_ac", "material": "pla", "process": "standard"}
 SECTIONS: dict[str, type[Frozen]] = {"machine": Machine, "material": Material, "process": Process, "search": Search}
-LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diameters
+LIMITS = {"machine", "machine.nozzle_limit_c", "machine.bed_limit_c", "machine.head", "machine.head.nozzle_mm"}
 
 
 class Profile(Frozen):
@@ -59,28 +61,17 @@ def load(
         whole |= tables(kind, name)
     for setting in settings:
         _apply(whole, setting)
-    try:
-        profile = Profile.model_validate(whole)
-    except ValidationError as error:
-        raise ProfileError("; ".join(sentences(error.errors(), Profile))) from None
+    profile = _validated(whole)
     if profile.process.bridge_longest_mm is None:
         asked = profile.process.model_copy(update={"bridge_longest_mm": profile.material.bridge_longest_mm})
         profile = profile.model_copy(update={"process": asked})
-    problems = _check_together(profile)
-    if problems:
-        raise ProfileError("; ".join(problems))
     return profile
 
 
 def with_part_settings(profile: Profile, given: Iterable[PartSettings]) -> Profile:
     """The profile with these settings of single parts under those it has. Raises ProfileError naming every problem at once."""
-    parts = merge_part_settings(profile.process, [*given, *profile.parts])
-    whole = profile.model_copy(update={"parts": parts})
-    checked = {each.part: _check_together(whole.of_part(each.part)) for each in parts}
-    problems = [f"part {part}: {problem}" for part, sentences in checked.items() for problem in sentences]
-    if problems:
-        raise ProfileError("; ".join(problems))
-    return whole
+    parts = merge_part_settings(profile.process, [*given, *profile.parts], profile.machine.head.nozzle_mm)
+    return profile.model_copy(update={"parts": parts})
 
 
 def load_one(name: str, settings: Iterable[str] = (), kind: str = "") -> dict[str, Frozen]:
@@ -93,23 +84,18 @@ def load_one(name: str, settings: Iterable[str] = (), kind: str = "") -> dict[st
         if setting.partition(".")[0].strip() not in OF_KIND[kind]:
             own_keys = " and ".join(f"{each}." for each in OF_KIND[kind])
             raise ProfileError(f"--set {setting}: {name} is a {kind} profile, whose keys begin with {own_keys}")
-    problems, models = [], {}
-    for section in OF_KIND[kind]:
-        try:
-            models[section] = SECTIONS[section].model_validate(whole[section])
-        except ValidationError as error:
-            problems += sentences(error.errors(), SECTIONS[section], f"{section}.")
+    problems = [problem for name in OF_KIND[kind] for problem in _section_problems(name, whole[name]).problems]
     if problems:
         raise ProfileError("; ".join(problems))
-    return models
+    return {name: SECTIONS[name].model_validate(whole[name]) for name in OF_KIND[kind]}
 
 
 def section(name: str, table: Any) -> Frozen:
     """One section made of a plain table, whose values may be text. Raises ProfileError."""
     try:
         return SECTIONS[name].model_validate(table)
-    except ValidationError as error:
-        raise ProfileError("; ".join(sentences(error.errors(), SECTIONS[name], f"{name}."))) from None
+    except ValidationError:
+        raise ProfileError("; ".join(_section_problems(name, table).problems)) from None
 
 
 def profile_of_tables(tables: dict[str, Any]) -> Profile:
@@ -153,28 +139,32 @@ def _apply(whole: dict[str, Any], setting: str) -> None:
     table[steps[-1]] = value
 
 
-def _check_together(profile: Profile) -> list[str]:
-    """What no single file can know: material and process against machine; every problem one sentence."""
-    machine, material = profile.machine, profile.material
-    nozzle_mm = machine.head.nozzle_mm
-    problems = [
-        f"material.{key} is {getattr(material, key):g}: {machine.name} allows at most {machine.nozzle_limit_c:g} deg C"
-        for key in ("nozzle_c", "first_layer_nozzle_c")
-        if getattr(material, key) > machine.nozzle_limit_c
-    ]
-    if material.bed_c > machine.bed_limit_c > 0:
-        problems.append(f"material.bed_c is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} deg C")
-    for key in WIDTHS:
-        width_mm = getattr(profile.process, key)
-        if width_mm is not None and not LEAST_WIDTH * nozzle_mm <= width_mm <= MOST_WIDTH * nozzle_mm:
-            problems.append(
-                f"process.{key} is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of "
-                f"{LEAST_WIDTH * nozzle_mm:g} to {MOST_WIDTH * nozzle_mm:g} mm"
-            )
-    for key in HEIGHTS:
-        if getattr(profile.process, key) > nozzle_mm:
-            problems.append(
-                f"process.{key} is {getattr(profile.process, key):g}: a {nozzle_mm:g} mm nozzle prints layers of at most "
-                f"{nozzle_mm:g} mm"
-            )
-    return problems
+def _validated(whole: dict[str, Any]) -> Profile:
+    """The profile of these tables. Raises ProfileError naming every problem at once."""
+    try:
+        profile = Profile.model_validate(whole)
+    except ValidationError:
+        raise ProfileError("; ".join(_all_problems(whole))) from None
+    problems = _of_several(profile)
+    if problems:
+        raise ProfileError("; ".join(problems))
+    return profile
+
+
+def _all_problems(whole: dict[str, Any]) -> list[str]:
+    """The problems of all tables, and what is wrong between those of their values that are right by themselves."""
+    sound = {name: table for kind, name_of_kind in DEFAULTS.items() for name, table in tables(kind, name_of_kind).items()}
+    checked = table_problems(Profile, "", whole, sound)
+    if checked.value is None or checked.mended & LIMITS:
+        return checked.problems
+    return checked.problems + [text for text in _of_several(checked.value) if not checked.tells_of_mended(text)]
+
+
+def _of_several(profile: Profile) -> list[str]:
+    machine = profile.machine
+    return [*too_hot(profile.material, machine), *unfit_for_nozzle(profile.process, machine.head.nozzle_mm)]
+
+
+def _section_problems(name: str, table: Any) -> TableProblems:
+    kind = next(kind for kind, sections in OF_KIND.items() if name in sections)
+    return table_problems(SECTIONS[name], f"{name}.", table, tables(kind, DEFAULTS[kind]).get(name, {}))

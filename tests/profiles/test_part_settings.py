@@ -46,6 +46,16 @@ def test_what_a_part_cannot_have_is_refused_in_one_sentence(text: str, sentence:
     assert "\n" not in str(refused.value)
 
 
+def test_all_problems_of_a_part_s_settings_are_told_at_once() -> None:
+    with pytest.raises(ProfileError) as refused:
+        given("2:walls=-1,line_width_mm=2,scale=2")
+    assert str(refused.value).split("; ") == [
+        "part 2: process.scale holds for the whole print: --set process.scale=... sets it",
+        "part 2: process.walls is -1: it must be a whole number from 0 to 50",
+        "part 2: process.line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm",
+    ]
+
+
 def test_where_the_model_is_cut_and_what_parts_share_is_no_part_s_own() -> None:
     keys = part_keys()
     assert {"walls", "infill_density", "layer_height_mm", "outer_wall_speed_mm_s", "interface_flow"} <= set(keys)

@@ -97,11 +97,11 @@ silhouette_mm = [[1, 0], [0.5, 2], [3, 1]]
     problems = check_file(file)
     assert [problem.split(":")[0] for problem in problems[1:]] == [
         "machine.x.speed_mm_s is 0",
+        "machine.lift is not a key of a profile",
+        "machine.x.limits_mm is [10.0, -10.0]",
         "machine.y.limits_mm is [10.0, -10.0]",
         "machine.head.silhouette_mm",
         "machine.head.silhouette_mm",
-        "machine.lift is not a key of a profile",
-        "machine.x.limits_mm is [10.0, -10.0]",
         "machine.tilt.letter and turn.letter are both A",
         "machine.tilt.limits_deg is [-0.1, 0.1]",
         "machine.uncalibrated names machine.nix, which is not a key of a machine",

@@ -120,18 +120,16 @@ def test_every_key_has_a_description_and_says_what_it_allows(key: str, field: ob
             'machine.head.boxes=[{name="fan",min_mm=[0,0,0]}]',
             "machine.head.boxes.0.max_mm is missing: a list of three numbers is expected",
         ),
-        ("process.line_width_mm=0.2", "process.layer_height_mm is 0.2 mm: at most 0.9 of line_width_mm (0.18 mm) is allowed"),
         ("process.interface_overlap=1", "process.interface_overlap is 1: it must be a number from 0 to 0.9"),
-        (
-            "process.infill_line_width_mm=0.2",
-            "process.layer_height_mm is 0.2 mm: at most 0.9 of infill_line_width_mm (0.18 mm) is allowed",
-        ),
         (
             "process.outer_wall_line_width_mm=2",
             "process.outer_wall_line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm",
         ),
         ("process.line_width_mm=2", "process.line_width_mm is 2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm"),
         ("material.nozzle_c=400", "material.nozzle_c is 400: generic A/C table allows at most 300 deg C"),
+        ("material.homing_nozzle_c=310", "material.homing_nozzle_c is 310: generic A/C table allows at most 300 deg C"),
+        ("material.homing_nozzle_c=1e400", "material.homing_nozzle_c is inf: it must be a number from 0 to 450"),
+        ("material.standby_c=310", "material.standby_c is 310: generic A/C table allows at most 300 deg C"),
         ("material.bed_c=150", "material.bed_c is 150: generic A/C table allows at most 110 deg C"),
     ],
 )
@@ -156,6 +154,39 @@ def test_all_problems_are_told_at_once() -> None:
         "search.beam_width",
     ]
     assert refusal("material.nozzle_c=400", "material.bed_c=150").count("allows at most") == 2
+
+
+def test_what_keys_must_be_together_is_told_with_what_each_must_be_and_what_the_machine_allows() -> None:
+    assert refusal("process.layer_height_mm=0.5", "process.interlock_mm=1", "process.walls=-1", "material.nozzle_c=400").split(
+        "; "
+    ) == [
+        "process.walls is -1: it must be a whole number from 0 to 50",
+        "process.layer_height_mm is 0.5 mm: at most 0.9 of line_width_mm (0.405 mm) is allowed",
+        "process.interlock_mm is 1 mm: at most line_width_mm less layer_height_mm (0 mm) is filled by one bead",
+        "material.nozzle_c is 400: generic A/C table allows at most 300 deg C",
+        "process.layer_height_mm is 0.5: a 0.4 mm nozzle prints layers of at most 0.4 mm",
+    ]
+    assert refusal("process.infill_line_width_mm=0.2").split("; ") == [
+        "process.layer_height_mm is 0.2 mm: at most 0.9 of infill_line_width_mm (0.18 mm) is allowed",
+        "process.first_layer_height_mm is 0.2 mm: at most 0.9 of infill_line_width_mm (0.18 mm) is allowed",
+        "process.infill_line_width_mm is 0.2: a 0.4 mm nozzle prints lines of 0.24 to 1 mm",
+    ]
+
+
+def test_adaptive_layers_are_not_thicker_than_the_nozzle_is_wide() -> None:
+    thick = ("process.line_width_mm=0.9", "process.most_layer_height_mm=0.6")
+    assert refusal(*thick, "process.adaptive_cusp_mm=0.1") == (
+        "process.most_layer_height_mm is 0.6: a 0.4 mm nozzle prints layers of at most 0.4 mm"
+    )
+    assert load(settings=thick).process.most_layer_height_mm == 0.6
+
+
+def test_nothing_is_told_of_a_value_that_nobody_gave() -> None:
+    """0.3 mm grooves are too deep for layers of 0.2 mm, which is what the layers would be if the wrong height were left out."""
+    assert refusal("process.layer_height_mm=99", "process.interlock_mm=0.3") == (
+        "process.layer_height_mm is 99: it must be a number from 0.02 to 2"
+    )
+    assert refusal("machine.nozzle_limit_c=-1", "material.nozzle_c=400").count(";") == 0
 
 
 def test_set_understands_numbers_lists_truths_and_texts() -> None:

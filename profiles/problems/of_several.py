@@ -1,0 +1,35 @@
+"""Problems that no single profile can know: material and process against the machine; each one sentence."""
+
+from collections.abc import Iterable
+
+from profiles.machine import Machine
+from profiles.material import Material
+from profiles.process import WIDTHS, Process
+
+NOZZLE_TEMPERATURES = ("nozzle_c", "first_layer_nozzle_c", "homing_nozzle_c", "standby_c")
+LEAST_WIDTH, MOST_WIDTH = 0.6, 2.5  # lines a nozzle can print, in its own diameters
+
+
+def too_hot(material: Material, machine: Machine) -> Iterable[str]:
+    """Temperatures of the material that the machine does not allow."""
+    for key in NOZZLE_TEMPERATURES:
+        temperature_c = getattr(material, key)
+        if temperature_c is not None and temperature_c > machine.nozzle_limit_c:
+            yield f"material.{key} is {temperature_c:g}: {machine.name} allows at most {machine.nozzle_limit_c:g} deg C"
+    if material.bed_c > machine.bed_limit_c > 0:
+        yield f"material.bed_c is {material.bed_c:g}: {machine.name} allows at most {machine.bed_limit_c:g} deg C"
+
+
+def unfit_for_nozzle(process: Process, nozzle_mm: float) -> Iterable[str]:
+    """Lines and layers of the process that the nozzle cannot print; nozzle_mm: its diameter."""
+    for key in WIDTHS:
+        width_mm = getattr(process, key)
+        if width_mm is not None and not LEAST_WIDTH * nozzle_mm <= width_mm <= MOST_WIDTH * nozzle_mm:
+            yield (
+                f"process.{key} is {width_mm:g}: a {nozzle_mm:g} mm nozzle prints lines of "
+                f"{LEAST_WIDTH * nozzle_mm:g} to {MOST_WIDTH * nozzle_mm:g} mm"
+            )
+    for key in process.heights:
+        height_mm = getattr(process, key)
+        if height_mm > nozzle_mm:
+            yield f"process.{key} is {height_mm:g}: a {nozzle_mm:g} mm nozzle prints layers of at most {nozzle_mm:g} mm"
