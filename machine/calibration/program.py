@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 
 from machine.firmware import dialect_of
+from machine.gcode.blocks import check_blocks
 from machine.gcode.pen import Pen, number
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
@@ -59,7 +60,11 @@ def course(machine: Machine, mark_height_mm: float, mark_radius_mm: float | None
 
 
 def calibration_lines(profile: Profile, touches: Course) -> Iterator[str]:
-    """The lines of the program: homing as the start block does it but without heat, then every touch, then level again."""
+    """The lines of the program: homing as the start block does it but without heat, then every touch, then level again.
+
+    Raises ProfileError, before the first line, for a block of the profile that the firmware refuses.
+    """
+    check_blocks(profile)
     machine = profile.machine.model_copy(update={"coordinates": "table"})
     dialect = dialect_of(machine)
     pen = Pen(dialect, machine, "", level(machine))

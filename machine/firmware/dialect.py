@@ -54,6 +54,9 @@ class Dialect:
     filament_mode: FilamentMode = "apart"
     bare_g92: bool = False  # a G92 without words calls every axis 0, else it does nothing
     macros: bool = False  # knows lines of NAME KEY=VALUE
+    statements: frozenset[str] = frozenset()  # words in capitals that begin lines which are no commands
+    bare_words: bool = True  # takes words without a number, G28 X Y, and an E that no command uses
+    lacks: frozenset[str] = frozenset()  # codes of other firmwares' start blocks at which it ends the program
     value_word: str = "S"  # of temperatures and fans
     stands: tuple[str, ...] = ()  # after a restart: the axes stand at {x_mm} {y_mm} {z_mm} {tilt_deg} {turn_deg}
     serial: bool = True  # takes numbered lines with checksums over a serial line and answers ok

@@ -1,11 +1,17 @@
 """LinuxCNC: filament is a plain axis in absolute millimetres, heaters and fan are user M-codes whose value is the P word.
 
 M104, M106, M107, M109, M140 and M190 are scripts of the machine (its own codes are M100 to M199). G0 ignores F, so travels are
-G1. M428 and M429 switch xyzac-trt-kins as the sample configuration does; a file ends with M2.
+G1. M428 and M429 switch xyzac-trt-kins as the sample configuration does; a file ends with M2. The interpreter ends a program at a
+code that it does not know and that the machine has not remapped, at a word without a number, and at an E that no command uses
+(rs274ngc/interp_array.cc, interp_check.cc).
 """
 
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
+
+_LACKS = (
+    "G29 G32 M17 M18 M82 M83 M84 M201 M203 M204 M205 M207 M208 M220 M221 M300 M302 M400 M420 M486 M500 M501 M568 M572 M600 M900"
+)
 
 DIALECT = Dialect(
     firmware="LinuxCNC",
@@ -24,6 +30,8 @@ DIALECT = Dialect(
     inverse_time=True,
     rapid=True,
     value_word="P",
+    bare_words=False,
+    lacks=frozenset(_LACKS.split()),
     serial=False,
     follow_persists=True,
     homed_before=True,

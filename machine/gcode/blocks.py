@@ -1,13 +1,18 @@
-"""Blocks: what a G-code block of a machine may name, and why it cannot be filled in, before there is a program."""
+"""Blocks: what a G-code block of a machine may name, and why it cannot be written, before there is a program."""
+
+from collections.abc import Iterator, Mapping, Sequence
 
 from machine.firmware import dialect_of
+from machine.gcode.block_words import refused_lines
 from machine.gcode.placeholders import fill_block, placeholders, resume_placeholders
 from mdp.pose import level
 from profiles.errors import ProfileError
-from profiles.machine import Blocks
+from profiles.machine import Blocks, Machine
+from profiles.places import shipped_of_dialect
 from profiles.profile import Profile
 
 RESUME = "resume"
+MOST_QUOTED = 3
 
 
 def placeholder_names(profile: Profile, block: str) -> list[str]:
@@ -16,15 +21,40 @@ def placeholder_names(profile: Profile, block: str) -> list[str]:
 
 
 def block_problems(profile: Profile, *blocks: str) -> list[str]:
-    """What cannot be filled in of blocks, of all where none is named; each by itself."""
-    problems, machine = [], profile.machine
+    """What cannot be filled in of blocks, of all where none is named, each by itself; and what the firmware refuses of them."""
+    machine, dialect = profile.machine, dialect_of(profile.machine)
+    problems, refused = [], {}
     for block in blocks or tuple(Blocks.model_fields):
         try:
-            text, longest = getattr(machine.gcode, block), dialect_of(machine).longest_line
-            fill_block(text, f"machine.gcode.{block}", _values(profile, block), longest)
+            lines = fill_block(
+                getattr(machine.gcode, block), f"machine.gcode.{block}", _values(profile, block), dialect.longest_line
+            )
+            refused[block] = list(refused_lines(lines, dialect))
         except ProfileError as error:
             problems.append(str(error))
-    return problems
+    return [*problems, *_foreign(machine, {block: lines for block, lines in refused.items() if lines})]
+
+
+def check_blocks(profile: Profile) -> None:
+    """Raises ProfileError where a block cannot be filled in, or is written for another firmware."""
+    problems = block_problems(profile)
+    if problems:
+        raise ProfileError("; ".join(problems))
+
+
+def _foreign(machine: Machine, refused: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """What a person should do about lines of blocks that the firmware refuses."""
+    if not refused:
+        return
+    lines = list(dict.fromkeys(line for block in refused.values() for line in block))
+    shown = ", ".join(repr(line) for line in lines[:MOST_QUOTED]) + (", ..." if len(lines) > MOST_QUOTED else "")
+    blocks = " and ".join(f"machine.gcode.{block}" for block in refused)
+    known = ", ".join(shipped_of_dialect(machine.dialect))
+    inherit = f"use or inherit a machine of that dialect ({known}), or " if known else ""
+    yield (
+        f"machine.dialect is {machine.dialect}, but {blocks} {'are' if len(refused) > 1 else 'is'} written for another firmware: "
+        f"{dialect_of(machine).firmware} does not take {shown}; {inherit}write {blocks} in its words"
+    )
 
 
 def _values(profile: Profile, block: str) -> dict[str, object]:

@@ -9,6 +9,7 @@ import numpy as np
 from machine.firmware import dialect_of
 from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
+from machine.gcode.blocks import check_blocks
 from machine.gcode.contents import contents_comment
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_path
 from machine.gcode.placeholders import fill_block, placeholders
@@ -29,8 +30,9 @@ BLOCKS = ("start", "before_part", "after_part", "end")
 def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
     """The lines of a G-code file, without line ends, in the dialect of profile.machine.
 
-    Raises ProfileError, before the first line, for a block of the profile that cannot be filled in.
+    Raises ProfileError, before the first line, for a block of the profile that cannot be filled in or that the firmware refuses.
     """
+    check_blocks(profile)
     machine = profile.machine
     dialect = dialect_of(machine)
     letter = next(each for each in dialect.filament if each not in (machine.tilt.letter, machine.turn.letter))

@@ -18,6 +18,7 @@ from machine.app.requests import ModelRequest
 from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
+from machine.gcode.blocks import check_blocks
 from machine.gcode.writer import write_gcode
 from machine.planning.limits import check_parts
 from machine.planning.moves import MachineProgram
@@ -64,6 +65,8 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     check_copies(request.copies)
     record_file, given = request.outputs.record, read_given_plan(request)
     profile = with_plan_settings(request.profile, given)
+    if to_build:
+        check_blocks(profile)
     began = perf_counter()
     mesh, repairs = read_mesh(locate(request.model), profile.process.scale, profile.process.rotate_deg)
     read_s = perf_counter() - began
@@ -147,12 +150,14 @@ def build(
     report: Report | None = None,
     on_slices: OnProgress | None = None,
 ) -> Program:
-    """Slice, plan, write and dry-run a decomposition. Raises MoveError, before slicing, for a part outside the axes' ranges.
+    """Slice, plan, write and dry-run a decomposition. Before slicing it raises MoveError for a part outside the axes' ranges,
+    ProfileError for a G-code block that the machine's firmware refuses.
 
     pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show. stops: where the print waits
     for a person. report: where progress is shown; None: on the terminal. on_slices: is shown the parts while they are sliced.
     """
     parts = decomposition.parts
+    check_blocks(profile)
     check_parts(parts, profile)
     compilers.wait_for(compilers.PROGRAM, report)
     with reporting() if report is None else nullcontext(report) as told:

@@ -12,7 +12,8 @@ from tests.machine.hand import post_and_arm, squares
 
 
 def written(dialect: str, pauses: list[str], changes: list[str], *settings: str) -> list[str]:
-    profile = load(settings=[f"machine.dialect={dialect}", "machine.purge_mm=0", *settings])
+    machine = "linuxcnc_xyzac" if dialect == "linuxcnc" else "generic_ac"
+    profile = load(machine, settings=[f"machine.dialect={dialect}", "machine.purge_mm=0", *settings])
     decomposition = post_and_arm(profile.machine)
     sliced = [squares(part, profile) for part in decomposition.parts]
     program = plan(decomposition, sliced, profile, parse_stops(pauses, changes))

@@ -77,11 +77,11 @@ def profile_as_given(given: Given, before: Profile) -> Profile:
 
 
 def check_block(profile: Profile, key: str) -> None:
-    """Raises ProfileError where the key is one of a G-code block that cannot be filled in."""
-    if key.startswith(BLOCKS_OF):
-        problems = block_problems(profile, key.removeprefix(BLOCKS_OF))
-        if problems:
-            raise ProfileError("; ".join(problems))
+    """Raises ProfileError where the key is that of a G-code block that cannot be written, or of a dialect not the blocks'."""
+    blocks = [key.removeprefix(BLOCKS_OF)] if key.startswith(BLOCKS_OF) else []
+    problems = block_problems(profile, *blocks) if blocks or key == "machine.dialect" else []
+    if problems:
+        raise ProfileError("; ".join(problems))
 
 
 def allowed_keys(part: int) -> set[str]:
