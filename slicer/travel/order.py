@@ -84,9 +84,11 @@ def _sequence(beads: Sequence[Bead], section: Polygons, first: Floats) -> list[t
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for k, island in enumerate(islands):
         groups[int(island)].append(k)
+    waiting = np.argsort(islands, kind="stable")  # by island: of two alike the lower number
     tip, placed = first, list[tuple[Bead, Floats]]()
     while groups:
-        nearest = -1 if -1 in groups else _next_island(groups, starts, tip)
+        nearest = -1 if -1 in groups else int(islands[waiting[np.argmin(((starts[waiting] - tip) ** 2).sum(axis=1))]])
+        waiting = waiting[islands[waiting] != nearest]
         phases = _phases([beads[k] for k in groups.pop(nearest)])
         begun = len(placed)
         for number, items in enumerate(phases, start=1):
@@ -99,13 +101,6 @@ def _sequence(beads: Sequence[Bead], section: Polygons, first: Floats) -> list[t
                 placed += [(bead, bead.points[::-1] if flip else bead.points) for bead in items[k]]
             tip = placed[-1][1][-1]
     return placed
-
-
-def _next_island(groups: dict[int, list[int]], starts: Floats, tip: Floats) -> int:
-    """The island with the nearest beginning of a bead."""
-    if len(groups) == 1:
-        return next(iter(groups))
-    return min(groups, key=lambda island: (float(((starts[groups[island]] - tip) ** 2).sum(axis=1).min()), island))
 
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
