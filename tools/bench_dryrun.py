@@ -22,7 +22,8 @@ import numpy as np
 from machine.app.pipeline.pipeline import decompose_model
 from machine.app.requests import ModelRequest
 from machine.dryrun import clearance, contents, dry_run, extrusion, heat, layering, motion, placement, provenance, sequence
-from machine.dryrun.replay import beads_of, replay
+from machine.dryrun.replay import replay
+from machine.dryrun.strokes import beads_of
 from machine.gcode.writer import write_gcode
 from machine.kinematics.table import workpiece_path
 from machine.planning.plan import plan

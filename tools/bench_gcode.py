@@ -41,7 +41,8 @@ def main() -> None:
     parser.add_argument("dialect", choices=dialects(), nargs="?", default="marlin")
     parser.add_argument("coordinates", choices=("table", "workpiece"), nargs="?", default="table")
     given = parser.parse_args()
-    profile = load(settings=[f"machine.dialect={given.dialect}", f"machine.coordinates={given.coordinates}"])
+    blocks = ["machine.gcode.start=", "machine.gcode.end="]  # the example's own are Marlin's
+    profile = load(settings=[f"machine.dialect={given.dialect}", f"machine.coordinates={given.coordinates}", *blocks])
     made = program()
     marks = [time.process_time()]
     begun = write_gcode(made, profile)

@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     profile = load(settings=[*SAME, *UNMARKED, *((TREE,) if options.support else ()), *options.set])
     for model in options.models:
         mesh = standing(model, options.height)
-        cuts = layer_heights(mesh, profile.process, True).cut_mm
+        cuts = layer_heights(mesh, profile, True).cut_mm
         section_s = min(core_seconds(lambda: sections(mesh, cuts)) for _ in range(RUNS + 1))  # noqa: B023
         print(f"\n{Path(model).name}: {len(mesh.faces)} faces, {len(cuts)} layers, sections {section_s:.3f} core s")
         words = (options.rival, *(SNUG if options.support else ()))

@@ -61,7 +61,7 @@ def row(file: Path, every: int, profile: Profile) -> str:
     began = process_time()
     sliced = slice_part(part, profile)
     taken_s, width = process_time() - began, profile.process.line_width_mm
-    at = layer_heights(mesh, profile.process, True)
+    at = layer_heights(mesh, profile, True)
     by_height = {round(layer.z_mm, 6): layer for layer in sliced.layers}
     volume = sum(layer.volume_mm3(path) for layer in sliced.layers for path in layer.paths)
     spots, over, looked = [(0.0, 0)], [(0.0, 0)], 0
