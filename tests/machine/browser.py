@@ -103,7 +103,8 @@ class Browser:
         end = time.monotonic() + PATIENCE_S
         while not self.value(f"Promise.resolve({condition}).then(Boolean)"):
             if time.monotonic() > end:
-                raise TimeoutError(f"{condition}; the console says {self.complaints}")
+                root = self.value("({...document.documentElement.dataset, title: document.title})")
+                raise TimeoutError(f"{condition}; the page is {root}, the console says {self.complaints}")
             time.sleep(0.02)
 
     def click(self, selector: str) -> None:

@@ -82,7 +82,8 @@ function main() {
       if (!content) {
         bench.key = ""; // the next state asks again, as that of a line that is back
         if (picture) picture.show(null);
-        return answer && !answer.ok ? undefined : notice(MISSING, "model"); // another model lies there by now, or none has come
+        if (!answer || answer.ok) return notice(MISSING, "model");
+        return void setTimeout(() => { if (!bench.key) follow(bench.state); }, AGAIN_MS); // another model lies there by now
       }
       bench.triangles = trianglesFrom(content);
     }
