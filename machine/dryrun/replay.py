@@ -23,6 +23,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 STEP_MM = 0.5
+EVEN = 1e-6
 ROUGH = 0.5  # of half a bead: by how much earlier plastic, seen from another side, may seem to stand higher than it does
 INNER = 0.35  # of the bead's width: where what lies under it is looked for
 OWN = 3.0  # so many widths back along its path the plastic is the bead's own beginning
@@ -164,7 +165,7 @@ def _under(place: tuple[float, float, float, float], row: int, strict: bool, str
     if not strict and owner >= 0 and owner < about.first:
         reach += half
     if not strict and (strokes.stands_off[row] or (owner >= 0 and strokes.stands_off[owner])):
-        reach += about.gap
+        reach += height * np.ceil(about.gap / height - EVEN)  # support ends with a layer: its gap is rounded up to whole ones
     return 1 if top > z - reach else 0
 
 

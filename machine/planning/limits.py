@@ -1,18 +1,13 @@
 """Limits: what every axis allows; a program outside is refused before any text is written, a speed is lowered to fit."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from machine.kinematics.table import machine_points
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Rows
-from mdp.decomposition import Part
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats
 from profiles.errors import MoveError
 from profiles.frozen import Limits
 from profiles.machine import Machine
-from profiles.profile import Profile
 
 ROUNDING = 5e-4
 
@@ -43,26 +38,6 @@ def check(program: MachineProgram, rows: Rows, machine: Machine) -> None:
         f"{place(program, int(rows.move[row]))}: {letter} would go to {worst:.3f} {unit}, "
         f"allowed is {least[axis]:g} to {most[axis]:g} {unit} on {machine.name}"
     )
-
-
-def check_parts(parts: Sequence[Part], profile: Profile) -> None:
-    """Raise MoveError when a part, standing as its pose has it, reaches outside X, Y or Z: known before anything is sliced.
-
-    Half a line is left at the sides, for the tip stays so far inside what it prints.
-    """
-    machine = profile.machine
-    for part in parts:
-        inset = 0.5 * profile.of_part(part.index).process.line_width_mm * np.array([1.0, 1.0, 0.0])
-        reached = machine_points(machine, part.pose, part.mesh.vertices)
-        low, high = reached.min(axis=0) + inset, reached.max(axis=0) - inset
-        for axis, (letter, limits) in enumerate(list(axis_limits(machine).items())[:3]):
-            for value in (low[axis], high[axis]):
-                if not limits[0] - ROUNDING <= value <= limits[1] + ROUNDING:
-                    where = f"{machine.tilt.letter}{part.pose.tilt_deg:.1f} {machine.turn.letter}{part.pose.turn_deg:.1f}"
-                    raise MoveError(
-                        f"part {part.index} reaches {letter} {value:.1f} mm at {where}, {letter} goes from {limits[0]:g} to "
-                        f"{limits[1]:g} mm on {machine.name}: process.scale makes the model smaller"
-                    )
 
 
 def place(program: MachineProgram, index: int) -> str:

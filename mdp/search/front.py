@@ -121,14 +121,16 @@ class Choice:
 def choose(rows: Sequence[FrontRow], second_mm2: float, most_longer: float = inf) -> Choice:
     """The row of the fewest parts among those whose cost is alike to the least. rows: by their number of parts.
 
-    second_mm2: every second that a row takes longer than the fastest one counts so much; 0 and where a row that may be taken has
-    no time: seconds do not count. most_longer: share by which a row may take more time, or filament, than the first.
+    second_mm2: every second that a row takes longer than the fastest one counts so much. Where any row has a time, those that may
+    be taken and have none cannot be printed; where none has, seconds do not count. most_longer: share by which a row may take more
+    time, or filament, than the first.
     """
     places = [place for place, good in enumerate(pays(rows)) if good]
+    places = [place for place in places if rows[place].time_s is not None] or places
     scars = _first_alike([rows[place].cost_mm2 for place in places])
     reason = "the least cost" if rows[places[scars]].cost_mm2 <= min(row.cost_mm2 for row in rows) else LEAST_PARTS
     times_s = [time_s for place in places if (time_s := rows[place].time_s) is not None]
-    if second_mm2 <= 0.0 or len(times_s) < len(places):
+    if second_mm2 <= 0.0 or not times_s:
         return Choice(places[scars], reason)
     allowed = [place for place in places if _is_quick(rows[place], rows[0], most_longer)]
     totals = [rows[place].cost_mm2 + second_mm2 * ((rows[place].time_s or 0.0) - min(times_s)) for place in allowed]

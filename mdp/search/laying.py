@@ -6,7 +6,7 @@ search, and the most promising one by the whole search: that takes as long as th
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, inf
 
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
@@ -80,8 +80,10 @@ def _most_promising(mesh: Mesh, profile: Profile, pricing: PricingBy, limit_mm2:
     glimpses = []
     for orientation in distinct_orientations(mesh, profile)[:PRICED]:
         turned = standing_still(mesh, orientation.rotation)
-        bare_mm2 = second_mm2 * _bare_s(turned, profile, pricing) if second_mm2 > 0.0 else 0.0
-        glimpses.append(_Glimpse(orientation, turned, bare_mm2, bare_mm2 + scar_mm2 * orientation.risky_mm2))
+        bare_s = _bare_s(turned, profile, pricing)
+        if bare_s is not None:
+            whole_mm2 = second_mm2 * bare_s + scar_mm2 * orientation.risky_mm2
+            glimpses.append(_Glimpse(orientation, turned, second_mm2 * bare_s, whole_mm2))
     best = min(glimpses, key=lambda each: each.whole_mm2, default=None)
     if best is None:
         return None
@@ -119,7 +121,8 @@ def find_better_way(mesh: Mesh, decomposition: Decomposition, profile: Profile, 
             continue
         turned = standing_still(mesh, orientation.rotation)
         row = _row_of_one_piece(turned, profile, pricing)
-        ways.append(OtherWay(orientation, row, total_mm2(row, second_mm2)))
+        if row.time_s is not None:
+            ways.append(OtherWay(orientation, row, total_mm2(row, second_mm2)))
     best = min(ways, key=lambda way: way.total_mm2, default=None)
     return best if best is not None and best.total_mm2 <= WORTH_TELLING * chosen_mm2 else None
 
@@ -144,8 +147,10 @@ def _alike(one: Orientation, other: Orientation, worst_mm2: float) -> bool:
 
 
 def total_mm2(row: FrontRow | None, second_mm2: float) -> float:
-    """What a row costs with its time."""
-    return 0.0 if row is None else row.cost_mm2 + second_mm2 * (row.time_s or 0.0)
+    """What a row costs with its time; infinite where time counts and the row has none, for it cannot be printed."""
+    if row is None or second_mm2 <= 0.0:
+        return 0.0 if row is None else row.cost_mm2
+    return inf if row.time_s is None else row.cost_mm2 + second_mm2 * row.time_s
 
 
 def _guess(profile: Profile) -> Callable[[Orientation], float]:
@@ -165,11 +170,12 @@ def _row_of_one_piece(mesh: Mesh, profile: Profile, pricing: PricingBy) -> Front
     return price_row(front_row(problem.root, problem.terms), (one_piece(mesh, profile.machine),), pricing(profile))
 
 
-def _bare_s(mesh: Mesh, profile: Profile, pricing: PricingBy) -> float:
-    """Seconds that a mesh in one piece takes without any support, which hardly any decomposition goes below."""
+def _bare_s(mesh: Mesh, profile: Profile, pricing: PricingBy) -> float | None:
+    """Seconds that a mesh in one piece takes without any support, which hardly any decomposition goes below; None where it cannot
+    be printed so."""
     bare = profile.model_copy(update={"process": profile.process.model_copy(update={"support": "none"})})
     price = pricing(bare)((one_piece(mesh, profile.machine),))
-    return 0.0 if price is None else price.time_s
+    return None if price is None else price.time_s
 
 
 def _with_search(profile: Profile, **settings: object) -> Profile:

@@ -62,6 +62,8 @@ def _steady(within: NDArray[np.bool_], lengths: Floats, shortest_mm: float) -> N
     """Runs shorter than that take after their surroundings, those within last so that none is overlooked for a gap."""
     for value in (False, True):
         bounds = [0, *(np.flatnonzero(np.diff(within)) + 1).tolist(), len(within)]
+        if len(bounds) == 2:
+            break  # a short bead that lies within as a whole has no surroundings
         for a, b in pairwise(bounds):
             if within[a] == value and float(lengths[a:b].sum()) < shortest_mm:
                 within[a:b] = not value

@@ -43,9 +43,9 @@ def put(firefox: Firefox, element: str, value: object, event: str = "change") ->
 def put_setting(firefox: Firefox, key: str, value: object) -> None:
     """A setting found by its name, changed, and marked as changed."""
     put(firefox, "$('search-settings')", key, "input")
-    firefox.wait(f"document.querySelector('[data-key=\"{key}\"] input')")
+    firefox.wait(f"document.querySelector('[data-key=\"{key}\"]')")
     assert firefox.value("document.querySelectorAll('#settings-list [data-key]').length") == 1
-    put(firefox, f"document.querySelector('[data-key=\"{key}\"] input')", value)
+    put(firefox, f"document.querySelector('[data-key=\"{key}\"]').querySelector('input, textarea')", value)
     firefox.wait(f"document.querySelector('[data-key=\"{key}\"].changed')")
 
 
@@ -72,6 +72,7 @@ def test_firefox_draws_the_model_lays_it_down_and_on_a_face(firefox: Firefox) ->
         firefox.click("[data-view=top]")
         firefox.click("#fit")
         firefox.click("#lay")
+        firefox.wait("document.documentElement.dataset.busy === '' && $('lay').getAttribute('aria-pressed') === 'true'")
         firefox.press(*middle(firefox, "canvas"))
         firefox.wait(done("lay a face down"))
         assert firefox.value("$('overhang').textContent") == "0.0 mm²"  # upside down a T needs no support
@@ -135,7 +136,7 @@ def test_firefox_changes_settings_of_all_parts_and_of_one(firefox: Firefox) -> N
     assert firefox.value("$('settings-part').selectedOptions[0].text") == "part 2 (1 of its own)"
     put(firefox, "$('settings-part')", 0)
     assert "--set process.walls=1" in firefox.value("$('command-line').textContent")
-    put_setting(firefox, "machine.table.radius_mm", 5)
+    put_setting(firefox, "machine.gcode.after_part", "M104 S120")
 
 
 def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: Firefox) -> None:
@@ -153,7 +154,7 @@ def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: F
     put(firefox, f"{VIEW}.getElementById('layer-high-mm')", 0.8)
     assert firefox.value(f"{VIEW}.getElementById('layer-high-number').value") == "2"
     firefox.click("#leave-print")
-    firefox.click("#undo")  # the table is as wide again as it is
+    firefox.click("#undo")  # part 2 is printed hot again
     firefox.wait("document.body.classList.contains('stale')")
     firefox.click("#slice")
     firefox.wait(SLICED)

@@ -20,7 +20,7 @@ from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
 from machine.gcode.blocks import check_blocks
 from machine.gcode.writer import write_gcode
-from machine.planning.limits import check_parts
+from machine.planning.fit import check_parts, check_standing
 from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
 from machine.planning.purge import has_purge
@@ -77,6 +77,8 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     orientation = None if given is None or given.orientation is None else np.array(given.orientation)
     if orientation is not None:
         mesh = standing_still(mesh, orientation)
+    if to_build and not request.orient:
+        check_standing(mesh, profile)  # a search may take minutes
     better: OtherWay | None = None
     notes: tuple[str, ...]
     with reporting() as report:
@@ -150,8 +152,8 @@ def build(
     report: Report | None = None,
     on_slices: OnProgress | None = None,
 ) -> Program:
-    """Slice, plan, write and dry-run a decomposition. Before slicing it raises MoveError for a part outside the axes' ranges,
-    ProfileError for a G-code block that the machine's firmware refuses.
+    """Slice, plan, write and dry-run a decomposition. Before slicing it raises MoveError for a part that the machine has no
+    room for, ProfileError for a G-code block that the machine's firmware refuses.
 
     pictures: the G-code becomes a file, with the pictures in its head that the machine's pages show. stops: where the print waits
     for a person. report: where progress is shown; None: on the terminal. on_slices: is shown the parts while they are sliced.

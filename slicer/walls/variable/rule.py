@@ -12,6 +12,7 @@ from mdp.kernels.kernel import part
 ADD = 0.7  # of a spacing: from this on what two beads leave between them gets a bead of its own
 ROOM = 1.5  # spacings: narrower places between all walls get one bead
 SPLIT = 1.5  # spacings: from this on one bead becomes two
+FEATURE = 0.5  # of the least width: places so narrow get a bead that is wider than they are, narrower ones none
 
 
 class Rule(NamedTuple):
@@ -37,7 +38,7 @@ def nominal(rule: Rule, level: int) -> float:
 @part
 def bead_count(rule: Rule, radius: float) -> int:
     """How many beads lie across a place with that half thickness; 2 walls + 2: all walls, and more than a bead between them."""
-    if 2.0 * radius < rule.least:
+    if 2.0 * radius < FEATURE * rule.least:
         return 0
     rest, narrowest, widest = 2.0 * radius - rule.round, rule.least - rule.round, rule.most - rule.round
     for level in range(rule.walls):

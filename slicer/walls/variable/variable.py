@@ -15,7 +15,7 @@ from slicer.walls.variable.counts import Counts, count_beads
 from slicer.walls.variable.course import corners, smoothed
 from slicer.walls.variable.lines import Line, lines_of, trace_chains
 from slicer.walls.variable.loops import trace_loops
-from slicer.walls.variable.rule import Rule
+from slicer.walls.variable.rule import FEATURE, Rule
 from slicer.walls.variable.skeleton import Skeleton, skeleton_of
 
 STEP = 0.42  # nominal spacings: sampling of the boundary
@@ -28,6 +28,7 @@ DOT = 0.3  # of its width: a shorter line is laid as a dash, thinner by
 DASH = 0.25
 SLACK_MM = 0.01  # by which a place may be narrower than the least bead
 SHORT = 0.05  # of its width: a dash is no shorter
+THIN = 4.0  # least widths: what is narrower than one and longer than this is a wall, what is shorter the tip of a corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +131,38 @@ def _dash(begin: Floats, end: Floats, width: float, rule: Rule) -> Wall:
 
 
 def _kept_inside(line: Wall, borders: Floats, rule: Rule) -> Wall:
-    """A line that lies alone no wider than its place, without ends where not even the least bead fits."""
+    """A line that lies alone no wider than its place, but for the least bead, without ends where not even that fits.
+
+    Thin walls keep ends of theirs where it nearly fits: a wall that is now thicker and now thinner than the least bead would be
+    all gaps, each above another place than the one in the layer below.
+    """
     if line.level > 0:
         return line
     room = 2.0 * distances(line.points, borders)
-    fits = np.flatnonzero(room > rule.least - SLACK_MM)
-    first, last = (fits[0], fits[-1]) if len(fits) and not line.closed else (0, len(room) - 1 if len(fits) else -1)
     widths = np.maximum(np.minimum(line.widths, room), rule.least)
+    first, last = _fitting(line.points, room, rule)
+    if line.closed and last >= first:
+        first, last = 0, len(room) - 1
     return replace(line, points=line.points[first : last + 1], widths=widths[first : last + 1])
+
+
+def _fitting(points: Floats, room: Floats, rule: Rule) -> tuple[int, int]:
+    """The first and the last point of a line (n, 2) with that much room that has its bead; last < first: none has."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    fits = np.flatnonzero(room > rule.least - SLACK_MM)
+    narrow = np.flatnonzero(room <= FEATURE * rule.least - SLACK_MM)
+    if not len(fits):
+        ends = np.concatenate([[-1], narrow, [len(room)]])
+        most = int(np.argmax(along[np.maximum(ends[1:] - 1, 0)] - along[np.minimum(ends[:-1] + 1, len(room) - 1)]))
+        first, last = int(ends[most]) + 1, int(ends[most + 1]) - 1
+        return (first, last) if last > first and along[last] - along[first] > THIN * rule.least else (0, -1)
+    first, last = int(fits[0]), int(fits[-1])
+    begin = int(narrow[narrow < first].max(initial=-1)) + 1
+    end = int(narrow[narrow > last].min(initial=len(room))) - 1
+    return (
+        begin if along[first] - along[begin] > THIN * rule.least else first,
+        end if along[end] - along[last] > THIN * rule.least else last,
+    )
 
 
 def _simplified(wall: Wall) -> Wall:

@@ -1,9 +1,7 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from machine.planning.limits import axis_limits, check, check_parts, travel_speed, turn_speed
+from machine.planning.limits import axis_limits, check, travel_speed, turn_speed
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Travel, rows
 from machine.planning.plan import plan
 from mdp.pose import Pose
@@ -71,19 +69,3 @@ def test_a_turn_of_both_axes_lasts_as_long_as_the_slower_one() -> None:
 def test_a_cable_bounds_the_turn_like_a_limit() -> None:
     machine = load(settings=["machine.turn.budget_deg=400"]).machine
     assert axis_limits(machine)["C"] == (-400.0, 400.0)
-
-
-@pytest.mark.parametrize(
-    ("scale", "message"),
-    [
-        ((1.0, 1.0, 5.0), r"part 1 reaches Z 300.0 mm at A0.0 C0.0, Z goes from -80 to 260 mm on generic A/C table"),
-        ((40.0, 1.0, 1.0), r"part 1 reaches X -199.8 mm at A0.0 C0.0, X goes from -160 to 160 mm"),
-    ],
-)
-def test_a_part_larger_than_the_axes_is_refused_before_it_is_sliced(scale: tuple[float, float, float], message: str) -> None:
-    profile = load()
-    part = post_and_arm(profile.machine).parts[0]
-    large = replace(part, mesh=type(part.mesh)(part.mesh.vertices * scale, part.mesh.faces))
-    with pytest.raises(MoveError, match=message):
-        check_parts([large], profile)
-    check_parts([part], profile)

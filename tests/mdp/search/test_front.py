@@ -70,8 +70,10 @@ def test_a_row_that_costs_more_than_one_with_fewer_parts_is_not_taken_however_fa
     assert choose(front((100.0, 900.0), (120.0, 1.0)), 1.0).place == 0
 
 
-def test_time_does_not_count_where_it_is_not_known_of_all() -> None:
-    assert choose(front((200.0, 900.0), (100.0, None)), 1.0).place == 1
+def test_a_row_that_cannot_be_printed_is_not_taken_while_another_one_can() -> None:
+    rows = front((200.0, 900.0), (100.0, None))
+    assert [choose(rows, second_mm2).place for second_mm2 in (0.0, 1.0)] == [0, 0]
+    assert choose(front((200.0, None), (100.0, None)), 1.0).place == 1
 
 
 def test_what_is_given_up_for_time_is_told_with_figures() -> None:

@@ -62,6 +62,24 @@ def test_an_orientation_that_costs_a_fifth_less_is_told_and_one_that_costs_more_
     assert find_better_way(flat, decompose(flat, "box", PROFILE, price=by_height(PROFILE)), PROFILE, by_height) is None
 
 
+def on_a_small_plate(profile: Profile) -> Pricing:
+    """The same printer with a plate for bases up to 20 mm wide."""
+
+    def price(parts: Sequence[Part]) -> Price | None:
+        vertices = parts[0].mesh.vertices
+        return by_height(profile)(parts) if np.ptp(vertices[vertices[:, 2] < 0.1, 0]) < 20.0 else None
+
+    return price
+
+
+def test_no_orientation_is_told_or_taken_that_the_machine_has_no_room_for() -> None:
+    price = on_a_small_plate(PROFILE)
+    standing = decompose(tee(), "tee", PROFILE, price=price)
+    assert find_better_way(tee(), standing, PROFILE, on_a_small_plate) is None
+    search = partial(decompose, name="mesh", profile=PROFILE, price=price)
+    assert lay_down(tee(), PROFILE, on_a_small_plate, search).orientation is None
+
+
 def test_the_side_that_a_model_lies_on_has_a_name() -> None:
     assert side_in_words(measure_upright(tee(), 45.0)) == "as it stands"
     sides = {side_in_words(orientation) for orientation in distinct_orientations(box(20, 30, 40), PROFILE)}

@@ -50,6 +50,11 @@ def test_the_stretch_beyond_the_bank_overhangs_and_nothing_is_lost() -> None:
     assert [len(p.approach) for p in pieces] == [1] + [0] * (len(pieces) - 1)
 
 
+def test_a_bead_shorter_than_two_lines_overhangs_where_all_of_it_hangs() -> None:
+    (piece,) = split(placed([(8, 5), (8.5, 5)]), Polygons.square((20, 10)), Polygons.square((5, 10)))
+    assert piece.bead.kind is Kind.OVERHANG
+
+
 @pytest.mark.parametrize(
     ("out", "share", "kind"), [(0.1, 0.5, Kind.OVERHANG), (-0.05, 0.5, Kind.OUTER_WALL), (0.1, 0.2, Kind.OUTER_WALL)]
 )

@@ -7,7 +7,7 @@ import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.marks import standing_mesh
-from machine.planning.limits import check_parts
+from machine.planning.fit import check_parts
 from mdp.mesh import Mesh
 from mdp.search.parts import one_piece
 from profiles.errors import MoveError

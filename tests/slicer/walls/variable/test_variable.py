@@ -16,6 +16,7 @@ from slicer.paths import Kind
 from slicer.slice import slice_part
 from slicer.walls.layer_walls import bead_rule, layer_walls
 from slicer.walls.variable.pieces import split_course
+from slicer.walls.variable.rule import FEATURE
 from slicer.walls.variable.variable import Wall, variable_walls
 from slicer.walls.walls import wall_beads
 from tests.shapes import from_manifold
@@ -54,7 +55,7 @@ def farthest_out_mm(walls: Sequence[Wall], section: Polygons) -> float:
 
 
 @pytest.mark.parametrize(
-    ("thickness", "beads"), [(0.2, 0), (0.25, 1), (0.5, 1), (0.7, 2), (1.0, 2), (1.3, 3), (1.6, 4), (2.0, 5), (2.4, 6), (3.0, 7)]
+    ("thickness", "beads"), [(0.1, 0), (0.15, 1), (0.25, 1), (0.5, 1), (0.7, 2), (1.0, 2), (1.3, 3), (1.6, 4), (2.0, 5), (2.4, 6), (3.0, 7)]
 )
 def test_a_plate_gets_as_many_beads_as_fit(thickness: float, beads: int) -> None:
     assert across(variable_walls(plate(thickness), RULE), 6.0) == beads
@@ -106,6 +107,14 @@ def test_a_thick_island_has_the_classic_walls() -> None:
     ]
 
 
+def test_a_wall_that_is_now_thicker_and_now_thinner_than_the_least_bead_is_laid_from_end_to_end() -> None:
+    x = np.linspace(0, 30, 121)
+    side = 0.12 + 0.02 * np.sin(2.0 * x)  # of half the least bead: 0.2 to 0.28 mm thick, 0.24 mm is the least
+    walls = variable_walls(Polygons([np.concatenate([np.column_stack([x, -side]), np.column_stack([x, side])[::-1]])]), RULE)
+    assert len(walls) == 1
+    assert length_mm(walls[0].course.points) > 29.0
+
+
 def test_a_ring_of_one_bead_runs_round() -> None:
     (bead,) = variable_walls(Polygons.circle(6, 128) - Polygons.circle(5.4, 128), RULE)
     assert bead.closed
@@ -126,7 +135,9 @@ def test_a_pin_is_filled_by_rings_or_a_dash_inside_it(diameter: float) -> None:
 def test_all_beads_of_any_polygon_lie_in_it_with_widths_a_nozzle_prints(points: Points, hole: float, aside: float) -> None:
     section = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(hole, 16).translate((aside, 0))
     walls = variable_walls(section, RULE)
-    assert farthest_out_mm(walls, section) < 0.05 * WIDTH
+    wider = [wall for wall in walls if wall.level > 0 or wall.closed or wall.widths.min() > RULE.least + 1e-9]
+    assert farthest_out_mm(wider, section) < 0.05 * WIDTH
+    assert farthest_out_mm(walls, section) < 0.05 * WIDTH + 0.5 * (1.0 - FEATURE) * RULE.least  # where a wall is that thin
     widths = np.concatenate([wall.widths for wall in walls]) if walls else np.array([WIDTH])
     assert widths.min() > 0.6 * NOZZLE - 1e-9
     assert widths.max() < 2.0 * NOZZLE + 1e-9

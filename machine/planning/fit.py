@@ -1,0 +1,63 @@
+"""Fit: whether a machine has room for parts, known before anything is sliced: every axis reaches them, and they stand on the plate."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from machine.kinematics.table import machine_points
+from machine.planning.limits import ROUNDING, axis_limits
+from mdp.decomposition import Part
+from mdp.mesh import Mesh
+from mdp.overhang import PLATFORM_TOLERANCE_MM
+from profiles.errors import MoveError
+from profiles.machine import Machine
+from profiles.profile import Profile
+
+
+def check_parts(parts: Sequence[Part], profile: Profile) -> None:
+    """Raise MoveError when the machine has no room for a part.
+
+    A part that stands as its pose has it reaches outside X, Y or Z, or the first one stands over the plate's edge. Half a line
+    is left at the sides, for the tip stays so far inside what it prints.
+    """
+    for part in parts:
+        inset_mm = 0.5 * profile.of_part(part.index).process.line_width_mm
+        _check_reach(part, inset_mm, profile.machine)
+        if part.index == 1:
+            check_standing(part.mesh, profile)
+
+
+def _check_reach(part: Part, inset_mm: float, machine: Machine) -> None:
+    reached = machine_points(machine, part.pose, part.mesh.vertices)
+    inset = inset_mm * np.array([1.0, 1.0, 0.0])
+    low, high = reached.min(axis=0) + inset, reached.max(axis=0) - inset
+    for axis, (letter, limits) in enumerate(list(axis_limits(machine).items())[:3]):
+        for value in (low[axis], high[axis]):
+            if not limits[0] - ROUNDING <= value <= limits[1] + ROUNDING:
+                where = f"{machine.tilt.letter}{part.pose.tilt_deg:.1f} {machine.turn.letter}{part.pose.turn_deg:.1f}"
+                raise MoveError(
+                    f"part {part.index} reaches {letter} {value:.1f} mm at {where}, {letter} goes from {limits[0]:g} to "
+                    f"{limits[1]:g} mm on {machine.name}: process.scale makes the model smaller"
+                )
+
+
+def check_standing(mesh: Mesh, profile: Profile) -> None:
+    """Raise MoveError when what stands on the platform, in the workpiece frame, lies over the plate's edge.
+
+    Brims and supports are not known yet: the dry run looks at them.
+    """
+    machine, inset_mm = profile.machine, 0.5 * profile.of_part(1).process.line_width_mm
+    standing = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM, :2]
+    reach = np.maximum(np.abs(standing) - inset_mm, 0.0)
+    if machine.table.size_mm is None:
+        over_mm = float(np.hypot(reach[:, 0], reach[:, 1]).max(initial=0.0)) - machine.table.radius_mm
+        edge = f"{machine.table.radius_mm:g} mm from its middle"
+    else:
+        over_mm = float((reach - 0.5 * np.array(machine.table.size_mm)).max(initial=-np.inf))
+        edge = "it measures {:g} x {:g} mm".format(*machine.table.size_mm)
+    if over_mm > ROUNDING:
+        x, y = np.ptp(standing, axis=0)
+        raise MoveError(
+            f"part 1 stands on {x:.1f} x {y:.1f} mm, {over_mm:.1f} mm over the edge of the plate of {machine.name}, {edge}: "
+            "process.scale makes the model smaller"
+        )
