@@ -14,6 +14,7 @@ from slicer.geometry.halfedges import opposites
 from slicer.geometry.segments import Segment, orientation
 
 Indices = NDArray[np.int64]
+ROUNDING = 1e-14  # of the terms that are added up: ten times their error
 MOST_FLIPS = 200  # for every side; real polygons need fewer than ten, rounding must not make it endless
 
 
@@ -53,8 +54,11 @@ def _inside_circle(points: Floats, a: int, b: int, c: int, p: int) -> bool:
     ax, ay, bx, by = points[a, 0] - x, points[a, 1] - y, points[b, 0] - x, points[b, 1] - y
     cx, cy = points[c, 0] - x, points[c, 1] - y
     a2, b2, c2 = ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy
-    determinant = a2 * (bx * cy - by * cx) + b2 * (cx * ay - cy * ax) + c2 * (ax * by - ay * bx)
-    return bool(determinant > 1e-12)
+    bc, ca, ab = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
+    size = (
+        a2 * (abs(bx * cy) + abs(by * cx)) + b2 * (abs(cx * ay) + abs(cy * ax)) + c2 * (abs(ax * by) + abs(ay * bx))
+    )  # what rounding goes by (Shewchuk 1997, section 4.4): of four points on one circle no side must flip for ever
+    return bool(a2 * bc + b2 * ca + c2 * ab > ROUNDING * size)
 
 
 @kernel

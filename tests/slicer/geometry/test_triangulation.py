@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from slicer.geometry.chordal_axis import chordal_axis
-from slicer.geometry.polygons import Polygons, contours
-from slicer.geometry.triangulation import triangulate
+from slicer.geometry.polygons import Polygons, contours, resample
+from slicer.geometry.triangulation import _flip, triangulate
 from tests.slicer.hand import as_shapely, ragged
 
 
@@ -33,6 +33,14 @@ def test_the_triangles_are_those_of_shapely_s_constrained_delaunay_triangulation
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(as_shapely(star)))
     expected = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
     assert as_rows(corners(star)) == as_rows(expected)
+
+
+@pytest.mark.parametrize("corners", [64, 128, 180, 256])
+@pytest.mark.parametrize("radius_mm", [3.0, 13.7, 15.3, 60.0])
+def test_points_on_one_circle_are_flipped_only_as_long_as_that_betters_them(corners: int, radius_mm: float) -> None:
+    found = triangulate([resample(loop, 0.17) for loop in contours(Polygons.circle(radius_mm, corners))])
+    assert found is not None
+    assert _flip(found) == 0  # it ended by itself
 
 
 def test_a_polygon_without_area_has_no_triangulation() -> None:
