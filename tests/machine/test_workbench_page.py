@@ -219,7 +219,9 @@ def test_a_picture_whose_model_or_card_goes_says_so_and_comes_back(browser: Brow
 def test_a_model_that_was_another_one_when_it_was_asked_for_is_asked_for_again(browser: Browser, bench: Running) -> None:
     browser.open(bench.address)
     browser.wait("document.documentElement.dataset.version")
-    late = "(at, ...more) => `${at}`.startsWith('model/') && late-- > 0 ? new Response(null, { status: 404 }) : asking(at, ...more)"
+    late = (
+        "(at, ...more) => `${at}`.startsWith('model/') && late-- > 0 ? new Response(null, { status: 404 }) : asking(at, ...more)"
+    )
     browser.value(f"{{ window.late = 2; const asking = window.fetch; window.fetch = async {late}; }}")
     choose(browser, "tee.stl", stl(tee()))
     browser.wait("late < 0 && document.documentElement.dataset.shown && $('title').textContent === 'tee.stl'")
