@@ -122,8 +122,8 @@ def choose(rows: Sequence[FrontRow], second_mm2: float, most_longer: float = inf
     """The row of the fewest parts among those whose cost is alike to the least. rows: by their number of parts.
 
     second_mm2: every second that a row takes longer than the fastest one counts so much. Where any row has a time, those that may
-    be taken and have none cannot be printed; where none has, seconds do not count. most_longer: share by which a row may take more
-    time, or filament, than the first.
+    be taken and have none cannot be printed; where none has, seconds do not count. most_longer: share by which a row may take
+    more time, or filament, than the first.
     """
     places = [place for place, good in enumerate(pays(rows)) if good]
     places = [place for place in places if rows[place].time_s is not None] or places
