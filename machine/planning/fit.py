@@ -1,4 +1,4 @@
-"""Fit: whether a machine has room for parts, known before anything is sliced: every axis reaches them, they stand on the plate."""
+"""Fit: whether a machine has room for parts, known before slicing: every axis reaches them, they stand on the plate."""
 
 from collections.abc import Sequence
 
