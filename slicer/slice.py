@@ -67,10 +67,17 @@ def slice_site(site: Site, supports: Supports, on_layer: Callable[[int, int], No
     rear = rear_of(bounds_mm)
     layers: list[Layer] = []
     tip, seams, unwanted = rear, np.zeros((0, 2)), unwanted_segments(part, stack.heights.cut_mm)
+    bare: list[int] = []  # layers that hold something and print none of it
+    last = 0
     usual = bottom_layers(profile.process) if profile.process.spiral_vase else len(stack.outlines)
     for i in range(min(usual, len(stack.outlines))):
         around = Surroundings(rear, seams, tip, stack.edges, float(stack.heights.cut_mm[i]), i, unwanted[i])
-        beads = [*_part_beads(stack, i), *_auxiliary_beads(stack, i, part, later)]
+        own = _part_beads(stack, i)
+        if own:
+            last = i
+        elif profile.process.walls and not stack.own[i].is_empty():
+            bare.append(i)
+        beads = [*own, *_auxiliary_beads(stack, i, part, later)]
         beads = [bead if bead.kind in WALLS else simplify_bead(bead) for bead in beads]
         beads, seams = place_seams(beads, profile.process, around)
         beads += stack.ending[i]
@@ -83,7 +90,15 @@ def slice_site(site: Site, supports: Supports, on_layer: Callable[[int, int], No
     if usual < len(stack.outlines):
         layers += vase_layers(stack.outlines, stack.supports.areas, stack.heights, profile, tip)
     _check_not_empty(part, bounds_mm, layers, profile.process)
-    return SlicedPart(part.index, tuple(layers), _unsupported(site, supports, layers), stack.interface_mm3)
+    too_thin = [i for i in bare if i < last and usual == len(stack.outlines)]
+    return SlicedPart(
+        part.index,
+        tuple(layers),
+        _unsupported(site, supports, layers),
+        stack.interface_mm3,
+        len(too_thin),
+        float(stack.heights.tip_mm[too_thin[0]]) if too_thin else 0.0,
+    )
 
 
 def _unsupported(site: Site, supports: Supports, layers: Sequence[Layer]) -> tuple[Unsupported, ...]:

@@ -32,6 +32,14 @@ def expected_mm3(mesh: Mesh, sliced: SlicedPart) -> float:
     return mesh.volume_mm3 - 0.2 * ROUNDING * sum(path.length_mm for path in of_kind(sliced, Kind.OUTER_WALL))
 
 
+@pytest.mark.parametrize(("thick_mm", "layers"), [(0.3, 0), (0.08, 4)])
+def test_layers_with_nothing_wide_enough_for_a_line_below_others_are_counted(thick_mm: float, layers: int) -> None:
+    block = m3.Manifold.cube((4, 4, 1))
+    neck = m3.Manifold.cube((2, thick_mm, 0.8)).translate((1, 2, 1))
+    sliced = slice_part(whole(standing(block + neck + block.translate((0, 0, 1.8)))), profile())
+    assert (sliced.too_thin, sliced.too_thin_mm) == (layers, pytest.approx(1.2 if layers else 0.0))
+
+
 @pytest.mark.parametrize("make", [box, cylinder, hollow, bowl, ball, branch])
 def test_a_solid_part_extrudes_its_volume(make: Callable[[], Mesh]) -> None:
     sliced = slice_part(whole(make()), profile(*SOLID))

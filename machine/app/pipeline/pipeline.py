@@ -38,6 +38,7 @@ from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 from slicer.parts import OnProgress, SlicingProgress, slice_parts
+from slicer.paths import SlicedPart
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +174,7 @@ def build(
         sliced = slice_parts(parts, profile, show)
         told("planning moves")
         program = plan(decomposition, sliced, profile, stops)
-        for note in _left_out(program, profile):
+        for note in (*_too_thin(sliced, profile), *_left_out(program, profile)):
             say(f"{decomposition.name}: {note}")
         lines = tuple(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
@@ -191,6 +192,16 @@ def _with_own_figures(decomposition: Decomposition, run: DryRun) -> Decompositio
         return decomposition
     row = replace(chosen, time_s=run.time_s, filament_mm=float(np.max(run.program.filament_mm, initial=0.0)))
     return replace(decomposition, front=tuple(row if each is chosen else each for each in decomposition.front))
+
+
+def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
+    """Layers that no line is narrow enough for, with what is above them."""
+    for part in sliced:
+        if part.too_thin:
+            where = f"{part.too_thin} layers of part {part.index}, the first at {part.too_thin_mm:.2f} mm"
+            nozzle = f"a line of a {profile.machine.head.nozzle_mm:g} mm nozzle"
+            wanted = "a larger process.scale or a finer nozzle prints them"
+            yield f"{where}, hold nothing wide enough for {nozzle}, so what is above them hangs: {wanted}"
 
 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
