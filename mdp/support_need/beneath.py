@@ -1,22 +1,29 @@
 """Beneath: which faces have, along a direction, nothing of the solid beneath them, only air (a numba kernel).
 
 Support leans, so a few directions spread evenly stand for those between them. For each a grid of cells across it keeps the lowest
-surface that looks up; a face is over air where none in its cell lies lower than itself.
+surface that looks up; a place is over air where none in its cell lies lower than itself. Flat places are asked as a whole, at the
+places of a raster, and look up as a whole, so that it does not matter how they are cut into triangles.
 """
 
 from math import pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, part
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Ints
 from mdp.support_need.linked_faces import LinkedFaces
 from mdp.support_need.patches import Classes, frame_across
 
 COUNT = 37  # directions over the half sphere, some 24 degrees apart
 CELLS = 96  # of a grid along its longer side
 LEAST_COSINE = 0.05  # of a surface that looks up and the direction
+RASTER = 0.5  # cells between two places of flat places that are looked at
+ASIDE = 0.29  # of the raster's step: where in it these places lie, so that they are on no edge of a cell
+FEW_SAMPLES = 8.0  # on a flat place that is too small for the raster
+MOST = 0.55  # share of a flat place over air that makes all of it; half of it often is, up to rounding
+TINY = 1e-9  # twice the area of a face seen edge-on, in cells
 
 
 def coarse_directions() -> Floats:
@@ -27,28 +34,109 @@ def coarse_directions() -> Floats:
     return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
 
 
+class Counts(NamedTuple):
+    """Of every flat place, at its number (m,): how low and how high it reaches, how many places of the raster lie on it, and how
+    many of these over air. Where these are too few: its area, and what of it is over air by points of its faces."""
+
+    least: Floats
+    most: Floats
+    sampled: Floats
+    airy: Floats
+    area: Floats
+    airy_area: Floats
+
+
 @kernel
-def find_over_air(begin_row: int, end_row: int, surface: LinkedFaces, directions: Floats, out: Classes) -> None:
-    """For each of (k, 3) directions which faces (k, m) are over air for the most part, 0 or 1."""
+def find_over_air(begin_row: int, end_row: int, surface: LinkedFaces, places: Ints, directions: Floats, out: Classes) -> None:
+    """For each of (k, 3) directions which faces (k, m) that look down are over air, 0 or 1. places: (m,) from flat_places; each
+    is one or the other as a whole."""
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
-    seen = table(vertices.shape[1], 3)
+    seen, count = table(vertices.shape[1], 3), len(faces)
+    facing = floats(count, 0.0)
     for row in range(begin_row, end_row):
         d = directions[row]
         cell = _see(vertices, d, seen)
+        counts = _no_counts(count)
+        _find_extents(seen, faces, places, counts)
         lowest = floats((CELLS + 2) * (CELLS + 2), np.inf)
-        for f in range(len(faces)):
-            if normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2] > LEAST_COSINE:
-                _lay(seen, faces[f, 0], faces[f, 1], faces[f, 2], lowest)
-        for f in range(len(faces)):
-            airy = 0
-            for k in range(4):
-                x, y, z = 0.0, 0.0, 0.0
-                for corner in range(3):
-                    share = (1.0 if k == 3 else (2.0 if k == corner else 0.5)) / 3.0
-                    v = faces[f, corner]
-                    x, y, z = x + share * seen[v, 0], y + share * seen[v, 1], z + share * seen[v, 2]
-                airy += int(lowest[int(y) * (CELLS + 2) + int(x)] > z - 1e-3 * cell)
-            out[row, f] = int(airy > 2)
+        for f in range(count):
+            facing[f] = normals[0, f] * d[0] + normals[1, f] * d[1] + normals[2, f] * d[2]
+            if facing[f] > LEAST_COSINE:
+                _lay(seen, faces[f], counts.least[places[f]], counts.most[places[f]], lowest)
+        for f in range(count):
+            if facing[f] < 0.0:
+                _sample(seen, faces[f], lowest, 1e-3 * cell, places[f], counts)
+        for f in range(count):
+            if facing[f] < 0.0 and counts.sampled[places[f]] < FEW_SAMPLES:
+                counts.area[places[f]] += surface.areas_mm2[f]
+                counts.airy_area[places[f]] += surface.areas_mm2[f] * _share_over_air(seen, faces[f], lowest, 1e-3 * cell)
+        for f in range(count):
+            p = places[f]
+            few = counts.sampled[p] < FEW_SAMPLES
+            out[row, f] = int(counts.airy_area[p] > MOST * counts.area[p] if few else counts.airy[p] > MOST * counts.sampled[p])
+
+
+@part
+def _no_counts(count: int) -> Counts:
+    """Of so many flat places."""
+    zeros = table(4, count)
+    return Counts(floats(count, np.inf), floats(count, -np.inf), zeros[0], zeros[1], zeros[2], zeros[3])
+
+
+@part
+def _find_extents(seen: Floats, faces: Ints, places: Ints, counts: Counts) -> None:
+    """How low and how high the flat places reach."""
+    for f in range(len(faces)):
+        p = places[f]
+        for corner in range(3):
+            z = seen[faces[f, corner], 2]
+            counts.least[p], counts.most[p] = min(counts.least[p], z), max(counts.most[p], z)
+
+
+@part
+def _is_airy(lowest: Floats, x: float, y: float, z: float) -> bool:
+    """Whether nothing in the cell of a place that looks up lies lower."""
+    return bool(lowest[int(y) * (CELLS + 2) + int(x)] > z)
+
+
+@part
+def _sample(seen: Floats, face: Ints, lowest: Floats, slack_mm: float, place: int, counts: Counts) -> None:
+    """Look down from those places of a raster that lie on a face, one row after the other."""
+    a, b, c = face[0], face[1], face[2]
+    ux, uy, uz = seen[b, 0] - seen[a, 0], seen[b, 1] - seen[a, 1], seen[b, 2] - seen[a, 2]
+    vx, vy, vz = seen[c, 0] - seen[a, 0], seen[c, 1] - seen[a, 1], seen[c, 2] - seen[a, 2]
+    twice = ux * vy - uy * vx
+    if abs(twice) < TINY:
+        return
+    slope_x, slope_y = (uz * vy - vz * uy) / twice, (vz * ux - uz * vx) / twice
+    low, high = min(seen[a, 1], seen[b, 1], seen[c, 1]), max(seen[a, 1], seen[b, 1], seen[c, 1])
+    for j in range(int(low / RASTER), int(high / RASTER) + 1):
+        y, begin, end = (j + ASIDE) * RASTER, np.inf, -np.inf
+        for k in range(3):
+            p, q = face[k], face[(k + 1) % 3]
+            if (seen[p, 1] < y) != (seen[q, 1] < y):
+                x = seen[p, 0] + (y - seen[p, 1]) / (seen[q, 1] - seen[p, 1]) * (seen[q, 0] - seen[p, 0])
+                begin, end = min(begin, x), max(end, x)
+        if begin < end:
+            for i in range(int(np.ceil(begin / RASTER - ASIDE)), int(np.ceil(end / RASTER - ASIDE))):
+                x = (i + ASIDE) * RASTER
+                z = seen[a, 2] + slope_x * (x - seen[a, 0]) + slope_y * (y - seen[a, 1])
+                counts.sampled[place] += 1.0
+                counts.airy[place] += int(_is_airy(lowest, x, y, z - slack_mm))
+
+
+@part
+def _share_over_air(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -> float:
+    """The share of a small face over air, by its middle and places near its corners."""
+    airy = 0
+    for k in range(4):
+        x, y, z = 0.0, 0.0, 0.0
+        for corner in range(3):
+            share = (1.0 if k == 3 else (2.0 if k == corner else 0.5)) / 3.0
+            v = face[corner]
+            x, y, z = x + share * seen[v, 0], y + share * seen[v, 1], z + share * seen[v, 2]
+        airy += int(_is_airy(lowest, x, y, z - slack_mm))
+    return 0.25 * airy
 
 
 @part
@@ -70,12 +158,13 @@ def _see(vertices: Floats, d: Floats, seen: Floats) -> float:
 
 
 @part
-def _lay(seen: Floats, a: int, b: int, c: int, lowest: Floats) -> None:
-    """Lay a triangle, wider by half a cell, into the grid of lowest surfaces."""
+def _lay(seen: Floats, face: Ints, least: float, most: float, lowest: Floats) -> None:
+    """Lay a face into the cells that it touches of the grid of lowest surfaces, as high as its plane is at their middles, within
+    the extent of its flat place."""
+    a, b, c = face[0], face[1], face[2]
     ax, ay, bx, by, cx, cy = seen[a, 0], seen[a, 1], seen[b, 0], seen[b, 1], seen[c, 0], seen[c, 1]
     twice = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    least, most = min(seen[a, 2], seen[b, 2], seen[c, 2]), max(seen[a, 2], seen[b, 2], seen[c, 2])
-    if twice <= 0.0:
+    if twice < TINY:
         return
     slack_a = 0.5 * (abs(cx - bx) + abs(cy - by))
     slack_b = 0.5 * (abs(ax - cx) + abs(ay - cy))

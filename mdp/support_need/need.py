@@ -95,11 +95,7 @@ class SupportNeed:
         cuts leave remembers but one."""
         directions = coarse_directions()
         over_air = np.zeros((len(directions), len(self.surface.faces)), np.uint8)
-        in_threads(find_over_air, len(directions), self.surface, directions, over_air)
-        places, areas = flat_places(self.surface), self.surface.areas_mm2
-        half = 0.5 * np.bincount(places, areas)
-        for row in over_air:
-            row[:] = (np.bincount(places, areas * row) > half)[places]
+        in_threads(find_over_air, len(directions), self.surface, flat_places(self.surface), directions, over_air)
         return over_air
 
 

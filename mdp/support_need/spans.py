@@ -11,6 +11,7 @@ from mdp.mesh import Floats, Ints
 
 TURNS = 8  # directions tried over half a turn, besides those of the place's own sides
 BINS = 36  # of directions of the sides, over half a turn
+BESIDE = 0.37  # of a bin: where in the first one the direction 0 lies; usual angles lie at no end of a bin
 LINES = 24  # over a place at most; else one every line width
 HOPELESS = 0.2  # share of the ends of lines that lie on no bank, beyond which lines need not be drawn
 TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place, as for the slicer's bridges
@@ -18,12 +19,10 @@ ROUNDING_MM = 0.05  # a span may seem longer by this than it was drawn
 
 
 class Sides(NamedTuple):
-    """The rim of a hanging place seen along the direction, mm: ends (n, 4) x, y, x, y, which sides are banks (n,), and edges
-    (n, 2) the faces they belong to and the corner each begins at."""
+    """The rim of a hanging place seen along the direction, mm: ends (n, 4) x, y, x, y, and which sides are banks (n,)."""
 
     ends: Floats
     banked: Ints
-    edges: Ints
 
 
 @part
@@ -36,7 +35,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
         cos, sin = np.cos(angles[a]), np.sin(angles[a])
         across_mm, loose_mm = _across(sides, cos, sin)
         if (
-            area_mm2 <= 0.5 * longest_mm * across_mm  # else the mean line is too long
+            area_mm2 <= 0.5 * (longest_mm + ROUNDING_MM) * across_mm  # else the mean line is too long
             and loose_mm <= HOPELESS * across_mm
             and _spans_along(sides, cos, sin, longest_mm, width_mm)
         ):
@@ -62,8 +61,8 @@ def _angles(ends: Floats) -> Floats:
     for e in range(len(ends)):
         x, y = ends[e, 2] - ends[e, 0], ends[e, 3] - ends[e, 1]
         angle, size = np.arctan2(y, x), np.sqrt(x * x + y * y)
-        angle += np.pi if angle < 0.0 else 0.0
-        b = min(int(angle / np.pi * BINS), BINS - 1)
+        angle -= np.pi * np.floor(angle / np.pi + BESIDE / BINS)
+        b = min(max(int(angle / np.pi * BINS + BESIDE), 0), BINS - 1)
         length[b] += size
         turned[b] += size * angle
     angles = floats(TURNS + 4, 0.0)

@@ -1,0 +1,226 @@
+"""Descent: the way straight down a surface, as water takes it, and what it comes to (numba kernels).
+
+The way follows the steepest slope through faces, along edges where both sides slope towards them, and from vertex to vertex: it
+is one of the shape, the same however that is cut into triangles.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdp.kernels.kernel import inlined, part
+from mdp.mesh import Floats, Ints
+from mdp.support_need.linked_faces import LinkedFaces
+
+BANK_MM = 1.0  # a ridge that goes down less than this is no bank: it hangs in the air itself
+ROUNDING_MM = 1e-6  # of a way down just as deep
+BANKED, LOOSE = 0, -1  # what a way down comes to, if not to a patch, whose number is above 0
+SAFE = 0  # the number of faces that belong to no patch
+LEVEL = 1e-6  # slope of a face that water does not leave
+ASIDE = 1e-9  # a way that leaves an edge by less runs along it
+END = 1e-7  # share of an edge that is its end
+MOST_STEPS = 1000  # over faces, about a vertex or down; never reached by a sound mesh
+
+
+class View(NamedTuple):
+    """A surface along a direction (3,): the heights of its vertices (n,), the cosines of its faces' normals with the direction
+    (m,), the number of the patch that each face belongs to (m,), and the height up to which it rests on something.
+    place: room for a point."""
+
+    surface: LinkedFaces
+    direction: Floats
+    heights: Floats
+    cosines: Floats
+    number: Ints
+    ground_mm: float
+    place: Floats
+
+
+@part
+def descend(view: View, f: int, corner: int, share: float, own: int) -> int:
+    """The way down a face from a place on its edge: BANKED where it goes BANK_MM deep, to the ground or to what has solid beneath
+    it; the number of the patch on which it ends before, LOOSE where that is the own one or none."""
+    surface, heights = view.surface, view.heights
+    height = _put(view, f, corner, share)
+    deep = max(height - BANK_MM + ROUNDING_MM, view.ground_mm)
+    for _ in range(MOST_STEPS):
+        if height <= deep:
+            return BANKED
+        if view.cosines[f] ** 2 >= 1.0 - LEVEL**2:
+            return _end_on_face(view, f, own)
+        corner, share = _leave(surface, view.direction, view.place, f)
+        if corner >= 0 and END < share < 1.0 - END:
+            height = _put(view, f, corner, share)
+            g = surface.neighbours[f, corner]
+            if g >= 0 and flows_out(view, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3])) <= ASIDE:
+                f = g
+                continue
+        v = _lower_end(view, f, corner, share)
+        g = f
+        while g >= 0 and heights[v] > deep:  # from vertex to vertex, as far as edges are steeper than faces
+            f = g
+            g, w = _steepest(view, f, v)
+            if g < 0:
+                return _end_at_vertex(view, f, v, own)
+            if w == v:
+                break
+            v = w
+        f, height = g, heights[v]
+        for axis in range(3):
+            view.place[axis] = surface.vertices[axis, v]
+    return LOOSE
+
+
+@part
+def corner_of(surface: LinkedFaces, f: int, v: int) -> int:
+    """The corner of a face at a vertex."""
+    return 0 if surface.faces[f, 0] == v else (1 if surface.faces[f, 1] == v else 2)
+
+
+@part
+def outflow(vertices: Floats, faces: Ints, normals: Floats, d: Floats, f: int, corner: int) -> float:
+    """How fast water on a face runs out over the edge that begins at a corner; below 0: away from it."""
+    a, b = faces[f, corner], faces[f, (corner + 1) % 3]
+    x, y, z = vertices[0, b] - vertices[0, a], vertices[1, b] - vertices[1, a], vertices[2, b] - vertices[2, a]
+    p, q, r = _across(x, y, z, normals[0, f], normals[1, f], normals[2, f])
+    size = p * p + q * q + r * r
+    # at right angles to the normal, so that the direction itself will do
+    return -(d[0] * p + d[1] * q + d[2] * r) / np.sqrt(size) if size > 0.0 else 0.0
+
+
+@part
+def flows_out(view: View, f: int, corner: int) -> float:
+    """outflow of a face in a view."""
+    surface = view.surface
+    return outflow(surface.vertices, surface.faces, surface.normals, view.direction, f, corner)
+
+
+@inlined
+def _across(x: float, y: float, z: float, nx: float, ny: float, nz: float) -> tuple[float, float, float]:
+    """The vector in a face's plane across an edge and out of the face."""
+    return y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
+
+
+@part
+def _put(view: View, f: int, corner: int, share: float) -> float:
+    """Go to a place on the edge that begins at a corner; its height."""
+    a, b = view.surface.faces[f, corner], view.surface.faces[f, (corner + 1) % 3]
+    for axis in range(3):
+        begin = view.surface.vertices[axis, a]
+        view.place[axis] = begin + share * (view.surface.vertices[axis, b] - begin)
+    return float(view.heights[a] + share * (view.heights[b] - view.heights[a]))
+
+
+@part
+def _leave(surface: LinkedFaces, d: Floats, place: Floats, f: int) -> tuple[int, float]:
+    """The edge, by the corner it begins at, over which water at the place leaves a face, and where on it; -1: none."""
+    vertices, faces, normals = surface.vertices, surface.faces, surface.normals
+    nx, ny, nz = normals[0, f], normals[1, f], normals[2, f]
+    cosine = nx * d[0] + ny * d[1] + nz * d[2]
+    nearest, way_out, share = np.inf, -1, 0.0
+    for corner in range(3):
+        a, b = faces[f, corner], faces[f, (corner + 1) % 3]
+        ax, ay, az = vertices[0, a], vertices[1, a], vertices[2, a]
+        x, y, z = vertices[0, b] - ax, vertices[1, b] - ay, vertices[2, b] - az
+        p, q, r = _across(x, y, z, nx, ny, nz)
+        out = -(d[0] * p + d[1] * q + d[2] * r)
+        if out > ASIDE * np.sqrt(p * p + q * q + r * r):
+            way = ((ax - place[0]) * p + (ay - place[1]) * q + (az - place[2]) * r) / out
+            if way < nearest:
+                fx, fy, fz = cosine * nx - d[0], cosine * ny - d[1], cosine * nz - d[2]
+                along = (place[0] + way * fx - ax) * x + (place[1] + way * fy - ay) * y + (place[2] + way * fz - az) * z
+                nearest, way_out, share = way, corner, along / (x * x + y * y + z * z)
+    return way_out, min(max(share, 0.0), 1.0)
+
+
+@part
+def _lower_end(view: View, f: int, corner: int, share: float) -> int:
+    """The vertex where water goes on: the end of an edge at which it is, or else the lower one; of a face with no way out its
+    lowest corner."""
+    faces, heights = view.surface.faces, view.heights
+    if corner < 0:
+        v = faces[f, 0]
+        for k in range(1, 3):
+            v = faces[f, k] if heights[faces[f, k]] < heights[v] else v
+        return int(v)
+    a, b = faces[f, corner], faces[f, (corner + 1) % 3]
+    if share <= END or share >= 1.0 - END:
+        return int(a if share <= END else b)
+    return int(a if heights[a] <= heights[b] else b)
+
+
+@part
+def _turn(surface: LinkedFaces, first: int, f: int, v: int, forward: bool) -> tuple[int, bool]:
+    """The next face around a vertex after one of them, -1 when all were seen; at an open edge the other way round from the
+    first."""
+    corner = corner_of(surface, f, v)
+    g = surface.neighbours[f, corner if forward else (corner + 2) % 3]
+    if g < 0 and forward:
+        corner, forward = corner_of(surface, first, v), False
+        g = surface.neighbours[first, (corner + 2) % 3]
+    return (int(g), forward) if g >= 0 and g != first else (-1, forward)
+
+
+@part
+def _steepest(view: View, first: int, v: int) -> tuple[int, int]:
+    """Where water leaves a vertex: a face and the vertex itself, or a face and the other end of its edge; -1: nowhere."""
+    surface, best, way, end = view.surface, LEVEL, -1, v
+    f, forward = first, True
+    for _ in range(MOST_STEPS):
+        corner = corner_of(surface, f, v)
+        for k in range(1, 3):
+            w = surface.faces[f, (corner + k) % 3]
+            slope = _slope(view, v, w)
+            if slope > best:
+                best, way, end = slope, f, w
+        slope = np.sqrt(max(1.0 - view.cosines[f] ** 2, 0.0))
+        if slope >= best and _begins_within(view, f, corner):
+            best, way, end = slope, f, v
+        f, forward = _turn(surface, first, f, v, forward)
+        if f < 0:
+            break
+    return way, end
+
+
+@part
+def _slope(view: View, v: int, w: int) -> float:
+    """How steep it goes down from one vertex to another."""
+    length = 0.0
+    for axis in range(3):
+        length += (view.surface.vertices[axis, w] - view.surface.vertices[axis, v]) ** 2
+    return float((view.heights[v] - view.heights[w]) / np.sqrt(length)) if length > 0.0 else 0.0
+
+
+@part
+def _begins_within(view: View, f: int, corner: int) -> bool:
+    """Whether water at a corner of a face runs into it: out over neither of the edges there."""
+    before = (corner + 2) % 3
+    return flows_out(view, f, corner) <= ASIDE and flows_out(view, f, before) <= ASIDE and view.surface.areas_mm2[f] > 0.0
+
+
+@part
+def _end_on_face(view: View, f: int, own: int) -> int:
+    """What a way comes to that ends on a level face."""
+    if view.cosines[f] > 0.0:
+        return BANKED
+    return int(view.number[f]) if _is_others(view, f, own) else LOOSE
+
+
+@part
+def _is_others(view: View, f: int, own: int) -> bool:
+    """Whether a face belongs to another patch."""
+    return bool(view.number[f] != SAFE and view.number[f] != own)
+
+
+@part
+def _end_at_vertex(view: View, first: int, v: int, own: int) -> int:
+    """What a way comes to that ends at a vertex: a patch about it, or else the solid beneath a pit."""
+    f, forward, pit = first, True, False
+    for _ in range(MOST_STEPS):
+        if _is_others(view, f, own):
+            return int(view.number[f])
+        pit = pit or view.cosines[f] > 0.0
+        f, forward = _turn(view.surface, first, f, v, forward)
+        if f < 0:
+            break
+    return BANKED if pit else LOOSE

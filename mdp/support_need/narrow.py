@@ -1,0 +1,88 @@
+"""Narrow: whether a hanging place reaches nowhere far from its banks (numba kernels)."""
+
+from mdp.kernels.arrays import table
+from mdp.kernels.kernel import part
+from mdp.mesh import Floats, Ints
+from mdp.support_need.spans import Sides
+
+FINE_MM = 0.1  # between two places that are looked at, neither of them too far from a bank
+ROUNDING_MM = 1e-6
+DEEP = 64  # halvings of a triangle, one within the other
+
+
+@part
+def is_near_banks(sides: Sides, reach_mm: float, triangle: Floats, todo: Floats, nearest: int) -> int:
+    """A bank within reach of a triangle (6,), x, y of its corners, all of which lies within reach of banks; -1: some of it does
+    not. nearest: the bank to try first; todo (DEEP, 6): room for triangles."""
+    count = 1
+    for k in range(6):
+        todo[0, k] = triangle[k]
+    while count > 0:
+        count -= 1
+        t = todo[count]
+        for k in range(3):
+            nearest = _near_bank(sides.ends, sides.banked, t[2 * k], t[2 * k + 1], reach_mm, nearest)
+            if nearest < 0:
+                return -1
+        longest, split = 0.0, 0
+        for k in range(3):
+            n = (k + 1) % 3
+            length = (t[2 * n] - t[2 * k]) ** 2 + (t[2 * n + 1] - t[2 * k + 1]) ** 2
+            if length > longest:
+                longest, split = length, k
+        if longest > FINE_MM * FINE_MM and not _all_near_one(sides, t, reach_mm, nearest) and count + 2 <= DEEP:
+            _halve(todo, count, split)
+            count += 2
+    return nearest
+
+
+@part
+def triangles_room() -> Floats:
+    """Room for the triangles of is_near_banks."""
+    return table(DEEP, 6)
+
+
+@part
+def _halve(todo: Floats, at: int, split: int) -> None:
+    """Put the halves of a triangle in its place and the one after it, cut through the middle of an edge."""
+    a, b, c = 2 * split, 2 * ((split + 1) % 3), 2 * ((split + 2) % 3)
+    for axis in range(2):
+        middle = 0.5 * (todo[at, a + axis] + todo[at, b + axis])
+        todo[at + 1, 0 + axis], todo[at + 1, 2 + axis], todo[at + 1, 4 + axis] = middle, todo[at, b + axis], todo[at, c + axis]
+        todo[at, b + axis] = middle
+
+
+@part
+def _all_near_one(sides: Sides, t: Floats, reach_mm: float, first: int) -> bool:
+    """Whether one bank lies near all corners of a triangle, and so near all of it."""
+    ends, banked, count = sides.ends, sides.banked, len(sides.banked)
+    for k in range(count):
+        e = (first + k) % count
+        if banked[e] > 0:
+            near = 0
+            while near < 3 and _is_near(ends, e, t[2 * near], t[2 * near + 1], reach_mm):
+                near += 1
+            if near == 3:
+                return True
+    return False
+
+
+@part
+def _near_bank(ends: Floats, banked: Ints, x: float, y: float, reach_mm: float, first: int) -> int:
+    """A banked side within reach of a place, looked for from a side on; -1: none."""
+    count = len(banked)
+    for k in range(count):
+        e = (first + k) % count
+        if banked[e] > 0 and _is_near(ends, e, x, y, reach_mm):
+            return e
+    return -1
+
+
+@part
+def _is_near(ends: Floats, e: int, x: float, y: float, reach_mm: float) -> bool:
+    """Whether a place lies within reach of a side."""
+    ax, ay, bx, by = ends[e, 0], ends[e, 1], ends[e, 2] - ends[e, 0], ends[e, 3] - ends[e, 1]
+    length = bx * bx + by * by
+    share = ((x - ax) * bx + (y - ay) * by) / length if length > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return bool((x - ax - share * bx) ** 2 + (y - ay - share * by) ** 2 <= (reach_mm + ROUNDING_MM) ** 2)
