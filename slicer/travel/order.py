@@ -16,15 +16,16 @@ from mdp.kernels.kernel import kernel
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from profiles.process import Process
-from slicer.bead import Bead, outer_wall_width_mm
+from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, area_mm2, contours, start_at
 from slicer.geometry.segments import inside
 from slicer.paths import Kind
-from slicer.travel.combing import NOWHERE, Combing
+from slicer.travel.combing import NOWHERE
 from slicer.travel.path_order import order_paths
+from slicer.travel.retracting import travels
 
 OUTSIDE = -1000  # ranks up to this belong to no island: skirt, brim, support
-SUPPORT = "Support"  # with this word begin the kinds that are torn off: a travel among them may ooze
+NO_SUPPORT = Polygons()
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,43 +38,25 @@ class Placed:
     approach: Floats
 
 
-def order_beads(beads: Sequence[Bead], section: Polygons, process: Process, tip: Floats | None) -> list[Placed]:
-    """The beads of one layer in printing order; tip: (2,) where the nozzle stands before, None at the part's start."""
+def order_beads(
+    beads: Sequence[Bead], section: Polygons, process: Process, tip: Floats | None, support: Polygons = NO_SUPPORT
+) -> list[Placed]:
+    """The beads of one layer in printing order.
+
+    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed.
+    """
     if not beads:
         return []
     first = beads[0].points[0] if tip is None else tip
     placed = _sequence(beads, section, first)
     to = np.array([points[0] for _, points in placed])
     since = np.array([first, *(points[-1] for _, points in placed[:-1])])
-    supports = np.array([bead.kind.value.startswith(SUPPORT) for bead, _ in placed])
-    combing = Combing(section, min(process.line_width_mm, outer_wall_width_mm(process)))
-    retracts, detours = _travels(combing, since, to, supports, process)
+    retracts, detours = travels(since, to, section, support, process)
     retracts[0] = retracts[0] or tip is None
     return [
         Placed(bead, points, bool(pull), detours.get(k, NOWHERE))
         for k, ((bead, points), pull) in enumerate(zip(placed, retracts, strict=True))
     ]
-
-
-def _travels(
-    combing: Combing, since: Floats, to: Floats, supports: NDArray[np.bool_], process: Process
-) -> tuple[NDArray[np.bool_], dict[int, Floats]]:
-    """Which travels retract: long ones that leave the inside of the section and find no short detour inside it.
-
-    A travel from support to support may leave it, but not cross it. Returns the detours too, by the travel's number.
-    """
-    long = np.hypot(*(to - since).T) >= process.retract_travel_mm
-    retracts = long.copy()
-    retracts[long] = combing.leaves(since[long], to[long])
-    detours: dict[int, Floats] = {}
-    for k in np.flatnonzero(retracts):
-        if k and supports[k] and supports[k - 1]:
-            retracts[k] = combing.crosses(since[k : k + 1], to[k : k + 1])[0]
-        elif process.combing:
-            detour = combing.detour(since[k], to[k], process.combing_detour_mm)
-            if detour is not None:
-                retracts[k], detours[int(k)] = False, detour
-    return retracts, detours
 
 
 def _sequence(beads: Sequence[Bead], section: Polygons, first: Floats) -> list[tuple[Bead, Floats]]:

@@ -8,7 +8,7 @@ from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from slicer.speed import _slow_down
-from slicer.travel.order import order_beads
+from slicer.travel.order import OUTSIDE, order_beads
 from tests.shapes import box, tee
 from tests.slicer.hand import profile, whole
 
@@ -98,3 +98,20 @@ def test_no_bead_asks_for_more_than_the_hot_end_melts() -> None:
     sliced = slice_part(whole(box(20, 20, 4)), chosen)
     for layer in sliced.layers:
         assert max(layer.volume_mm3(p) / p.length_mm * p.speed_mm_s for p in layer.paths) <= 5.0 + 1e-9
+
+
+def column(x: float) -> Bead:
+    """A line of support 3 mm long."""
+    return Bead(Kind.SUPPORT, np.array([[x, 1.0], [x, 4.0]]), 0.45, OUTSIDE)
+
+
+def test_a_travel_over_one_piece_of_support_does_not_retract_and_one_through_the_air_to_the_next_piece_does() -> None:
+    support = Polygons.square((10, 5)) + Polygons.square((5, 5)).translate((13, 0))
+    placed = order_beads([column(1), column(9), column(14)], Polygons(), STANDARD, np.array([1.0, 0.9]), support)
+    assert [(float(p.points[0, 0]), p.retract) for p in placed] == [(1, False), (9, False), (14, True)]
+
+
+def test_a_travel_round_a_hole_of_its_support_does_not_retract() -> None:
+    support = Polygons.square((10, 10)) - Polygons.square((6, 3)).translate((2, 1))
+    placed = order_beads([column(1), column(9)], Polygons(), STANDARD, np.array([1.0, 0.9]), support)
+    assert [(p.retract, len(p.approach) > 0) for p in placed] == [(False, False), (False, True)]
