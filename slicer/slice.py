@@ -157,7 +157,8 @@ def _layer(beads: list[Bead], stack: Stack, index: int, part: Part, profile: Pro
     own = stack.processes[index]
     on_platform = part.index == 1
     beads = begin_inside(beads) if index == 0 and not on_platform else beads
-    ordered = split_overhangs(order_beads(beads, outline, own, tip), outline, stack.bank(index), own)
+    ordered = order_beads(beads, outline, own, tip, stack.supports.areas[index])
+    ordered = split_overhangs(ordered, outline, stack.bank(index), own)
     if index == 0 and not on_platform and process.interlock_mm > 0.0:
         ordered = fill_grooves(ordered, part, process, height_mm)
     fixed: Mapping[Kind, float] | None = None

@@ -12,7 +12,7 @@ from slicer.bead import Bead
 from slicer.geometry.polygons import Polygons, clean, contours, union
 from slicer.paths import Kind
 from slicer.section import sections
-from slicer.travel.order import OUTSIDE
+from slicer.travel.islands import OUTSIDE
 
 BENEATH_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
 

@@ -17,7 +17,7 @@ from slicer.fill.zigzag import zigzag_lines
 from slicer.geometry.polygons import Polygons, clean, close_loop, contours, offset
 from slicer.paths import Kind
 from slicer.section import sections
-from slicer.travel.order import OUTSIDE
+from slicer.travel.islands import OUTSIDE
 
 ROOF_LAYERS = 3  # the first of them sags between the sparse lines, the last one is even
 DENSITY = 0.25  # of its inside: lines near enough for the roof to span, as a raft's base

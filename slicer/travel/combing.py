@@ -1,7 +1,7 @@
-"""Combing: detours through the inside of a section for travels whose straight line would leave it.
+"""Combing: detours through the inside of an area for travels whose straight line would leave it.
 
-A detour follows the border of the section's inside from where the straight line leaves it to where it comes back, the shorter
-way round, and is then pulled taut. Every segment of it is tested against the border of the section's safe inside.
+A detour follows the border of the area's inside from where the straight line leaves it to where it comes back, the shorter
+way round, and is then pulled taut. Every segment of it is tested against the border of the area's safe inside.
 """
 
 from functools import cached_property
@@ -17,40 +17,35 @@ from slicer.geometry.cells import Cells, cells_of, crossings, free, nearest, wit
 from slicer.geometry.polygons import Polygons, offset
 from slicer.geometry.segments import Segment
 
-SAFE = 0.4  # line widths inside the section within which travels ooze unseen; centrelines of outer walls lie at 0.5
-BEHIND = 1.1  # detours run behind the outer wall where the section is wide enough,
+SAFE = 0.4  # line widths inside the area within which travels ooze unseen; centrelines of outer walls lie at 0.5
+BEHIND = 1.1  # detours run behind the outer wall where the area is wide enough,
 AMONG = 0.45  # else as near to its middle as the walls themselves
 TAUT = 3.0  # a detour along the border may be longer than allowed by this factor before it is pulled taut
 NOWHERE = np.zeros((0, 2))
 
 
 class Combing:
-    """Where the tip may travel in one layer without a retraction."""
+    """Where the tip may travel over an area of one layer, a section or its support, without a retraction."""
 
-    def __init__(self, section: Polygons, width_mm: float) -> None:
-        self._section, self._width_mm = section, width_mm
+    def __init__(self, area: Polygons, width_mm: float) -> None:
+        self._area, self._width_mm = area, width_mm
 
     @cached_property
     def safe(self) -> Cells:
         """The border that no travel without a retraction crosses."""
-        return cells_of(offset(self._section, -SAFE * self._width_mm))
+        return cells_of(offset(self._area, -SAFE * self._width_mm))
 
     @cached_property
     def _behind(self) -> Cells:
-        return cells_of(offset(self._section, -BEHIND * self._width_mm))
+        return cells_of(offset(self._area, -BEHIND * self._width_mm))
 
     @cached_property
     def _among(self) -> Cells:
-        return cells_of(offset(self._section, -AMONG * self._width_mm))
+        return cells_of(offset(self._area, -AMONG * self._width_mm))
 
     def leaves(self, since: Floats, to: Floats) -> NDArray[np.bool_]:
         """(n, 2) by two whether the travels between these points leave the safe inside."""
-        out: NDArray[np.bool_] = _leaves(self.safe, since, to, True)
-        return out
-
-    def crosses(self, since: Floats, to: Floats) -> NDArray[np.bool_]:
-        """(n, 2) by two whether the travels between these points cross the border of the safe inside, wherever they begin."""
-        out: NDArray[np.bool_] = _leaves(self.safe, since, to, False)
+        out: NDArray[np.bool_] = _leaves(self.safe, since, to)
         return out
 
     def detour(self, start: Floats, end: Floats, most_mm: float) -> Floats | None:
@@ -75,12 +70,12 @@ class _Stretch(NamedTuple):
 
 
 @kernel
-def _leaves(safe: Cells, since: Floats, to: Floats, begins_within: bool) -> NDArray[np.bool_]:
-    """Which segments cross the border, or begin outside where that counts."""
+def _leaves(safe: Cells, since: Floats, to: Floats) -> NDArray[np.bool_]:
+    """Which segments cross the border, or begin outside."""
     out = np.empty(len(to), np.bool_)
     for k in range(len(to)):
         x, y = since[k, 0], since[k, 1]
-        out[k] = (begins_within and not within(safe, x, y)) or not free(safe, Segment(x, y, to[k, 0], to[k, 1]))
+        out[k] = not within(safe, x, y) or not free(safe, Segment(x, y, to[k, 0], to[k, 1]))
     return out
 
 

@@ -1,12 +1,13 @@
 """Order: in which sequence the beads of a layer are printed, and which travels between them retract.
 
-Skirt and support come first. Islands of the section follow each other in a short order; inside an island the walls come
-first, each outer wall right after the inner walls behind its seam, then by rising rank gaps, skin and infill.
+Skirt and support come first. The pieces of support, then the islands of the section, follow each other in a short order; inside
+an island the walls come first, each outer wall right after the inner walls behind its seam, then by rising rank gaps, skin and
+infill. Every piece ends near the next one, and where a layer ends the next one begins.
 """
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,18 @@ from mdp.kernels.kernel import kernel
 from mdp.kernels.sorting import counting_sort
 from mdp.mesh import Floats, Ints
 from profiles.process import Process
-from slicer.bead import Bead, outer_wall_width_mm
-from slicer.geometry.polygons import Polygons, area_mm2, contours, start_at
-from slicer.geometry.segments import inside
+from slicer.bead import WALLS, Bead
+from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
-from slicer.travel.combing import NOWHERE, Combing
+from slicer.travel.combing import NOWHERE
+from slicer.travel.islands import FIRST, OUTSIDE, SUPPORTS, islands_of
 from slicer.travel.path_order import order_paths
+from slicer.travel.retracting import travels
+from slicer.travel.rings import AS_IT_IS, CLOSED, OPEN, order_lines
 
-OUTSIDE = -1000  # ranks up to this belong to no island: skirt, brim, support
-SUPPORT = "Support"  # with this word begin the kinds that are torn off: a travel among them may ooze
+NO_SUPPORT = Polygons()
+SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
+ROUNDS = 2  # a phase ends well only once it is known where the next one begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +41,20 @@ class Placed:
     approach: Floats
 
 
-def order_beads(beads: Sequence[Bead], section: Polygons, process: Process, tip: Floats | None) -> list[Placed]:
-    """The beads of one layer in printing order; tip: (2,) where the nozzle stands before, None at the part's start."""
+def order_beads(
+    beads: Sequence[Bead], section: Polygons, process: Process, tip: Floats | None, support: Polygons = NO_SUPPORT
+) -> list[Placed]:
+    """The beads of one layer in printing order.
+
+    tip: (2,) where the nozzle stands before, None at the part's start; support: where that is printed.
+    """
     if not beads:
         return []
     first = beads[0].points[0] if tip is None else tip
-    placed = _sequence(beads, section, first)
+    placed = _sequence(beads, islands_of(beads, section, support), first)
     to = np.array([points[0] for _, points in placed])
     since = np.array([first, *(points[-1] for _, points in placed[:-1])])
-    supports = np.array([bead.kind.value.startswith(SUPPORT) for bead, _ in placed])
-    combing = Combing(section, min(process.line_width_mm, outer_wall_width_mm(process)))
-    retracts, detours = _travels(combing, since, to, supports, process)
+    retracts, detours = travels(since, to, section, support, process)
     retracts[0] = retracts[0] or tip is None
     return [
         Placed(bead, points, bool(pull), detours.get(k, NOWHERE))
@@ -55,52 +62,89 @@ def order_beads(beads: Sequence[Bead], section: Polygons, process: Process, tip:
     ]
 
 
-def _travels(
-    combing: Combing, since: Floats, to: Floats, supports: NDArray[np.bool_], process: Process
-) -> tuple[NDArray[np.bool_], dict[int, Floats]]:
-    """Which travels retract: long ones that leave the inside of the section and find no short detour inside it.
-
-    A travel from support to support may leave it, but not cross it. Returns the detours too, by the travel's number.
-    """
-    long = np.hypot(*(to - since).T) >= process.retract_travel_mm
-    retracts = long.copy()
-    retracts[long] = combing.leaves(since[long], to[long])
-    detours: dict[int, Floats] = {}
-    for k in np.flatnonzero(retracts):
-        if k and supports[k] and supports[k - 1]:
-            retracts[k] = combing.crosses(since[k : k + 1], to[k : k + 1])[0]
-        elif process.combing:
-            detour = combing.detour(since[k], to[k], process.combing_detour_mm)
-            if detour is not None:
-                retracts[k], detours[int(k)] = False, detour
-    return retracts, detours
-
-
-def _sequence(beads: Sequence[Bead], section: Polygons, first: Floats) -> list[tuple[Bead, Floats]]:
+def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats) -> list[tuple[Bead, Floats]]:
     """The beads in order, each with its points as printed."""
-    ranks = np.array([bead.rank for bead in beads], dtype=np.int32)
-    starts = _starts(beads)
-    islands = _islands(starts, ranks, section)
-    groups: defaultdict[int, list[int]] = defaultdict(list)
-    for k, island in enumerate(islands):
-        groups[int(island)].append(k)
-    waiting = np.argsort(islands, kind="stable")  # by island: of two alike the lower number
+    groups: defaultdict[int, list[Bead]] = defaultdict(list)
+    for bead, island in zip(beads, islands.tolist(), strict=True):
+        groups[island].append(bead)
+    tour = _tour(groups, first)
     tip, placed = first, list[tuple[Bead, Floats]]()
-    while groups:
-        nearest = -1 if -1 in groups else int(islands[waiting[np.argmin(((starts[waiting] - tip) ** 2).sum(axis=1))]])
-        waiting = waiting[islands[waiting] != nearest]
-        phases = _phases([beads[k] for k in groups.pop(nearest)])
-        begun = len(placed)
-        for number, items in enumerate(phases, start=1):
-            entries = np.array([item[0].points[0] for item in items])
-            exits = np.array([item[-1].points[-1] for item in items])
-            fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
-            last = number == len(phases) > 1 and not groups  # the next layer most likely begins where this island began
-            goal = np.ascontiguousarray(placed[begun][1][:1]) if last else NOWHERE
-            for k, flip in zip(*order_paths(entries, exits, fixed, tip[0], tip[1], goal), strict=True):
-                placed += [(bead, bead.points[::-1] if flip else bead.points) for bead in items[k]]
-            tip = placed[-1][1][-1]
+    for place, island in enumerate(tour):
+        phases = _phases(groups[island])
+        following = tour[place + 1] if place + 1 < len(tour) else _nearest_island(groups, tour, island)
+        goal = NOWHERE if following == island and len(phases) == 1 else _middle(groups[following])[None]
+        placed += _in_phases(phases, tip, goal)
+        tip = placed[-1][1][-1]
     return placed
+
+
+def _tour(groups: dict[int, list[Bead]], first: Floats) -> list[int]:
+    """The islands in a short order: skirt and brim, then support, then the part."""
+    stages: defaultdict[int, list[int]] = defaultdict(list)
+    for island in sorted(groups):
+        stages[0 if island == FIRST else 1 if groups[island][0].kind in SUPPORTS else 2].append(island)
+    tour: list[int] = []
+    for stage in sorted(stages):
+        places = np.array([_middle(groups[island]) for island in stages[stage]])
+        goal = NOWHERE
+        if stage == 1 and 2 in stages:
+            parts = np.array([_middle(groups[island]) for island in stages[2]])
+            goal = parts[np.argmin(((parts - places.mean(axis=0)) ** 2).sum(axis=1))][None]
+        order, _ = order_paths(places, places, np.ones(len(places), np.bool_), first[0], first[1], goal)
+        tour += [stages[stage][k] for k in order]
+        first = _middle(groups[tour[-1]])
+    return tour
+
+
+def _nearest_island(groups: dict[int, list[Bead]], tour: Sequence[int], last: int) -> int:
+    """Where the next layer most likely begins: the support nearest to the last island, itself where there is none."""
+    supports = [island for island in tour if island != FIRST and groups[island][0].kind in SUPPORTS]
+    here = _middle(groups[last])
+    return min(supports, key=lambda island: float(np.hypot(*(_middle(groups[island]) - here))), default=last)
+
+
+def _middle(beads: Sequence[Bead]) -> Floats:
+    """(2,) the place that stands for an island: where its first outer wall begins, of others the middle of all that they are."""
+    leader = next((bead for bead in beads if bead.kind is Kind.OUTER_WALL), None)
+    points = np.concatenate([bead.points for bead in beads]) if leader is None else leader.points[:1]
+    middle: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return middle
+
+
+def _in_phases(phases: Sequence[Sequence[Sequence[Bead]]], tip: Floats, goal: Floats) -> list[tuple[Bead, Floats]]:
+    """The phases of an island one after the other, each once more when it is known where the next one begins."""
+    goals = [NOWHERE] * (len(phases) - 1) + [goal]
+    for _ in range(min(len(phases), ROUNDS)):
+        runs, at = list[list[tuple[Bead, Floats]]](), tip
+        for phase, end in zip(phases, goals, strict=True):
+            runs.append(_short_order(phase, at, end))
+            at = runs[-1][-1][1][-1]
+        goals = [*(np.ascontiguousarray(run[0][1][:1]) for run in runs[1:]), goal]
+    return [placed for run in runs for placed in run]
+
+
+def _short_order(items: Sequence[Sequence[Bead]], tip: Floats, goal: Floats) -> list[tuple[Bead, Floats]]:
+    """Chains of beads in a short order from the tip on, each bead with its points as printed."""
+    lines = [item[0].points if len(item) == 1 else np.array([item[0].points[0], item[-1].points[-1]]) for item in items]
+    fixed = np.array([len(item) > 1 or item[0].one_way for item in items])
+    placed: list[tuple[Bead, Floats]] = []
+    for run in order_lines(lines, fixed, [_freedom(item) for item in items], tip, goal):
+        item = items[run.number]
+        if len(item) > 1:
+            placed += [(bead, bead.points) for bead in item]
+        elif len(run.pieces) > 1:
+            placed += [(replace(item[0], points=piece), piece) for piece in run.pieces]
+        else:
+            placed.append((item[0], run.pieces[0]))
+    return placed
+
+
+def _freedom(chain: Sequence[Bead]) -> int:
+    """What may be done with a chain so that the ways to and from it are short."""
+    bead = chain[0]
+    if len(chain) > 1 or bead.kind in SEAMED:
+        return AS_IT_IS
+    return CLOSED if bead.closed else OPEN if bead.kind is Kind.INFILL else AS_IT_IS
 
 
 def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
@@ -183,28 +227,3 @@ def _nearest(points: Floats, places: Floats) -> NDArray[np.int64]:
             ring += 1
         out[p] = best
     return out
-
-
-def _islands(starts: Floats, ranks: Ints, section: Polygons) -> Ints:
-    """The island of each bead: the smallest outer contour around its start; -1 for beads outside (skirt, support)."""
-    outer = sorted((loop for loop in contours(section) if area_mm2(loop) > 0), key=lambda loop: abs(area_mm2(loop)))
-    if len(outer) < 2:
-        return np.where(ranks <= OUTSIDE, -1, 0).astype(np.int32)
-    sides = [np.hstack([loop, start_at(loop, 1)]) for loop in outer]
-    offsets = np.cumsum([0, *(len(side) for side in sides)])
-    boxes = np.array([[*loop.min(axis=0), *loop.max(axis=0)] for loop in outer])
-    islands = _containing(np.concatenate(sides), offsets, boxes, starts)
-    return np.where(ranks <= OUTSIDE, -1, islands).astype(np.int32)
-
-
-@kernel
-def _containing(sides: Floats, offsets: NDArray[np.int64], boxes: Floats, points: Floats) -> Ints:
-    islands = np.full(len(points), len(boxes), np.int32)
-    for p in range(len(points)):
-        x, y = points[p, 0], points[p, 1]
-        for k in range(len(boxes)):
-            near = boxes[k, 0] <= x <= boxes[k, 2] and boxes[k, 1] <= y <= boxes[k, 3]
-            if near and inside(sides[offsets[k] : offsets[k + 1]], x, y):
-                islands[p] = k
-                break
-    return islands

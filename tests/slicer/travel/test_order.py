@@ -8,6 +8,7 @@ from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from slicer.speed import _slow_down
+from slicer.travel.islands import OUTSIDE
 from slicer.travel.order import order_beads
 from tests.shapes import box, tee
 from tests.slicer.hand import profile, whole
@@ -16,8 +17,8 @@ STANDARD = profile().process
 STRAIGHT = profile("process.combing=false").process
 
 
-def line(x0: float, y0: float, x1: float, y1: float, rank: int = 3) -> Bead:
-    return Bead(Kind.INFILL, np.array([[x0, y0], [x1, y1]], dtype=float), 0.45, rank)
+def line(x0: float, y0: float, x1: float, y1: float, rank: int = 3, kind: Kind = Kind.INFILL) -> Bead:
+    return Bead(kind, np.array([[x0, y0], [x1, y1]], dtype=float), 0.45, rank)
 
 
 def test_lines_are_visited_from_the_nearest_end() -> None:
@@ -98,3 +99,52 @@ def test_no_bead_asks_for_more_than_the_hot_end_melts() -> None:
     sliced = slice_part(whole(box(20, 20, 4)), chosen)
     for layer in sliced.layers:
         assert max(layer.volume_mm3(p) / p.length_mm * p.speed_mm_s for p in layer.paths) <= 5.0 + 1e-9
+
+
+def column(x: float) -> Bead:
+    """A line of support 3 mm long."""
+    return Bead(Kind.SUPPORT, np.array([[x, 1.0], [x, 4.0]]), 0.45, OUTSIDE)
+
+
+def test_a_travel_over_one_piece_of_support_does_not_retract_and_one_through_the_air_to_the_next_piece_does() -> None:
+    support = Polygons.square((10, 5)) + Polygons.square((5, 5)).translate((13, 0))
+    placed = order_beads([column(1), column(9), column(14)], Polygons(), STANDARD, np.array([1.0, 0.9]), support)
+    assert [(float(p.points[0, 0]), p.retract) for p in placed] == [(1, False), (9, False), (14, True)]
+
+
+def test_a_travel_round_a_hole_of_its_support_does_not_retract() -> None:
+    support = Polygons.square((10, 10)) - Polygons.square((6, 3)).translate((2, 1))
+    placed = order_beads([column(1), column(9)], Polygons(), STANDARD, np.array([1.0, 0.9]), support)
+    assert [(p.retract, len(p.approach) > 0) for p in placed] == [(False, False), (False, True)]
+
+
+def ring(x: float, y: float, kind: Kind = Kind.SUPPORT) -> Bead:
+    """A square of 2 mm round a place, begun at its lower left corner."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]], dtype=float)
+    return Bead(kind, corners + np.array([x, y]), 0.45, OUTSIDE if kind is Kind.SUPPORT else 0)
+
+
+def test_an_outline_of_support_begins_where_the_tip_comes_from_and_a_wall_at_its_seam() -> None:
+    support = Polygons.square((3, 3), True)
+    for kind, start in ((Kind.SUPPORT, (1, 1)), (Kind.OUTER_WALL, (-1, -1))):
+        placed = order_beads([ring(0, 0, kind)], support, STANDARD, np.array([5.0, 5.0]), support)
+        assert tuple(placed[0].points[0]) == tuple(placed[0].points[-1]) == start
+
+
+def test_a_piece_of_support_is_finished_before_the_next_begins() -> None:
+    support = Polygons.square((6, 6), True) + Polygons.square((6, 6), True).translate((7, 0))
+    beads = [line(x, -1, x, 1, OUTSIDE, Kind.SUPPORT) for x in (-2, 2, 5, 9)] + [ring(0, 0), ring(7, 0)]
+    placed = order_beads(beads, Polygons(), STANDARD, np.array([0.0, -4.0]), support)
+    assert [bool(p.points[:, 0].mean() > 3.5) for p in placed] == [False] * 3 + [True] * 3
+
+
+def test_a_layer_ends_near_the_support_with_which_the_next_one_begins() -> None:
+    section, support = Polygons.square((20, 4), True), Polygons.square((3, 3), True).translate((12, 0))
+    placed = order_beads([line(-9, 0, 9, 0), ring(12, 0)], section, STANDARD, np.array([12.0, 0.0]), support)
+    assert tuple(placed[-1].points[-1]) == (9, 0)
+
+
+def test_every_phase_of_an_island_ends_near_the_next_one() -> None:
+    beads = [line(0, 1, 9, 1, 1), line(0, 2, 9, 2, 1), line(12, 1, 20, 1, 2)]
+    placed = order_beads(beads, Polygons.square((30, 10)), STANDARD, np.array([4.5, 0.0]))
+    assert [(p.bead.rank, float(p.points[-1, 0])) for p in placed[:2]] == [(1, 0), (1, 9)]

@@ -1,0 +1,59 @@
+"""Islands: what of a layer hangs together, the section's pieces and those of its support, and a short way through all of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.kernels.kernel import kernel
+from mdp.mesh import Floats, Ints
+from slicer.bead import Bead
+from slicer.geometry.polygons import Polygons, area_mm2, contours, start_at
+from slicer.geometry.segments import inside
+from slicer.paths import Kind
+
+OUTSIDE = -1000  # ranks up to this belong to no island of the section: skirt, brim, support
+SUPPORTS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
+FIRST = -1  # the number of what comes before all islands: skirt and brim
+
+
+def islands_of(beads: Sequence[Bead], section: Polygons, support: Polygons) -> Ints:
+    """(n,) the number of each bead's island: the smallest outer contour round its start, of the section or of its support.
+
+    Those of support come after those of the section; FIRST: skirt and brim.
+    """
+    ranks = np.array([bead.rank for bead in beads], dtype=np.int32)
+    starts = np.array([bead.points[0] for bead in beads]).reshape(-1, 2)
+    torn_off = np.array([bead.kind in SUPPORTS for bead in beads])
+    islands = np.where(ranks <= OUTSIDE, FIRST, 0).astype(np.int32)
+    own, after = ranks > OUTSIDE, 0
+    for wanted, area in ((own, section), (~own & torn_off, support)):
+        if wanted.any():
+            islands[wanted] = after + _pieces_around(starts[wanted], area)
+            after = int(islands.max()) + 1
+    return islands
+
+
+def _pieces_around(starts: Floats, area: Polygons) -> Ints:
+    """(n,) the number of the area's piece that each start lies in; those in none have a number of their own."""
+    outer = sorted((loop for loop in contours(area) if area_mm2(loop) > 0), key=lambda loop: abs(area_mm2(loop)))
+    if len(outer) < 2:
+        return np.zeros(len(starts), np.int32)
+    sides = [np.hstack([loop, start_at(loop, 1)]) for loop in outer]
+    offsets = np.cumsum([0, *(len(side) for side in sides)])
+    boxes = np.array([[*loop.min(axis=0), *loop.max(axis=0)] for loop in outer])
+    found: Ints = _containing(np.concatenate(sides), offsets, boxes, starts)
+    return found
+
+
+@kernel
+def _containing(sides: Floats, offsets: NDArray[np.int64], boxes: Floats, points: Floats) -> Ints:
+    islands = np.full(len(points), len(boxes), np.int32)
+    for p in range(len(points)):
+        x, y = points[p, 0], points[p, 1]
+        for k in range(len(boxes)):
+            near = boxes[k, 0] <= x <= boxes[k, 2] and boxes[k, 1] <= y <= boxes[k, 3]
+            if near and inside(sides[offsets[k] : offsets[k + 1]], x, y):
+                islands[p] = k
+                break
+    return islands
