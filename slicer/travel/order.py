@@ -28,6 +28,7 @@ from slicer.travel.rings import AS_IT_IS, CLOSED, OPEN, order_lines
 
 NO_SUPPORT = Polygons()
 SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
+FILL, LAST = 1, 99  # beads of these ranks fill what the walls enclose, in any order; what smooths a top comes after
 ROUNDS = 2  # a phase ends well only once it is known where the next one begins
 
 
@@ -51,7 +52,7 @@ def order_beads(
     if not beads:
         return []
     first = beads[0].points[0] if tip is None else tip
-    placed = _sequence(beads, islands_of(beads, section, support), first)
+    placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
     to = np.array([points[0] for _, points in placed])
     since = np.array([first, *(points[-1] for _, points in placed[:-1])])
     retracts, detours = travels(since, to, section, support, process)
@@ -62,27 +63,27 @@ def order_beads(
     ]
 
 
-def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats) -> list[tuple[Bead, Floats]]:
+def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats, support_first: bool) -> list[tuple[Bead, Floats]]:
     """The beads in order, each with its points as printed."""
     groups: defaultdict[int, list[Bead]] = defaultdict(list)
     for bead, island in zip(beads, islands.tolist(), strict=True):
         groups[island].append(bead)
-    tour = _tour(groups, first)
+    tour = _tour(groups, first, support_first)
     tip, placed = first, list[tuple[Bead, Floats]]()
     for place, island in enumerate(tour):
         phases = _phases(groups[island])
-        following = tour[place + 1] if place + 1 < len(tour) else _nearest_island(groups, tour, island)
+        following = tour[place + 1] if place + 1 < len(tour) else island
         goal = NOWHERE if following == island and len(phases) == 1 else _middle(groups[following])[None]
         placed += _in_phases(phases, tip, goal)
         tip = placed[-1][1][-1]
     return placed
 
 
-def _tour(groups: dict[int, list[Bead]], first: Floats) -> list[int]:
-    """The islands in a short order: skirt and brim, then support, then the part."""
+def _tour(groups: dict[int, list[Bead]], first: Floats, support_first: bool) -> list[int]:
+    """The islands in a short order after skirt and brim, support before the part where that is asked for."""
     stages: defaultdict[int, list[int]] = defaultdict(list)
     for island in sorted(groups):
-        stages[0 if island == FIRST else 1 if groups[island][0].kind in SUPPORTS else 2].append(island)
+        stages[0 if island == FIRST else 1 if support_first and groups[island][0].kind in SUPPORTS else 2].append(island)
     tour: list[int] = []
     for stage in sorted(stages):
         places = np.array([_middle(groups[island]) for island in stages[stage]])
@@ -94,13 +95,6 @@ def _tour(groups: dict[int, list[Bead]], first: Floats) -> list[int]:
         tour += [stages[stage][k] for k in order]
         first = _middle(groups[tour[-1]])
     return tour
-
-
-def _nearest_island(groups: dict[int, list[Bead]], tour: Sequence[int], last: int) -> int:
-    """Where the next layer most likely begins: the support nearest to the last island, itself where there is none."""
-    supports = [island for island in tour if island != FIRST and groups[island][0].kind in SUPPORTS]
-    here = _middle(groups[last])
-    return min(supports, key=lambda island: float(np.hypot(*(_middle(groups[island]) - here))), default=last)
 
 
 def _middle(beads: Sequence[Bead]) -> Floats:
@@ -155,10 +149,11 @@ def _phases(beads: Sequence[Bead]) -> list[list[list[Bead]]]:
     for bead in beads:
         if leaders and OUTSIDE < bead.rank <= 0:
             continue
-        if bead.follows and phases[bead.rank]:
-            phases[bead.rank][-1].append(bead)
+        phase = FILL if FILL <= bead.rank <= LAST else bead.rank
+        if bead.follows and phases[phase]:
+            phases[phase][-1].append(bead)
         else:
-            phases[bead.rank].append([bead])
+            phases[phase].append([bead])
     if walls:
         phases[0] = _families(walls, leaders)
     return [phases[rank] for rank in sorted(phases)]
