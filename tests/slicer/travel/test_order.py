@@ -46,7 +46,8 @@ def test_a_travel_inside_the_section_does_not_retract_and_one_across_a_hole_does
     section = Polygons.square((20, 20)) - Polygons.square((4, 4)).translate((8, 8))
     beads = [line(1, 5, 5, 5), line(15, 5, 19, 5), line(15, 10, 19, 10, 4), line(1, 10, 5, 10, 5)]
     placed = order_beads(beads, section, STRAIGHT, np.array([0.9, 5.0]))
-    assert [p.retract for p in placed] == [False, False, False, True]
+    assert [p.retract for p in placed] == [False, False, True, False]
+    assert placed[2].points[0].tolist() == [15, 10]  # from (5, 10), across the hole
 
 
 def test_a_short_travel_never_retracts() -> None:
