@@ -25,6 +25,7 @@ from slicer.support.overhang import Overhang, detect_overhangs
 from slicer.support.pedestal import pedestal_layers, without_pedestal
 from slicer.support.support import Supports, generate_supports
 from slicer.support.unwanted import shut_areas, without_unwanted
+from slicer.walls.layer_walls import without_hairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +105,8 @@ def survey(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequenc
     heights = layer_heights(mesh, profile, on_platform, pedestal_mm)
     pedestal_count = pedestal_layers(heights.tip_mm, pedestal_mm)
     outlines = [clean(loops, process.slit_closing_mm) for loops in sections(mesh, heights.cut_mm)]
+    nozzle_mm = profile.machine.head.nozzle_mm
+    outlines = [without_hairs(each, process, process.layer_height_mm, nozzle_mm) for each in outlines]
     if on_platform and not pedestal_count:
         base = clean(sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
         outlines = lay_on_plate(outlines, heights.cut_mm, base, process.line_width_mm)

@@ -31,7 +31,7 @@ class Overhang:
 def detect_overhangs(
     mesh: Mesh, outlines: Sequence[Polygons], cuts_mm: Floats, process: Process, below: Polygons | None
 ) -> list[Overhang]:
-    """For every layer the part of its outline above a risky face.
+    """For every layer the part of its outline above a risky face, and what begins over nothing.
 
     mesh and cuts_mm: part frame. below: plastic under the first layer, None: the platform, on which it may lie. What carries
     itself by the search's definition (mdp.support_need) does not hang; what bridges layer by layer, as arches do, does
@@ -41,16 +41,23 @@ def detect_overhangs(
     overhangs = [Overhang(Polygons(), ())] * len(outlines)
     risky = facing_down(mesh, UP, process.self_supporting_angle_deg)
     needing = faces_by_layer(mesh, cuts_mm, risky & needs_support(mesh, process, below is None))
-    for i, triangles in faces_by_layer(mesh, cuts_mm, risky).items():
-        if i == 0 and below is None:
-            continue
-        bank = outlines[i - 1] if i else offset(below, RIM_MM)
-        hanging = (outlines[i] - bank) ^ offset(Polygons(triangles), 0.5 * RIM_MM)
+    faces = faces_by_layer(mesh, cuts_mm, risky)
+    for i in range(int(below is None), len(outlines)):
+        bank = outlines[i - 1] if i else offset(below or EMPTY, RIM_MM)
+        floating, triangles = _floating(outlines[i], bank), faces.get(i, [])
+        hanging = (outlines[i] - bank) ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else EMPTY
+        hanging = hanging if floating.is_empty() else hanging + floating
         if not hanging.is_empty():
             all_need = len(needing.get(i, ())) == len(triangles)
-            need = hanging if all_need else hanging ^ offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM)
+            need = hanging if all_need else hanging ^ (offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM) + floating)
             overhangs[i] = _sort_islands(hanging, need, bank, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
     return overhangs
+
+
+def _floating(outline: Polygons, bank: Polygons) -> Polygons:
+    """The pieces of a layer that begin over nothing, however steep they are: a bell's rim that gets thick enough for a line."""
+    begun = [] if outline.is_empty() else [piece for piece in islands(outline) if (piece ^ bank).is_empty()]
+    return union(begun) if begun else EMPTY
 
 
 def _sort_islands(

@@ -6,14 +6,16 @@ An island that is nowhere narrower than its walls want gets the classic walls, w
 from itertools import chain
 
 from profiles.process import Process
-from slicer.bead import PATH_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
-from slicer.geometry.polygons import Polygons, difference, islands, offset, offset_round, opening, strips
+from slicer.bead import PATH_RESOLUTION_MM, length_mm, outer_wall_width_mm, spacing_mm
+from slicer.geometry.polygons import Polygons, close_loop, contours, difference, islands, offset, offset_round, opening, strips
+from slicer.walls.gap import LEAST_LINE
 from slicer.walls.variable.pieces import split_course
-from slicer.walls.variable.rule import ROOM, Rule
+from slicer.walls.variable.rule import FEATURE, ROOM, Rule
 from slicer.walls.variable.variable import Wall, variable_walls
 from slicer.walls.walls import SLACK_MM, Walls, walls
 
 LEAST_WIDTH, MOST_WIDTH = 0.6, 2.0  # of beads, in diameters of the nozzle
+HAIR_MM = 0.04  # nobody can tell whether a piece only so much thicker than the thinnest gets a line all along
 NARROW = 0.1  # of the line width: what walls leave that is narrower than that is a corner
 
 
@@ -24,6 +26,22 @@ def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) 
     least = max(LEAST_WIDTH * nozzle_mm, height_mm)
     most = max(MOST_WIDTH * nozzle_mm, outer, inner)
     return Rule(count, outer - taken, inner - taken, taken, least, most)
+
+
+def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_mm: float) -> Polygons:
+    """A section without the pieces that are nowhere wide enough for a line: what is above them begins there."""
+    if process.wall_generator == "classic":
+        least_mm = LEAST_LINE * process.line_width_mm
+    else:
+        least_mm = FEATURE * max(LEAST_WIDTH * nozzle_mm, height_mm)
+    pieces = [] if section.is_empty() else islands(section)
+    kept = [piece for piece in pieces if not _is_hair(piece, least_mm + HAIR_MM)]
+    return section if len(kept) == len(pieces) else Polygons.compose(kept) if kept else Polygons()
+
+
+def _is_hair(piece: Polygons, least_mm: float) -> bool:
+    around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
+    return 2.0 * piece.area() < least_mm * around_mm and offset(piece, -0.5 * least_mm).is_empty()
 
 
 def layer_walls(section: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float) -> Walls:

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.pose import UP, about
+from slicer.demand.site import survey
+from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import slice_part
 from tests.shapes import branch, from_manifold, standing, tee
@@ -123,6 +125,15 @@ def test_a_part_begins_with_its_support_and_higher_up_takes_what_is_near() -> No
     assert kinds[0] in PROPS
     assert not set(PROPS) & set(kinds[kinds.index(Kind.INNER_WALL) :])
     assert all(set(PROPS) & {path.kind for path in layer.paths} for layer in layers[:100])
+
+
+def test_a_rim_that_gets_thick_enough_for_a_line_in_mid_air_hangs_there() -> None:
+    bell = m3.Manifold.revolve(m3.CrossSection([[(8, 6), (8.8, 20), (8.8, 22), (0, 22), (0, 20), (8, 20)]]), 64)
+    site = survey(whole(standing(bell + m3.Manifold.cylinder(22, 3, 3, 64))), profile(), (), ())
+    first = next(i for i, outline in enumerate(site.outlines) if outline.bounds()[2] > 5.0)
+    ring = site.outlines[first] - Polygons.circle(4.0, 32)
+    assert 0.16 < ring.area() / (2.0 * np.pi * 8.0) < 0.18  # as thick as the thinnest that gets a line all along
+    assert site.overhangs[first].hanging.area() == pytest.approx(ring.area(), rel=0.01)
 
 
 def test_none_means_none() -> None:
