@@ -108,12 +108,12 @@ def moves_of(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats, 
 
 
 def _spans(program: ParsedProgram, profile: Profile) -> Floats:
-    """(n,) how far each bead may span: what fills, over sparse infill's cells; support, over its own lines; walls not at all."""
+    """(n,) how far each bead may span: what fills, over sparse infill's cells; support, over its own lines; any, its width."""
     process = profile.process
     infill_mm, support_mm = infill_cell_mm(process), support_cell_mm(process)
     of_type = {**dict.fromkeys(FILLING, infill_mm), Kind.INFILL.value: ZIGZAG * infill_mm, **dict.fromkeys(SUPPORT, support_mm)}
     spans: Floats = np.array([of_type.get(name, 0.0) for name in program.types])[program.type]
-    return spans
+    return np.maximum(spans, program.width_mm)  # walls too: they bridge slots and teeth narrower than themselves
 
 
 def _slacks(program: ParsedProgram, extruded: NDArray[np.bool_], half: Floats, across: Floats) -> Floats:

@@ -118,6 +118,13 @@ def test_a_bead_on_another_is_carried_until_it_stands_beside_it(shift: float, ai
     assert _sums(_run(f"G1 X20 E1.5 F600\nG0 Z0.4\nG0 Y{shift}\nG1 X-20 E1.5"))[0] == pytest.approx(air)
 
 
+@pytest.mark.parametrize(("slot_mm", "hangs"), [(0.5, False), (3.0, True)])
+def test_a_wall_spans_a_slot_that_is_no_wider_than_itself(slot_mm: float, hangs: bool) -> None:
+    banks = f"G1 X0 E0.75 F600\nG0 X{slot_mm}\nG1 X20 E0.75\n"
+    run = _run(f";TYPE:External perimeter\n;WIDTH:0.6\n;HEIGHT:0.2\n{banks}G0 Z0.4\nG1 X-20 E1.5")
+    assert (_sums(run)[0] > 0.0) == hangs
+
+
 def test_a_bridge_that_the_slicer_names_is_no_finding_but_counts_as_air() -> None:
     run = _run(";TYPE:Bridge infill\nG1 X20 E1.5 F600", 5.0)
     assert _sums(run)[0] == pytest.approx(40.0)
