@@ -75,7 +75,7 @@ def slice_site(site: Site, supports: Supports, on_layer: Callable[[int, int], No
         own = _part_beads(stack, i)
         if own:
             last = i
-        elif profile.process.walls and not stack.own[i].is_empty():
+        elif profile.process.walls and (i in site.hairs or not stack.own[i].is_empty()):
             bare.append(i)
         beads = [*own, *_auxiliary_beads(stack, i, part, later)]
         beads = [bead if bead.kind in WALLS else simplify_bead(bead) for bead in beads]

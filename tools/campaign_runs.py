@@ -62,7 +62,7 @@ def _models(folder: Path) -> list[Path]:
 
 def _varied(runs: list[Run], share: float) -> Iterator[Run]:
     for run in (Run(run.group, run.model, run.source, True) for run in runs):
-        if int(run.place[:8], 16) < share * 2**32:
+        if int(run.place[8:16], 16) < share * 2**32:  # not the digits that order them: these would all come first
             yield run
 
 

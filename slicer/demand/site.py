@@ -35,7 +35,7 @@ class Site:
     outlines: whole sections; own: without the pedestal; uncut: own without the grooves for later parts; overhangs: what hangs
     and what bridges; beneath: the plastic under the first layer, None on the platform; floor: the plate's outline, of use to
     part 1; pedestal_layers: how many of the lowest layers the pedestal takes. profile: the part's own. left_out: of each layer
-    what hangs and is not to be held up; empty: nothing does.
+    what hangs and is not to be held up; empty: nothing does. hairs: layers that hold something, but nothing that gets a line.
     """
 
     part: Part
@@ -52,6 +52,7 @@ class Site:
     pedestal_layers: int
     far_mm: float
     left_out: Sequence[Polygons] = ()
+    hairs: frozenset[int] = frozenset()
 
     @property
     def process(self) -> Process:
@@ -106,7 +107,9 @@ def survey(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequenc
     pedestal_count = pedestal_layers(heights.tip_mm, pedestal_mm)
     outlines = [clean(loops, process.slit_closing_mm) for loops in sections(mesh, heights.cut_mm)]
     nozzle_mm = profile.machine.head.nozzle_mm
-    outlines = [without_hairs(each, process, process.layer_height_mm, nozzle_mm) for each in outlines]
+    whole = outlines
+    outlines = [without_hairs(each, process, process.layer_height_mm, nozzle_mm) for each in whole]
+    hairs = frozenset(i for i, each in enumerate(outlines) if each.is_empty() and not whole[i].is_empty())
     if on_platform and not pedestal_count:
         base = clean(sections(mesh, np.array([PLATFORM_TOLERANCE_MM]))[0], process.slit_closing_mm)
         outlines = lay_on_plate(outlines, heights.cut_mm, base, process.line_width_mm)
@@ -133,6 +136,7 @@ def survey(part: Part, profile: Profile, earlier: Sequence[Part], later: Sequenc
         floor=plate_outline(profile.machine.table),
         pedestal_layers=pedestal_count,
         far_mm=far_mm(mesh),
+        hairs=hairs,
         left_out=_left_out(hanging, overhangs, process) if part.no_support.anywhere else (),
     )
 

@@ -198,7 +198,7 @@ def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:
     """Layers that no line is narrow enough for, with what is above them."""
     for part in sliced:
         if part.too_thin:
-            where = f"{part.too_thin} layers of part {part.index}, the first at {part.too_thin_mm:.2f} mm"
+            where = f"of part {part.index} {part.too_thin} layer(s), the first at {part.too_thin_mm:.2f} mm"
             nozzle = f"a line of a {profile.machine.head.nozzle_mm:g} mm nozzle"
             wanted = "a larger process.scale or a finer nozzle prints them"
             yield f"{where}, hold nothing wide enough for {nozzle}, so what is above them hangs: {wanted}"

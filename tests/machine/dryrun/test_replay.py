@@ -118,7 +118,7 @@ def test_a_bead_on_another_is_carried_until_it_stands_beside_it(shift: float, ai
     assert _sums(_run(f"G1 X20 E1.5 F600\nG0 Z0.4\nG0 Y{shift}\nG1 X-20 E1.5"))[0] == pytest.approx(air)
 
 
-@pytest.mark.parametrize(("slot_mm", "hangs"), [(0.5, False), (3.0, True)])
+@pytest.mark.parametrize(("slot_mm", "hangs"), [(0.9, False), (3.0, True)])
 def test_a_wall_spans_a_slot_that_is_no_wider_than_itself(slot_mm: float, hangs: bool) -> None:
     banks = f"G1 X0 E0.75 F600\nG0 X{slot_mm}\nG1 X20 E0.75\n"
     run = _run(f";TYPE:External perimeter\n;WIDTH:0.6\n;HEIGHT:0.2\n{banks}G0 Z0.4\nG1 X-20 E1.5")
