@@ -41,7 +41,7 @@ def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_
 
 def _is_hair(piece: Polygons, least_mm: float) -> bool:
     around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
-    return 2.0 * piece.area() < least_mm * around_mm and offset(piece, -0.5 * least_mm).is_empty()
+    return bool(2.0 * piece.area() < least_mm * around_mm and offset(piece, -0.5 * least_mm).is_empty())
 
 
 def layer_walls(section: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float) -> Walls:
