@@ -50,7 +50,8 @@ def detect_overhangs(
         if not hanging.is_empty():
             all_need = len(needing.get(i, ())) == len(triangles)
             need = hanging if all_need else hanging ^ (offset(Polygons(needing.get(i, [])), 0.5 * RIM_MM) + floating)
-            overhangs[i] = _sort_islands(hanging, need, bank, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
+            held = bank + (outlines[i] - hanging)  # also by slopes beside it that carry themselves
+            overhangs[i] = _sort_islands(hanging, need, held, process.line_width_mm, (level_mm, min(level_mm, arch_mm)))
     return overhangs
 
 
@@ -119,8 +120,9 @@ def bridge_unheld(
         bare = opening(free - held, 0.25 * process.line_width_mm)
         if bare.is_empty():
             continue
-        bank = outlines[i - 1] if i else offset(below or Polygons(), RIM_MM)
-        banks = edges(offset(bank + held, 0.25 * process.line_width_mm))
+        bank = outlines[i - 1] if i else offset(below or EMPTY, RIM_MM)
+        slopes = outlines[i] - union([free, *(span.place for span in overhang.bridges)])
+        banks = edges(offset(union([bank, held, slopes]), 0.25 * process.line_width_mm))
         spans = [span for island in islands(bare) for span in find_bridges(island, banks, process.line_width_mm)]
         bridged[i] = replace(overhang, bridges=(*overhang.bridges, *spans))
     return bridged

@@ -111,6 +111,14 @@ def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks() -> None:
     assert beads[0].flow == pytest.approx(0.9 * plain[0].flow)
 
 
+def test_a_deck_between_posts_that_widen_into_it_is_a_bridge() -> None:
+    gate = [(0, 0), (6, 0), (6, 9.6), (6.2, 10), (12.2, 10), (12.4, 9.6), (12.4, 0), (18.4, 0), (18.4, 12), (0, 12)]
+    solid = m3.Manifold.extrude(m3.CrossSection([gate]), 10).rotate((90, 0, 0))
+    layer = slice_part(whole(standing(solid)), profile(*SOLID)).layers[50]
+    lines = shapely.union_all([shapely.LineString(p.points).buffer(0.25) for p in layer.paths if p.kind is Kind.BRIDGE])
+    assert lines.area > 0.7 * 6.0 * 10.0
+
+
 def test_a_plate_resting_on_plastic_is_no_bridge() -> None:
     base, plate = cut(portal(0.0001), ((0, 0, 1), 8.0))
     assert of_kind(slice_part(plate, profile(*SOLID), [base]), Kind.BRIDGE) == []
