@@ -112,7 +112,7 @@ def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks() -> None:
 
 
 def test_a_deck_between_posts_that_widen_into_it_is_a_bridge() -> None:
-    gate = [(0, 0), (6, 0), (6, 9.6), (6.2, 10), (12.2, 10), (12.4, 9.6), (12.4, 0), (18.4, 0), (18.4, 12), (0, 12)]
+    gate = [(0, 0), (6, 0), (6, 9.75), (6.29, 10.05), (12.11, 10.05), (12.4, 9.75), (12.4, 0), (18.4, 0), (18.4, 12), (0, 12)]
     solid = m3.Manifold.extrude(m3.CrossSection([gate]), 10).rotate((90, 0, 0))
     layer = slice_part(whole(standing(solid)), profile(*SOLID)).layers[50]
     lines = shapely.union_all([shapely.LineString(p.points).buffer(0.25) for p in layer.paths if p.kind is Kind.BRIDGE])
