@@ -22,6 +22,7 @@ ON_PLATE_MM = 0.35  # so low a bead sags onto the plate
 NEW_OBJECT_MM = 1.0  # a fall of more begins another object beside the first one
 FLOATING_SHARE = 0.5  # of a layer's length
 LEAST_MM = 10.0
+CRUMB_MM = 1.0  # so little laid in a layer is the tip of something too fine to print, whatever lies below it
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
@@ -43,7 +44,8 @@ def _too_high(program: ParsedProgram, deposited: Beads) -> list[Finding]:
             continue
         mine = rows[group]
         gap = _gaps(program, mine)
-        high = np.flatnonzero(gap > np.maximum(SLACK_MM, SLACK_SHARE * program.height_mm[mine]))
+        laid_mm = np.bincount(program.layer[mine], weights=deposited.length_mm[told][group])[program.layer[mine]]
+        high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * program.height_mm[mine])) & (laid_mm > CRUMB_MM))
         if len(high):
             seen.add(part)
             row, layers = int(mine[high[0]]), len(np.unique(program.layer[mine[high]]))

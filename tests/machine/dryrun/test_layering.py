@@ -61,3 +61,11 @@ def test_a_layer_at_the_wrong_height_is_found_though_support_is_laid_before_the_
     assert any(";TYPE:Support material" in lines[k] for k in moved)
     edited = [word("Z", lambda z: z + rise_mm)(line) if k in moved else line for k, line in enumerate(lines)]
     assert {layer, layer + 1} & {f.layer for f in dry_run(edited, profile).errors if f.code == "gap"}
+
+
+@pytest.mark.parametrize(("length_mm", "codes"), [(0.8, set()), (5.0, {"gap"})])
+def test_a_crumb_on_top_of_a_part_is_no_missing_layer(length_mm: float, codes: set[str]) -> None:
+    begin = "G28\nM109 S210\nM83\n;PART:1 of 1\n;LAYER_CHANGE\n;TYPE:Perimeter\n;WIDTH:0.45\n;HEIGHT:0.2\nG0 Z0.2 F600\nG0 X-20"
+    crumb = f";LAYER_CHANGE\nG0 Z0.6\nG0 X0\nG1 X{length_mm} E{0.034 * length_mm:.4f}"
+    found = dry_run(f"{begin}\nG1 X20 E1.36 F600\n{crumb}\nM104 S0".splitlines(), load()).errors
+    assert {f.code for f in found if f.code == "gap"} == codes
