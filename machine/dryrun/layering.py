@@ -22,17 +22,23 @@ ON_PLATE_MM = 0.35  # so low a bead sags onto the plate
 NEW_OBJECT_MM = 1.0  # a fall of more begins another object beside the first one
 FLOATING_SHARE = 0.5  # of a layer's length
 LEAST_MM = 10.0
+SEEN_SHARE = 0.6  # of a layer's height: what begins so much too high hangs in the air of the replay
 CRUMB_MM = 1.0  # so little laid in a layer is the tip of something too fine to print, whatever lies below it
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
     """Errors of code gap, in every part the first sign."""
-    found = sorted([*_too_high(program, deposited), *_floating(program, deposited, contacts)], key=lambda each: each.line)
+    found = sorted(
+        [*_too_high(program, deposited, contacts), *_floating(program, deposited, contacts)], key=lambda each: each.line
+    )
     return list({each.part: each for each in reversed(found)}.values())
 
 
-def _too_high(program: ParsedProgram, deposited: Beads) -> list[Finding]:
-    """In every part the first bead whose underside lies above all that was laid before it, by the heights told."""
+def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
+    """In every part the first bead whose underside lies above all that was laid before it, by the heights told.
+
+    What stands off by most of a layer may stand on support that ends as high as the part does there: the replay knows.
+    """
     told = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
     rows = deposited.rows[told]
     turned = np.any(program.end[rows[1:], 3:] != program.end[rows[:-1], 3:], axis=1)
@@ -45,7 +51,10 @@ def _too_high(program: ParsedProgram, deposited: Beads) -> list[Finding]:
         mine = rows[group]
         gap = _gaps(program, mine)
         laid_mm = np.bincount(program.layer[mine], weights=deposited.length_mm[told][group])[program.layer[mine]]
-        high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * program.height_mm[mine])) & (laid_mm > CRUMB_MM))
+        height_mm = program.height_mm[mine]
+        in_air = (contacts.air_mm + contacts.beside_mm > 0.0) & ~program.rows_of_types(*LOOSE)
+        hangs = (gap < SEEN_SHARE * height_mm) | in_air[mine]
+        high = np.flatnonzero((gap > np.maximum(SLACK_MM, SLACK_SHARE * height_mm)) & (laid_mm > CRUMB_MM) & hangs)
         if len(high):
             seen.add(part)
             row, layers = int(mine[high[0]]), len(np.unique(program.layer[mine[high]]))

@@ -69,3 +69,14 @@ def test_a_crumb_on_top_of_a_part_is_no_missing_layer(length_mm: float, codes: s
     crumb = f";LAYER_CHANGE\nG0 Z0.6\nG0 X0\nG1 X{length_mm} E{0.034 * length_mm:.4f}"
     found = dry_run(f"{begin}\nG1 X20 E1.36 F600\n{crumb}\nM104 S0".splitlines(), load()).errors
     assert {f.code for f in found if f.code == "gap"} == codes
+
+
+@pytest.mark.parametrize(("y_mm", "codes"), [(5.0, set()), (0.0, {"gap"})])
+def test_what_stands_on_support_that_ends_as_high_as_the_part_is_no_missing_layer(y_mm: float, codes: set[str]) -> None:
+    lines = ["G28", "M109 S210", "M83", ";PART:1 of 1", ";WIDTH:0.45", ";HEIGHT:0.2", "G0 Z0.2 F600"]
+    for z_mm in (0.2, 0.4):
+        for kind, y in (("Perimeter", 0.0), ("Support material interface", 5.0)):
+            lines += [";LAYER_CHANGE"] if y == 0.0 else []
+            lines += [f";TYPE:{kind}", f"G0 Z{z_mm}", f"G0 X-20 Y{y}", "G1 X20 E1.36 F600"]
+    lines += [";LAYER_CHANGE", ";TYPE:Perimeter", "G0 Z0.8", f"G0 X-20 Y{y_mm}", "G1 X20 E1.36", "M104 S0"]
+    assert {f.code for f in dry_run(lines, load()).errors if f.code == "gap"} == codes
