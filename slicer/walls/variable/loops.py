@@ -125,8 +125,9 @@ def _cross(skeleton: Skeleton, nodes: tuple[int, int], depth: float, room_there:
     t, other = nodes
     here, there = skeleton.radii[t], skeleton.radii[other]
     share = 0.0 if there >= depth else (depth - there) / (here - there)
-    if not room_there:
-        share = max(share, 0.5)
+    if not room_there:  # halfway, but no farther than the loop is deep: a node may lie on the other side of a hall
+        away = np.hypot(skeleton.centres[t, 0] - skeleton.centres[other, 0], skeleton.centres[t, 1] - skeleton.centres[other, 1])
+        share = max(share, 0.5 if away <= 2.0 * depth else depth / away)
     x = skeleton.centres[other, 0] + share * (skeleton.centres[t, 0] - skeleton.centres[other, 0])
     y = skeleton.centres[other, 1] + share * (skeleton.centres[t, 1] - skeleton.centres[other, 1])
     return _add(out, n, (x, y), (0.0, 0.0), there + share * (here - there))

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import ROUND_SIDES, length_mm
-from slicer.geometry.polygons import Polygons
+from slicer.geometry.distance import distances
+from slicer.geometry.polygons import Polygons, edges
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from slicer.walls.layer_walls import bead_rule, layer_walls
@@ -114,6 +115,14 @@ def test_a_wall_that_is_now_thicker_and_now_thinner_than_the_least_bead_is_laid_
     walls = variable_walls(Polygons([np.concatenate([np.column_stack([x, -side]), np.column_stack([x, side])[::-1]])]), RULE)
     assert len(walls) == 1
     assert length_mm(walls[0].course.points) > 29.0
+
+
+@pytest.mark.parametrize("tooth_mm", [0.2, 0.35, 0.5])
+def test_the_outer_wall_of_a_hall_with_thin_teeth_stays_at_its_border(tooth_mm: float) -> None:
+    teeth = [Polygons.square((tooth_mm, 1.2)).translate((x, 29.5)) for x in (8.0, 9.0, 9.8, 14.0)]
+    hall = Polygons.square((30, 30)) + Polygons.compose(teeth)
+    outer = [wall for wall in variable_walls(hall, RULE) if wall.level == 0]
+    assert max(distances(wall.points, edges(hall)).max() for wall in outer) < 0.5
 
 
 def test_a_ring_of_one_bead_runs_round() -> None:
