@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import Finding, Severity, at_row, per_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import CROSSING_MM, Beads
+from machine.planning.fit import over_edge_mm
 from machine.reader.parsed import ParsedProgram
 from mdp.mesh import Floats
-from profiles.machine import Table
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -128,7 +128,8 @@ def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64],
     """
     heights = np.where(program.height_mm[rows] > 0, program.height_mm[rows], profile.process.first_layer_height_mm)
     lowest = np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= heights + ROUNDING_MM
-    over, edge = _over_mm(segments[:, :, :2], profile.machine.table)
+    ends, edge = over_edge_mm(segments[:, :, :2], profile.machine.table)
+    over = ends.max(axis=1, initial=-np.inf)
     beyond = lowest & ~program.rows_of_types(PURGE)[rows] & (over > ROUNDING_MM)
     marked, badness = np.zeros(len(program.line), dtype=np.bool_), np.zeros(len(program.line))
     marked[rows[beyond]] = True
@@ -167,13 +168,3 @@ def _distances(point: Floats, segments: Floats) -> Floats:
     share = np.clip(((point - a) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-12), 0.0, 1.0)
     away: Floats = np.linalg.norm(a + share[:, None] * d - point, axis=1)
     return away
-
-
-def _over_mm(points: Floats, table: Table) -> tuple[Floats, str]:
-    """(m,) how far the farther end of (m, 2, 2) segments lies over the edge, below 0 on the plate; the edge in words."""
-    if table.size_mm is None:
-        over: Floats = np.hypot(points[:, :, 0], points[:, :, 1]).max(axis=1, initial=0.0) - table.radius_mm
-        return over, f"{table.radius_mm:g} mm from its middle"
-    x, y = table.size_mm
-    over = (np.abs(points) - 0.5 * np.array([x, y])).max(axis=(1, 2), initial=-np.inf)
-    return over, f"it measures {x:g} x {y:g} mm"

@@ -7,10 +7,10 @@ import numpy as np
 from machine.kinematics.table import machine_points
 from machine.planning.limits import ROUNDING, axis_limits
 from mdp.decomposition import Part
-from mdp.mesh import Mesh
+from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.errors import MoveError
-from profiles.machine import Machine
+from profiles.machine import Machine, Table
 from profiles.profile import Profile
 
 
@@ -48,16 +48,21 @@ def check_standing(mesh: Mesh, profile: Profile) -> None:
     """
     machine, inset_mm = profile.machine, 0.5 * profile.of_part(1).process.line_width_mm
     standing = mesh.vertices[mesh.vertices[:, 2] <= PLATFORM_TOLERANCE_MM, :2]
-    reach = np.maximum(np.abs(standing) - inset_mm, 0.0)
-    if machine.table.size_mm is None:
-        over_mm = float(np.hypot(reach[:, 0], reach[:, 1]).max(initial=0.0)) - machine.table.radius_mm
-        edge = f"{machine.table.radius_mm:g} mm from its middle"
-    else:
-        over_mm = float((reach - 0.5 * np.array(machine.table.size_mm)).max(initial=-np.inf))
-        edge = "it measures {:g} x {:g} mm".format(*machine.table.size_mm)
+    over, edge = over_edge_mm(np.maximum(np.abs(standing) - inset_mm, 0.0), machine.table)
+    over_mm = float(over.max(initial=-np.inf))
     if over_mm > ROUNDING:
         x, y = np.ptp(standing, axis=0)
         raise MoveError(
             f"part 1 stands on {x:.1f} x {y:.1f} mm, {over_mm:.1f} mm over the edge of the plate of {machine.name}, {edge}: "
             "process.scale makes the model smaller"
         )
+
+
+def over_edge_mm(points_mm: Floats, table: Table) -> tuple[Floats, str]:
+    """(...) how far places (..., 2) lie over the plate's edge, below 0 on it; the edge in words."""
+    if table.size_mm is None:
+        over: Floats = np.hypot(points_mm[..., 0], points_mm[..., 1]) - table.radius_mm
+        return over, f"{table.radius_mm:g} mm from its middle"
+    x, y = table.size_mm
+    over = (np.abs(points_mm) - 0.5 * np.array([x, y])).max(axis=-1)
+    return over, f"it measures {x:g} x {y:g} mm"

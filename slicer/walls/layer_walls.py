@@ -23,7 +23,7 @@ def bead_rule(count: int, process: Process, height_mm: float, nozzle_mm: float) 
     """The rule of so many walls of a process in layers of that height."""
     outer, inner = outer_wall_width_mm(process), process.line_width_mm
     taken = inner - spacing_mm(inner, height_mm)
-    least = max(LEAST_WIDTH * nozzle_mm, height_mm)
+    least = _least_mm(nozzle_mm, height_mm)
     most = max(MOST_WIDTH * nozzle_mm, outer, inner)
     return Rule(count, outer - taken, inner - taken, taken, least, most)
 
@@ -33,7 +33,7 @@ def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_
     if process.wall_generator == "classic":
         least_mm = LEAST_LINE * process.line_width_mm
     else:
-        least_mm = FEATURE * max(LEAST_WIDTH * nozzle_mm, height_mm)
+        least_mm = FEATURE * _least_mm(nozzle_mm, height_mm)
     pieces = [] if section.is_empty() else islands(section)
     kept = [piece for piece in pieces if not _is_hair(piece, least_mm + HAIR_MM)]
     return section if len(kept) == len(pieces) else Polygons.compose(kept) if kept else Polygons()
@@ -42,6 +42,11 @@ def without_hairs(section: Polygons, process: Process, height_mm: float, nozzle_
 def _is_hair(piece: Polygons, least_mm: float) -> bool:
     around_mm = sum(length_mm(close_loop(loop)) for loop in contours(piece))
     return bool(2.0 * piece.area() < least_mm * around_mm and offset(piece, -0.5 * least_mm).is_empty())
+
+
+def _least_mm(nozzle_mm: float, height_mm: float) -> float:
+    """Width of the narrowest bead."""
+    return max(LEAST_WIDTH * nozzle_mm, height_mm)
 
 
 def layer_walls(section: Polygons, count: int, process: Process, height_mm: float, nozzle_mm: float) -> Walls:
