@@ -38,6 +38,7 @@ from slicer.walls.unwanted_seam import unwanted_segments
 from slicer.walls.variable.pieces import in_pieces
 from slicer.walls.walls import wall_beads
 
+ON_PLATE_MM = 0.35  # so low a bead sags onto the plate
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 
 
@@ -90,6 +91,8 @@ def slice_site(site: Site, supports: Supports, on_layer: Callable[[int, int], No
     if usual < len(stack.outlines):
         layers += vase_layers(stack.outlines, stack.supports.areas, stack.heights, profile, tip)
     _check_not_empty(part, bounds_mm, layers, profile.process)
+    if site.beneath is None:
+        _check_on_plate(part, layers, profile.process)
     too_thin = [i for i in bare if i < last and usual == len(stack.outlines)]
     return SlicedPart(
         part.index,
@@ -195,4 +198,14 @@ def _check_not_empty(part: Part, bounds_mm: Floats, layers: Sequence[Layer], pro
         raise SliceError(
             f"part {part.index} gives no path at all: it measures {x:.3g} x {y:.3g} x {z:.3g} mm and no place of it is wider "
             f"than half of process.line_width_mm ({0.5 * process.line_width_mm:g} mm is the least)"
+        )
+
+
+def _check_on_plate(part: Part, layers: Sequence[Layer], process: Process) -> None:
+    first = next(layer for layer in layers if any(path.kind is not Kind.SKIRT for path in layer.paths))
+    if first.z_mm - first.height_mm > ON_PLATE_MM:
+        support = "" if process.support == "auto" else ", or process.support = auto"
+        raise SliceError(
+            f"part {part.index} would begin in air, {first.z_mm - first.height_mm:.2f} mm above the plate: what lies below is "
+            f"too thin for lines of {process.line_width_mm:g} mm: a larger process.scale or a finer nozzle prints it{support}"
         )

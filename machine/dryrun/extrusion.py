@@ -146,14 +146,14 @@ def _weighted_median(values: Floats, weights: Floats) -> float:
 
 
 def _fast(program: ParsedProgram, rows: NDArray[np.int64], length: Floats) -> list[Finding]:
-    """Strokes as fast as travels, in a file whose other strokes are slower."""
+    """Strokes as fast as travels, in a file whose other strokes are slower; a slow machine purges as fast as it goes."""
     travels = np.flatnonzero((program.kind == MoveKind.TRAVEL) & (program.e_mm == 0.0))
     across = np.hypot(*(program.end[travels] - program.start[travels])[:, :2].T)
     if not (across > ROW_MM).any():
         return []
     usual = _weighted_median(program.feed[travels], np.where(across > ROW_MM, across, 0.0))
     feed = program.feed[rows]
-    fast = (feed > FAST * usual) & (length > ROW_MM)
+    fast = (feed > FAST * usual) & (length > ROW_MM) & ~program.rows_of_types(Kind.PURGE.value)[rows]
     if not fast.any() or fast.mean() > FEW or usual * FAST < FASTER * np.quantile(feed[~fast], 1.0 - FEW):
         return []
     problems = []

@@ -26,15 +26,16 @@ EVEN_MM = 1e-6  # heights nearer than this are equal
 SPECK_MM2 = 4.0 * SLIVER_MM**2  # no place that is no sliver is smaller
 LEAST_MM2 = 1e-5  # places smaller than this are rounding
 STEPS = (0.3, 0.6, 1.0)  # of the lean: how far support goes aside, no farther than needed, for it gets wider by as much
+BEYOND = 0.75  # of the radius: how far from plastic the middle of a disc may stand; its inner beads then lie on the edge
 WIDEST = 1.3  # times the distance: how far corners of widened places may reach; sharper ones than 100 degrees are cut off
 SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so the lean is never exceeded
 
 
 @dataclass(frozen=True, eq=False)
 class ReachableAreas:
-    """Per layer: ground to stand on (grown by the radius), what is reachable, and the lean from the layer below, mm.
+    """Per layer: ground to stand on, what is reachable, and the lean from the layer below, mm.
 
-    bottom_mm and top_mm: of all layers of the part.
+    bottom_mm and top_mm: of all layers of the part. ground: what is solid, grown by BEYOND of the radius.
     """
 
     radius_mm: float
@@ -109,7 +110,6 @@ def reachable_areas(
     plain = [s if s.is_empty() else s.simplify(COARSE_MM) for s in outlines]
     wide = [s if s.is_empty() else offset(s, radius + MARGIN_MM) for s in plain]
     tall = [s if s.is_empty() else offset(s, radius + process.support_distance_mm + MARGIN_MM) for s in plain[:count]]
-    base = None if below is None else offset(below, radius)
     root = int(np.searchsorted(np.maximum(bottom, 0.0), process.support_bottom_gap_mm - EVEN_MM))
     ground: list[Polygons] = []
     reachable: list[Polygons] = []
@@ -118,9 +118,9 @@ def reachable_areas(
         over = int(np.searchsorted(bottom, top[m] + process.support_gap_mm - EVEN_MM))
         shut = blocked[m] if blocked[m].is_empty() else offset(blocked[m], radius + MARGIN_MM)
         obstacles = union([o for o in (tall[m], *wide[near:m], *wide[m + 1 : over], shut) if not o.is_empty()])
-        stands = [wide[near - 1]] if near > 0 and process.support_on_part else []
-        if base is not None and m == root:
-            stands.append(base)
+        stands = [offset(plain[near - 1], BEYOND * radius)] if near > 0 and process.support_on_part else []
+        if below is not None and m == root:
+            stands.append(offset(below, BEYOND * radius))
         if handed is not None and m == 0:
             stands.append(handed)
         ground.append(union(stands))

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from profiles.process import Process
-from slicer.geometry.polygons import Polygons, closing, difference, islands, offset, opening, union
+from slicer.geometry.polygons import Polygons, closing, islands, offset, opening, union
 from slicer.heights import Heights
 from slicer.support.branch import Growth
 from slicer.support.columns import Columns
 from slicer.support.missed import LEAST_MM2, drop_small, find_missed, window
 from slicer.support.reachable import (
+    BEYOND,
     COARSE_MM,
     EVEN_MM,
     SMOOTH_MM,
@@ -163,12 +164,19 @@ def _keep_standing(bodies: Sequence[Polygons], areas: ReachableAreas, process: P
     printed: list[Polygons] = []
     for m, body in enumerate(bodies):
         if not body.is_empty() and (m > 0 or not on_platform):
-            below_mm = dilate(printed[-1], float(areas.lean_mm[m]) + SLACK_MM) if m else Polygons()
-            loose = difference(body, below_mm, areas.ground[m])
+            rest = body - dilate(printed[-1], float(areas.lean_mm[m]) + SLACK_MM) if m else body
+            loose = rest if only_slivers(rest) else _loose(rest, areas, m)
             if not only_slivers(loose):
                 body = _clip_loose(body, loose, areas, process)
         printed.append(body)
     return printed
+
+
+def _loose(rest: Polygons, areas: ReachableAreas, m: int) -> Polygons:
+    """What of support that no support carries is not on ground: discs reach beyond it, but nothing stands beside it alone."""
+    beside = rest - dilate(areas.ground[m], (1.0 - BEYOND) * areas.radius_mm)
+    alone = [piece for piece in islands(rest) if only_slivers(piece ^ areas.ground[m])]
+    return union([beside, *alone])
 
 
 def _clip_loose(body: Polygons, loose: Polygons, areas: ReachableAreas, process: Process) -> Polygons:
@@ -202,7 +210,9 @@ def _dense(printed: Sequence[Polygons], contacts: Sequence[Polygons], areas: Rea
             dense.append(area)
             continue
         over = [contact for contact in contacts[m : m + roofs] if not contact.is_empty()]
-        under = [g for g in areas.ground[max(m - floors + 1, 0) : m + 1] if not g.is_empty()]
+        under = [
+            dilate(g, (1.0 - BEYOND) * areas.radius_mm) for g in areas.ground[max(m - floors + 1, 0) : m + 1] if not g.is_empty()
+        ]
         near = opening(area ^ union([*over, *under]), 0.45 * process.line_width_mm)
         dense.append(near)
     return dense

@@ -1,4 +1,4 @@
-"""Overhangs: the stretches of walls that hardly lie on the layer below, split off so that they are printed slowly."""
+"""Overhangs: the stretches of walls and gap lines that hardly lie on the layer below, split off to be printed slowly."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,14 +11,14 @@ from slicer.paths import Kind
 from slicer.travel.order import Placed
 from slicer.travel.split import split
 
-WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL)
+SPLIT = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.OVERHANG)
 STEPS = (0.75, 0.5, 0.25, 0.0)  # shares of a bead's width on plastic below which it is printed more slowly
 SHORTEST = 2.0  # line widths: no stretch is split off for less, the speed would flicker
 NOISE_MM = 0.02  # two sections of one upright surface differ by as much after their cleaning
 
 
 def split_overhangs(placed: Sequence[Placed], section: Polygons, bank: Polygons | None, process: Process) -> list[Placed]:
-    """The beads of a layer with its walls split where less and less of their width lies on plastic, in the same order.
+    """The beads of a layer with its walls and gap lines split where less and less of their width lies on plastic.
 
     bank: what the layer lies on; None: the platform. A bead of width w whose centreline runs d outside the bank has the
     share 1/2 - d/w of its width on it; it overhangs where that is less than process.overhang_share.
@@ -31,7 +31,7 @@ def split_overhangs(placed: Sequence[Placed], section: Polygons, bank: Polygons 
         hanging = hanging_place(section, bank, share, process.line_width_mm)
         if hanging.area() < shortest_mm * NOISE_MM:
             break
-        kinds = (*WALLS, Kind.OVERHANG) if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
+        kinds = SPLIT if share <= 0.5 else (Kind.OUTER_WALL,)  # inner ones lie a line's width farther in
         out = split(out, hanging, kinds, shortest_mm, partial(_hanging, share=share, process=process))
     return out
 

@@ -40,6 +40,14 @@ def test_layers_with_nothing_wide_enough_for_a_line_below_others_are_counted(thi
     assert (sliced.too_thin, sliced.too_thin_mm) == (layers, pytest.approx(1.2 if layers else 0.0))
 
 
+def test_what_would_begin_above_the_plate_is_refused() -> None:
+    hair = m3.Manifold.cube((2, 0.08, 1.0)).translate((1, 2, 0)) + m3.Manifold.cube((4, 4, 1)).translate((0, 0, 1.0))
+    said = r"part 1 would begin in air, 1.00 mm above the plate: .* lines of 0.45 mm: .*, or process.support = auto"
+    with pytest.raises(SliceError, match=said):
+        slice_part(whole(standing(hair)), profile("process.support=none"))
+    slice_part(whole(standing(hair)), profile())
+
+
 @pytest.mark.parametrize("make", [box, cylinder, hollow, bowl, ball, branch])
 def test_a_solid_part_extrudes_its_volume(make: Callable[[], Mesh]) -> None:
     sliced = slice_part(whole(make()), profile(*SOLID))

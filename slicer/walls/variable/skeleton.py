@@ -58,17 +58,19 @@ def skeleton_of(triangulation: Triangulation) -> Skeleton:
     out = Skeleton(table(count, 2), floats(count, 0.0), table(len(tails), 2), flags(len(tails)))
     for t in range(count):
         _place(triangulation, t, out)
-        for turn in range(2):
+        for turn in range(3):
             near = far = 3 * t
             for h in range(3 * t, 3 * t + 3):
                 _foot(points, (preceding[tails[h]], tails[h], following[tails[h]]), h, out)
                 near = h if _away(out, h) < _away(out, near) else near
                 far = h if _away(out, h) > _away(out, far) else far
-            out.radii[t] = _away(out, near)
+            out.radii[t] = _away(out, near) if turn < 2 else 0.0
             if turn == 0:
                 _centre(out, near, far)
-        if _leaves(triangulation, t, out.centres[t, 0], out.centres[t, 1]):
-            out.radii[t] = 0.0
+            elif not _leaves(triangulation, t, out.centres[t, 0], out.centres[t, 1]):
+                break
+            else:
+                _place_in_the_middle(triangulation, t, out)
     for h in range(len(tails)):
         other = across[h]
         if other > h:
@@ -105,11 +107,19 @@ def _place(triangulation: Triangulation, t: int, out: Skeleton) -> None:
     cx, cy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
     doubled = 2.0 * (bx * cy - by * cx)
     if abs(doubled) < 1e-12:
-        out.centres[t, 0], out.centres[t, 1] = points[a, 0] + (bx + cx) / 3.0, points[a, 1] + (by + cy) / 3.0
+        _place_in_the_middle(triangulation, t, out)
         return
     b2, c2 = bx * bx + by * by, cx * cx + cy * cy
     out.centres[t, 0] = points[a, 0] + (cy * b2 - by * c2) / doubled
     out.centres[t, 1] = points[a, 1] + (bx * c2 - cx * b2) / doubled
+
+
+@part
+def _place_in_the_middle(triangulation: Triangulation, t: int, out: Skeleton) -> None:
+    """Puts a node into its triangle, where that has no circumcentre of use."""
+    points, tails, _ = triangulation
+    for axis in range(2):
+        out.centres[t, axis] = sum([points[tails[h], axis] for h in range(3 * t, 3 * t + 3)]) / 3.0
 
 
 @part

@@ -24,8 +24,8 @@ from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
 WIDTH = 0.45
 
 
-def placed(points: Any) -> Placed:
-    bead = Bead(Kind.OUTER_WALL, np.array(points, dtype=float), WIDTH, 0)
+def placed(points: Any, of: Kind = Kind.OUTER_WALL) -> Placed:
+    bead = Bead(of, np.array(points, dtype=float), WIDTH, 0)
     return Placed(bead, bead.points, True, np.array([[-1.0, -1.0]]))
 
 
@@ -48,6 +48,11 @@ def test_the_stretch_beyond_the_bank_overhangs_and_nothing_is_lost() -> None:
     assert all((a.points[-1] == b.points[0]).all() for a, b in pairwise(pieces))
     assert [p.retract for p in pieces] == [True] + [False] * (len(pieces) - 1)
     assert [len(p.approach) for p in pieces] == [1] + [0] * (len(pieces) - 1)
+
+
+def test_a_line_that_fills_a_gap_beside_a_bridge_overhangs_as_walls_do() -> None:
+    pieces = split(placed([(1, 5), (9, 5)], Kind.GAP), Polygons.square((10, 10)), Polygons.square((3, 10)))
+    assert [piece.bead.kind for piece in pieces] == [Kind.GAP, Kind.OVERHANG]
 
 
 def test_a_bead_shorter_than_two_lines_overhangs_where_all_of_it_hangs() -> None:

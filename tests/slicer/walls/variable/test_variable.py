@@ -12,13 +12,17 @@ from hypothesis import strategies as st
 
 from slicer.bead import ROUND_SIDES, length_mm
 from slicer.geometry.distance import distances
-from slicer.geometry.polygons import Polygons, edges
+from slicer.geometry.polygons import Polygons, edges, resample
+from slicer.geometry.triangulation import triangulate
 from slicer.paths import Kind
 from slicer.slice import slice_part
 from slicer.walls.layer_walls import bead_rule, layer_walls
+from slicer.walls.variable.counts import count_beads
+from slicer.walls.variable.loops import trace_loops
 from slicer.walls.variable.pieces import split_course
 from slicer.walls.variable.rule import FEATURE
-from slicer.walls.variable.variable import Wall, variable_walls
+from slicer.walls.variable.skeleton import skeleton_of
+from slicer.walls.variable.variable import STEP, Wall, variable_walls
 from slicer.walls.walls import wall_beads
 from tests.shapes import from_manifold
 from tests.slicer.hand import SOLID, as_shapely, content, of_kind, profile, volume_mm3, whole
@@ -187,3 +191,16 @@ def test_walls_stay_inside_a_plate_that_a_notch_all_but_cuts_through(neck: float
     notch = Polygons([np.array([(5.3, deep + 1.0), *tip, (6.5, deep + 1.0)])])
     plate_with_notch = plate(deep) - notch
     assert farthest_out_mm(variable_walls(plate_with_notch, RULE), plate_with_notch) < 0.1
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(1.0, 9.0), st.floats(-1e-8, 1e-8), st.floats(-1e-10, 1e-10))
+def test_two_corners_that_all_but_meet_throw_no_wall_out_of_a_plate(x: float, aside: float, away: float) -> None:
+    corners = np.array([(0, 0), (x, -1e-3), (x + aside, -1e-3 + away), (10, 0), (10, 5), (0, 5)])
+    triangulation = triangulate([resample(corners, STEP * RULE.inner)])
+    assert triangulation is not None
+    skeleton = skeleton_of(triangulation)
+    ribs = trace_loops(triangulation, skeleton, count_beads(triangulation.across, skeleton, RULE), RULE, 0)
+    points = ribs.feet + ribs.ways * ribs.depth[:, None]
+    assert (points.min(axis=0) >= 0.0).all()
+    assert (points.max(axis=0) <= (10.0, 5.0)).all()
