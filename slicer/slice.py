@@ -197,7 +197,8 @@ def _check_not_empty(part: Part, bounds_mm: Floats, layers: Sequence[Layer], pro
             )
         raise SliceError(
             f"part {part.index} gives no path at all: it measures {x:.3g} x {y:.3g} x {z:.3g} mm and no place of it is wider "
-            f"than half of process.line_width_mm ({0.5 * process.line_width_mm:g} mm is the least)"
+            f"than half of process.line_width_mm ({0.5 * process.line_width_mm:g} mm is the least): "
+            "a larger process.scale or a finer nozzle prints it"
         )
 
 

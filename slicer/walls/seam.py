@@ -144,7 +144,8 @@ def _target(loop: Floats, process: Process, around: Surroundings) -> _Target:
 
 
 def _open(loop: Floats, gap_mm: float, lead_mm: float) -> Floats:
-    """The loop as a polyline that ends a gap before its beginning; lead_mm: both ends are drawn inside by that."""
+    """The loop as a polyline that ends a gap before its beginning; lead_mm: both ends are drawn inside by that, as far as
+    there is room."""
     points = np.concatenate([loop, loop[:1]])
     steps = np.hypot(*np.diff(points, axis=0).T)
     if gap_mm > 0.0 and steps.sum() > 4.0 * gap_mm:
@@ -153,7 +154,8 @@ def _open(loop: Floats, gap_mm: float, lead_mm: float) -> Floats:
         share = (beyond[last] - gap_mm) / steps[last]
         points = np.concatenate([points[: last + 1], (points[last] + share * (points[last + 1] - points[last]))[None]])
     if lead_mm > 0.0:
-        inward = _inward(loop) * lead_mm
+        way = _inward(loop)
+        inward = way * min(lead_mm, 0.5 * _room_mm(loop, way))
         points = np.concatenate([(points[0] + inward)[None], points, (points[-1] + 0.5 * inward)[None]])
     return points
 
@@ -166,6 +168,17 @@ def _inward(loop: Floats) -> Floats:
     length = float(np.hypot(*along))
     along = along / length if length > 1e-6 else steps[1]
     return np.array([-along[1], along[0]])
+
+
+def _room_mm(loop: Floats, way: Floats) -> float:
+    """How far the inside of a loop (n, 2) reaches from its beginning along a unit vector; 0 where that leads out of it."""
+    sides, beside = start_at(loop, 1) - loop, (loop - loop[0]) @ np.array([-way[1], way[0]])
+    following = start_at(beside, 1)
+    crossed = np.flatnonzero((beside > 0.0) != (following > 0.0))
+    share = beside[crossed] / (beside[crossed] - following[crossed])
+    along = (loop[crossed] + share[:, None] * sides[crossed] - loop[0]) @ way
+    along = along[along > 1e-6]
+    return float(along.min()) if len(along) % 2 else 0.0
 
 
 @kernel

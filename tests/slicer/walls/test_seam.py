@@ -176,6 +176,15 @@ def test_first_layers_on_a_section_of_their_own_shape_begin_inside() -> None:
     assert starts[3:] == pytest.approx(8 - 0.225, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    "loop", [[(0, 0), (0.4, 1.6), (-0.4, 1.6)], [(0, 0), (0.3, 0), (0.3, 4), (0, 4)], [(0, 0), (0.01, -0.1), (0.3, 2)]]
+)
+def test_walls_of_a_tip_near_an_interface_begin_inside_it_all_the_same(loop: list[tuple[float, float]]) -> None:
+    everywhere = [[-1, y, 0.1, 1, y, 0.1] for y in np.arange(-1, 5, 0.1)]
+    (bead,), _ = place_seams([Bead(Kind.OUTER_WALL, np.array(loop), 0.45, 0)], process("rear"), around(interfaces=everywhere))
+    assert shapely.Polygon(loop).buffer(1e-6).covers(shapely.LineString(bead.points))
+
+
 def test_first_layers_on_a_wider_part_begin_beside_it_when_they_reach_beyond() -> None:
     post = m3.Manifold.cube((10, 10, 10)) + m3.Manifold.cube((20, 10, 4)).translate((0, 0, 10))
     base, plate = cut(standing(post), ((0, 0, 1), 10.0))
