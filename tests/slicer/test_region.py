@@ -75,6 +75,14 @@ def test_no_wall_begins_on_sparse_infill(side: float, aside: float, walls: int, 
         assert as_shapely(below[i].sparse).intersection(walled).area < 0.05
 
 
+@pytest.mark.parametrize(("aside", "solid"), [(0.3, False), (0.35, True)])
+def test_a_wall_that_hardly_touches_the_one_below_lies_on_solid_layers(aside: float, solid: bool) -> None:
+    sections = [square(24)] * 6 + [square(24) - Polygons.square((aside, 24)).translate((12 - aside, -12))] * 4
+    below = alone(sections, [offset(section, -3 * WIDTH) for section in sections], None, process(top=2, walls=3))[5]
+    wall = Polygons.square((aside, 20)).translate((12 - 3 * WIDTH - aside, -10))
+    assert (below.sparse ^ wall).is_empty() == solid
+
+
 def test_an_overhang_gets_bottom_layers() -> None:
     found = areas([square(10)] * 3 + [square(20)] * 5, top=0)
     assert found[3][1] == pytest.approx(300 + 4 * 10 * WIDTH, abs=5)
