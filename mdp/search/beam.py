@@ -88,6 +88,9 @@ class Beam:
                 self.front.offer(node)
             if node is not None and node.cost_mm2 < self.bests[slot].cost_mm2:
                 self.bests[slot] = node
+        for branch in branches:
+            if branch is not None and branch.node is not self.problem.root:
+                branch.node.let_go()
 
     def close(self) -> None:
         """Leave off what was begun for a next cut."""

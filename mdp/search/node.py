@@ -80,3 +80,8 @@ class Node:
     def signature(self) -> tuple[float, ...]:
         """Equal for two orders of the same cuts."""
         return (round(self.solid.volume(), 3), round(self.risky_mm2, 3), round(self.residual_mm2, 3))
+
+    def let_go(self) -> None:
+        """Forget what is large and made again when it is asked for: a search keeps all its nodes and comes back to few."""
+        for name in ("remainder", "seam_weights"):
+            self.__dict__.pop(name, None)
