@@ -91,7 +91,7 @@ def slice_site(site: Site, supports: Supports, on_layer: Callable[[int, int], No
     if usual < len(stack.outlines):
         layers += vase_layers(stack.outlines, stack.supports.areas, stack.heights, profile, tip)
     _check_not_empty(part, bounds_mm, layers, profile.process)
-    if site.beneath is None:
+    if site.beneath is None and profile.process.walls:
         _check_on_plate(part, layers, profile.process)
     too_thin = [i for i in bare if i < last and usual == len(stack.outlines)]
     return SlicedPart(
