@@ -122,7 +122,8 @@ def end_of(index: int, layer: int) -> Callable[[Lines], Iterable[int]]:
 def not_pulled(lines: Lines) -> Lines:
     """The last wipe of part 2 without its filament."""
     at = before_turn(lines, 2)
-    return on(lambda _: range(at - 8, at), word("E", lambda _: 0.0, "G1 .*E-"))(lines)
+    begin = max((k for k in range(at) if lines[k] == ";WIPE_START"), default=at - 8)
+    return on(lambda _: range(begin, at), word("E", lambda _: 0.0, "G1 .*E-"))(lines)
 
 
 def purged_at_middle(lines: Lines) -> Lines:
