@@ -160,7 +160,7 @@ class _PartLook:
             z_mm, height_mm = float(self._beads.end[rows, 2].max()), float(np.median(self._beads.height_mm[rows]))
             steps = self._steps(rows)
             if len(before) or self._part == 1:  # what it lies on is known
-                gap = z_mm - height_mm > below_mm + ROUNDING_MM
+                gap = z_mm - height_mm > below_mm + self._stand_off_mm(rows, before, height_mm) + ROUNDING_MM
                 whole = whole.with_other(Look(missing=(name,) if gap else ()))
                 whole = whole.with_other(self._hanging(steps, before)).with_other(self._volume(rows, name))
             whole = whole.with_other(self._twice(steps, name))
@@ -168,6 +168,11 @@ class _PartLook:
             np.maximum.at(self._top_mm, steps.cells.ravel(), np.repeat(tops_mm, steps.cells.shape[1]))
             before, below_mm = rows, z_mm
         return whole
+
+    def _stand_off_mm(self, rows: Ints, before: Ints, height_mm: float) -> float:
+        """What support alone keeps away from the part above or below it, in whole layers."""
+        alone = self._support[rows].all() or (len(before) > 0 and self._support[before].all())
+        return ceil(self._gap_mm / height_mm - ROUNDING_MM) * height_mm if alone else 0.0
 
     def _steps(self, rows: Ints) -> _Steps:
         """Strokes laid on the raster."""
