@@ -153,6 +153,8 @@ MISSING = ("missing checksum", "no checksum", "no line number")
 OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
 # Said by a firmware that has stopped for good, its heaters off: Marlin's kill(), Klipper's shutdown, RepRapFirmware's M112.
 KILLED = ("printer halted", "kill() called", "shutdown", "emergency stop")
+# Smoothieware's, GcodeDispatch::on_console_line_received: the answer to M112, and to every line once it has halted.
+HALTED_OK, HALTED = "Emergency Stop Requested", "!!"
 # Said by firmwares that stop, whatever became of the `Error:` before them.
 DEADLY = ("printer halted", "kill() called", "thermal runaway", "heating failed", "system stopped", "mintemp", "maxtemp")
 
@@ -186,8 +188,10 @@ def lacks_checksum(event: Event) -> bool:
 
 
 def is_halt(event: Event) -> bool:
-    """Whether the firmware says that it has stopped for good and switched its heaters off."""
-    return isinstance(event, FirmwareFault) and any(words in event.text.lower() for words in KILLED)
+    """Whether the firmware says that it has stopped for good and switched its heaters off. Any other error does not say so."""
+    if isinstance(event, Ok):
+        return HALTED_OK in event.text
+    return isinstance(event, FirmwareFault) and (event.text == HALTED or any(words in event.text.lower() for words in KILLED))
 
 
 def _error(text: str, folded: str) -> Event:

@@ -127,6 +127,44 @@ def test_an_insisting_firmware_without_an_emergency_parser_is_stopped_too() -> N
     assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)
 
 
+class Wire:
+    """A printer that says one thing to whatever it is told."""
+
+    name = "said"
+
+    def __init__(self, said: bytes) -> None:
+        self._said, self.now_s = said, 0.0
+
+    def write(self, data: bytes) -> None:
+        """Told."""
+
+    def read(self) -> bytes:
+        self.now_s += 0.1
+        said, self._said = self._said, b""
+        return said
+
+    def discard(self) -> None:
+        """Nothing waits."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+@pytest.mark.parametrize(("said", "halts"), [
+    (b"echo:M112 Shutdown\nError:Printer halted. kill() called!\n", True),
+    (b"Error: Emergency Stop! Reset the controller to continue.\n", True),
+    (b"ok Emergency Stop Requested - reset or M999 required to exit HALT state\n", True),  # Smoothieware
+    (b"!!\n", True),  # Smoothieware, once it has halted
+    (b"!! Extrude below minimum temp\nok\n", False),
+    (b"!! Move out of range: 999.000 0.000 0.000 [0.000]\nok\n", False),
+    (b"Error:checksum mismatch, Last Line: 4\nResend: 5\nok\n", False),
+])  # fmt: skip
+def test_an_emergency_stop_is_confirmed_by_words_of_a_halt_only(said: bytes, halts: bool) -> None:
+    wire = Wire(said)
+    medium = Medium(lambda name, baud: wire, lambda: wire.now_s, lambda seconds: None)
+    assert emergency_stop(wire, medium) is halts
+
+
 def test_a_firmware_that_answers_every_question_with_missing_checksum_is_asked_with_one() -> None:
     with SimulatedPrinter(SLOW.machine, build=INSISTS) as printer, open_port(printer.path, 115200) as port:
         answer = ask(port)
