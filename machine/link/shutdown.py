@@ -162,7 +162,8 @@ def emergency_stop(wire: Wire, medium: Medium) -> bool:
         start_s, orders = medium.now_s(), Orders(wire, medium)
         if orders.give(("M112",), _shows_kill, start_s + STOP_AGAIN_S):
             return True
-        return orders.give(("M112",), _shows_kill, start_s + STOP_MOST_S)
+        # One that had shut down before (Klipper) answers M112 with a bare ok, and any other command with its words.
+        return orders.give(("M112", "M107"), _shows_kill, start_s + STOP_MOST_S)
     except PortError:
         return False
 

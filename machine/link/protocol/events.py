@@ -145,9 +145,14 @@ REACH = re.compile(r"([a-z]):(-?\d+\.?\d*)")
 ACTION = re.compile(r"//\s*action:\s*(\w+)\s*(.*)")
 # A boot loader at another rate, and the jerk of a reset line, put rubbish in front of the word.
 START = re.compile(r"(?:.*[^ -~])?start")
-GREETS = re.compile(r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: .*")
+GREETS = re.compile(
+    r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: (?:Ready|Disconnect)"
+)
 # Words by which transmission errors are known even when a byte of them is damaged.
 OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
+# Klipper's gcode.py, _handle_shutdown; and the end of the message (klippy.py, message_shutdown) that answers every later command,
+# whose `!!` names nothing but the reason.
+SHUTDOWN = re.compile(r"// ?(Klipper state: Shutdown|Printer is shutdown)")
 UNKNOWN = re.compile(r'Unknown command: ?"?([A-Z][A-Z0-9_.]*)|\b([GM]\d+): Command is not supported')
 MISSING = ("missing checksum", "no checksum", "no line number")
 OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
@@ -208,6 +213,8 @@ def _read_report(text: str) -> Event:
         return Wait()
     if START.fullmatch(text):
         return Start()
+    if shutdown := SHUTDOWN.fullmatch(text):
+        return FirmwareFault(shutdown[1])
     if action := ACTION.fullmatch(text):
         return Action(action[1].lower(), action[2])
     if GREETS.fullmatch(text):

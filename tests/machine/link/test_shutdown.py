@@ -99,8 +99,17 @@ def test_a_printer_that_has_stopped_for_good_is_told_from_one_that_may_still_hea
 def test_a_klipper_that_has_shut_down_wants_a_firmware_restart() -> None:
     klipper = load(settings=["machine.dialect=klipper"])
     printer = VirtualPrinter(klipper.machine, faults=FaultScript((Fault("thermal runaway", at=5, unit="line"),)))
-    with pytest.raises(FirmwareError, match="send FIRMWARE_RESTART by tiltprint console before the next print"):
+    with pytest.raises(FirmwareError, match=r"Shutdown; the printer has halted.* send FIRMWARE_RESTART by tiltprint console"):
         print_lines(HOMING, PATH, medium=printer.medium, profile=klipper)
+
+
+def test_an_emergency_stop_of_a_klipper_is_confirmed() -> None:
+    klipper = load(settings=["machine.dialect=klipper"])
+    printer, control = VirtualPrinter(klipper.machine), Control()
+    medium = watching(printer, b"G1 X10", lambda: control.ask(Command.EMERGENCY_STOP))
+    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; send FIRMWARE_RESTART"):
+        print_lines(HOMING, PATH, control=control, medium=medium, profile=klipper)
+    assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)  # once more: it answers M112 with a bare ok now
 
 
 def test_a_firmware_that_insists_on_checksums_prints_and_is_switched_off_and_asked() -> None:
@@ -155,6 +164,7 @@ class Wire:
     (b"Error: Emergency Stop! Reset the controller to continue.\n", True),
     (b"ok Emergency Stop Requested - reset or M999 required to exit HALT state\n", True),  # Smoothieware
     (b"!!\n", True),  # Smoothieware, once it has halted
+    (b"// Klipper state: Shutdown\nok\n", True),  # klippy/gcode.py, cmd_M112 and _handle_shutdown
     (b"!! Extrude below minimum temp\nok\n", False),
     (b"!! Move out of range: 999.000 0.000 0.000 [0.000]\nok\n", False),
     (b"Error:checksum mismatch, Last Line: 4\nResend: 5\nok\n", False),
