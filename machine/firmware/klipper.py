@@ -87,6 +87,7 @@ SIMULATED = SimulationRules(
     identity_in_ok=True,
     banner=("// Klipper state: Ready",),
     numbers="ignore",
+    answers_blank=True,  # klippy/gcode.py, _process_commands: whatever a line holds, it is acknowledged
     queue_lines=20,
     blocks=100,  # its toolhead looks 2 s ahead, whatever number of moves that is
     urgent="lines",

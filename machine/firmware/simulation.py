@@ -39,6 +39,7 @@ class SimulationRules:
     with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it. while_heating:
     behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home: after a restart
     it believes itself at its home positions, and keeps only axes that were homed inside the limits.
+    answers_blank: an empty line is answered with ok.
     """
 
     identity: str
@@ -65,3 +66,4 @@ class SimulationRules:
     while_heating: str = " W:?"
     lacks: frozenset[str] = frozenset()
     starts_at_home: bool = False
+    answers_blank: bool = False

@@ -74,7 +74,7 @@ class Orders:
 
     def _ask_number(self, commands: Sequence[str]) -> None:
         self._waiting = tuple(commands)
-        self.wire.write(b"\n" + frame(FAR_NUMBER, "M105"))
+        self.wire.write(frame(FAR_NUMBER, "M105"))  # what was refused has ended a half line
 
 
 class Heaters(Enum):

@@ -230,7 +230,7 @@ class SimulatedFirmware:
             taken = receiver.take()
             if isinstance(taken, str):
                 self._said += receiver.ask_again(taken, self._build.resend_ok)
-                break
+                continue
             if taken is not None:
                 self._queue.append(taken)
                 if self._emergency is None and self._rules.urgent == "bytes" and taken[1] in EARLY:
@@ -267,6 +267,8 @@ class SimulatedFirmware:
             self._sleep(wake_s)
 
     def _begin(self, text: str, name: str, rest: str) -> Work:
+        if not text:
+            return None
         if name == "M112":
             self._stop_at_once()
             return None

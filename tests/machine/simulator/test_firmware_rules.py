@@ -71,6 +71,13 @@ def test_klipper_names_itself_behind_its_ok_and_tells_the_bed_first() -> None:
     assert answer(firmware, "M105\nM114\n") == ["ok B:20.0 /0.0 T0:20.0 /0.0", "X:0.000 Y:0.000 Z:0.000 E:0.000", "ok"]
 
 
+def test_klipper_answers_an_empty_line_and_one_that_insists_on_checksums_refuses_it() -> None:
+    """klippy/gcode.py, _process_commands; OctoPrint's virtual_printer, forceChecksum in _processIncoming."""
+    assert answer(SimulatedFirmware(KLIPPER), "\n;\n") == ["ok", "ok"]
+    assert answer(SimulatedFirmware(MARLIN, BuildOptions(checksums=True)), "\n") == ["Error: Missing checksum"]
+    assert answer(SimulatedFirmware(MARLIN), "\n") == []
+
+
 def test_klipper_stops_reading_behind_twenty_commands() -> None:
     firmware = SimulatedFirmware(KLIPPER)
     firmware.receive(b"G4 P100\n" * 60)
