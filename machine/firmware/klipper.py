@@ -80,11 +80,14 @@ def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, be
     return f"B:{bed_c:.1f} /{bed_target_c:.1f} T0:{nozzle_c:.1f} /{nozzle_target_c:.1f}"
 
 
+IDENTITY = "FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13.0-simulated"
+
 SIMULATED = SimulationRules(
-    identity="FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13.0-simulated",
+    identity=IDENTITY,
     identity_in_ok=True,
     banner=("// Klipper state: Ready",),
     numbers="ignore",
+    answers_blank=True,  # klippy/gcode.py, _process_commands: whatever a line holds, it is acknowledged
     queue_lines=20,
     blocks=100,  # its toolhead looks 2 s ahead, whatever number of moves that is
     urgent="lines",
@@ -97,8 +100,20 @@ SIMULATED = SimulationRules(
     cold_moves=False,
     unhomed="!! Must home axis first: {}",
     out_of_range="!! Move out of range: {}",
-    kill=("!! Shutdown due to M112 command", "// Klipper state: Shutdown"),
-    after_kill=("!! Shutdown due to M112 command",),
+    heater_fault="Heater extruder not heating at expected rate",
+    kill=("// Klipper state: Shutdown",),
+    # klippy/gcode.py, _respond_error and cmd_default: the reason is told to the next command, not to M105 and what is known
+    # without a printer; klippy/klippy.py, message_shutdown.
+    after_kill=(
+        "// {}",
+        "// Once the underlying issue is corrected, use the",
+        '// "FIRMWARE_RESTART" command to reset the firmware, reload the',
+        "// config, and restart the host software.",
+        "// Printer is shutdown",
+        "!! {}",
+        "ok",
+    ),
+    answers_killed={"M105": "ok T:0", "M110": "ok", "M112": "ok", "M115": f"ok {IDENTITY}"},
     position=position_report,
     temperatures=temperature_report,
     while_heating="",

@@ -1,7 +1,7 @@
 """SimulationRules: how the simulated printer takes lines and words its answers in the name of a firmware."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 # Coordinates and steps by letter -> the answer to M114.
@@ -34,10 +34,12 @@ class SimulationRules:
     blocks: planned moves. min_segment_s: shorter moves are stretched while few wait. urgent: where an M112 is seen before its
     turn ("bytes": an emergency parser, "lines": when its line has been read). unknown, cold, unhomed, out_of_range: what is
     said of such commands; out_of_range "": the target is clamped without a word. cold_moves: a cold move is made without
-    filament. kill: said when it stops for ever; after_kill: said, with ok, to every line from then on. has_build_options: it
-    is built with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it.
-    while_heating: behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home:
-    after a restart it believes itself at its home positions, and keeps only axes that were homed inside the limits.
+    filament. heater_fault: its own reason when a heater fails. kill: said when it stops for ever; after_kill: said to every line
+    from then on, {}: why it has stopped; answers_killed: commands that are answered otherwise. has_build_options: it is built
+    with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it. while_heating:
+    behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home: after a restart
+    it believes itself at its home positions, and keeps only axes that were homed inside the limits.
+    answers_blank: an empty line is answered with ok.
     """
 
     identity: str
@@ -53,7 +55,9 @@ class SimulationRules:
     min_segment_s: float = 0.0
     cold_moves: bool = True
     out_of_range: str = ""
+    heater_fault: str = ""
     after_kill: tuple[str, ...] = ()
+    answers_killed: Mapping[str, str] = field(default_factory=dict)
     has_build_options: bool = False
     identity_in_ok: bool = False
     reports_position: bool = False
@@ -62,3 +66,4 @@ class SimulationRules:
     while_heating: str = " W:?"
     lacks: frozenset[str] = frozenset()
     starts_at_home: bool = False
+    answers_blank: bool = False

@@ -110,12 +110,14 @@ class _Inquiry:
                     next_s = now_s  # asked in another way at once
 
     def _write(self, question: str) -> None:
-        """The newline ends what stood on the line before. Where unnumbered lines are refused, a far one brings the number."""
+        """The newline ends what stood on the line before. Where unnumbered lines are refused, empty ones are, too, and a far one
+        brings the number.
+        """
         if self._next_number:
-            self._port.write(b"\n" + frame(self._next_number, question))
+            self._port.write(frame(self._next_number, question))
             self._next_number = 0
         else:
-            self._port.write(b"\n" + frame(FAR_NUMBER, question) if self._refused else f"\n{question}\n".encode("ascii"))
+            self._port.write(frame(FAR_NUMBER, question) if self._refused else f"\n{question}\n".encode("ascii"))
 
     def answer(self) -> Answer:
         """What all of it amounts to."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import FirmwareFault, Ok, Position, Resend, Temperature, is_halt, lacks_checksum, read_event
+from machine.link.protocol.events import Ok, Position, Resend, Temperature, is_halt, lacks_checksum, read_event
 from machine.link.protocol.framing import FAR_NUMBER, frame, number_lines
 from profiles.errors import PortError
 
@@ -74,7 +74,7 @@ class Orders:
 
     def _ask_number(self, commands: Sequence[str]) -> None:
         self._waiting = tuple(commands)
-        self.wire.write(b"\n" + frame(FAR_NUMBER, "M105"))
+        self.wire.write(frame(FAR_NUMBER, "M105"))  # what was refused has ended a half line
 
 
 class Heaters(Enum):
@@ -154,20 +154,18 @@ def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float) -> Posi
 def emergency_stop(wire: Wire, medium: Medium) -> bool:
     """M112 ahead of everything that waits to be sent, and once more; True when the printer says that it has halted.
 
-    Without number: an emergency parser reads it from the raw bytes, any other firmware as a line of its own.
+    An error of another kind may have been on its way and confirms nothing. Without number: an emergency parser reads it from the
+    raw bytes, any other firmware as a line of its own.
     """
     try:
         wire.discard()
         start_s, orders = medium.now_s(), Orders(wire, medium)
-        if orders.give(("M112",), _shows_halt, start_s + STOP_AGAIN_S):
+        if orders.give(("M112",), _shows_kill, start_s + STOP_AGAIN_S):
             return True
-        return orders.give(("M112",), _shows_halt, start_s + STOP_MOST_S)
+        # One that had shut down before (Klipper) answers M112 with a bare ok, and any other command with its words.
+        return orders.give(("M112", "M107"), _shows_kill, start_s + STOP_MOST_S)
     except PortError:
         return False
-
-
-def _shows_halt(line: bytes) -> bool:
-    return isinstance(read_event(line), FirmwareFault)
 
 
 def _shows_kill(line: bytes) -> bool:

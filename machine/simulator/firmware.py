@@ -52,6 +52,7 @@ class SimulatedFirmware:
         self._waits = False  # the program itself waits for the command at work
         self._taken = self._watched = 0
         self.watch: Callable[[int], bool] | None = None
+        self._reason = ""  # for which it has stopped
         self.dead = False
 
     def _reads_bytes(self) -> bool:
@@ -67,8 +68,8 @@ class SimulatedFirmware:
             if self.dead:
                 return
         lines = self._receiver.receive(data)
-        if self._rules.urgent == "lines" and any(line.strip() == b"M112" for line in lines):
-            self._shut_down("M112", ())
+        if not self.dead and self._rules.urgent == "lines" and any(line.strip() == b"M112" for line in lines):
+            self._stop_at_once()
 
     @property
     def has_ring(self) -> bool:
@@ -127,6 +128,7 @@ class SimulatedFirmware:
         board.forget()
         board.motion.forget()
         board.busy_every_s = self._busy_default_s
+        self._receiver.forget()
         self._forget()
         self._receiver.last, self.dead = 0, False
         if banner:
@@ -148,17 +150,35 @@ class SimulatedFirmware:
 
     def kill(self, error: str) -> None:
         """The firmware stops for ever with its own words, heaters off."""
-        self._shut_down(error, (f"Error:{error}",))
+        own = self._rules.heater_fault
+        self._shut_down(error, () if own else (f"Error:{error}",), own)
 
-    def _shut_down(self, event: str, report: tuple[str, ...]) -> None:
+    def _stop_at_once(self) -> None:
+        """M112."""
+        report = ("echo:M112 Shutdown",) if self._rules.urgent == "bytes" else ()
+        self._shut_down("M112", report, "Shutdown due to M112 command")
+
+    def _shut_down(self, event: str, report: tuple[str, ...], reason: str) -> None:
         self.board.note(event)
         self.board.off()
         self._said += [*report, *self._rules.kill]
+        self._reason, self.dead = reason, True
+        if self._rules.after_kill:
+            self._answer_waiting()
+        else:
+            self._receiver.forget()
         self._forget()
-        self.dead = True
+
+    def _answer_waiting(self) -> None:
+        """The command at work ends with its ok, those behind it are refused."""
+        waiting = [text for _, text in self._queue]
+        if self._work is not None:
+            self._said.append("ok")
+            del waiting[0]
+        for text in waiting:
+            self._refuse(text)
 
     def _forget(self) -> None:
-        self._receiver.forget()
         self._queue.clear()
         if self._emergency is not None:
             self._emergency.forget()
@@ -169,8 +189,12 @@ class SimulatedFirmware:
     def _answer_dead(self) -> None:
         """A firmware on a computer of its own still answers when it has stopped the machine: no, and ok."""
         while len(self._receiver):
-            if self._receiver.take() is not None:
-                self._said += [*self._rules.after_kill, "ok"]
+            if isinstance(taken := self._receiver.take(), tuple):
+                self._refuse(taken[1])
+
+    def _refuse(self, text: str) -> None:
+        answer = self._rules.answers_killed.get(split_command(text)[0])
+        self._said += [answer] if answer else [line.format(self._reason) for line in self._rules.after_kill]
 
     def _do_urgent(self, order: str) -> None:
         board = self.board
@@ -183,13 +207,13 @@ class SimulatedFirmware:
     def _act_at_once(self, order: str) -> None:
         board = self.board
         if order == "M112":
-            self._shut_down("M112", ("echo:M112 Shutdown",))
+            self._stop_at_once()
         elif order == "M108":
             board.impatient = True
             if board.waits_for_heat or board.waits_for_person:
                 self._wake_s = board.now_s
         elif order == "M410" and board.homes:  # Endstops::validate_homing_move: the end stop was not met
-            self._shut_down("Homing Failed", ("echo:Homing Failed",))
+            self._shut_down("Homing Failed", ("echo:Homing Failed",), "")
         elif order == "M410":
             board.motion.halt(board.now_s)
             board.note("M410")
@@ -206,7 +230,7 @@ class SimulatedFirmware:
             taken = receiver.take()
             if isinstance(taken, str):
                 self._said += receiver.ask_again(taken, self._build.resend_ok)
-                break
+                continue
             if taken is not None:
                 self._queue.append(taken)
                 if self._emergency is None and self._rules.urgent == "bytes" and taken[1] in EARLY:
@@ -243,8 +267,10 @@ class SimulatedFirmware:
             self._sleep(wake_s)
 
     def _begin(self, text: str, name: str, rest: str) -> Work:
+        if not text:
+            return None
         if name == "M112":
-            self._shut_down("M112", ("echo:M112 Shutdown",))
+            self._stop_at_once()
             return None
         if self._macros:
             macro = command_of(name.upper())

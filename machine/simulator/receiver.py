@@ -59,8 +59,10 @@ class Receiver:
         """The oldest line: its label for ADVANCED_OK and its command, or what is wrong with it; None: nothing to do."""
         self._read = 0
         line = self._lines.popleft().partition(b";")[0][: self._longest].lstrip(b" ")
+        if not line and self._rules.answers_blank:
+            return "", ""
         if not line:
-            return None
+            return MISSING if self._insists else None
         label = ""
         if line[:1] == b"N":
             if self._rules.numbers != "resend":

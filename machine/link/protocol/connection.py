@@ -114,7 +114,9 @@ class Connection:
 
         done: what is known otherwise of the lines on their way: they have been done, or are to be sent once more.
         """
-        self._out[:] = b"\n"  # ends a half line
+        # A half line is refused together with the question behind it, and asked for again; an empty line would be answered by
+        # some firmwares. Those that do not ask for lines were asked for their status, which ended it.
+        self._out.clear()
         self._decoder.discard_partial()
         self._questions.unanswered = 0
         if done:
@@ -140,9 +142,12 @@ class Connection:
                 self._handle_ok(event, now_s)
             case Resend() if self.state is not State.SYNC:
                 self._handle_resend(event, now_s)
+            case LineError() if self.state in (State.DRAIN, State.SYNC):  # of what came before: no line of ours has a number yet
+                self.greeting.heard = event.text
             case LineError():
                 self._oks.expect_resend_ok(self._timeouts.hear_line_error(now_s))
             case Busy():
+                self.greeting.heard = event.text
                 self._timeouts.hear_busy(now_s)
             case Start():
                 self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))

@@ -145,14 +145,21 @@ REACH = re.compile(r"([a-z]):(-?\d+\.?\d*)")
 ACTION = re.compile(r"//\s*action:\s*(\w+)\s*(.*)")
 # A boot loader at another rate, and the jerk of a reset line, put rubbish in front of the word.
 START = re.compile(r"(?:.*[^ -~])?start")
-GREETS = re.compile(r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: .*")
+GREETS = re.compile(
+    r"Grbl \d.*|Smoothie|.* is up and running.*|echo: ?Last Updated.*|Marlin \d+\.\d.*|// ?Klipper state: (?:Ready|Disconnect)"
+)
 # Words by which transmission errors are known even when a byte of them is damaged.
 OF_THE_LINE = ("checksum", "line number", "last line", "expected line")
+# Klipper's gcode.py, _handle_shutdown; and the end of the message (klippy.py, message_shutdown) that answers every later command,
+# whose `!!` names nothing but the reason.
+SHUTDOWN = re.compile(r"// ?(Klipper state: Shutdown|Printer is shutdown)")
 UNKNOWN = re.compile(r'Unknown command: ?"?([A-Z][A-Z0-9_.]*)|\b([GM]\d+): Command is not supported')
 MISSING = ("missing checksum", "no checksum", "no line number")
 OF_THE_CARD = ("no media", "volume.init", "openroot", "workdir", "open failed", "cannot open", "cannot enter", "sd init")
 # Said by a firmware that has stopped for good, its heaters off: Marlin's kill(), Klipper's shutdown, RepRapFirmware's M112.
 KILLED = ("printer halted", "kill() called", "shutdown", "emergency stop")
+# Smoothieware's, GcodeDispatch::on_console_line_received: the answer to M112, and to every line once it has halted.
+HALTED_OK, HALTED = "Emergency Stop Requested", "!!"
 # Said by firmwares that stop, whatever became of the `Error:` before them.
 DEADLY = ("printer halted", "kill() called", "thermal runaway", "heating failed", "system stopped", "mintemp", "maxtemp")
 
@@ -186,8 +193,10 @@ def lacks_checksum(event: Event) -> bool:
 
 
 def is_halt(event: Event) -> bool:
-    """Whether the firmware says that it has stopped for good and switched its heaters off."""
-    return isinstance(event, FirmwareFault) and any(words in event.text.lower() for words in KILLED)
+    """Whether the firmware says that it has stopped for good and switched its heaters off. Any other error does not say so."""
+    if isinstance(event, Ok):
+        return HALTED_OK in event.text
+    return isinstance(event, FirmwareFault) and (event.text == HALTED or any(words in event.text.lower() for words in KILLED))
 
 
 def _error(text: str, folded: str) -> Event:
@@ -204,6 +213,8 @@ def _read_report(text: str) -> Event:
         return Wait()
     if START.fullmatch(text):
         return Start()
+    if shutdown := SHUTDOWN.fullmatch(text):
+        return FirmwareFault(shutdown[1])
     if action := ACTION.fullmatch(text):
         return Action(action[1].lower(), action[2])
     if GREETS.fullmatch(text):

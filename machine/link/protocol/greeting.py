@@ -7,14 +7,18 @@ from machine.link.protocol.events import Area, Capability, Identity
 from machine.link.protocol.verdict import failed_greeting
 from profiles.errors import PrinterError
 
-GREETING = b"\nN0 M110 N0*125\n"  # the newline ends a half line of an earlier session
+# No newline before it: an empty line counts as a line where checksums are insisted on (OctoPrint's virtual printer: Missing
+# checksum), and is answered with ok by Klipper and Smoothieware. What stands half written there costs one greeting.
+GREETING = b"N0 M110 N0*125\n"
 
 
 class Greeting:
-    """identity: the FIRMWARE_NAME line; firmware: the one it names; area: limits of its axes, where it reports them."""
+    """identity: the FIRMWARE_NAME line; firmware: the one it names; area: limits of its axes, where it reports them. heard: the
+    last words of a printer that were no answer to a greeting.
+    """
 
     def __init__(self, firmware: Firmware = MARLIN, rx_bytes: int | None = None, baud: int | None = None) -> None:
-        self.firmware, self.identity = firmware, ""
+        self.firmware, self.identity, self.heard = firmware, "", ""
         self.capabilities: dict[str, bool] = {}
         self.area: Area | None = None
         self._rx_bytes, self._baud, self._tries = rx_bytes, baud, 0
@@ -40,7 +44,7 @@ class Greeting:
 
     def give_up(self, decoder: LineDecoder) -> PrinterError | None:
         """Why there is no sense in one more greeting; None when there is, and it counts as given."""
-        error = failed_greeting(decoder, self._tries, self._baud)
+        error = failed_greeting(decoder, self._tries, self._baud, self.heard)
         if error is None:
             self._tries += 1
         return error

@@ -10,8 +10,8 @@ BAUDS = (115200, 250000, 230400, 500000, 1000000, 57600)  # what firmwares are b
 LOST = "position and temperatures are lost, the print cannot go on"
 
 
-def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None) -> PrinterError | None:
-    """Why there is no sense in another greeting after so many; None when there is."""
+def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: str = "") -> PrinterError | None:
+    """Why there is no sense in another greeting after so many; None when there is. heard: what came instead of an answer."""
     at = "this baud rate" if baud is None else f"{baud} baud"
     if tries >= RUBBISH_TRIES and decoder.rubbish:
         others = ", ".join(str(rate) for rate in BAUDS if rate != baud)
@@ -21,6 +21,8 @@ def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None) -> Print
     if decoder.foreign:
         text = f"what answers there is no printer that this program knows: to {tries} greetings it said {decoder.foreign[:60]!r}"
         return RemoteProtocolError(text)
+    if heard:
+        return RemoteProtocolError(f"the printer did not take {tries} greetings: the last that it said was {heard[:60]!r}")
     return SilenceError(f"the printer did not answer {tries} greetings: it may be off, or speak at another rate than {at}")
 
 

@@ -195,7 +195,7 @@ def test_an_emergency_stop_without_answer_is_given_twice_and_says_to_cut_the_pow
     watcher.when = {150: watcher.ask(Command.EMERGENCY_STOP)}
     with pytest.raises(FirmwareError, match="did not confirm M112: cut the power"):
         watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written, deaf=b"M112"))
-    assert written[-2:] == [b"\nM112\n", b"\nM112\n"]
+    assert written[-2:] == [b"\nM112\n", b"\nM112\nM107\n"]
 
 
 class _Tap:

@@ -501,11 +501,12 @@ class Halving:
         self._line.write(data)
 
 
-def test_scenario_33_a_half_written_line_is_never_continued(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scenario_33_a_half_written_line_is_refused_with_the_question_behind_it(monkeypatch: pytest.MonkeyPatch) -> None:
     first: list[bytes] = []
     monkeypatch.setattr(Halving, "failed", False)
     done = printed(wrap=lambda line: Halving(line, first))
-    assert first[0][:1] == b"\n"
+    assert b" M105*" in first[0]
+    assert b"checksum mismatch, Last Line: %d" % (LINE - 1) in done.heard
     assert_exact(done)
 
 

@@ -99,8 +99,17 @@ def test_a_printer_that_has_stopped_for_good_is_told_from_one_that_may_still_hea
 def test_a_klipper_that_has_shut_down_wants_a_firmware_restart() -> None:
     klipper = load(settings=["machine.dialect=klipper"])
     printer = VirtualPrinter(klipper.machine, faults=FaultScript((Fault("thermal runaway", at=5, unit="line"),)))
-    with pytest.raises(FirmwareError, match="send FIRMWARE_RESTART by tiltprint console before the next print"):
+    with pytest.raises(FirmwareError, match=r"Shutdown; the printer has halted.* send FIRMWARE_RESTART by tiltprint console"):
         print_lines(HOMING, PATH, medium=printer.medium, profile=klipper)
+
+
+def test_an_emergency_stop_of_a_klipper_is_confirmed() -> None:
+    klipper = load(settings=["machine.dialect=klipper"])
+    printer, control = VirtualPrinter(klipper.machine), Control()
+    medium = watching(printer, b"G1 X10", lambda: control.ask(Command.EMERGENCY_STOP))
+    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; send FIRMWARE_RESTART"):
+        print_lines(HOMING, PATH, control=control, medium=medium, profile=klipper)
+    assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)  # once more: it answers M112 with a bare ok now
 
 
 def test_a_firmware_that_insists_on_checksums_prints_and_is_switched_off_and_asked() -> None:
@@ -125,6 +134,45 @@ def test_a_cancel_switches_the_heaters_of_an_insisting_firmware_off() -> None:
 def test_an_insisting_firmware_without_an_emergency_parser_is_stopped_too() -> None:
     printer = VirtualPrinter(SLOW.machine, BuildOptions(checksums=True, emergency_parser=False))
     assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)
+
+
+class Wire:
+    """A printer that says one thing to whatever it is told."""
+
+    name = "said"
+
+    def __init__(self, said: bytes) -> None:
+        self._said, self.now_s = said, 0.0
+
+    def write(self, data: bytes) -> None:
+        """Told."""
+
+    def read(self) -> bytes:
+        self.now_s += 0.1
+        said, self._said = self._said, b""
+        return said
+
+    def discard(self) -> None:
+        """Nothing waits."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+@pytest.mark.parametrize(("said", "halts"), [
+    (b"echo:M112 Shutdown\nError:Printer halted. kill() called!\n", True),
+    (b"Error: Emergency Stop! Reset the controller to continue.\n", True),
+    (b"ok Emergency Stop Requested - reset or M999 required to exit HALT state\n", True),  # Smoothieware
+    (b"!!\n", True),  # Smoothieware, once it has halted
+    (b"// Klipper state: Shutdown\nok\n", True),  # klippy/gcode.py, cmd_M112 and _handle_shutdown
+    (b"!! Extrude below minimum temp\nok\n", False),
+    (b"!! Move out of range: 999.000 0.000 0.000 [0.000]\nok\n", False),
+    (b"Error:checksum mismatch, Last Line: 4\nResend: 5\nok\n", False),
+])  # fmt: skip
+def test_an_emergency_stop_is_confirmed_by_words_of_a_halt_only(said: bytes, halts: bool) -> None:
+    wire = Wire(said)
+    medium = Medium(lambda name, baud: wire, lambda: wire.now_s, lambda seconds: None)
+    assert emergency_stop(wire, medium) is halts
 
 
 def test_a_firmware_that_answers_every_question_with_missing_checksum_is_asked_with_one() -> None:

@@ -206,7 +206,7 @@ def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
 
 
 PROGRAM = ["M104 S200", "M109 S200", *strokes(300)]
-WIRE = [b"\nN0 M110 N0*125\n", frame(1, "M115"), frame(2, "M105"), frame(3, "M155 S2")]
+WIRE = [b"N0 M110 N0*125\n", frame(1, "M115"), frame(2, "M105"), frame(3, "M155 S2")]
 WIRE += [frame(4 + i, line) for i, line in enumerate(PROGRAM)]
 
 

@@ -71,6 +71,13 @@ def test_klipper_names_itself_behind_its_ok_and_tells_the_bed_first() -> None:
     assert answer(firmware, "M105\nM114\n") == ["ok B:20.0 /0.0 T0:20.0 /0.0", "X:0.000 Y:0.000 Z:0.000 E:0.000", "ok"]
 
 
+def test_klipper_answers_an_empty_line_and_one_that_insists_on_checksums_refuses_it() -> None:
+    """klippy/gcode.py, _process_commands; OctoPrint's virtual_printer, forceChecksum in _processIncoming."""
+    assert answer(SimulatedFirmware(KLIPPER), "\n;\n") == ["ok", "ok"]
+    assert answer(SimulatedFirmware(MARLIN, BuildOptions(checksums=True)), "\n") == ["Error: Missing checksum"]
+    assert answer(SimulatedFirmware(MARLIN), "\n") == []
+
+
 def test_klipper_stops_reading_behind_twenty_commands() -> None:
     firmware = SimulatedFirmware(KLIPPER)
     firmware.receive(b"G4 P100\n" * 60)
@@ -95,11 +102,28 @@ def test_the_terminal_s_back_pressure_reaches_the_host() -> None:
     assert refused
 
 
-def test_klipper_sees_m112_out_of_order_and_refuses_everything_after_it() -> None:
+def test_klipper_sees_m112_out_of_order_and_tells_the_reason_to_what_waits_behind_it() -> None:
+    """klippy/gcode.py: _process_data looks for M112 before it is at work; _respond_state, then _respond_error of the next one."""
     firmware = SimulatedFirmware(KLIPPER)
-    answer(firmware, "G4 S50\n" * 5, until_s=1.0)
-    assert answer(firmware, "M112\n", until_s=1.0)[0] == "!! Shutdown due to M112 command"
-    assert answer(firmware, "M105\n", until_s=2.0) == ["!! Shutdown due to M112 command", "ok"]
+    answer(firmware, "G4 S50\nG1 X5\n", until_s=1.0)
+    said = answer(firmware, "M112\n", until_s=1.0)
+    assert said[:3] == ["// Klipper state: Shutdown", "ok", "// Shutdown due to M112 command"]
+    assert said[-4:] == ["// Printer is shutdown", "!! Shutdown due to M112 command", "ok", "ok"]
+
+
+def test_a_klipper_that_is_shut_down_answers_m105_and_m112_as_if_nothing_had_happened() -> None:
+    """klippy/gcode.py, cmd_default and base_gcode_handlers."""
+    firmware = SimulatedFirmware(KLIPPER)
+    assert answer(firmware, "M112\n") == ["// Klipper state: Shutdown", "ok"]
+    assert answer(firmware, "M105\nM112\n") == ["ok T:0", "ok"]
+    assert answer(firmware, "G1 X5\n")[-2:] == ["!! Shutdown due to M112 command", "ok"]
+
+
+def test_klipper_names_a_heater_s_failure_to_the_next_command_only() -> None:
+    firmware = SimulatedFirmware(KLIPPER)
+    firmware.kill("Thermal Runaway, system stopped! Heater_ID: 0")
+    said = answer(firmware, "M104 S0\n")
+    assert (said[0], said[-2]) == ("// Klipper state: Shutdown", "!! Heater extruder not heating at expected rate")
 
 
 @pytest.mark.parametrize(("machine", "line", "said"), [

@@ -97,7 +97,7 @@ def test_the_greeting_agrees_on_numbers_then_asks_who_is_there(size: int) -> Non
     table.wait(0.4)
     assert table.wire() == b""
     table.wait(0.2)
-    assert table.wire() == b"\nN0 M110 N0*125\n"
+    assert table.wire() == b"N0 M110 N0*125\n"
     table.say(b"ne\nok\n")
     assert table.wire() == HELLO
     table.say(b"FIRMWARE_NAME:Marlin\nCap:AUTOREPORT_TEMP:1\nok\n")
@@ -115,7 +115,7 @@ def test_a_board_that_restarts_on_opening_is_greeted_again() -> None:
     table.say(b"start\necho: Last Updated\nok P15 B3\n")
     assert table.wire() == b""
     table.wait(0.6)
-    assert table.wire() == b"\nN0 M110 N0*125\n"
+    assert table.wire() == b"N0 M110 N0*125\n"
     table.say(b"ok P15 B3\n")
     assert table.connection.state is State.SYNC
     table.say(b"ok\n")
@@ -130,6 +130,23 @@ def test_a_mute_printer_is_given_up_after_some_greetings() -> None:
         table.wait(3.1)
     assert isinstance(table.connection.fault, SilenceError)
     assert table.now_s < 30
+
+
+def test_complaints_about_what_came_before_the_greeting_are_no_answers_to_it() -> None:
+    table = Table()
+    table.wait(0.6)
+    table.say(b"Error: Missing checksum\nok\nFIRMWARE_NAME:Marlin\nok\nok T:20 /0\n")
+    assert table.connection.state is State.OPEN
+
+
+def test_a_printer_that_takes_no_greeting_is_told_by_what_it_said() -> None:
+    table = Table()
+    for _ in range(SYNC_TRIES + 2):
+        table.say(b"Error: Missing checksum\n")
+        table.wait(3.1)
+    assert str(table.connection.fault) == (
+        "the printer did not take 6 greetings: the last that it said was 'Error: Missing checksum'"
+    )
 
 
 def test_a_plain_printer_gets_one_line_at_a_time() -> None:
@@ -638,7 +655,7 @@ def test_a_mended_cable_is_followed_by_a_question_and_what_was_lost_is_repeated(
     line = table.send("G1 X1")
     table.say(b"ok N1")
     table.connection.reconnect(table.now_s)
-    assert table.wire() == b"\n" + frame(12, "M105")
+    assert table.wire() == frame(12, "M105")
     table.say(b"Error:Line Number is not Last Line Number+1, Last Line: 10\nResend: 11\nok\n")
     table.wait(0.2)
     assert table.wire() == line

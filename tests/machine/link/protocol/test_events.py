@@ -5,6 +5,7 @@ import pytest
 from machine.link.protocol.decoder import LineDecoder
 from machine.link.protocol.events import (
     Action,
+    Banner,
     Busy,
     Capability,
     Echo,
@@ -44,6 +45,10 @@ LINES: list[tuple[bytes, Event]] = [
     (b"Error:Thermal Runaway, system stopped! Heater_ID: 0", FirmwareFault(
         "Error:Thermal Runaway, system stopped! Heater_ID: 0")),
     (b"!! Lost communication with MCU", FirmwareFault("!! Lost communication with MCU")),
+    (b"// Klipper state: Shutdown", FirmwareFault("Klipper state: Shutdown")),
+    (b"// Printer is shutdown", FirmwareFault("Printer is shutdown")),
+    (b"// Klipper state: Ready", Banner("// Klipper state: Ready")),
+    (b"// Klipper state: Not ready", Echo("Klipper state: Not ready")),
     (b"fatal: heater", FirmwareFault("fatal: heater")),
     (b'echo:Unknown command: "5 G92"', Echo('Unknown command: "5 G92"')),
     (b"//action:pause\r", Action("pause")),
