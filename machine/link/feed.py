@@ -8,7 +8,7 @@ from threading import Event as Flag
 
 from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
-from machine.gcode.words import PAUSE_REMARK
+from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
 from machine.link.journal import FINISHED, LEFT, Checkpoint, Journal
 from machine.link.line_history import LineHistory, SentLine
@@ -18,7 +18,7 @@ from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
 from machine.link.progress import ProgramPosition, Progress, Schedule
 from machine.link.protocol.events import Event, Ok, Position
-from machine.link.protocol.framing import LINE_LIMIT, command_of
+from machine.link.protocol.framing import LINE_LIMIT, command_of, name_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
 from machine.link.status import PrinterStatus
@@ -156,8 +156,12 @@ class Feed:
             why, self._program_pause = self._program_pause, ""
             self._pause(f"the program pauses: {why}")
         since_s = self._pending.pause_s
-        if since_s is not None and (not _extrudes(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
+        if since_s is not None and (not self._prints(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
             self._pause()
+
+    def _prints(self, command: str) -> bool:
+        """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
+        return name_of(command) == "MANUAL_STEPPER" or self.modal.names_filament(command)
 
     def _send_own(self) -> None:
         """Commands of the person's own."""
@@ -173,7 +177,7 @@ class Feed:
         since_s = self.exchange.medium.now_s() - self._checked_s
         if self.exchange.connection.advanced:
             return ended and since_s >= CHECK_S
-        return (ended or command.startswith("G0")) and since_s >= CHECK_MUTE_S
+        return since_s >= CHECK_MUTE_S and (ended or split_command(command.upper())[0] == "G0")
 
     def _position_errors(self) -> list[str]:
         """Axes on which the printer's own position is not the program's, all moves over; none where it does not report it."""
@@ -355,8 +359,3 @@ class Feed:
         connection = self.exchange.connection
         slow = any(line.slow_timeout_s for line in connection.window.flight)
         return "no answer from the printer, it is asked again" if connection.state is State.PROBING and not slow else ""
-
-
-def _extrudes(command: str) -> bool:
-    """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
-    return command.startswith("MANUAL_STEPPER") or (command[0] == "G" and command[1:2] in "123" and " E" in command)

@@ -134,6 +134,17 @@ def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_asid
     assert re.fullmatch(r"G0 X\S+ Y\S+ F\d+", away[3])
 
 
+@pytest.mark.parametrize("written", [str.lower, lambda line: line.replace("G1 ", "G01 ").replace(" E", "E")])
+def test_a_pause_begins_at_a_travel_however_the_strokes_are_written(written: Callable[[str], str]) -> None:
+    watcher = watched()
+    body = [written(line) if "E" in line else line for line in BODY]
+    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
+    watcher.run([*START, *POSED, *body])
+    lines = watcher.lines()
+    following = next(line for line in lines[lines.index("M400") :] if line in body)
+    assert following.startswith("G0 ")
+
+
 @pytest.mark.parametrize("action", ["pause", "cancel"])
 def test_the_printer_may_ask_for_a_pause_or_the_end(action: str) -> None:
     watcher = watched()
