@@ -29,11 +29,16 @@ class Job:
         self.steps = 4  # looks that a print takes
         self.commands: list[str] = []
         self.halted = False
+        self.up_s = 3600  # since it was switched on
         self.refuse: dict[str, tuple[int, str]] = {}  # path -> status and words that are answered instead
         self.break_off: str = ""  # path during whose body the server goes away
 
     def start(self, file: str) -> None:
         self.state, self.file, self.position = "printing", file, 0
+
+    def restart(self) -> None:
+        """It has died and comes back: it knows of no print."""
+        self.state, self.file, self.position, self.up_s = "idle", "", 0, 5
 
     def look(self) -> None:
         if self.state == "printing":
@@ -302,7 +307,7 @@ class DuetStandIn(Handler):
         heaters = [{"current": 59.9, "active": 60.0}, {"current": 209.6, "active": 210.0}]
         duration = 12 if status in ("processing", "paused") else None
         return {
-            "state": {"status": status},
+            "state": {"status": status, "upTime": job.up_s},
             "job": {"filePosition": job.position, "duration": duration},
             "heat": {"heaters": heaters},
         }
