@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from threading import Event as Flag
 
 from machine.link.exchange import Exchange, Reconnection
-from machine.link.feed import Feed, PrintJob
+from machine.link.feed import Feed
+from machine.link.job import PrintJob
 from machine.link.journal import Journal
 from machine.link.medium import SERIAL, Medium, reopen, stable_name
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
