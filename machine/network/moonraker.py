@@ -88,9 +88,13 @@ class Moonraker:
         return f"Klipper is in the state {server.get('klippy_state')}: {table(words).get('state_message') or 'no reason given'}"
 
     def has(self, file: str) -> bool:
-        """Whether it holds a file of this name."""
-        reply = self._http.get("/server/files/metadata", {"filename": file})
-        return reply.status != 404 and self._value(reply, "to tell of its files") is not None
+        """Whether it holds a file of this name, by what lies in its folder.
+
+        /server/files/metadata answers 404 for a file that it has not scanned (file_manager.py, _handle_metadata_request).
+        """
+        reply = self._http.get("/server/files/directory", {"path": "gcodes"})
+        files = table(table(self._value(reply, "to tell of its files")).get("result")).get("files")
+        return any(table(each).get("filename") == file for each in files) if isinstance(files, list) else False
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file with its checksum, without which half a file would be taken for a whole one."""

@@ -161,9 +161,10 @@ class OctoPrintStandIn(Handler):
 
 
 class MoonrakerStandIn(Handler):
-    """As Moonraker 0.11 before a Klipper that is ready."""
+    """As Moonraker 0.11 before a Klipper that is ready. scans: whether it has read the files that it holds."""
 
     steppers = ("stepper_a", "stepper_c")
+    scans = True
 
     def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> tuple[int, Any]:
         if self.headers.get("X-Api-Key") != self.key:
@@ -172,8 +173,11 @@ class MoonrakerStandIn(Handler):
         if path == "/server/files/upload":
             return self._upload(body)
         if path == "/server/files/metadata":
-            known = query["filename"] in self.job.files
+            known = self.scans and query["filename"] in self.job.files
             return (200, {"result": {}}) if known else (404, {"error": {"code": 404, "message": "Metadata not available"}})
+        if path == "/server/files/directory":
+            assert query["path"] == "gcodes"
+            return 200, {"result": {"dirs": [{"dirname": ".cache"}], "files": [{"filename": name} for name in self.job.files]}}
         if path.startswith("/printer/"):
             return self._printer(path, value)
         if path == "/server/info":

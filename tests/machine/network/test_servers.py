@@ -62,6 +62,12 @@ def test_a_file_is_handed_over_whole_with_its_progress(kind: str) -> None:
     assert counts == [*range(0, len(UPLOAD.content), 65536), len(UPLOAD.content)]
 
 
+def test_a_file_that_a_moonraker_has_not_scanned_yet_is_there_all_the_same() -> None:
+    with stand_in("moonraker", scans=False) as (job, address), open_server(address) as server:
+        job.files["copied.gcode"] = b""
+        assert (server.has("copied.gcode"), server.has("other.gcode")) == (True, False)
+
+
 @every_kind
 def test_a_print_is_started_and_followed_to_its_end(kind: str) -> None:
     seen: list[JobStatus] = []
