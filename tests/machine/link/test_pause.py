@@ -354,6 +354,41 @@ def test_a_port_that_stays_away_ends_the_print_in_bounded_time() -> None:
     assert watcher.printer.now_s < 1000.0
 
 
+class _Loose:
+    """A wire that takes nothing."""
+
+    name = PATH
+
+    def write(self, data: bytes) -> None:
+        raise PortError("the plug is loose")
+
+    def read(self) -> bytes:
+        return b""
+
+    def discard(self) -> None:
+        pass
+
+    close = discard
+
+
+def test_a_plug_that_stays_loose_is_waited_for_no_longer_than_is_said() -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=100.0),), profile=UNASKING["klipper"])
+    usual = watcher.printer.medium
+    wires: list[Wire] = []
+
+    def opened(name: str, baud: int) -> Wire:
+        wire = usual.open(name, baud) if len(wires) < 3 else None
+        if wire is None:
+            raise PortError("it is gone")
+        wires.append(_Loose() if wires else wire)
+        return wires[-1]
+
+    with pytest.raises(PortError, match="did not come back within 120 s"):
+        watcher.run(PROGRAM, medium=Medium(opened, usual.now_s, usual.wait))
+    waited_s = [progress.elapsed_s for progress in watcher.shown if progress.state == "reconnecting"]
+    assert waited_s[-1] - waited_s[0] == pytest.approx(120.0, abs=5.0)
+
+
 def test_the_stop_flag_ends_the_wait_for_a_lost_port() -> None:
     watcher, stop = watched((Fault("disconnect", at=120, unit="line", seconds=1e6),)), Flag()
     watcher.when = {"reconnecting": stop.set}
