@@ -160,10 +160,17 @@ class OctoPrintStandIn(Handler):
         return 204, None
 
 
+BUILT_IN = (
+    *("G1", "M104", "MANUAL_STEPPER", "SET_VELOCITY_LIMIT", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "TURN_OFF_HEATERS"),
+    *("SET_PRESSURE_ADVANCE", "PAUSE", "RESUME", "CANCEL_PRINT"),
+)
+
+
 class MoonrakerStandIn(Handler):
     """As Moonraker 0.11 before a Klipper that is ready. scans: whether it has read the files that it holds."""
 
     steppers = ("stepper_a", "stepper_c")
+    macros = ("HOME_AB",)
     scans = True
 
     def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> tuple[int, Any]:
@@ -202,7 +209,7 @@ class MoonrakerStandIn(Handler):
                 "result": {"state": "ready", "software_version": "v0.13.0-1", "state_message": "Shutdown due to webhooks request"}
             }
         if path == "/printer/objects/list":
-            return 200, {"result": {"objects": ["toolhead", *(f"manual_stepper {name}" for name in self.steppers)]}}
+            return 200, {"result": {"objects": ["gcode", "toolhead", *(f"manual_stepper {name}" for name in self.steppers)]}}
         if path == "/printer/objects/query":
             return 200, {"result": {"status": self._objects(value["objects"])}}
         if path == "/printer/emergency_stop":
@@ -223,6 +230,7 @@ class MoonrakerStandIn(Handler):
         job.look()
         state = "standby" if job.state == "idle" else job.state
         every = {
+            "gcode": {"commands": {name: {} for name in (*BUILT_IN, *self.macros)}},
             "toolhead": {"axis_minimum": [-200.0, -200.0, -5.0, 0.0], "axis_maximum": [200.0, 200.0, 400.0, 0.0]},
             "print_stats": {"state": state, "filename": job.file, "total_duration": 12.5, "message": ""},
             "virtual_sdcard": {"file_position": job.position},
