@@ -63,6 +63,11 @@ AXES = replace(
     before_end=_FREE,
 )
 
+# What is shown, and what lets a part be left out: without their sections Klipper says that it does not know them, and prints on.
+OPTIONAL = frozenset({
+    "SET_PRINT_STATS_INFO", "SET_DISPLAY_TEXT", "EXCLUDE_OBJECT_DEFINE", "EXCLUDE_OBJECT_START", "EXCLUDE_OBJECT_END",
+})  # fmt: skip
+
 
 def stepper_name(axis: RotaryAxis) -> str:
     """What the [manual_stepper] of a rotary axis is called."""

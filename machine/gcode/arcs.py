@@ -1,6 +1,7 @@
 """Arcs: the geometry of G2 and G3, and runs of short straight moves that lie on one circle."""
 
-from math import acos, atan2, ceil, cos, hypot, pi, sin
+from collections.abc import Mapping
+from math import acos, atan2, ceil, cos, floor, hypot, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ LARGEST_MM, SMALLEST_MM = 500.0, 0.3  # radii beyond: straight to the eye, or sm
 WIDEST = 1.7 * pi  # sweep of one arc: a whole circle would end where it begins, which rounding could turn into nothing
 UNEVEN = 0.01  # filament per mm may differ by this share along an arc
 MOST_CHORDS = 20000
+AXIS_DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))  # a quarter turn apart
 
 Point = tuple[float, float]
 
@@ -38,6 +40,23 @@ def centre_of(start: Point, end: Point, radius: float, clockwise: bool) -> Point
     if clockwise != (radius < 0.0):
         aside = -aside
     return 0.5 * (start[0] + end[0]) - aside * dy, 0.5 * (start[1] + end[1]) + aside * dx
+
+
+def told_centre(start: Point, end: Point, shape: Mapping[str, float], clockwise: bool) -> Point | None:
+    """Centre by the words R or I J of an arc, mm; None where they give none."""
+    if "R" in shape:
+        return centre_of(start, end, shape["R"], clockwise)
+    return (start[0] + shape.get("I", 0.0), start[1] + shape.get("J", 0.0)) if shape else None
+
+
+def arc_box(start: Point, end: Point, centre: Point, clockwise: bool) -> tuple[Point, Point]:
+    """Least and greatest x y of an arc: of its ends, and of where it passes the direction of an axis."""
+    first = atan2(start[1] - centre[1], start[0] - centre[0])
+    low, high = sorted((first, first + sweep_rad(start, end, centre, clockwise)))
+    radius = max(hypot(x - centre[0], y - centre[1]) for x, y in (start, end))
+    passed = [AXIS_DIRECTIONS[k % 4] for k in range(ceil(low / (pi / 2.0)), floor(high / (pi / 2.0)) + 1)]
+    xs, ys = zip(start, end, *((centre[0] + radius * x, centre[1] + radius * y) for x, y in passed), strict=True)
+    return (min(xs), min(ys)), (max(xs), max(ys))
 
 
 def chord_count(radius: float, sweep: float, tolerance_mm: float) -> int:

@@ -4,9 +4,10 @@ Positions are those of the program (what M114 tells), rotary axes unwrapped; Non
 """
 
 from dataclasses import dataclass, field
+from math import inf
 
 from machine.gcode.modes import COMMANDS, E_AXIS, Axes, Modes
-from machine.gcode.words import read_letters, read_number, read_values, read_words, split_command
+from machine.gcode.words import Word, read_letters, read_number, read_values, read_words, split_command
 
 MOVES = frozenset({"G0", "G1", "G2", "G3"})
 SETTINGS = (
@@ -38,6 +39,7 @@ class ModalState:
     fans: dict[str, str] = field(default_factory=dict)
     settings: dict[str, str] = field(default_factory=dict)
     pulled_mm: float = 0.0  # filament that stands further back than it has stood
+    pushed_mm: float = 0.0  # filament that the newest command pushes; inf: some, nobody can know how much
     modes: Modes = field(init=False)
 
     def __post_init__(self) -> None:
@@ -55,6 +57,7 @@ class ModalState:
     def take(self, command: str) -> bool:
         """Take note of a command; True when it moves an axis or filament."""
         text = command.upper()
+        self.pushed_mm = 0.0
         if text[:3] == "G1 ":  # nearly every line
             return self._move(text[2:])
         name, rest = split_command(text)
@@ -86,21 +89,25 @@ class ModalState:
             lines.append(f"G1 F{modes.feed / modes.unit_mm:g}")
         return [*lines, *self.settings.values(), *self.fans.values()]
 
+    def names_filament(self, command: str) -> bool:
+        """Whether a command is a move that has a word for filament."""
+        name, rest = split_command(command.upper())
+        return name in MOVES and any(self.axes.words.get(letter) == E_AXIS for letter, _ in read_words(rest))
+
     def _move(self, rest: str) -> bool:
         at, words = self.at, read_words(rest)
         before = at[E_AXIS]
         moved = self.modes.move(at, words)
         after = at[E_AXIS]
-        if before is not None and after is not None:
-            if after < before or self.pulled_mm:
-                self._push(after - before)
-        elif self.modes.steps[E_AXIS]:
-            self._push(sum(value * self.modes.unit_mm for letter, value in words if letter == "E"))
+        self.pushed_mm = after - before if before is not None and after is not None else self._unsummed(words)
+        if self.pulled_mm or self.pushed_mm < 0.0:
+            self.pulled_mm = max(0.0, round(self.pulled_mm - self.pushed_mm, 9))  # what sums of words leave over is nothing
         return moved
 
-    def _push(self, filament_mm: float) -> None:
-        if self.pulled_mm or filament_mm < 0.0:
-            self.pulled_mm = max(0.0, round(self.pulled_mm - filament_mm, 9))  # what sums of words leave over is nothing
+    def _unsummed(self, words: list[Word]) -> float:
+        """Filament that a move pushes where it is not known where the filament has stood."""
+        told = [value * self.modes.unit_mm for letter, value in words if self.axes.words.get(letter) == E_AXIS]
+        return sum(told) if self.modes.steps[E_AXIS] or not told else inf
 
     def _forget(self, letter: str) -> None:
         if letter in self.axes.letters[:E_AXIS]:

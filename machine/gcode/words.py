@@ -57,6 +57,14 @@ def split_command(text: str) -> tuple[str, str]:
     return name, rest
 
 
+def macro_name(line: str) -> str:
+    """The macro that a line of a program calls, in capitals; "" where it has none."""
+    if line[1:2].isdigit():  # nearly every line
+        return ""
+    command = line.partition(";")[0].strip().upper()
+    return command.partition(" ")[0] if MACRO.fullmatch(command) else ""
+
+
 def unframe(number: int, code: str) -> str:
     """A line without its N number and checksum; GcodeError when the checksum does not fit."""
     body, star, given = code.partition("*")

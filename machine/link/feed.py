@@ -2,29 +2,29 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from threading import Event as Flag
 
 from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
-from machine.gcode.words import PAUSE_REMARK
+from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
+from machine.link.job import PrintJob
 from machine.link.journal import FINISHED, LEFT, Checkpoint, Journal
 from machine.link.line_history import LineHistory, SentLine
 from machine.link.line_outcome import line_was_done, position_differences
 from machine.link.pause.park_moves import lift_move, plan_park
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
-from machine.link.progress import ProgramPosition, Progress, Schedule
+from machine.link.progress import ProgramPosition, Progress
 from machine.link.protocol.events import Event, Ok, Position
-from machine.link.protocol.framing import LINE_LIMIT, command_of
+from machine.link.protocol.framing import command_of, name_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
 from machine.link.status import PrinterStatus
 from machine.link.watchdog import PrinterReports, Watchdog
 from profiles.errors import RemoteProtocolError
-from profiles.profile import Profile
 
 PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
@@ -33,16 +33,6 @@ BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
 CHECK_S = 30.0  # between looks at the position where a layer ends
 CHECK_MUTE_S = 10.0  # the same for a printer that does not report what it has executed
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
-
-
-@dataclass(frozen=True)
-class PrintJob:
-    """What is fixed for a print before it begins. total: commands; limit: characters of a line that the firmware takes."""
-
-    total: int | None = None
-    schedule: Schedule | None = None
-    limit: int = LINE_LIMIT
-    profile: Profile | None = None
 
 
 class Feed:
@@ -131,17 +121,14 @@ class Feed:
     def _commands(self, lines: Iterable[str]) -> Iterator[tuple[int, str]]:
         for line, text in enumerate(lines, 1):
             command = command_of(text, line, self._job.limit)
+            self._layer_ended |= self._position.read_comment(text)
             if command:
-                if command.startswith("M73"):
+                if command[0] in "Mm":
                     self._position.read_m73(command, self.exchange.medium.now_s() - self._start_s)
-                elif command.startswith(("M220", "M221")):
                     self._pending.note_override(command)
                 yield line, command
             elif PAUSE_REMARK in text:
                 self._program_pause = text.partition(PAUSE_REMARK)[2].strip()
-            elif text.startswith(";"):
-                self._position.read_comment(text)
-                self._layer_ended = self._layer_ended or text.startswith(";LAYER_CHANGE")
 
     def _before(self, command: str) -> None:
         """What is due before the next command of the program."""
@@ -156,8 +143,12 @@ class Feed:
             why, self._program_pause = self._program_pause, ""
             self._pause(f"the program pauses: {why}")
         since_s = self._pending.pause_s
-        if since_s is not None and (not _extrudes(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
+        if since_s is not None and (not self._prints(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
             self._pause()
+
+    def _prints(self, command: str) -> bool:
+        """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
+        return name_of(command) == "MANUAL_STEPPER" or self.modal.names_filament(command)
 
     def _send_own(self) -> None:
         """Commands of the person's own."""
@@ -173,7 +164,7 @@ class Feed:
         since_s = self.exchange.medium.now_s() - self._checked_s
         if self.exchange.connection.advanced:
             return ended and since_s >= CHECK_S
-        return (ended or command.startswith("G0")) and since_s >= CHECK_MUTE_S
+        return since_s >= CHECK_MUTE_S and (ended or split_command(command.upper())[0] == "G0")
 
     def _position_errors(self) -> list[str]:
         """Axes on which the printer's own position is not the program's, all moves over; none where it does not report it."""
@@ -262,7 +253,7 @@ class Feed:
         """
         connection = self.exchange.connection
         reports = connection.greeting.capabilities.get("AUTOREPORT_TEMP")
-        return not reports and (bool(self.reports.waiting) or any(line.slow_timeout_s for line in connection.window.flight))
+        return not reports and (bool(self.reports.waiting) or connection.window.at_slow_command)
 
     def poll(self) -> None:
         """See what a person wants, and show where the print stands now and then. Raises CancelledError, EmergencyError."""
@@ -353,10 +344,5 @@ class Feed:
     def _silence(self) -> str:
         """Said while an answer is overdue; a slow command may take its time."""
         connection = self.exchange.connection
-        slow = any(line.slow_timeout_s for line in connection.window.flight)
-        return "no answer from the printer, it is asked again" if connection.state is State.PROBING and not slow else ""
-
-
-def _extrudes(command: str) -> bool:
-    """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
-    return command.startswith("MANUAL_STEPPER") or (command[0] == "G" and command[1:2] in "123" and " E" in command)
+        overdue = connection.state is State.PROBING and not connection.window.at_slow_command
+        return "no answer from the printer, it is asked again" if overdue else ""

@@ -60,9 +60,8 @@ def stable_name(port: str) -> str:
         return port
 
 
-def reopen(name: str, baud: int, medium: Medium, on_turn: Callable[[], None]) -> Wire | None:
-    """The wire to the printer once it is there again, None when it stays away too long. on_turn() may raise to end the wait."""
-    end_s = medium.now_s() + medium.lost_s
+def reopen(name: str, baud: int, medium: Medium, on_turn: Callable[[], None], end_s: float) -> Wire | None:
+    """The wire to the printer once it is there again, None when it is not by end_s. on_turn() may raise to end the wait."""
     while medium.now_s() < end_s:
         on_turn()
         medium.wait(EVERY_S)

@@ -11,7 +11,7 @@ from threading import Event as Flag
 
 from machine.firmware import dialects
 from machine.gcode.modes import Axes
-from machine.gcode.words import read_words
+from machine.gcode.words import read_words, split_command
 from machine.link.protocol.framing import LINE_LIMIT, REFUSED, command_of, name_of
 from profiles.errors import LocalProtocolError
 
@@ -130,8 +130,9 @@ class PendingCommands:
 
     def note_override(self, command: str) -> None:
         """Take note of an M220 or M221 of the program itself; no firmware goes down to 0."""
-        value = dict(read_words(command)).get("S", 0.0)
-        if value > 0 and command.startswith("M220"):
+        name, rest = split_command(command.upper())
+        value = dict(read_words(rest)).get("S", 0.0) if name in ("M220", "M221") else 0.0
+        if value > 0 and name == "M220":
             self.feed_percent = value
         elif value > 0:
             self.flow_percent = value

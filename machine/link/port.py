@@ -119,6 +119,7 @@ class Port:
 
     def close(self) -> None:
         """Close; a port that is gone already counts as closed."""
+        self._descriptor = None  # the system gives its number to the next file that is opened
         try:
             self._device.close()
         except _TROUBLE:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from machine.gcode.words import read_words
+from machine.gcode.landmarks import begins_layer, begun_part
+from machine.gcode.words import read_words, split_command
 from machine.link.protocol.events import Temperature
-
-PART = re.compile(r";\s*PART:\s*(\d+)(?:\s+of\s+(\d+))?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -67,17 +65,23 @@ class ProgramPosition:
     minutes_left: float | None = None
     reported_at_s: float = field(default=0.0)
 
-    def read_comment(self, line: str) -> None:
-        """Take note of `;PART:2 of 3` and `;LAYER_CHANGE`."""
-        if line.startswith(";LAYER_CHANGE"):
+    def read_comment(self, line: str) -> bool:
+        """Take note of what a line says behind its `;`; whether a layer begins there."""
+        comment = line.partition(";")[2].strip()
+        if not comment:
+            return False
+        if begins := begins_layer(comment):
             self.layer = 1 if self.layer is None else self.layer + 1
-        elif part := PART.match(line):
-            self.part, self.layer = int(part[1]), None
-            self.parts = int(part[2]) if part[2] else self.parts
+        elif part := begun_part(comment):
+            self.part, self.layer, self.parts = part[0], None, part[1] or self.parts
+        return begins
 
     def read_m73(self, command: str, now_s: float) -> None:
-        """Take note of M73's P (per cent done) and R (minutes left)."""
-        words = dict(read_words(command[3:].upper()))
+        """Take note of the P (per cent done) and R (minutes left) of an M73; nothing of another command."""
+        name, rest = split_command(command.upper())
+        if name != "M73":
+            return
+        words = dict(read_words(rest))
         self.percent = words.get("P", self.percent)
         if "R" in words:
             self.minutes_left, self.reported_at_s = words["R"], now_s

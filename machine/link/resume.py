@@ -96,9 +96,9 @@ def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile
     ahead: list[ProgramState] = []
     for number, text in enumerate(lines, 1):
         command = command_of(text, number, limit)
+        if before is None and (not command or number < first):
+            position.read_comment(text)
         if not command:
-            if text.startswith(";") and before is None:
-                position.read_comment(text)
             continue
         if number >= first and before is None:
             before = deepcopy(modal), deepcopy(position)

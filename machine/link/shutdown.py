@@ -136,8 +136,11 @@ class _Shown:
         return self.off or self.halted
 
 
-def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float) -> Position | None:
-    """A step away from the print; words: of G1, relative. Where the printer says it stands then. Raises PortError."""
+def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn: Callable[[], None]) -> Position | None:
+    """A step away from the print; words: of G1, relative. Where the printer says it stands then.
+
+    on_turn: called meanwhile, may raise. Raises PortError.
+    """
     positions: list[Position] = []
 
     def reports_done(line: bytes) -> bool:
@@ -147,7 +150,7 @@ def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float) -> Posi
         return isinstance(event, Ok) and event.temperature is not None
 
     step = ("M83", "G91", f"G1 {words} F{feed_mm_min:.0f}", "G90", "M400", "M114", "M105")
-    arrived = Orders(wire, medium).give(step, reports_done, medium.now_s() + LIFT_S)
+    arrived = Orders(wire, medium, on_turn).give(step, reports_done, medium.now_s() + LIFT_S)
     return positions[-1] if arrived and positions else None
 
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from threading import Event as Flag
 
 from machine.link.exchange import Exchange, Reconnection
-from machine.link.feed import Feed, PrintJob
+from machine.link.feed import Feed
+from machine.link.job import PrintJob
 from machine.link.journal import Journal
 from machine.link.medium import SERIAL, Medium, reopen, stable_name
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
@@ -100,7 +101,7 @@ class _PortFinder:
         feed.exchange.wire.close()
         end_s = medium.now_s() + medium.lost_s
         with feed.in_state("reconnecting", f"{error}; waiting {medium.lost_s:.0f} s for it to come back"):
-            while medium.now_s() < end_s and (wire := reopen(self._name, self._baud, medium, feed.poll)) is not None:
+            while (wire := reopen(self._name, self._baud, medium, feed.poll, end_s)) is not None:
                 if feed.exchange.connection.greeting.firmware.line.resends:
                     return Reconnection(wire, None)
                 feed.exchange.wire = wire  # whoever cancels meanwhile wants the heaters off
@@ -177,7 +178,7 @@ class _Print:
             heaters = heaters_off(exchange.wire, self.medium, timeout_s, waits and exchange.waits, feed.heed_emergency)
             move = feed.lift_move() if heaters is Heaters.OFF and alive else None
             if move is not None:
-                feed.record_lift(lift_tip(exchange.wire, self.medium, *move))
+                feed.record_lift(lift_tip(exchange.wire, self.medium, *move, feed.heed_emergency))
         except PortError:
             return Heaters.UNPROVED
         except EmergencyError:

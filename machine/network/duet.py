@@ -49,6 +49,7 @@ class Duet:
         self._nozzle, self._bed = 1, 0  # heaters
         self._connected = False
         self._last: Phase | None = None  # of the print, for idle says nothing of how it ended
+        self._up_s = 0.0  # since the board was reset
 
     def greet(self) -> Greeting:
         """Log in, and learn firmware, axes with their limits and which heaters are nozzle and bed."""
@@ -84,7 +85,12 @@ class Duet:
         """From what the object model calls frequently changing, and what the firmware has said since."""
         before = self._last  # an answer that was on its way when the print began is none of its end
         model = table(table(self._value("/rr_model", {"flags": "d99fn"})).get("result"))
-        job, state = table(model.get("job")), str(table(model.get("state")).get("status") or "")
+        job, told = table(model.get("job")), table(model.get("state"))
+        state, up_s = str(told.get("status") or ""), number(told.get("upTime"))
+        if up_s is not None:
+            if up_s < self._up_s:  # reset since (Platform/RepRap.cpp): idle is not the end of the print
+                before = self._last = None
+            self._up_s = up_s
         elapsed_s = number(job.get("duration"))
         under_way = Phase.READY if elapsed_s is None else Phase.PRINTING  # busy, changingTool: within a print or without one
         phase = STATES.get(state, under_way)

@@ -14,6 +14,7 @@ from enum import Enum
 from functools import partial
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
+from machine.link.protocol.events import Temperature
 from machine.network.server import ACTIVE, JobStatus, Phase, PrintServer
 from profiles.errors import NoAnswerError, ServerError
 
@@ -23,6 +24,7 @@ JOIN_S = 0.5  # an order that still waits for its answer is left to the server
 BEGIN_S = 15.0  # a server that has taken the order to start shows it by then
 QUIET_S = 15.0  # without an answer or an error for so long, it is said
 LOST_S = 120.0  # without an answer for so long the person is told the truth: nothing is known
+UNKNOWN = "whether the print goes on there is not known"
 UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
 OnStatus = Callable[[JobStatus, str], None]  # with a message to the person, "" when there is none
 
@@ -31,7 +33,7 @@ class End(Enum):
     """How following a print ended."""
 
     DONE = "done"
-    CANCELLED = "cancelled"
+    CANCELLED = "cancelled"  # by the person here
     LEFT = "left"  # the print goes on
     STOPPED = "stopped"  # by the emergency stop
 
@@ -50,14 +52,14 @@ def follow_print(
 ) -> End:
     """Have a file printed that a server holds, and follow that to its end.
 
-    size: of the file, bytes; left(): whether the person has gone away. Raises ServerError when it is refused, fails or is lost.
+    size: of the file, bytes; left(): whether the person has gone away. Raises ServerError when it is refused, fails or is lost,
+    or when the server no longer prints it and nobody here has cancelled it.
     """
     return _Follower(server, file, size, on_status, control, left).run()
 
 
 def follow_running(server: PrintServer, now: JobStatus, on_status: OnStatus, control: Control, left: Callable[[], bool]) -> End:
-    """Follow the print that a server is at already to its end. now: an active status of it. Raises ServerError when it fails or
-    is lost."""
+    """Follow the print that a server is at already to its end. now: an active status of it. Raises ServerError as above."""
     return _Follower(server, now.file, 0, on_status, control, left, now).run()
 
 
@@ -94,7 +96,8 @@ class _Follower:
         self._message = ""
         self._starts = running is None
         self._last_active: Phase | None = running.phase if running else None
-        self._read = 0
+        self._read, self._heat = 0, Temperature()
+        self._cancels = False  # the server has the order, or may have it
         self._began_s: float | None = None  # since when the server has been told to start
         self._failed: Exception | None = None  # of the start, or of a thread
         self._shown: tuple[JobStatus | None, str] = (None, "")
@@ -153,7 +156,7 @@ class _Follower:
         if heard.status is None:
             return None
         quiet = heard.error is not None or silent_s > QUIET_S
-        message = self._message or (f"no answer for {silent_s:.0f} s, the print goes on there" if quiet else "")
+        message = self._message or (f"no answer for {silent_s:.0f} s: {UNKNOWN}" if quiet else "")
         if heard.status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
             self._shown, self._shown_s = (heard.status, message), time.monotonic()
             self._on_status(heard.status, message)
@@ -162,17 +165,36 @@ class _Follower:
     def _end_of(self, status: JobStatus) -> End | None:
         if self._began_s is None:
             return None
+        heat = status.temperature
+        self._heat = heat if (heat.nozzle_c, heat.bed_c) != (None, None) else self._heat
         if status.phase in ACTIVE:
             if self._last_active is not None and status.file not in ("", self._file):
                 raise ServerError(f"{self._server.name} prints {status.file} now: what became of {self._file} is not known")
             self._last_active, self._read = status.phase, max(self._read, status.bytes_read or 0)
             return None
         if status.phase is Phase.OFFLINE or (status.phase is Phase.FAILED and self._last_active is not None):
-            where = f" at {100 * self._read / self._size:.0f} %" if self._read and self._size else ""
+            where = f" at {self._reached}" if self._reached else ""
             raise ServerError(f"{self._server.name}: the print has failed{where}: {status.message or status.phase.value}")
         if self._last_active is None:
             return self._end_unseen(status, time.monotonic() - self._began_s)
+        if status.phase is not Phase.DONE and not self._cancels:
+            raise ServerError(self._ended_there(status))
         return End.DONE if status.phase is Phase.DONE else End.CANCELLED
+
+    @property
+    def _reached(self) -> str:
+        """How far the server has read, in words; "" where it is not known."""
+        return f"{100 * self._read / self._size:.0f} %" if self._read and self._size else ""
+
+    def _ended_there(self, status: JobStatus) -> str:
+        """A server that has died and come back, or somebody else who has cancelled: the heaters may still be on."""
+        degrees = (("nozzle", self._heat.nozzle_c), ("bed", self._heat.bed_c))
+        heat = [f"{what} {value_c:.0f} deg C" for what, value_c in degrees if value_c is not None]
+        known = ", ".join([*([f"{self._reached} read"] if self._reached else []), *heat])
+        return (
+            f"{self._server.name} no longer prints {self._file or 'its file'} ({status.message or status.phase.value})"
+            f"{f'; last known: {known}' if known else ''}: look at the printer"
+        )
 
     def _end_unseen(self, status: JobStatus, waited_s: float) -> End | None:
         """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
@@ -209,8 +231,19 @@ class _Follower:
             limits = FEED_PERCENT if request.command is Command.FEED else FLOW_PERCENT
             self._message = percent_refusal(value, limits) or ""
             return None if self._message else partial(self._set_percent, request.command, value)
-        orders = {Command.PAUSE: server.pause, Command.RESUME: server.resume, Command.CANCEL: server.cancel}
+        orders = {Command.PAUSE: server.pause, Command.RESUME: server.resume, Command.CANCEL: self._cancel}
         return orders.get(request.command)
+
+    def _cancel(self) -> None:
+        """What ends from now on was cancelled here, unless the order was refused."""
+        self._cancels = True
+        try:
+            self._server.cancel()
+        except NoAnswerError:
+            raise
+        except ServerError:
+            self._cancels = False
+            raise
 
     def _set_percent(self, command: Command, value: float) -> None:
         self._server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")

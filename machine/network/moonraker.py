@@ -40,7 +40,7 @@ class Moonraker:
             http.set_header("X-Api-Key", http.credentials.key)
 
     def greet(self) -> Greeting:
-        """Its version; axes, limits and steppers of its Klipper where that is ready."""
+        """Its version; axes, limits, steppers and commands of its Klipper where that is ready."""
         server = table(self._get("/server/info"))
         if "klippy_state" not in server:
             raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
@@ -52,7 +52,13 @@ class Moonraker:
         names = frozenset(name for name in objects if isinstance(name, str)) if isinstance(objects, list) else frozenset()
         steppers = frozenset(name.removeprefix(STEPPER) for name in names if name.startswith(STEPPER))
         limits = self._limits() if "toolhead" in names else {}
-        return Greeting(f"{text}, Klipper {version}".strip(), f"Klipper {version}".strip(), "XYZ", limits, steppers)
+        commands = self._commands() if "gcode" in names else None
+        return Greeting(f"{text}, Klipper {version}".strip(), f"Klipper {version}".strip(), "XYZ", limits, steppers, commands)
+
+    def _commands(self) -> frozenset[str] | None:
+        """All that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to tell."""
+        told = table(self._query(("gcode",)).get("gcode")).get("commands")
+        return frozenset(name.upper() for name in told) if isinstance(told, dict) else None
 
     def _limits(self) -> dict[str, tuple[float, float]]:
         toolhead = table(self._query(("toolhead",)).get("toolhead"))
@@ -88,9 +94,13 @@ class Moonraker:
         return f"Klipper is in the state {server.get('klippy_state')}: {table(words).get('state_message') or 'no reason given'}"
 
     def has(self, file: str) -> bool:
-        """Whether it holds a file of this name."""
-        reply = self._http.get("/server/files/metadata", {"filename": file})
-        return reply.status != 404 and self._value(reply, "to tell of its files") is not None
+        """Whether it holds a file of this name, by what lies in its folder.
+
+        /server/files/metadata answers 404 for a file that it has not scanned (file_manager.py, _handle_metadata_request).
+        """
+        reply = self._http.get("/server/files/directory", {"path": "gcodes"})
+        files = table(table(self._value(reply, "to tell of its files")).get("result")).get("files")
+        return any(table(each).get("filename") == file for each in files) if isinstance(files, list) else False
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file with its checksum, without which half a file would be taken for a whole one."""

@@ -50,7 +50,7 @@ class Greeting:
     """Who answers. text: server, version and what it drives; firmware: as M115 names it, "" when it does not tell.
 
     letters: axes of the printer; limits: letter -> least and greatest place, mm or deg; steppers: names of the [manual_stepper]
-    sections, None where there is no such thing.
+    sections, commands: names of all commands and macros, in capitals; None where there is no such thing.
     """
 
     text: str
@@ -58,6 +58,7 @@ class Greeting:
     letters: str = ""
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     steppers: frozenset[str] | None = None
+    commands: frozenset[str] | None = None
 
 
 class PrintServer(Protocol):

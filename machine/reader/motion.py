@@ -4,7 +4,7 @@ from math import hypot, inf
 
 import numpy as np
 
-from machine.gcode.arcs import centre_of, chord_count, chords, sweep_rad
+from machine.gcode.arcs import chord_count, chords, sweep_rad, told_centre
 from machine.gcode.modes import E_AXIS
 from machine.kinematics.coordinates import axis_positions, followed_places
 from machine.reader.state import Reader, Words
@@ -55,10 +55,7 @@ def arc(reader: Reader, name: str, words: Words) -> None:
     after = reader.at.copy()
     del reader.rows[known:]
     start, end = (before[0], before[1]), (after[0], after[1])
-    if "R" in shape:
-        centre = centre_of(start, end, shape["R"], clockwise)
-    else:
-        centre = (start[0] + shape.get("I", 0.0), start[1] + shape.get("J", 0.0)) if shape else None
+    centre = told_centre(start, end, shape, clockwise)
     radii = [0.0, 0.0] if centre is None else [hypot(p[0] - centre[0], p[1] - centre[1]) for p in (start, end)]
     if centre is None or min(radii) == 0.0 or abs(radii[0] - radii[1]) > ROUND_MM:
         raise GcodeError(

@@ -3,6 +3,7 @@
 import re
 
 from machine.gcode.contents import KEY, read_contents
+from machine.gcode.landmarks import begins_layer, begun_part
 from machine.reader.parsed import Unheld
 from machine.reader.state import Reader
 
@@ -10,8 +11,14 @@ from machine.reader.state import Reader
 def remark(reader: Reader, text: str) -> None:
     """What a comment says, the sign taken off: PrusaSlicer's words, Cura's LAYER and our own PART, CONTENTS and UNSUPPORTED."""
     text = text.strip()
-    if text == "LAYER_CHANGE":
-        _layer(reader)
+    if begins_layer(text):
+        reader.layer += 1
+        reader.layers += 1
+        return
+    if part := begun_part(text):
+        reader.part, reader.layer = part[0], 0
+        reader.parts.append(reader.part)
+        reader.announced = max(reader.announced, part[1])
         return
     key, colon, value = text.partition(":")
     if not colon:
@@ -22,12 +29,6 @@ def remark(reader: Reader, text: str) -> None:
         reader.width = _positive(value)
     elif key == "HEIGHT":
         reader.height = _positive(value)
-    elif key == "PART":
-        numbers = re.fullmatch("([0-9]{1,6})(?: of ([0-9]{1,6}))?.*", value.strip())
-        if numbers:
-            reader.part, reader.layer = int(numbers[1]), 0
-            reader.parts.append(reader.part)
-            reader.announced = max(reader.announced, int(numbers[2] or 0))
     elif key == KEY:
         contents = read_contents(value, reader.number, reader.part)
         if contents is not None:
@@ -37,13 +38,6 @@ def remark(reader: Reader, text: str) -> None:
         layer, _, reason = place.partition(" ")
         worst = int(layer) if re.fullmatch("[0-9]{1,6}", layer) else 0
         reader.unsupported.append(Unheld(reader.number, reader.part, _positive(area), worst, reason))
-    elif key == "LAYER" and re.fullmatch("-?[0-9]{1,6}", value):
-        _layer(reader)
-
-
-def _layer(reader: Reader) -> None:
-    reader.layer += 1
-    reader.layers += 1
 
 
 def _positive(text: str) -> float:

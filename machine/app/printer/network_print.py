@@ -202,8 +202,8 @@ class ServerProgress(ProgressToldByServer):
     def _read_to(self, line: int) -> None:
         for text in self._lines[self.line : line]:
             self._place.read_comment(text)
-            if text.startswith("M73"):
-                self._place.read_m73(text, self.elapsed_s)
+            if text[:1] in "Mm":
+                self._place.read_m73(text.partition(";")[0], self.elapsed_s)
         self.line = max(self.line, line)
 
 

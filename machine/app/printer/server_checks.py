@@ -1,8 +1,11 @@
 """Server checks: whether a print server, its printer, a machine's profile and a program belong together, before a byte goes."""
 
+from collections.abc import Iterable
+
 from machine.app.pipeline.programs import refuse_errors
 from machine.app.printer.compatibility import check_printer, check_program, refuse
-from machine.firmware.klipper import stepper_name
+from machine.firmware.klipper import OPTIONAL, stepper_name
+from machine.gcode.words import macro_name
 from machine.link.identification import Answer, Kind
 from machine.network.address import ServerAddress, is_server_address
 from machine.network.server import ACTIVE, Greeting, JobStatus, Phase
@@ -14,19 +17,21 @@ from profiles.profile import Profile
 
 
 def check_server_machine(address: ServerAddress, greeting: Greeting, machine: Machine, force: bool) -> None:
-    """Refuse a machine whose dialect the server's firmware does not read, or whose axes it lacks. Raises PrinterError."""
+    """Refuse a machine whose dialect the server's firmware does not read, whose axes or macros it lacks. Raises PrinterError."""
     if sentence := dialect_mismatch(address, machine.name, machine.dialect):
         raise PrinterError(sentence)
     check_printer(_answer(greeting), machine, force)
     refuse(lacking_steppers(greeting, machine), force)
+    refuse(_unknown_macros(lacking_macros(greeting, _block_lines(machine)), machine.name), force)
 
 
 def ready_for_server(greeting: Greeting, program: Program, profile: Profile, file: str, force: bool) -> None:
-    """Refuse a program made for another machine, that leaves the limits that the server tells, or with errors of the dry run.
-
-    Raises PrinterError, MoveError.
+    """Refuse a program made for another machine, that leaves the limits that the server tells, that calls macros which are not
+    there, or with errors of the dry run. Raises PrinterError, MoveError.
     """
     check_program(_answer(greeting), program, profile, file, force)
+    told = lacking_macros(greeting, _block_lines(profile.machine))
+    refuse(_unknown_macros([name for name in lacking_macros(greeting, program.lines) if name not in told], file), force)
     refuse_errors(program, force)
 
 
@@ -60,6 +65,27 @@ def lacking_steppers(greeting: Greeting, machine: Machine) -> str:
     return (
         f"{machine.name} turns its table by {sections}, which this Klipper lacks; it has {there}: machine.tilt.stepper names it"
     )
+
+
+def lacking_macros(greeting: Greeting, lines: Iterable[str]) -> list[str]:
+    """The macros that lines call and a Klipper does not have; [] when it has all or does not tell."""
+    if greeting.commands is None:
+        return []
+    called = dict.fromkeys(name for line in lines if (name := macro_name(line)))
+    return [name for name in called if name not in greeting.commands and name not in OPTIONAL]
+
+
+def _block_lines(machine: Machine) -> list[str]:
+    blocks = machine.gcode
+    return [line for block in (blocks.start, blocks.before_part, blocks.after_part, blocks.end) for line in block.splitlines()]
+
+
+def _unknown_macros(names: list[str], caller: str) -> str:
+    """Klipper answers an unknown command with a text and goes on (klippy/gcode.py, cmd_default): nothing would be homed."""
+    if not names:
+        return ""
+    sections = " and ".join(f"[gcode_macro {name}]" for name in names)
+    return f"{caller} calls {' and '.join(names)}, which this Klipper does not know and would pass over: it needs {sections}"
 
 
 def _answer(greeting: Greeting) -> Answer | None:

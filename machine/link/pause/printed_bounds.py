@@ -5,8 +5,9 @@ from itertools import product
 
 import numpy as np
 
-from machine.gcode.modal_state import ModalState
-from machine.gcode.modes import E_AXIS
+from machine.gcode.arcs import arc_box, told_centre
+from machine.gcode.modal_state import ModalState, Place
+from machine.gcode.words import read_words, split_command
 from machine.kinematics.collision import Printed
 from machine.kinematics.coordinates import origin_mm
 from machine.kinematics.table import workpiece_points
@@ -25,17 +26,17 @@ class PrintedBounds:
 
     def track(self, modal: ModalState, command: str) -> tuple[bool, bool]:
         """Hand a command to `modal` and keep the boxes in step; whether it moves something, and whether it extrudes."""
-        before, pulled = modal.at[E_AXIS], modal.pulled_mm
+        before, pulled = modal.place(), modal.pulled_mm
         if not modal.take(command):
             return False, False
-        after = modal.at[E_AXIS]
-        stroke = command[:2] in ("G1", "G2", "G3") and not command[2:3].isdigit()
-        extrudes = stroke and not pulled and (before is None or after is None or after > before)
+        extrudes = modal.pushed_mm > 0.0 and not pulled
         if extrudes:
-            self.extrude_to(modal.place())
+            after = modal.place()
+            for place in (before, *_far_corners(modal, command, before, after), after):
+                self.extrude_to(place)
         return True, extrudes
 
-    def extrude_to(self, place: tuple[float | None, ...]) -> None:
+    def extrude_to(self, place: Place) -> None:
         """Filament was pushed on the way to a place, X Y Z tilt turn."""
         x, y, z, tilt, turn = place[:5]
         if x is None or y is None or z is None:
@@ -62,3 +63,17 @@ class PrintedBounds:
             else:
                 corners.append(workpiece_points(self.machine, Pose(tilt, turn), places))
         return Printed(np.vstack(corners), BEAD_MM)
+
+
+def _far_corners(modal: ModalState, command: str, before: Place, after: Place) -> list[Place]:
+    """Corners of the box around an arc that was just taken, at the pose and height of its end; none of another move."""
+    name, rest = split_command(command.upper())
+    words = modal.axes.words
+    if name not in ("G2", "G3") or before[0] is None or before[1] is None or after[0] is None or after[1] is None:
+        return []
+    shape = {letter: value * modal.modes.unit_mm for letter, value in read_words(rest) if letter in "IJR" and letter not in words}
+    start, end = (before[0], before[1]), (after[0], after[1])
+    centre = told_centre(start, end, shape, name == "G2")
+    if centre is None:
+        return []
+    return [(*corner, *after[2:]) for corner in arc_box(start, end, centre, name == "G2")]

@@ -78,6 +78,11 @@ class Window:
             return False
         return not slow_timeout_s(command)
 
+    @property
+    def at_slow_command(self) -> bool:
+        """Whether a command that may take its time is in flight."""
+        return any(line.slow_timeout_s for line in self.flight)
+
     def fits_buffer(self, command: str) -> bool:
         """Whether the receive buffer has a place for it even if nothing of what is in flight has left the buffer yet."""
         # N, number, blank, *, three digits of the checksum, newline

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
-from machine.gcode.arcs import centre_of, chord_count, chords, sweep_rad
+from machine.gcode.arcs import arc_box, centre_of, chord_count, chords, sweep_rad
 from machine.gcode.writer import write_gcode
 from machine.planning.moves import MachineProgram, Stroke, Travel
 from machine.reader.motion import CHORD_MM
@@ -143,3 +143,18 @@ def test_a_program_with_arcs_lays_the_same_plastic_as_one_without() -> None:
     runs = [dry_run(_program(flat, profile)[0], profile) for profile in (load(), load(settings=ARCS))]
     assert runs[1].segment_mm3.sum() == pytest.approx(runs[0].segment_mm3.sum(), rel=1e-6)
     assert runs[1].time_s == pytest.approx(runs[0].time_s, rel=0.25)
+
+
+_place = st.floats(-50.0, 50.0)
+
+
+@given(_place, _place, st.floats(0.5, 40.0), st.floats(-pi, pi), st.floats(0.01, 2.0 * pi), st.booleans())
+def test_the_box_of_an_arc_holds_all_its_points_and_touches_them_on_every_side(
+    x: float, y: float, radius: float, first: float, swept: float, clockwise: bool
+) -> None:
+    angles = first + (-swept if clockwise else swept) * np.linspace(0.0, 1.0, 4001)
+    points = np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)])
+    start, end = tuple(points[0].tolist()), tuple(points[-1].tolist())
+    low, high = arc_box(start, end, (x, y), clockwise)
+    assert np.abs(points.min(axis=0) - low).max() < 1e-4
+    assert np.abs(points.max(axis=0) - high).max() < 1e-4

@@ -134,6 +134,17 @@ def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_asid
     assert re.fullmatch(r"G0 X\S+ Y\S+ F\d+", away[3])
 
 
+@pytest.mark.parametrize("written", [str.lower, lambda line: line.replace("G1 ", "G01 ").replace(" E", "E")])
+def test_a_pause_begins_at_a_travel_however_the_strokes_are_written(written: Callable[[str], str]) -> None:
+    watcher = watched()
+    body = [written(line) if "E" in line else line for line in BODY]
+    watcher.when = {150: watcher.ask(Command.PAUSE), "paused": watcher.ask(Command.RESUME)}
+    watcher.run([*START, *POSED, *body])
+    lines = watcher.lines()
+    following = next(line for line in lines[lines.index("M400") :] if line in body)
+    assert following.startswith("G0 ")
+
+
 @pytest.mark.parametrize("action", ["pause", "cancel"])
 def test_the_printer_may_ask_for_a_pause_or_the_end(action: str) -> None:
     watcher = watched()
@@ -341,6 +352,41 @@ def test_a_port_that_stays_away_ends_the_print_in_bounded_time() -> None:
     with pytest.raises(PortError, match=r"did not come back within 120 s; its heaters may still be on"):
         watcher.run(PROGRAM)
     assert watcher.printer.now_s < 1000.0
+
+
+class _Loose:
+    """A wire that takes nothing."""
+
+    name = PATH
+
+    def write(self, data: bytes) -> None:
+        raise PortError("the plug is loose")
+
+    def read(self) -> bytes:
+        return b""
+
+    def discard(self) -> None:
+        pass
+
+    close = discard
+
+
+def test_a_plug_that_stays_loose_is_waited_for_no_longer_than_is_said() -> None:
+    watcher = watched((Fault("disconnect", at=120, unit="line", seconds=100.0),), profile=UNASKING["klipper"])
+    usual = watcher.printer.medium
+    wires: list[Wire] = []
+
+    def opened(name: str, baud: int) -> Wire:
+        wire = usual.open(name, baud) if len(wires) < 3 else None
+        if wire is None:
+            raise PortError("it is gone")
+        wires.append(_Loose() if wires else wire)
+        return wires[-1]
+
+    with pytest.raises(PortError, match="did not come back within 120 s"):
+        watcher.run(PROGRAM, medium=Medium(opened, usual.now_s, usual.wait))
+    waited_s = [progress.elapsed_s for progress in watcher.shown if progress.state == "reconnecting"]
+    assert waited_s[-1] - waited_s[0] == pytest.approx(120.0, abs=5.0)
 
 
 def test_the_stop_flag_ends_the_wait_for_a_lost_port() -> None:

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from time import monotonic
 
 import pytest
@@ -174,6 +175,25 @@ def test_a_closed_port_stays_closed() -> None:
         port.close()
         with pytest.raises(PortError, match="was lost"):
             port.write(b"G28\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a port has the descriptor there")
+def test_a_closed_port_touches_no_file_that_has_its_descriptor_since(tmp_path: Path) -> None:
+    with accepted() as (port, _):
+        number, other = port._device.fileno(), tmp_path / "other"
+        port.close()
+        other.write_bytes(b"text")
+        descriptor = os.open(other, os.O_RDWR)
+        os.dup2(descriptor, number)
+        try:
+            with pytest.raises(PortError, match="was lost"):
+                port.write(b"G28\n")
+            with pytest.raises(PortError, match="was lost"):
+                port.read()
+        finally:
+            for held in {descriptor, number}:
+                os.close(held)
+        assert other.read_bytes() == b"text"
 
 
 def test_serial_devices_are_told_once_and_stable_names_first(monkeypatch: pytest.MonkeyPatch) -> None:

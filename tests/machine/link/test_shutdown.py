@@ -25,11 +25,11 @@ HOMING = ["M104 S200", "M140 S60", "G1 Z60 F600", "G28 X Y Z", "G1 X10 F600", "M
 INSISTS = BuildOptions(checksums=True)
 
 
-def watching(printer: VirtualPrinter, word: bytes, act: object) -> Medium:
-    """The printer's medium; act() is called when a word is on the wire."""
+def watching(medium: Medium, word: bytes, act: object) -> Medium:
+    """The medium; act() is called when a word is on the wire."""
 
     def opened(name: str, baud: int) -> object:
-        wire = printer.medium.open(name, baud)
+        wire = medium.open(name, baud)
         write = wire.write
 
         def heard(data: bytes) -> None:
@@ -40,12 +40,12 @@ def watching(printer: VirtualPrinter, word: bytes, act: object) -> Medium:
         wire.write = heard  # type: ignore[method-assign]
         return wire
 
-    return replace(printer.medium, open=opened)  # type: ignore[arg-type]
+    return replace(medium, open=opened)  # type: ignore[arg-type]
 
 
 def cancelled_in_homing(printer: VirtualPrinter) -> Outcome:
     stop = Flag()
-    medium = watching(printer, b"G28 X Y Z", stop.set)
+    medium = watching(printer.medium, b"G28 X Y Z", stop.set)
     return print_lines(HOMING, PATH, stop=stop, medium=medium, profile=SLOW)
 
 
@@ -68,8 +68,16 @@ def test_an_emergency_stop_is_heeded_while_homing_is_waited_for() -> None:
         control.ask(Command.EMERGENCY_STOP)
 
     with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; switch it off and on, or press its reset"):
-        print_lines(HOMING, PATH, stop=stop, control=control, medium=watching(printer, b"G28 X Y Z", press), profile=SLOW)
+        print_lines(HOMING, PATH, stop=stop, control=control, medium=watching(printer.medium, b"G28 X Y Z", press), profile=SLOW)
     assert not printer.record.happened("homed XYZ")
+
+
+def test_an_emergency_stop_is_heeded_while_the_tip_is_lifted() -> None:
+    printer, control, stop = VirtualPrinter(SLOW.machine), Control(), Flag()
+    program = ["G28 X Y Z", "G92 A0 C0", "G0 Z60 F9000", "G0 X10 Y10 F9000", "M117 here", *["G0 X9 F9000", "G0 X10"] * 20]
+    medium = watching(watching(printer.medium, b"M117", stop.set), b"G91", lambda: control.ask(Command.EMERGENCY_STOP))
+    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"):
+        print_lines(program, PATH, stop=stop, control=control, medium=medium, profile=SLOW)
 
 
 def test_a_printer_that_falls_silent_in_homing_is_not_waited_for_twice() -> None:

@@ -19,6 +19,7 @@ from machine.link.progress import ProgramPosition, Progress, Schedule
 from machine.link.protocol.framing import frame
 from machine.link.protocol.timeout import Timing
 from machine.link.stream import Outcome, print_lines
+from machine.reader.parse import parse_gcode
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import HEALED, Fault, random_script
 from machine.simulator.firmware import SimulatedFirmware
@@ -98,6 +99,29 @@ def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
     assert last.left_s == pytest.approx(180.0, abs=60.0)
     assert last.temperature.nozzle_c == pytest.approx(200.0, abs=1.5)
     assert last.temperature.bed_target_c == 60.0
+
+
+COMMENTED = {
+    "Cura": [";LAYER_COUNT:2", ";LAYER:0", "G1 X1 E1", ";LAYER:1", "G1 X2 E1"],
+    "PrusaSlicer": [";LAYER_CHANGE", ";Z:0.2", "G1 X1 E1", ";LAYER_CHANGE", "G1 X2 E1"],
+    "with blanks": ["; PART:2 of 3", " ;LAYER_CHANGE", "G1 X1 E1 ;LAYER:7", "G1 X2 E1"],
+}
+
+
+@pytest.mark.parametrize("slicer", COMMENTED)
+def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) -> None:
+    told: list[Progress] = []
+    with SimulatedPrinter(MACHINE) as printer:
+        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, told.append, timing=PATIENT)
+    parsed = parse_gcode(COMMENTED[slicer], MACHINE)
+    assert (told[-1].layer, told[-1].part or 0) == (2, parsed.part[-1]) == (parsed.layer[-1], parsed.part[-1])
+
+
+def test_m73_and_m220_count_in_lower_case_too() -> None:
+    told: list[Progress] = []
+    with SimulatedPrinter(MACHINE) as printer:
+        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, told.append, timing=PATIENT)
+    assert (told[-1].share, told[-1].feed_percent) == (0.5, 80.0)
 
 
 def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:

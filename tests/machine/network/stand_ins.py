@@ -29,11 +29,16 @@ class Job:
         self.steps = 4  # looks that a print takes
         self.commands: list[str] = []
         self.halted = False
+        self.up_s = 3600  # since it was switched on
         self.refuse: dict[str, tuple[int, str]] = {}  # path -> status and words that are answered instead
         self.break_off: str = ""  # path during whose body the server goes away
 
     def start(self, file: str) -> None:
         self.state, self.file, self.position = "printing", file, 0
+
+    def restart(self) -> None:
+        """It has died and comes back: it knows of no print."""
+        self.state, self.file, self.position, self.up_s = "idle", "", 0, 5
 
     def look(self) -> None:
         if self.state == "printing":
@@ -155,10 +160,18 @@ class OctoPrintStandIn(Handler):
         return 204, None
 
 
+BUILT_IN = (
+    *("G1", "M104", "MANUAL_STEPPER", "SET_VELOCITY_LIMIT", "SET_HEATER_TEMPERATURE", "TEMPERATURE_WAIT", "TURN_OFF_HEATERS"),
+    *("SET_PRESSURE_ADVANCE", "PAUSE", "RESUME", "CANCEL_PRINT"),
+)
+
+
 class MoonrakerStandIn(Handler):
-    """As Moonraker 0.11 before a Klipper that is ready."""
+    """As Moonraker 0.11 before a Klipper that is ready. scans: whether it has read the files that it holds."""
 
     steppers = ("stepper_a", "stepper_c")
+    macros = ("HOME_AB",)
+    scans = True
 
     def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> tuple[int, Any]:
         if self.headers.get("X-Api-Key") != self.key:
@@ -167,8 +180,11 @@ class MoonrakerStandIn(Handler):
         if path == "/server/files/upload":
             return self._upload(body)
         if path == "/server/files/metadata":
-            known = query["filename"] in self.job.files
+            known = self.scans and query["filename"] in self.job.files
             return (200, {"result": {}}) if known else (404, {"error": {"code": 404, "message": "Metadata not available"}})
+        if path == "/server/files/directory":
+            assert query["path"] == "gcodes"
+            return 200, {"result": {"dirs": [{"dirname": ".cache"}], "files": [{"filename": name} for name in self.job.files]}}
         if path.startswith("/printer/"):
             return self._printer(path, value)
         if path == "/server/info":
@@ -193,7 +209,7 @@ class MoonrakerStandIn(Handler):
                 "result": {"state": "ready", "software_version": "v0.13.0-1", "state_message": "Shutdown due to webhooks request"}
             }
         if path == "/printer/objects/list":
-            return 200, {"result": {"objects": ["toolhead", *(f"manual_stepper {name}" for name in self.steppers)]}}
+            return 200, {"result": {"objects": ["gcode", "toolhead", *(f"manual_stepper {name}" for name in self.steppers)]}}
         if path == "/printer/objects/query":
             return 200, {"result": {"status": self._objects(value["objects"])}}
         if path == "/printer/emergency_stop":
@@ -214,6 +230,7 @@ class MoonrakerStandIn(Handler):
         job.look()
         state = "standby" if job.state == "idle" else job.state
         every = {
+            "gcode": {"commands": {name: {} for name in (*BUILT_IN, *self.macros)}},
             "toolhead": {"axis_minimum": [-200.0, -200.0, -5.0, 0.0], "axis_maximum": [200.0, 200.0, 400.0, 0.0]},
             "print_stats": {"state": state, "filename": job.file, "total_duration": 12.5, "message": ""},
             "virtual_sdcard": {"file_position": job.position},
@@ -302,7 +319,7 @@ class DuetStandIn(Handler):
         heaters = [{"current": 59.9, "active": 60.0}, {"current": 209.6, "active": 210.0}]
         duration = 12 if status in ("processing", "paused") else None
         return {
-            "state": {"status": status},
+            "state": {"status": status, "upTime": job.up_s},
             "job": {"filePosition": job.position, "duration": duration},
             "heat": {"heaters": heaters},
         }

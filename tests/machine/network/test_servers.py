@@ -2,6 +2,7 @@
 
 import contextlib
 import random
+import re
 import shutil
 import socket
 import subprocess
@@ -59,6 +60,12 @@ def test_a_file_is_handed_over_whole_with_its_progress(kind: str) -> None:
         assert server.has("box.gcode")
     assert job.files == {"box.gcode": UPLOAD.content}
     assert counts == [*range(0, len(UPLOAD.content), 65536), len(UPLOAD.content)]
+
+
+def test_a_file_that_a_moonraker_has_not_scanned_yet_is_there_all_the_same() -> None:
+    with stand_in("moonraker", scans=False) as (job, address), open_server(address) as server:
+        job.files["copied.gcode"] = b""
+        assert (server.has("copied.gcode"), server.has("other.gcode")) == (True, False)
 
 
 @every_kind
@@ -258,7 +265,61 @@ def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch:
 
         with pytest.raises(ServerError, match="the print may go on, look at the printer"):
             run(server, Control(), away)
-    assert any("the print goes on there" in message for message in told)
+    assert any(re.fullmatch("no answer for . s: whether the print goes on there is not known", message) for message in told)
+
+
+@every_kind
+def test_a_print_on_a_server_that_died_and_came_back_is_neither_done_nor_cancelled(kind: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        hand_over(server)
+        job.steps = 10_000
+
+        def die(status: JobStatus, message: str) -> None:
+            if message.startswith("no answer"):
+                job.restart()
+                job.refuse = {}
+            elif status.phase is Phase.PRINTING:
+                job.refuse = dict.fromkeys(("/api/job", "/server/info", "/rr_model"), (502, "Bad Gateway"))
+
+        with pytest.raises(
+            ServerError, match=r"no longer prints box\.gcode \(ready\); last known: .*nozzle 210 deg C, bed 60 deg C"
+        ):
+            run(server, Control(), die)
+
+
+@pytest.mark.parametrize("kind", ["octoprint", "moonraker"])
+def test_a_print_that_somebody_else_has_cancelled_is_not_said_to_be_cancelled_here(kind: str) -> None:
+    with stand_in(kind) as (job, address), open_server(address) as server:
+        hand_over(server)
+        job.steps = 10_000
+
+        def cancel_there(status: JobStatus, message: str) -> None:
+            if status.phase is Phase.PRINTING:
+                job.state = "cancelled"
+
+        with pytest.raises(ServerError, match=r"no longer prints box\.gcode"):
+            run(server, Control(), cancel_there)
+
+
+def test_a_cancel_that_was_refused_has_cancelled_nothing() -> None:
+    class Busy(STAND_INS["octoprint"]):  # type: ignore[misc]
+        def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> tuple[int, object]:
+            busy = (method, path) == ("POST", "/api/job")
+            return (409, {"error": "it is busy"}) if busy else super().answer(method, path, query, body)
+
+    control = Control()
+    with stand_in("octoprint", handler=Busy) as (job, address), open_server(address) as server:
+        hand_over(server)
+        job.steps = 10_000
+
+        def cancel(status: JobStatus, message: str) -> None:
+            if "refuses to cancel" in message:
+                job.restart()
+            elif status.phase is Phase.PRINTING:
+                control.ask(Command.CANCEL)
+
+        with pytest.raises(ServerError, match=r"no longer prints box\.gcode"):
+            run(server, control, cancel)
 
 
 def greet(address: str) -> None:

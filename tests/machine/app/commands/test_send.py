@@ -108,6 +108,23 @@ def test_a_klipper_without_the_table_s_steppers_is_refused(capsys: pytest.Captur
     assert job.files == {}
 
 
+def test_a_klipper_without_a_macro_that_the_machine_calls_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with stand_in("moonraker", steppers=("stepper_a", "stepper_b"), macros=()) as (job, address):
+        assert sent(KLIPPER, "--to", address) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert "Pro calls HOME_AB, which this Klipper does not know and would pass over: it needs [gcode_macro HOME_AB]" in said
+    assert job.files == {}
+
+
+def test_a_klipper_without_a_macro_that_the_file_calls_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "own.gcode"
+    file.write_text(KLIPPER.read_text().replace("\nM190", "\nchamber_heat S=40 ; of the file's own\nM190", 1))
+    with stand_in("moonraker", steppers=("stepper_a", "stepper_b")) as (job, address):
+        assert sent(file, "--to", address) == 1
+    assert "own.gcode calls CHAMBER_HEAT, which this Klipper does not know" in " ".join(capsys.readouterr().err.split())
+    assert job.files == {}
+
+
 def test_a_file_in_which_the_dry_run_finds_errors_is_not_sent(capsys: pytest.CaptureFixture[str]) -> None:
     with stand_in("octoprint") as (job, address):
         assert sent(MARLIN, "--to", address) == 1
