@@ -111,10 +111,16 @@ class Prints(News):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
         if isinstance(order, ResumeOrder) and realpath(order.journal) in map(realpath, self._journals_in_use()):
             raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")
-        self.prints = [each for each in self.prints if not each.over or not _same(each.state["port"], port)][-MOST_OVER:]
+        self._forget_old(port)
         begun = RunningPrint(next(self._numbers), order, page, self.tell)
         self.prints.append(begun)
         self._start(self._print(begun))
+
+    def _forget_old(self, port: str) -> None:
+        """Drop what is over at a port that prints anew, and all but the newest of what is over elsewhere. What runs stays:
+        only what is listed can be stopped."""
+        over = [each for each in self.prints if each.over and not _same(each.state["port"], port)][-MOST_OVER:]
+        self.prints = [each for each in self.prints if not each.over or each in over]
 
     async def _print(self, begun: RunningPrint) -> None:
         try:
