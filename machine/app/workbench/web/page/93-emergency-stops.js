@@ -16,9 +16,8 @@ function stopsAsked(prints, send, isOpen) {
     if (stopped().length ? !stopped().some(going) : isOpen()) return;
     say(isOpen() ? "THE STOP IS NOT CONFIRMED: use the machine's own switch." : "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.");
   };
-  /** number: of a print; null: all. */
   const ask = (number) => {
-    for (const each of prints().filter(going)) if (number === null || number === each.number) asked.add(each.number);
+    if (prints().some((each) => going(each) && each.number === number)) asked.add(number);
     send({ do: "emergency", print: number });
     if (!isOpen()) doubt();
     clearTimeout(late);
@@ -26,7 +25,7 @@ function stopsAsked(prints, send, isOpen) {
   };
   $("stop-noted").addEventListener("click", () => { if (!stopped().some(going)) asked = new Set(); say(""); });
   return {
-    ask,
+    /** number: of a print. */
     press: (number) => {
       const now = performance.now();
       pressed = { number: now - pressed.at < SAME_PRESS_MS ? pressed.number : number, at: now };
