@@ -24,6 +24,7 @@ const fake = (() => {
   }
 
   Object.defineProperty(globalThis, "performance", { value: { now: () => now_ms } });
+  Date.now = () => now_ms;
   Object.assign(globalThis, {
     WebSocket: Socket,
     location: { href: "http://127.0.0.1:8000/token/1/", origin: "http://127.0.0.1:8000", pathname: "/token/1/" },

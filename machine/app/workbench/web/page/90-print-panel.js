@@ -5,7 +5,7 @@ const STOP_KEY = "e";
 
 function printPanel(bench) {
   let state = { ports: null, asking: false, journals: null, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
-  const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem);
+  const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem, () => stops.expired());
   const follow = followIn(bench, () => print());
   const send = (command) => { problem(""); socket.send(command); };
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());

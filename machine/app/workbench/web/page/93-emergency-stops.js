@@ -31,6 +31,8 @@ function stopsAsked(prints, send, isOpen) {
       pressed = { number: now - pressed.at < SAME_PRESS_MS ? pressed.number : number, at: now };
       ask(pressed.number);
     },
+    /** One has waited too long for a line, or its print is not there any more. */
+    expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."); },
     told: () => { if (stopped().length && !stopped().some(going)) say(stopped().map(({ name, sentence }) => `${name}: ${sentence}.`).join(" ")); },
   };
 }

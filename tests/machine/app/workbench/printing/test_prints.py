@@ -351,7 +351,10 @@ def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.M
     async def run() -> None:
         prints = Prints()
         prints.prints += [RunningPrint(number, order("sim"), "me", lambda: None) for number in (1, 2)]
+        prints._last = 2
         prints.prints[0].state["phase"] = "over"  # by the first press
+        prints.command("anybody", {"do": "emergency", "print": 1}, lambda asked: order(""))
+        del prints.prints[0]  # another page has taken it off the list
         prints.command("anybody", {"do": "emergency", "print": 1}, lambda asked: order(""))
         assert 2 not in stopped
         prints.command("anybody", {"do": "emergency", "print": None}, lambda asked: order(""))
