@@ -86,7 +86,7 @@ def prints_line(running: Running, page: str) -> Iterator[PrintPage]:
 
 
 def kinds_of_fields(browser: Browser | Firefox) -> tuple[list[str], list[str]]:
-    """The kinds of fields into which an e is typed, and those on which it is the emergency stop; while something prints."""
+    """The kinds of fields that need an e themselves, and those on which it is the emergency stop; while something prints."""
     typed, stopping = browser.value(LETTER_E)
     return typed, stopping
 

@@ -205,7 +205,7 @@ def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(fir
         firefox.wait("$('held').hidden && !$('run-commands').hidden")
         put(firefox, "$('search-settings')", "", "input")  # so that every setting has its field
         typed, stopping = kinds_of_fields(firefox)
-        assert typed == ["number", "search", "text", "textarea"]
+        assert typed == ["number", "search", "select-one", "text", "textarea"]
         assert not set(typed) & set(stopping)
         firefox.value(
             "{ $('printer-field').open = true; $('baud-line').hidden = false; $('baud').value = ''; $('baud').focus(); }"
@@ -214,7 +214,10 @@ def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(fir
             firefox.key(key)
         assert firefox.value("[$('baud').value, $('baud').valueAsNumber]") == ["1e3", 1000]
         assert firefox.value(PRINTING) != "over"
-        firefox.value("{ $('baud').value = 115200; $('sim-speed').focus(); }")  # a list, which is no field to type into
+        firefox.value("{ $('baud').value = 115200; $('sim-speed').focus(); }")
+        firefox.key("e")  # the letter of an entry of the list
+        assert firefox.value(PRINTING) != "over"
+        firefox.value("$('feed').focus()")  # a slider, which takes no letter
         firefox.key("e")
         firefox.wait(f"{PRINTING} === 'over' && $('emergency').hidden")
         assert "emergency stop: the printer has halted" in firefox.value("$('stop-words').textContent")

@@ -157,7 +157,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.click("#follow")
         browser.wait(f"['ready', 'failed'].includes({VIEW}?.documentElement?.dataset.state)")
         typed, stopping = kinds_of_fields(browser)
-        assert typed == ["number", "search", "text", "textarea"]
+        assert typed == ["number", "search", "select-one", "text", "textarea"]
         assert not set(typed) & set(stopping)
         browser.value(f"{VIEW}.querySelector('button').focus()")
         sliced.process.send_signal(signal.SIGSTOP)  # the workbench hangs while somebody presses the key

@@ -29,6 +29,16 @@ function notice(text, about) {
   $("notice").hidden = !said;
 }
 
+const UNTYPED = ["range", "radio", "checkbox", "button", "file"]; // inputs into which no letter goes
+
+/** Whether the element in focus needs a key itself, so that it is no command: a field that is typed into, a list, which goes to the entry
+ * of a letter, a slider, a button. */
+function needsKey({ key, target: { tagName, type } }) {
+  if (["SELECT", "TEXTAREA"].includes(tagName) || (tagName === "INPUT" && !UNTYPED.includes(type))) return true;
+  if (tagName === "INPUT" && ["range", "radio"].includes(type) && /^(Arrow|Page|Home|End)/.test(key)) return true;
+  return key === " " && ["BUTTON", "SUMMARY", "INPUT"].includes(tagName);
+}
+
 /** Who is told what has changed: row, layers, colours, look. */
 function bells() {
   const heard = new Map();

@@ -25,20 +25,11 @@ function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
   ["corner", "front", "side", "top"].forEach((name, k) => { keys[k + 1] = () => document.querySelector(`[data-view=${name}]`).click(); });
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || $("help").open) return;
-    if (taken(event)) return;
+    if (needsKey(event)) return;
     const act = keys[event.key] || keys[event.key.toLowerCase()];
     if (!act) return;
     event.preventDefault();
     act(event);
   });
   $("help-button").addEventListener("click", () => $("help").showModal());
-}
-
-/** Keys that the element in focus needs itself: a list, a slider, a button. */
-function taken({ key, target: { tagName, type } }) {
-  if (tagName === "SELECT") return key.length === 1 || /^(Arrow|Page|Home|End)/.test(key);
-  if (tagName === "INPUT" && type === "number") return true;
-  if (tagName === "INPUT" && type === "radio" && /^Arrow/.test(key)) return true;
-  if (tagName === "INPUT" && type === "range" && /^(Arrow|Page|Home|End)/.test(key)) return true;
-  return key === " " && ["BUTTON", "SUMMARY", "INPUT"].includes(tagName);
 }

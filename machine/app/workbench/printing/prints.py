@@ -5,7 +5,6 @@ The emergency stop alone is every page's: who sees that something goes wrong mus
 """
 
 import asyncio
-import itertools
 from collections import Counter
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
@@ -36,7 +35,7 @@ class Prints(News):
     def __init__(self) -> None:
         super().__init__()
         self.prints: list[RunningPrint] = []
-        self._numbers = itertools.count(1)
+        self._last = 0  # number that was given
         self._pages: Counter[str] = Counter()
         self._ports: list[dict[str, Any]] | None = None
         self._journals: list[ResumableJournal] | None = None
@@ -111,10 +110,17 @@ class Prints(News):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
         if isinstance(order, ResumeOrder) and realpath(order.journal) in map(realpath, self._journals_in_use()):
             raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")
-        self.prints = [each for each in self.prints if not each.over or not _same(each.state["port"], port)][-MOST_OVER:]
-        begun = RunningPrint(next(self._numbers), order, page, self.tell)
+        self._forget_old(port)
+        self._last += 1
+        begun = RunningPrint(self._last, order, page, self.tell)
         self.prints.append(begun)
         self._start(self._print(begun))
+
+    def _forget_old(self, port: str) -> None:
+        """Drop what is over at a port that prints anew, and all but the newest of what is over elsewhere. What runs stays:
+        only what is listed can be stopped."""
+        over = [each for each in self.prints if each.over and not _same(each.state["port"], port)][-MOST_OVER:]
+        self.prints = [each for each in self.prints if not each.over or each in over]
 
     async def _print(self, begun: RunningPrint) -> None:
         try:
@@ -123,11 +129,12 @@ class Prints(News):
             begun.fail(error)
 
     def _stop_at_once(self, number: object) -> None:
-        """The one that was named, all when none was or it is not known: when in doubt everything stops. One that is over already
-        stops no other, for a button is pressed twice in a fright."""
-        named = [each for each in self.prints if each.number == number]
-        for each in named or self.running:
-            each.stop_at_once()
+        """The one that was named, all when none was or there never was such a one: in doubt everything stops. One that is over
+        already, in the list or not any more, stops no other: a button is pressed twice in a fright, and a press may come late."""
+        known = isinstance(number, int) and 0 < number <= self._last
+        for each in self.prints if known else self.running:
+            if each.number == number or not known:
+                each.stop_at_once()
 
     def _command_one(self, page: str, named: RunningPrint, asked: dict[str, Any]) -> None:
         word = asked.get("do")

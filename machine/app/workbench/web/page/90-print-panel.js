@@ -5,7 +5,7 @@ const STOP_KEY = "e";
 
 function printPanel(bench) {
   let state = { ports: null, asking: false, journals: null, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
-  const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem);
+  const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem, () => stops.expired());
   const follow = followIn(bench, () => print());
   const send = (command) => { problem(""); socket.send(command); };
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
@@ -70,21 +70,18 @@ function printPanel(bench) {
     $(id).addEventListener("blur", () => delete $(id).dataset.held);
     $(id).addEventListener("change", () => { delete $(id).dataset.held; command(id, { percent: Number($(id).value) }); });
   }
-  $("emergency").addEventListener("click", () => stops.press(Number($("emergency").dataset.print)));
+  const stop = () => stops.press(Number($("emergency").dataset.print));
+  $("emergency").addEventListener("click", stop);
   const byKey = (event) => {
-    if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || event.repeat || typedInto(event.target)) return;
-    if (!state.prints.some((each) => each.phase !== "over")) return;
+    if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || event.repeat || needsKey(event) || $("emergency").hidden) return;
     event.preventDefault();
     event.stopPropagation();
-    stops.ask(null);
+    stop();
   };
   addEventListener("keydown", byKey, true);
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
   return { told: ({ sliced, model }) => { $("check").disabled = !model; $("unsliced").hidden = Boolean(sliced && !sliced.stale); follow.told(); } };
 }
-
-/** Where a letter that is pressed is written, so that it is no command. */
-const typedInto = (target) => target.tagName === "TEXTAREA" || (target.tagName === "INPUT" && !["range", "checkbox", "radio", "button", "file"].includes(target.type));
 
 function problem(text) {
   $("print-problem").textContent = text;

@@ -2,23 +2,29 @@
 
 const OWN_PAGE = crypto.getRandomValues(new Uint32Array(3)).join("-");
 const ANSWER_MS = 3000; // within which the workbench answers, and a printer has confirmed an emergency stop
+const OWED_MS = 10000; // so long an emergency stop waits for a line: after that its person has done something else
 
-/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. Emergency
- * stops that find no line are sent as soon as there is one; a command to which nothing answers is told. */
-function printsLine(follow, refused) {
+/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. An emergency
+ * stop that finds no line is sent as soon as there is one, if that is soon and its print still there, else expired() is called; a command
+ * to which nothing answers is told. */
+function printsLine(follow, refused, expired) {
   let socket = null, owed = [], waiting = 0;
+  const sendOwed = (prints) => {
+    const meant = owed.filter(({ command, at }) => Date.now() - at < OWED_MS && prints.some(({ number }) => number === command.print));
+    meant.forEach(({ command }) => socket.send(JSON.stringify(command)));
+    if (meant.length < owed.length) expired();
+    owed = [];
+  };
   const open = () => {
     socket = new WebSocket(new URL(`prints?page=${OWN_PAGE}`, location.href.replace(/^http/, "ws")));
-    socket.onopen = () => {
-      owed.forEach((text) => socket.send(text));
-      owed = [];
-      notice("", "sent");
-    };
+    socket.onopen = () => notice("", "sent");
     socket.onmessage = (event) => {
       clearTimeout(waiting);
       notice("", "sent");
       const told = JSON.parse(event.data);
-      if (told.problem) refused(told.problem); else follow(told);
+      if (told.problem) return refused(told.problem);
+      follow(told);
+      sendOwed(told.prints);
     };
     socket.onclose = ({ code }) => { if (code !== CLOSED_CODE) setTimeout(open, AGAIN_MS); };
   };
@@ -27,13 +33,12 @@ function printsLine(follow, refused) {
   return {
     isOpen,
     send: (command) => {
-      const text = JSON.stringify(command);
       clearTimeout(waiting);
       if (isOpen()) {
         waiting = setTimeout(notice, ANSWER_MS, "tiltprint does not answer: what was asked for may not have arrived.", "sent");
-        return socket.send(text);
+        return socket.send(JSON.stringify(command));
       }
-      if (command.do === "emergency") owed.push(text);
+      if (command.do === "emergency") owed.push({ command, at: Date.now() });
       else notice("The line to tiltprint is lost; nothing was sent.", "sent");
     },
   };

@@ -16,9 +16,8 @@ function stopsAsked(prints, send, isOpen) {
     if (stopped().length ? !stopped().some(going) : isOpen()) return;
     say(isOpen() ? "THE STOP IS NOT CONFIRMED: use the machine's own switch." : "THE STOP HAS NOT ARRIVED, the line to tiltprint is lost: use the machine's own switch.");
   };
-  /** number: of a print; null: all. */
   const ask = (number) => {
-    for (const each of prints().filter(going)) if (number === null || number === each.number) asked.add(each.number);
+    if (prints().some((each) => going(each) && each.number === number)) asked.add(number);
     send({ do: "emergency", print: number });
     if (!isOpen()) doubt();
     clearTimeout(late);
@@ -26,12 +25,14 @@ function stopsAsked(prints, send, isOpen) {
   };
   $("stop-noted").addEventListener("click", () => { if (!stopped().some(going)) asked = new Set(); say(""); });
   return {
-    ask,
+    /** number: of a print. */
     press: (number) => {
       const now = performance.now();
       pressed = { number: now - pressed.at < SAME_PRESS_MS ? pressed.number : number, at: now };
       ask(pressed.number);
     },
+    /** One has waited too long for a line, or its print is not there any more. */
+    expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."); },
     told: () => { if (stopped().length && !stopped().some(going)) say(stopped().map(({ name, sentence }) => `${name}: ${sentence}.`).join(" ")); },
   };
 }

@@ -215,7 +215,7 @@ function keysOf(bench, camera, picture) {
       event.preventDefault();
       return bench.send({ do: event.shiftKey || event.key.toLowerCase() === "y" ? "redo" : "undo" });
     }
-    if (event.ctrlKey || event.metaKey || event.altKey || ["INPUT", "SELECT", "TEXTAREA"].includes(event.target.tagName)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || needsKey(event)) return;
     const act = keys[event.key] || keys[event.key.toLowerCase()];
     if (!act) return;
     event.preventDefault();

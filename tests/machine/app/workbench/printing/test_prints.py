@@ -351,10 +351,35 @@ def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.M
     async def run() -> None:
         prints = Prints()
         prints.prints += [RunningPrint(number, order("sim"), "me", lambda: None) for number in (1, 2)]
+        prints._last = 2
         prints.prints[0].state["phase"] = "over"  # by the first press
+        prints.command("anybody", {"do": "emergency", "print": 1}, lambda asked: order(""))
+        del prints.prints[0]  # another page has taken it off the list
         prints.command("anybody", {"do": "emergency", "print": 1}, lambda asked: order(""))
         assert 2 not in stopped
         prints.command("anybody", {"do": "emergency", "print": None}, lambda asked: order(""))
         assert 2 in stopped
+
+    asyncio.run(run())
+
+
+def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newest_five(monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped: list[int] = []
+    monkeypatch.setattr(RunningPrint, "stop_at_once", lambda one: stopped.append(one.number))
+
+    async def runs(one: RunningPrint) -> None:
+        """For good."""
+
+    async def run() -> None:
+        prints = Prints()
+        monkeypatch.setattr(RunningPrint, "run", runs)
+        for number in range(1, 16):
+            prints.command("me", {"do": "check"}, lambda asked: order(f"/dev/port{number}"))  # noqa: B023
+            if number > 8:
+                prints.prints[-1].state["phase"] = "over"
+        prints.command("me", {"do": "check"}, lambda asked: order("/dev/port16"))
+        prints.command("anybody", {"do": "emergency"}, lambda asked: order(""))
+        assert stopped == [1, 2, 3, 4, 5, 6, 7, 8, 16]
+        assert [each.number for each in prints.prints if each.over] == [11, 12, 13, 14, 15]
 
     asyncio.run(run())

@@ -1,0 +1,67 @@
+"""The emergency stop of a page: which print it is given to, by which keys, and what becomes of one that finds no line."""
+
+import pytest
+
+from tests.machine.fake_page import needs_node, on_fake_page
+
+# Two prints run, the second one is the newest; the page is of none of them.
+TWO_PRINTS = """
+    printPanel({ state: null });
+    const known = { port: "sim", phase: "printing", progress: null, checks: [], words: [], said: [] };
+    const prints = [1, 2].map((number) => ({ ...known, number, name: `box ${number}` }));
+    const state = { ports: null, asking: false, journals: null, prints };
+    fake.sockets[0].open();
+    fake.sockets[0].tell(state);
+"""
+
+
+@needs_node
+@pytest.mark.parametrize("target", [
+    "{ tagName: 'SELECT' }",
+    "{ tagName: 'TEXTAREA' }",
+    "{ tagName: 'INPUT', type: 'text' }",
+    "{ tagName: 'INPUT', type: 'search' }",
+    "{ tagName: 'INPUT', type: 'number' }",
+])  # fmt: skip
+def test_a_letter_e_that_the_field_in_focus_needs_stops_nothing(target: str) -> None:
+    assert on_fake_page(f"{TWO_PRINTS} fake.press('e', {target}); return fake.sent();") == []
+
+
+@needs_node
+@pytest.mark.parametrize("target", ["{ tagName: 'BODY' }", "{ tagName: 'BUTTON' }", "{ tagName: 'INPUT', type: 'range' }"])
+def test_the_key_e_stops_the_print_that_the_button_names_and_no_other(target: str) -> None:
+    assert on_fake_page(f"{TWO_PRINTS} fake.press('e', {target}); return fake.sent();") == [{"do": "emergency", "print": 2}]
+    looked_at = "$('which').value = 1; $('which').fire('change');"
+    acts = f"fake.press('e', {target})", "$('emergency').fire('click')"
+    by_key, by_button = (on_fake_page(f"{TWO_PRINTS} {looked_at} {act}; return fake.sent();") for act in acts)
+    assert by_key == by_button == [{"do": "emergency", "print": 1}]
+
+
+LINE_LOST = f"""{TWO_PRINTS}
+    fake.sockets[0].lose();
+    $('emergency').fire('click');
+    const back = (after_ms, numbers) => {{
+        fake.wait(after_ms);
+        fake.sockets.at(-1).open();
+        fake.sockets.at(-1).tell({{ ...state, prints: prints.filter(({{ number }}) => numbers.includes(number)) }});
+        return [fake.sent(), $('stop-words').textContent];
+    }};
+"""
+NOT_GIVEN = "THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."
+
+
+@needs_node
+def test_a_stop_that_finds_no_line_is_given_to_its_print_when_the_line_is_back_soon() -> None:
+    sent, _ = on_fake_page(f"{LINE_LOST} return back(9000, [1, 2]);")
+    assert sent == [{"do": "emergency", "print": 2}]
+
+
+@needs_node
+def test_a_stop_that_has_waited_for_a_line_too_long_is_not_given_and_that_is_told() -> None:
+    assert on_fake_page(f"{LINE_LOST} return back(11000, [1, 2]);") == [[], NOT_GIVEN]
+
+
+@needs_node
+def test_a_stop_that_has_waited_for_a_line_stops_no_other_print() -> None:
+    sent, _ = on_fake_page(f"{LINE_LOST} return back(2000, [1]);")
+    assert sent == []

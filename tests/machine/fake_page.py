@@ -1,0 +1,28 @@
+"""The workbench's own script run by Node on a page that is none: what it sends and says, without a browser."""
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from machine.app.workbench.web.page import workbench_page
+
+NODE = shutil.which("node")
+FAKE = Path(__file__).with_suffix(".js")
+needs_node = pytest.mark.skipif(NODE is None, reason="Node is not installed: the page's script is not tried without a browser")
+
+
+def on_fake_page(act: str) -> Any:
+    """What a function's body gives that runs in place of the page's `main`, by the names of fake_page.js."""
+    page, _ = workbench_page(8000)
+    script, began, _ = page.decode().rpartition("<script>")[2].rpartition("main();")
+    assert NODE is not None
+    assert began
+    ends = "process.stdout.write(JSON.stringify(given), () => process.exit(0));"
+    whole = "\n".join([FAKE.read_text("utf-8"), script, f"const given = (() => {{ {act} }})();", ends])
+    run = subprocess.run([NODE, "-"], input=whole, capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stderr
+    return json.loads(run.stdout)
