@@ -12,7 +12,8 @@ class LineRules:
     flight while its numbered answers report no free places; places_plain: while its answers carry no numbers. rx_bytes: what
     the receive buffer holds. silence_s: how long a line may stay without answer once it was asked about, None: as the
     stream's timing says. last_number: then the numbers begin anew. reports_rotary_axes: M114 names every axis that a program
-    may move. revival: what lets it print again after it has halted.
+    may move. waiting_moves: how many may wait behind the newest acknowledged one where its answers do not tell, None: any
+    number. revival: what lets it print again after it has halted.
     """
 
     resends: bool = True
@@ -25,4 +26,5 @@ class LineRules:
     # is sent, and short numbers leave the line to the program. All are far below 2^31, where a firmware's counter turns.
     last_number: int = 99_900
     reports_rotary_axes: bool = False
+    waiting_moves: int | None = None
     revival: str = "switch it off and on, or press its reset button,"

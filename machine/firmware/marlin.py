@@ -30,13 +30,15 @@ DIALECT = Dialect(
     wait_for_person=("M0 {text}",),
 )
 
+BLOCK_BUFFER_SIZE, BUFSIZE = 16, 4  # Configuration_adv.h: planned moves, and commands read ahead of them
+
 SIMULATED = SimulationRules(
     identity="FIRMWARE_NAME:Marlin bugfix-2.1.x (simulated) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin "
     "PROTOCOL_VERSION:1.0 MACHINE_TYPE:tiltprint EXTRUDER_COUNT:1 AXIS_COUNT:{axes} UUID:cede2a2f-41a2-4748-9b12-c55c62f367ff",
     banner=("start", "Marlin bugfix-2.1.x (simulated)", "echo: Last Updated: 2024-09-29 | Author: (none, default config)"),
     numbers="resend",
-    queue_lines=4,
-    blocks=15,  # of BLOCK_BUFFER_SIZE 16: one place of its ring stays empty
+    queue_lines=BUFSIZE,
+    blocks=BLOCK_BUFFER_SIZE - 1,  # one place of its ring stays empty
     min_segment_s=0.02,  # DEFAULT_MINSEGMENTTIME
     urgent="bytes",
     unknown='echo:Unknown command: "{}"',
@@ -54,6 +56,6 @@ MARLIN = Firmware(
     name="Marlin",
     signs=("marlin",),
     dialects={"marlin": DIALECT},
-    line=LineRules(reports_rotary_axes=True),
+    line=LineRules(reports_rotary_axes=True, waiting_moves=BLOCK_BUFFER_SIZE + BUFSIZE),
     simulated=SIMULATED,
 )

@@ -11,8 +11,8 @@ from machine.gcode.modes import axes_of
 from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
 from machine.link.job import PrintJob
-from machine.link.journal import FINISHED, LEFT, Checkpoint, Journal
-from machine.link.line_history import LineHistory, SentLine
+from machine.link.journal import EVERY_LINES, FINISHED, LEFT, Checkpoint, Journal
+from machine.link.line_history import LineHistory, SentLine, shifts
 from machine.link.line_outcome import line_was_done, position_differences
 from machine.link.pause.park_moves import lift_move, plan_park
 from machine.link.pause.printed_bounds import PrintedBounds
@@ -32,6 +32,7 @@ REPORT_S = 2  # between reports of one that does
 BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
 CHECK_S = 30.0  # between looks at the position where a layer ends
 CHECK_MUTE_S = 10.0  # the same for a printer that does not report what it has executed
+MUTE_LINES = 4  # between records of the journal for such a one: what it may have done since is done twice
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
 
@@ -60,7 +61,7 @@ class Feed:
         self.state, self._trouble, self.started, self.finished = "printing", "", False, False
         self.sent = self._skipped = 0
         self._program_pause = ""  # what the program says of the pause before its next command
-        self._layer_ended = self._reconnected = self._parked = False
+        self._layer_ended = self._reconnected = self._parked = self._shifted = False
         self._start_s = self._shown_s = self._asked_s = self._checked_s = start_s
 
     @property
@@ -71,7 +72,7 @@ class Feed:
     def run(self, lines: Iterable[str]) -> None:
         """Feed the program from its beginning, or where the job says, to the barrier at its end."""
         exchange = self.exchange
-        resume_point, self.started = self.resume_point, True
+        resume_point, self.started, self.history = self.resume_point, True, self._new_history()
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send(f"M155 S{REPORT_S}")
         for line, command in self._commands(lines):
@@ -91,7 +92,7 @@ class Feed:
     def _approach(self, resume_point: ResumePoint) -> None:
         """What stands before the first line of a resumed print, proved by the printer's own position."""
         self.set_state("resuming")
-        self.history = LineHistory(resume_point.line - 1)
+        self.history = self._new_history(resume_point.line - 1)
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
         self._record()
         for command in resume_point.before:
@@ -110,7 +111,10 @@ class Feed:
         return self.modal.take(command) if self._bounds is None else self._bounds.track(self.modal, command)[0]
 
     def _send(self, line: int, command: str) -> None:
-        if self._journal is not None and self._journal.record_due(line):
+        if self._journal is not None and (
+            shifts(command, self.modal.axes.letters)
+            or self._journal.record_due(line, EVERY_LINES if self.exchange.connection.advanced else MUTE_LINES)
+        ):
             self.history.sent = line
             self._record()
         number = self.exchange.send(command)
@@ -137,8 +141,10 @@ class Feed:
         if self._reconnected:
             self._reconnected = False
             self._verify_position("after the port came back")
-        if self._journal is not None and self._check_due(command):
-            self._check_position()
+        if self._journal is not None:
+            self._secure(command)
+            if self._check_due(command):
+                self._check_position()
         if self._program_pause:
             why, self._program_pause = self._program_pause, ""
             self._pause(f"the program pauses: {why}")
@@ -157,6 +163,22 @@ class Feed:
             self.exchange.send(command)
             if command[0] in "Mm":  # a person's temperature or fan holds beyond a pause
                 self.modal.take(command)
+
+    def _secure(self, command: str) -> None:
+        """Before the tip's height or the table changes, and before the first stroke after that: all moves are over, so that after
+        a power cut it is known on which side of the change the tip stood. A printer that tells what it has executed needs none.
+        """
+        shift = shifts(command, self.modal.axes.letters)
+        stroke = not shift and self._prints(command)
+        if not self.exchange.connection.advanced and (stroke if self._shifted else shift):
+            self.exchange.drain()
+            self.history.end_moves()
+            self._record()
+        self._shifted = shift or (self._shifted and not stroke)
+
+    def _new_history(self, before: int = 0) -> LineHistory:
+        connection = self.exchange.connection
+        return LineHistory(before, None if connection.advanced else connection.greeting.waiting_moves)
 
     def _check_due(self, command: str) -> bool:
         """Whether the position is to be looked at now: at a layer's end, or in a travel where the printer reports little."""

@@ -27,7 +27,7 @@ except ImportError:  # Windows
 if sys.platform == "win32":
     import msvcrt
 
-FORMAT = 1
+FORMAT = 2  # in 1 the height or the table might have changed after the line that was recorded last
 FINISHED, LEFT, RESUMED = "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
 EVERY_LINES = 16  # the sender never gets so many lines ahead of the newest record,
 EVERY_S = 0.1  # which is not older than this when something has happened since
@@ -116,9 +116,9 @@ class Journal:
             self._noted_s = now_s
             self.write(checkpoint)
 
-    def record_due(self, line: int) -> bool:
-        """Whether a record is due before this line is sent."""
-        return line - self.last.sent >= EVERY_LINES
+    def record_due(self, line: int, lines: int = EVERY_LINES) -> bool:
+        """Whether a record is due before this line is sent, so that the newest one is less than so many lines behind."""
+        return line - self.last.sent >= lines
 
     def write(self, checkpoint: Checkpoint) -> None:
         """Write a checkpoint at once."""

@@ -1,7 +1,10 @@
 """Line history: how far a program has come; its lines sent, acknowledged and surely executed."""
 
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
+
+from machine.gcode.words import read_words, split_command
 
 MOST_WAITING = 4096  # moves whose end is awaited; of further ones, without any word from the planner, nothing can be known
 PLANNER_BLOCKS = 16  # Marlin's BLOCK_BUFFER_SIZE; a printer that reports more free places has more
@@ -19,18 +22,18 @@ class SentLine(NamedTuple):
 class LineHistory:
     """Lines of the program, from 1; 0 or the line before the first one sent means none.
 
-    Acknowledged is not executed: a move may wait in the planner. What ADVANCED_OK reports of free places bounds how many do; a
-    printer that does not report them is only known after a barrier.
+    Acknowledged is not executed: a move may wait in the planner. What ADVANCED_OK reports of free places bounds how many do; of a
+    printer that does not report them its firmware bounds it (waiting), or it is only known after a barrier (None).
     """
 
-    def __init__(self, before: int = 0) -> None:
+    def __init__(self, before: int = 0, waiting: int | None = None) -> None:
         self.before = self.sent = self.acknowledged = self.executed = before
         self.number = 0  # the newest wire number that is acknowledged
         self.commands = 0  # acknowledged commands of the program
         self.pose: tuple[float | None, ...] = ()  # after the newest acknowledged command
         self._flight: deque[SentLine] = deque()
         self._planned: deque[SentLine] = deque()
-        self._blocks, self._free = PLANNER_BLOCKS, 0
+        self._blocks, self._free, self._waiting = PLANNER_BLOCKS, 0, waiting
 
     @property
     def only_unanswered(self) -> SentLine | None:
@@ -52,17 +55,34 @@ class LineHistory:
             self.commands += 1
             if step.moves and len(planned) < MOST_WAITING:
                 planned.append(step)
-        if free is None:
+        waiting = self._waiting if free is None else self._waiting_beside(free)
+        if waiting is None:
             return
-        self._blocks = max(self._blocks, free + 1)
-        # The less of two answers counts: a damaged digit in one of them must not make a waiting move an executed one.
-        least, self._free = min(free, self._free), free
-        waiting = self._blocks - least
         while len(planned) > waiting:
             planned.popleft()
         self.executed = max(self.executed, planned[0].line - 1 if planned else self.acknowledged)
+
+    def _waiting_beside(self, free: int) -> int:
+        """How many moves wait. The less of two answers counts: a damaged digit in one of them must not make a waiting move an
+        executed one.
+        """
+        self._blocks = max(self._blocks, free + 1)
+        least, self._free = min(free, self._free), free
+        return self._blocks - least
 
     def end_moves(self) -> None:
         """Every move acknowledged so far is over."""
         self._planned.clear()
         self.executed = self.acknowledged
+
+
+def shifts(command: str, letters: Sequence[str]) -> bool:
+    """Whether a command without filament takes the tip to another height or turns the table; letters: X Y Z tilt turn E.
+
+    After a power cut X and Y are homed, but not these: a journal tells of such a line before it is sent.
+    """
+    name, rest = split_command(command.upper())
+    if name == "MANUAL_STEPPER":
+        return True
+    named = {letter for letter, _ in read_words(rest)} if name in ("G0", "G1") else set()
+    return letters[5] not in named and not named.isdisjoint(letters[2:5])

@@ -18,6 +18,7 @@ from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import E_AXIS, axes_of
 from machine.kinematics.collision import Printed
 from machine.link.journal import EVERY_LINES, LEFT, Checkpoint
+from machine.link.line_history import shifts
 from machine.link.pause.park_moves import filament_commands, heat_commands
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pause.return_path import homed_return_moves, return_moves
@@ -42,6 +43,7 @@ NO_ANSWER = (
     "still heat or move? Nothing was changed: when it has come to rest, resume can be tried again"
 )
 SEVERAL = 3  # coordinates that are not 0: so many do not agree by chance
+UNSURE_MM = 0.005
 SAME = 0.02  # mm or deg: M114 reports hundredths
 HOME_KEYS = ("x.home_mm", "y.home_mm", "z.home_mm", "tilt.home_deg", "turn.home_deg")
 NUMBERS_AHEAD = 4096  # a printer's last line number beyond the one on record: questions have numbers too
@@ -66,7 +68,8 @@ class ProgramState:
 @dataclass(frozen=True)
 class InterruptedPrint:
     """What a journal and its program say. line: the first one not surely executed; modal: the state before it; ahead: the states
-    after the commands that may have been done since; stroked: whether anything was printed before.
+    after the commands that may have been done since; stroked: whether anything was printed before. stood_mm: the height at which
+    the tip stands, as a person has seen it.
     """
 
     line: int
@@ -77,6 +80,7 @@ class InterruptedPrint:
     stroked: bool
     ahead: tuple[ProgramState, ...]
     checkpoint: Checkpoint
+    stood_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,11 @@ def read_interrupted_print(lines: Iterable[str], checkpoint: Checkpoint, profile
             continue
         if number >= first and before is None:
             before = deepcopy(modal), deepcopy(position)
-        if before is not None and number >= checkpoint.sent + EVERY_LINES:
+        if (
+            before is not None
+            and number > checkpoint.sent
+            and (number >= checkpoint.sent + EVERY_LINES or shifts(command, modal.axes.letters))
+        ):
             break
         _, extruded = bounds.track(modal, command)
         if before is None:
@@ -273,13 +281,20 @@ def position_at_interruption(point: InterruptedPrint, profile: Profile) -> tuple
             where = f"lines {point.line} to {point.last}"
             raise JournalError(f"{where}: the table was turning about {letter}, so nobody knows where it stands; {HOME_IT}")
     at, pose = _goal(point, profile)
-    low, _ = heights_mm(point)
-    return np.array([at[0], at[1], low]), pose
+    return np.array([at[0], at[1], heights_mm(point)[0]]), pose
 
 
-def heights_mm(point: InterruptedPrint) -> tuple[float, float]:
-    """Least and greatest Z at which the tip may have stood. The least is taken: a tip that is higher prints badly, one that is
-    lower ploughs through the print.
+def heights_mm(point: InterruptedPrint) -> tuple[float, ...]:
+    """The heights Z at which the tip may have stood, rising; the one that a person has seen. Taken for too low a one the tip
+    prints too high, taken for too high a one it ploughs through the print.
     """
-    heights = [z for modal in (point.modal, *(state.modal for state in point.ahead)) if (z := modal.at[2]) is not None]
-    return min(heights), max(heights)
+    if point.stood_mm is not None:
+        return (point.stood_mm,)
+    found = sorted(z for modal in (point.modal, *(state.modal for state in point.ahead)) if (z := modal.at[2]) is not None)
+    return tuple(z for k, z in enumerate(found) if k == 0 or z - found[k - 1] > UNSURE_MM)
+
+
+def is_in_doubt(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> bool:
+    """Whether the height must be seen by a person: Z is not homed, and the tip was neither parked nor at one height only."""
+    parked = point.checkpoint.state in PARKED and None not in point.checkpoint.pose[:E_AXIS]
+    return way.homes and not profile.machine.gcode.resume and not parked and len(heights_mm(point)) > 1

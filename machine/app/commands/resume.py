@@ -28,7 +28,8 @@ def list_resumable() -> int:
 def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, yes: bool = False) -> int:
     """Tell where a print goes on, ask, and print the rest; 0 when it was printed, 1 when the answer was no.
 
-    named: the profile whose machine the user has named. yes: go on without asking. The journal of the request is a new one.
+    named: the profile whose machine the user has named. yes: go on without asking, unless the height of the tip is in doubt. The
+    journal of the request is a new one.
     """
     cut_off = read_resumption(journal, printing, named)
     for sentence in cut_off.told():
@@ -38,14 +39,31 @@ def resume(journal: Path, printing: PrintRequest, named: Profile | None = None, 
         say_lines(question)
         return yes or _agreed()
 
-    return print_rest(cut_off, printing, agrees)
+    def which(question: str, heights: tuple[float, ...]) -> float | None:
+        say_lines(question)
+        return _height(heights, yes)
+
+    return print_rest(cut_off, printing, agrees, which)
 
 
 def _agreed() -> bool:
     """Ask; raises JournalError where nobody can answer."""
     if not sys.stdin.isatty():
         raise JournalError("whether to go on is asked first: give --yes where there is no terminal to ask at")
-    sys.stderr.write("go on? [y/N] ")
+    return _answer("go on? [y/N] ") in ("y", "yes")
+
+
+def _height(heights: tuple[float, ...], yes: bool) -> float | None:
+    """Ask for the number of one; None for any other answer. Raises JournalError where nobody can look."""
+    listed = ", ".join(f"{number}: Z {z:.2f}" for number, z in enumerate(heights, 1))
+    if yes or not sys.stdin.isatty():
+        raise JournalError(f"a person must see at which height the tip stands ({listed}): resume at a terminal, without --yes")
+    chosen = _answer(f"which? [{listed}; anything else: none] ")
+    return heights[int(chosen) - 1] if chosen in [str(number) for number in range(1, len(heights) + 1)] else None
+
+
+def _answer(prompt: str) -> str:
+    sys.stderr.write(prompt)
     sys.stderr.flush()
     with interrupting():
-        return sys.stdin.readline().strip().lower() in ("y", "yes")
+        return sys.stdin.readline().strip().lower()

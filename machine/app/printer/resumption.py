@@ -39,6 +39,7 @@ from machine.link.resume import (
     ResumePlan,
     ResumePoint,
     heights_mm,
+    is_in_doubt,
     plan_resume,
     position_at_interruption,
     read_interrupted_print,
@@ -49,7 +50,6 @@ from machine.view.program import Program
 from profiles.errors import JournalError, ProfileError
 from profiles.profile import Profile, profile_of_tables
 
-UNSURE_MM = 0.005
 NOTHING, STOPPED = 1, 130  # what a resume ends with besides 0: the answer was no; a person has stopped the rest
 
 
@@ -104,11 +104,16 @@ def read_resumption(journal: Path, printing: PrintRequest, named: Profile | None
 
 
 def print_rest(
-    cut_off: Resumption, printing: PrintRequest, agrees: Callable[[str], bool], attendance: Attendance | None = None
+    cut_off: Resumption,
+    printing: PrintRequest,
+    agrees: Callable[[str], bool],
+    which: Callable[[str, tuple[float, ...]], float | None],
+    attendance: Attendance | None = None,
 ) -> int:
     """Ask the printer where it stands, then agrees(question) a person, and print the rest; says how it ended.
 
-    0, NOTHING or STOPPED. The journal of the request is a new one. attendance: of a person who is not at the terminal.
+    0, NOTHING or STOPPED. which(question, heights): where the tip may have stood at several heights, the one a person sees, None
+    for none; may raise JournalError. The journal of the request is a new one. attendance: of a person who is not at the terminal.
     Raises PrinterError.
     """
     job = PrintJob(cut_off.name, Program(cut_off.lines, dry_run(cut_off.lines, cut_off.profile), None), cut_off.profile)
@@ -116,7 +121,14 @@ def print_rest(
 
         def begin(status: PrinterStatus) -> ResumePoint:
             way = plan_resume(cut_off.point, status, cut_off.profile)
-            if not agrees(_question(way, cut_off.point, cut_off.profile)):
+            point = cut_off.point
+            if is_in_doubt(way, point, cut_off.profile):
+                stood_mm = which(_height_question(point), heights_mm(point))
+                if stood_mm is None:
+                    raise CancelledError
+                point = replace(point, stood_mm=stood_mm)
+                way = plan_resume(point, status, cut_off.profile)
+            if not agrees(_question(way, point, cut_off.profile)):
                 raise CancelledError
             # From here on the printer counts its lines anew: only the new journal can tell whether it has restarted.
             done = way.start.line - 1
@@ -185,17 +197,23 @@ def _program(journal: Path, story: JournalContents) -> GcodeFile:
     return program
 
 
+def _height_question(point: InterruptedPrint) -> str:
+    """At which height the tip stands; Z is not homed, so that all that follows lies by as much too high or too low."""
+    heights = " or ".join(f"Z {z:.2f}" for z in heights_mm(point))
+    return f"the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
+
+
 def _question(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> str:
     """What is going to be done, and what the person must make sure of."""
     reason = f"it goes on with line {way.start.line}: {way.reason}"
     if not way.homes:
         return reason
-    low, high = heights_mm(point)
     (x, y, z), pose = position_at_interruption(point, profile)
     tilt, turn, machine = pose.tilt_deg, pose.turn_deg, profile.machine
     place = f"tip at X {x:.1f} Y {y:.1f} Z {z:.2f}"
-    if point.checkpoint.state not in PARKED and high - low > UNSURE_MM:
-        place += f" (or up to {high - low:.2f} mm higher: watch how the first lines lie)"
+    heights = heights_mm(point)
+    if point.checkpoint.state not in PARKED and len(heights) > 1:
+        place += f" (or up to {heights[-1] - heights[0]:.2f} mm higher)"
     if hypot(tilt, turn) > 0:
         turns = f", {int(turn // 360)} whole turns and {turn % 360:.3f}" if abs(turn) >= 360 else ""
         place += f", table at {machine.tilt.letter} {tilt:.3f} {machine.turn.letter} {turn:.3f}{turns}"

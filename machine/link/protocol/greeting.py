@@ -33,6 +33,11 @@ class Greeting:
         """Whether an M112 is read from the raw bytes."""
         return self.capabilities.get("EMERGENCY_PARSER", False)
 
+    @property
+    def waiting_moves(self) -> int | None:
+        """How many moves may wait behind the newest acknowledged one; None: any number, as of a firmware that has no name."""
+        return None if identify(self.identity) is None else self.firmware.line.waiting_moves
+
     def learn(self, answer: Identity | Capability | Area) -> None:
         """A line of the answer to M115."""
         if isinstance(answer, Identity):

@@ -74,7 +74,7 @@ def test_a_record_damaged_before_the_end_is_refused_by_its_number(tmp_path: Path
     (b"", "is empty"),
     (b"G28\nG1 X5\n", "is no journal of a print"),
     (b"%08x {}\n" % crc32(b"{}"), "another version"),
-    (b'%08x {"format":1}\n' % crc32(b'{"format":1}'), "does not tell program and profile"),
+    (b'%08x {"format":2}\n' % crc32(b'{"format":2}'), "does not tell program and profile"),
     (os.urandom(5000), "is no journal"),
 ])  # fmt: skip
 def test_what_is_no_journal_is_refused_with_a_sentence(tmp_path: Path, content: bytes, words: str) -> None:

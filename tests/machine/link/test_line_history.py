@@ -57,6 +57,14 @@ def test_without_word_of_the_planner_only_a_barrier_tells() -> None:
     assert history.executed == 40
 
 
+def test_a_firmware_bounds_what_waits_where_its_answers_do_not_tell() -> None:
+    history = LineHistory(waiting=20)
+    for step in moves(40):
+        history.send(step)
+        history.acknowledge(step.number)
+    assert (history.acknowledged, history.executed) == (40, 40 - 27)  # 20 moves, and 6 commands among them that move nothing
+
+
 def test_the_history_of_a_mute_printer_stays_small() -> None:
     history = LineHistory()
     for step in moves(20000):

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from threading import Event as Flag
 
@@ -22,7 +23,7 @@ from machine.link.port import open_port
 from machine.link.progress import Progress
 from machine.link.protocol.events import Position, Temperature
 from machine.link.protocol.framing import frame
-from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, plan_resume, read_interrupted_print
+from machine.link.resume import InterruptedPrint, ResumePlan, ResumePoint, heights_mm, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
 from machine.reader.gcode_file import GcodeFile
@@ -223,6 +224,62 @@ def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: Gc
         surely = sum(is_move(each) for each in PROGRAM[: last.executed])
         assert surely <= len(printer.record.start), line
         assert last.executed <= last.acknowledged <= last.sent
+
+
+@pytest.mark.parametrize("line", range(60, len(PROGRAM), 23))
+def test_after_a_power_cut_of_a_stock_marlin_few_moves_are_done_twice_and_the_height_is_known(text: GcodeFile, line: int) -> None:
+    """BLOCK_BUFFER_SIZE 16 and BUFSIZE 4 (Configuration_adv.h) bound what waits, and four lines what no record knows."""
+    printer = VirtualPrinter(
+        PROFILE.machine, BuildOptions(advanced_ok=False), FaultScript((Fault("reset", at=line, unit="line"),))
+    )
+    with journal_of(text, "first") as journal, pytest.raises(FirmwareError):
+        print_lines(text, PATH, medium=printer.medium, profile=PROFILE, journal=journal)
+    cut_off = read_interrupted_print(text, read_journal(journal.path).last, PROFILE, LIMIT)
+    done, record = len(moved(printer)), printer.record
+    assert done - sum(is_move(each) for each in PROGRAM[: cut_off.line - 1]) <= 24
+    stroked = record.end[-1, 5] - record.start[-1, 5] > 0.0
+    at = heights_mm(cut_off)
+    assert any(abs(z - record.end[-1, 2]) < 0.01 for z in at)
+    assert len(at) == 1 or not stroked
+
+
+def doubtful(text: GcodeFile, journal: Path, printer: SimulatedPrinter) -> None:
+    assert main(["print", str(text.path), "--port", printer.path, "--journal", str(journal), "--force"]) == 1
+
+
+IN_DOUBT = [Fault("reset", at=PROGRAM.index("G0 Z62.2 F900") + 8, unit="line")]
+
+
+def test_a_height_in_doubt_is_not_guessed(text: GcodeFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    journal = tmp_path / "journal"
+    with SimulatedPrinter(PROFILE.machine, faults=IN_DOUBT) as printer:
+        doubtful(text, journal, printer)
+        assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
+    told = capsys.readouterr().err
+    assert "it stands at Z 62.00 or Z 62.20; look at the print below it, for Z is not homed" in told
+    assert "a person must see at which height the tip stands (1: Z 62.00, 2: Z 62.20)" in told
+
+
+@pytest.mark.parametrize(("said", "called"), [("1", "Z62 "), ("2", "Z62.2 "), ("n", "")])
+def test_the_height_that_a_person_sees_is_what_the_axis_is_called(
+    text: GcodeFile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, called: str
+) -> None:
+    monkeypatch.setattr("sys.stdin", Person([said, "y"]))
+    journal, log = tmp_path / "journal", tmp_path / "log"
+    with SimulatedPrinter(PROFILE.machine, faults=IN_DOUBT) as printer:
+        doubtful(text, journal, printer)
+        ended = main(["resume", str(journal), "--port", printer.path, "--log", str(log)])
+    assert (ended, called in log.read_text()) == (0 if called else 1, True)
+
+
+class Person(StringIO):
+    """At a terminal."""
+
+    def __init__(self, answers: list[str]) -> None:
+        super().__init__("".join(f"{answer}\n" for answer in answers))
+
+    def isatty(self) -> bool:
+        return True
 
 
 def point(executed: int, acknowledged: int | None = None, number: int = 100) -> InterruptedPrint:

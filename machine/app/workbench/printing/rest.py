@@ -7,6 +7,7 @@ from machine.app.workbench.printing import checks as ends
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import ResumeOrder, State
+from profiles.errors import JournalError
 
 
 def go_on(order: ResumeOrder, person: AtPage, checks: Checks) -> State:
@@ -22,6 +23,10 @@ def go_on(order: ResumeOrder, person: AtPage, checks: Checks) -> State:
         checks.teller.tell(phase="ready", question=question)
         return person.agrees()
 
-    ended = print_rest(cut_off, order.printing, agrees, person)
+    def which(question: str, heights: tuple[float, ...]) -> float | None:
+        del heights
+        raise JournalError(f"{question}; which one is asked at a terminal only: tiltprint resume {order.journal}")
+
+    ended = print_rest(cut_off, order.printing, agrees, which, person)
     nothing = {"end": "left", "sentence": "nothing was moved or heated", "journal": ""}
     return {NOTHING: nothing, STOPPED: ends.STOPPED}.get(ended, ends.DONE)

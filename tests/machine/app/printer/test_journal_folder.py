@@ -19,6 +19,7 @@ from machine.app.commands.resume import list_resumable
 from machine.app.printer.journal_folder import new_journal, resumable_journals
 from machine.app.printer.resumption import read_resumption
 from machine.app.requests import PrintRequest
+from machine.link.journal import FORMAT
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import UserError
 from profiles.folders import state_folder
@@ -60,7 +61,13 @@ def test_a_journal_with_anything_at_all_in_its_heading_or_state_ends_nothing_wit
     program = tmp_path_factory.getbasetemp() / "p.gcode"
     program.write_text("\n".join(LINES))
     changed = PROFILE | {of_profile: value} if key == "profile" and of_profile else value
-    heading = {"format": 1, "program": str(program), "sha256": GcodeFile(program).sha256(), "name": "odd", "profile": PROFILE}
+    heading = {
+        "format": FORMAT,
+        "program": str(program),
+        "sha256": GcodeFile(program).sha256(),
+        "name": "odd",
+        "profile": PROFILE,
+    }
     is_no_bug(record(heading | {key: changed}) + record(state))
 
 
