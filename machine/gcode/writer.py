@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from math import ceil
 
 import numpy as np
@@ -80,6 +81,7 @@ def _lines(
             pen.filament_mm -= move.filament_mm
             yield f"{pen.dialect.stroke}{pen.filament()}{pen.speed(move.speed_mm_s)}"
         elif isinstance(move, Reorient):
+            yield from _heat_ahead(program, place, profile, pen)
             yield from _reorient(move, following, pen)
         elif isinstance(move, Pause):
             yield from _pause(move, pen)
@@ -191,14 +193,30 @@ def _begin_layer(move: BeginLayer, profile: Profile, pen: Pen) -> Iterator[str]:
     pen.layers += 1
     if pen.dialect.layer:
         yield pen.dialect.layer.format(pen.layers)
-    material = profile.material
-    heated = min(material.nozzle_c + move.nozzle_add_c, profile.machine.nozzle_limit_c)
-    wanted = material.first_layer_nozzle_c if move.part == 1 and move.index == 1 else heated
-    if wanted != pen.nozzle_c:
-        pen.nozzle_c = wanted
-        yield pen.dialect.nozzle.format(number(wanted))
+    yield from _set_nozzle(_nozzle_c(move, profile), pen)
     pen.layer_fan = move.fan
     yield from _set_fan(move.fan, pen)
+
+
+def _heat_ahead(program: MachineProgram, place: int, profile: Profile, pen: Pen) -> Iterator[str]:
+    """Before the turn at `place`, the heat of a layer after it that is to be hotter: it takes as long as a turn to come."""
+    coming = next((move for move in islice(program.moves, place, None) if isinstance(move, BeginLayer)), None)
+    if coming is not None and (wanted := _nozzle_c(coming, profile)) > pen.nozzle_c:
+        yield from _set_nozzle(wanted, pen)
+
+
+def _nozzle_c(layer: BeginLayer, profile: Profile) -> float:
+    """How hot a layer is printed."""
+    material = profile.material
+    if layer.part == 1 and layer.index == 1:
+        return material.first_layer_nozzle_c
+    return min(material.nozzle_c + layer.nozzle_add_c, profile.machine.nozzle_limit_c)
+
+
+def _set_nozzle(wanted_c: float, pen: Pen) -> Iterator[str]:
+    if wanted_c != pen.nozzle_c:
+        pen.nozzle_c = wanted_c
+        yield pen.dialect.nozzle.format(number(wanted_c))
 
 
 def _pause(move: Pause, pen: Pen) -> Iterator[str]:

@@ -31,9 +31,13 @@ OVER_LIMIT_C = 15.0
 OVER_REPORTS = 2  # in a row: a byte lost on the line makes 200 of 20.0 once
 WARNINGS = 20  # remembered of the printer's own words that show a program it does not understand
 WARNS = ("nknown command", "too long extrusion")
-# What displays, names parts or tunes: a firmware that does not know it is asked once.
-ADVICE = {"M73", "M117", "M118", "M201", "M203", "M204", "M205", "M300", "M413", "M486", "M572", "M593", "M900"}
-MACROS = ("EXCLUDE_OBJECT", "SET_PRINT_STATS_INFO", "SET_DISPLAY_TEXT", "SET_PRESSURE_ADVANCE", "SET_VELOCITY_LIMIT")
+# What displays or names parts: the print is none the worse without it, so nothing is said. Marlin has M73 and M486 only where it
+# was built with SET_PROGRESS_MANUALLY and CANCEL_OBJECTS (Configuration_adv.h), which it is not unless somebody asks for them.
+SHOWS = {"M73", "M117", "M118", "M300", "M486"}
+SHOWING = ("EXCLUDE_OBJECT", "SET_PRINT_STATS_INFO", "SET_DISPLAY_TEXT")
+# What tunes: a firmware that does not know it is asked once, too, but it is said.
+TUNES = {"M201", "M203", "M204", "M205", "M413", "M572", "M593", "M900"}
+TUNING = ("SET_PRESSURE_ADVANCE", "SET_VELOCITY_LIMIT")
 COLD = ("cold extrusion prevented", "not driven because its heater")  # Marlin, RepRapFirmware; Klipper's is an error
 ASKS = {"pause": Command.PAUSE, "resume": Command.RESUME, "cancel": Command.CANCEL}
 SILENT = {"paused", "resumed", "notification", "poweroff", "prompt_begin", "prompt_button", "prompt_show", "prompt_end"}
@@ -123,7 +127,8 @@ class PrinterReports:
             self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
         elif unknown := unknown_command(event):
             self.unknown.add(unknown)
-            self._warn(f"Unknown command: {unknown}")
+            if not _shows(unknown):
+                self._warn(f"Unknown command: {unknown}")
         elif isinstance(event, Echo):
             self._read_echo(event.text)
         elif isinstance(event, Action):
@@ -133,7 +138,7 @@ class PrinterReports:
     def leaves_out(self, command: str) -> bool:
         """Whether the firmware has said that it does not know a command, and can do without: no heat, move, mode or waiting."""
         name = name_of(command)
-        return name in self.unknown and (name in ADVICE or name.startswith(MACROS))
+        return name in self.unknown and (_shows(name) or name in TUNES or name.startswith(TUNING))
 
     @property
     def warnings(self) -> list[str]:
@@ -162,3 +167,8 @@ class PrinterReports:
     def _warn(self, text: str) -> None:
         if text in self._warned or len(self._warned) < WARNINGS:
             self._warned[text] = self._warned.get(text, 0) + 1
+
+
+def _shows(name: str) -> bool:
+    """Whether a command only displays or names something."""
+    return name in SHOWS or name.startswith(SHOWING)

@@ -120,6 +120,16 @@ def test_layers_that_ask_for_more_heat_get_it_up_to_the_machines_limit():
     assert heats[-3:] == ["M104 S210", "M104 S300", "M104 S0"]
 
 
+def test_the_heat_of_a_hotter_layer_after_a_turn_is_asked_for_before_the_turn() -> None:
+    profile, _, _, program = printed()
+    moves = tuple(replace(m, nozzle_add_c=5.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in program.moves)
+    lines = list(write_gcode(replace(program, moves=moves), profile))
+    turned = next(k for k, line in enumerate(lines) if line.startswith("G0 A90"))
+    last_stroke = max(k for k, line in enumerate(lines[:turned]) if re.match(r"G1 X.* E[0-9]", line))
+    assert [k for k, line in enumerate(lines) if line == "M104 S215" and last_stroke < k < turned]
+    assert lines[turned:].count("M104 S215") == 0
+
+
 def test_the_fan_follows_the_layers() -> None:
     assert [line for line in text() if line.startswith(("M106", "M107"))] == ["M106 S255", "M107", "M106 S255", "M107"]
 
