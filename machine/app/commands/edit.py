@@ -41,7 +41,7 @@ def edit(request: EditRequest) -> int:
         if request.browser:
             asyncio.get_running_loop().run_in_executor(None, _show_in_browser, address)
 
-    serve_workbench(lambda: Session(request.profile, request.given), begin, announce, request.port)
+    serve_workbench(lambda: Session(request.profile, request.given), begin, announce, request.port, request.upload_mib)
     return 0
 
 
