@@ -104,7 +104,10 @@ def _connecting(
             await socket.accept()
             await socket.close(CLOSED_CODE, CLOSED)
         else:
-            await talk(session, socket)
+            try:
+                await talk(session, socket)
+            except ExceptionGroup as bugs:  # each becomes a sentence for the other lines, and a log
+                session.refuse(bugs.exceptions[0])
 
     return connect
 
