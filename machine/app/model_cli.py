@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import Cuts, ModelRequest, Outputs
+from machine.app.requests import UPLOAD_MIB, Cuts, ModelRequest, Outputs
 from machine.app.terminal.options import (
     BeamWidth,
     Copies,
@@ -234,6 +234,9 @@ def edit(
         ),
     ] = 0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="only tell the address")] = False,
+    upload_mib: Annotated[
+        int, typer.Option("--upload-mib", metavar="N", min=1, max=1024, help="the largest file that is taken from a page")
+    ] = UPLOAD_MIB,
     machine: MachineName = "generic_ac",
     material: MaterialName = "pla",
     process: ProcessName = "standard",
@@ -244,7 +247,8 @@ def edit(
     from machine.app.requests import EditRequest, Given
 
     given = Given(machine, material, process, tuple(settings or ()))
-    return edit(EditRequest(profile_of(machine, material, process, settings), given, model, port, not no_browser))
+    profile = profile_of(machine, material, process, settings)
+    return edit(EditRequest(profile, given, model, port, not no_browser, upload_mib))
 
 
 COMMANDS: dict[str, Callable[..., int]] = {

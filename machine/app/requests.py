@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 STDOUT = Path("-")  # stands for standard output where a file is asked for
 GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port that stands for the simulated printer
+UPLOAD_MIB = 256  # the largest file that a page may send: five million facets of a binary STL
 FORCE_GOES_ON = "--force goes on"  # in a sentence: what it refuses is done all the same when it is forced
 
 
@@ -95,13 +96,14 @@ class Given:
 @dataclass(frozen=True)
 class EditRequest:
     """The workbench. given: what the profile is made of; model: a model or a plan to begin with; port: of this computer, 0: any
-    free one; browser: open it there."""
+    free one; browser: open it there; upload_mib: the largest file that is taken from a page."""
 
     profile: "Profile"
     given: Given
     model: str | None = None
     port: int = 0
     browser: bool = True
+    upload_mib: int = UPLOAD_MIB
 
 
 @dataclass(frozen=True)

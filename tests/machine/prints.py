@@ -45,8 +45,11 @@ class PrintPage:
         return {**newest, "progress": newest["progress"] or {}}
 
     def do(self, command: str, **given: Any) -> None:
+        self.say(json.dumps({"do": command, **given}))
+
+    def say(self, text: str | bytes) -> None:
         self.problem = ""
-        self._socket.send(json.dumps({"do": command, **given}))
+        self._socket.send(text)
 
     def command(self, command: str, **given: Any) -> None:
         """The same of the newest print."""

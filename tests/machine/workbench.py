@@ -63,7 +63,7 @@ class Page:
     def do(self, command: str, **given: Any) -> None:
         self.say(json.dumps({"do": command, **given}))
 
-    def say(self, text: str) -> None:
+    def say(self, text: str | bytes) -> None:
         self._socket.send(text)
 
     def until(self, condition: Any) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import asyncio
 import webbrowser
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from machine.app.requests import GCODE_SUFFIXES, EditRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.web.redirect import redirecting
 from machine.app.workbench.web.serve import serve_workbench
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
@@ -39,9 +41,10 @@ def edit(request: EditRequest) -> int:
         show(f"{address}\n")
         say("the workbench is there, for this computer alone; Ctrl-C ends it")
         if request.browser:
-            asyncio.get_running_loop().run_in_executor(None, _show_in_browser, address)
+            _lead_browser(address, until_end)
 
-    serve_workbench(lambda: Session(request.profile, request.given), begin, announce, request.port)
+    with ExitStack() as until_end:
+        serve_workbench(lambda: Session(request.profile, request.given), begin, announce, request.port, request.upload_mib)
     return 0
 
 
@@ -69,6 +72,16 @@ def _of_plan(file: Path, plan: PlanFile) -> Opened:
         told = f"its model {plan.model} is not beside it" if plan.model else "it names no model"
         raise PlanError(f"plan {file}: {told}: open the model first, then choose the plan in the page")
     return Opened(path, plan.model, plan)
+
+
+def _lead_browser(address: str, until_end: ExitStack) -> None:
+    """Open a browser beside the event loop, by a file that is there until the program ends."""
+    try:
+        file = until_end.enter_context(redirecting(address))
+    except OSError as error:
+        say(f"no browser is opened, for no file can be written that leads it: {error.strerror}; open the address in one")
+        return
+    asyncio.get_running_loop().run_in_executor(None, _show_in_browser, file.as_uri())
 
 
 def _show_in_browser(address: str) -> None:

@@ -1,23 +1,18 @@
 """Desk: what all work of a session stands on: the history, the processes, and the pages that wait for news."""
 
 import asyncio
-import itertools
-import re
 import sys
-import tempfile
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from machine.app.crash import log_bug
 from machine.app.workbench.bench.bench import Bench, History, Step
 from machine.app.workbench.work.lane import Lane
 from machine.app.workbench.work.news import News
+from machine.app.workbench.work.received import Received
 from profiles.errors import UserError
 
-UNSAFE = re.compile(r"[^\w .()+-]")
-LONGEST_NAME = 100
 LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
 LONGEST_ASK = 80  # letters of the name of a command
 MOST_ANSWERS = 20  # the pages are told what became of so many commands with a name, the last ones
@@ -28,7 +23,7 @@ class Desk(News):
 
     problem: what could not be done last; answers: to the last commands that a page gave a name, by that: why they were refused,
     "" for those that are done; busy: what the pages wait for. The lanes: quick for what a person waits for, long for searches and
-    slices, hand for planes in hand. followers: called after every change of the bench.
+    slices, hand for planes in hand. received: the files of its pages. followers: called after every change of the bench.
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -40,8 +35,7 @@ class Desk(News):
         self.closed = False
         self.quick, self.long, self.hand = Lane(), Lane(), Lane()
         self.followers: list[Callable[[], None]] = []
-        self._folder = tempfile.TemporaryDirectory(prefix="tiltprint-")
-        self._numbers = itertools.count(1)
+        self.received = Received()
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
@@ -56,7 +50,7 @@ class Desk(News):
             task.cancel()
         for lane in (self.quick, self.long, self.hand):
             lane.close()
-        self._folder.cleanup()
+        self.received.remove()
         self.tell()
 
     def start(self, work: Coroutine[Any, Any, None], ask: object = None) -> "asyncio.Task[None]":
@@ -75,13 +69,6 @@ class Desk(News):
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return task
-
-    def new_file(self, name: str) -> Path:
-        """A place in the session's own folder for a file that a page sends."""
-        folder = Path(self._folder.name) / str(next(self._numbers))
-        folder.mkdir()
-        plain = UNSAFE.sub("_", name.encode("ascii", "replace").decode())  # a disk counts bytes, so letters have one each
-        return folder / (plain[-LONGEST_NAME:].strip(". ") or "model")
 
     def refuse(self, error: Exception) -> str:
         """Tell the pages what could not be done, a bug with the log that it got; the sentence."""

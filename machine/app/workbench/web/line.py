@@ -16,6 +16,7 @@ MOST_COMMAND = 100_000  # characters
 _states: WeakKeyDictionary[Session, tuple[int, str]] = WeakKeyDictionary()
 CLOSED = "this bench is not open any more"
 CLOSED_CODE = 4404  # of a websocket that is closed for that
+GONE_CODE = 1006  # of one that has ended without a word, RFC 6455
 
 
 async def talk(session: Session, socket: WebSocket) -> None:
@@ -25,21 +26,36 @@ async def talk(session: Session, socket: WebSocket) -> None:
 
 
 async def until_either_ends(tell: Coroutine[Any, Any, None], hear: Coroutine[Any, Any, None]) -> None:
-    """The two directions of a line beside each other; that a page has gone is no fault."""
-    told, heard = asyncio.create_task(tell), asyncio.create_task(hear)
-    done, left = await asyncio.wait((told, heard), return_when=asyncio.FIRST_COMPLETED)
-    for task in left:
-        task.cancel()
-    for task in done:
-        if not isinstance(task.exception(), WebSocketDisconnect | RuntimeError | None):
-            task.result()
+    """The two directions of a line beside each other, of which neither outlives the other; that a page has gone is no fault."""
+    try:
+        async with asyncio.TaskGroup() as group:
+            hearing = group.create_task(hear)
+            group.create_task(tell).add_done_callback(lambda _: hearing.cancel())
+    except* WebSocketDisconnect:
+        pass
+
+
+async def send(socket: WebSocket, text: str) -> None:
+    """Say something to a page. Raises WebSocketDisconnect when it has gone."""
+    try:
+        await socket.send_text(text)
+    except RuntimeError as error:  # uvicorn's word for a line that it has closed itself and not told yet
+        raise WebSocketDisconnect(GONE_CODE) from error
+
+
+async def receive(socket: WebSocket) -> str:
+    """The next text of a page, "" for bytes, which are no command. Raises WebSocketDisconnect when it has gone."""
+    message = await socket.receive()
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message["code"])
+    return message.get("text") or ""
 
 
 async def _tell(session: Session, socket: WebSocket) -> None:
     """The newest state whenever there is one; what came in between while a slow page was reading is left out."""
     while not session.closed:
         seen = session.version
-        await socket.send_text(_state(session))
+        await send(socket, _state(session))
         await session.changed(seen)
     await socket.close(CLOSED_CODE, CLOSED)
 
@@ -55,7 +71,7 @@ def _state(session: Session) -> str:
 
 async def _hear(session: Session, socket: WebSocket) -> None:
     while True:
-        text, asked = await socket.receive_text(), dict[str, Any]()
+        text, asked = await receive(socket), dict[str, Any]()
         try:
             asked = parsed(text, MOST_COMMAND)
             session.command(asked)

@@ -18,7 +18,7 @@ from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder
 from machine.app.workbench.printing.ordering import order_of
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
-from machine.app.workbench.web.line import parsed, until_either_ends
+from machine.app.workbench.web.line import parsed, receive, send, until_either_ends
 from machine.network.address import is_server_address, parse_server_address
 from profiles.errors import JournalError, PrinterError, UserError
 
@@ -58,7 +58,7 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
 async def _tell(prints: Prints, socket: WebSocket) -> None:
     while True:
         seen = prints.version
-        await socket.send_text(_text(prints, seen))
+        await send(socket, _text(prints, seen))
         await prints.changed(seen)
 
 
@@ -70,16 +70,16 @@ def _text(prints: Prints, version: int) -> str:
 
 async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) -> None:
     while True:
-        text = await socket.receive_text()
+        text = await receive(socket)
         try:
             asked = parsed(text, MOST_COMMAND)
             prints.command(page, asked, lambda given: _order(session, given))
         except UserError as error:
-            await socket.send_text(json.dumps({"problem": str(error)}))
+            await send(socket, json.dumps({"problem": str(error)}))
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
             log = log_bug(error, ())
             told = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"
-            await socket.send_text(json.dumps({"problem": told}))
+            await send(socket, json.dumps({"problem": told}))
 
 
 def _order(session: Session, asked: dict[str, Any]) -> Order:

@@ -1,14 +1,13 @@
 """Profile files: those that pages have sent, in a folder that goes with the program, for benches may share them."""
 
-import itertools
 import os
 import shutil
-import tempfile
 from pathlib import Path
 
 from machine.app.requests import Given
 from machine.app.workbench.bench.settings import named
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.work.received import Received, remove_file
 from profiles.errors import ProfileError
 from profiles.places import KINDS, kind_in
 
@@ -17,8 +16,7 @@ class ProfileFiles:
     """A folder of them."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="tiltprint-")
-        self._numbers = itertools.count(1)
+        self._received = Received()
 
     def take(self, path: Path, session: Session) -> bool:
         """Whether a file that a page has sent is a profile, which is then taken in place of the bench's machine, material or
@@ -27,19 +25,18 @@ class ProfileFiles:
             kind = kind_in(path)
         except ProfileError:
             return False
-        folder = Path(self._folder.name) / str(next(self._numbers))
-        folder.mkdir()
-        kept = str(shutil.copy(path, folder))
+        kept = str(shutil.copy(path, self._received.new_file(path.name)))
         try:
             session.take_given(f"take {path.name}", lambda given: named(given, kind, kept))
         except ProfileError as error:
-            raise ProfileError(str(error).replace(f"{folder}{os.sep}", "")) from None
+            remove_file(Path(kept))
+            raise ProfileError(str(error).replace(f"{Path(kept).parent}{os.sep}", "")) from None
         return True
 
     def as_shown(self, given: Given) -> Given:
         """Names and settings for a person, who knows of a file that was sent by its own name alone."""
         for kind in KINDS:
             file = Path(getattr(given, kind))
-            if file.parent.parent == Path(self._folder.name):
+            if file.parent.parent == self._received.path:
                 given = named(given, kind, file.name)
         return given

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 import uvicorn
 
+from machine.app.requests import UPLOAD_MIB
 from machine.app.terminal.interrupts import calling
 from machine.app.terminal.progress import say
 from machine.app.workbench.printing.prints import Prints
@@ -16,6 +17,7 @@ from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.guard import HOST
 from machine.app.workbench.web.server import application
 from machine.app.workbench.work.processes import hear_the_ends
+from machine.app.workbench.work.received import tidy_left
 from profiles.errors import OutputError
 
 GRACE_S = 1  # for answers under way when it ends, and for its processes
@@ -49,23 +51,33 @@ def listen(port: int) -> socket.socket:
 
 
 def serve_workbench(
-    make: Callable[[], Session], begin: Callable[[Session], None], announce: Callable[[str], None], port: int = 0
+    make: Callable[[], Session],
+    begin: Callable[[Session], None],
+    announce: Callable[[str], None],
+    port: int = 0,
+    upload_mib: int = UPLOAD_MIB,
 ) -> None:
     """Serve until Ctrl-C. make: a session, made in the event loop; begin: given the first one when it is there; announce: given
-    its address when it answers."""
-    own, token = listen(port), secrets.token_urlsafe(24)
+    its address when it answers; upload_mib: the largest file that is taken from a page."""
+    own = listen(port)
     with own:
-        asyncio.run(_serve(make, begin, announce, own, token))
+        for folder in tidy_left():
+            say(f"a workbench that was killed has left the files of its benches in {folder}: they go with a start in a day")
+        asyncio.run(_serve(make, begin, announce, own, upload_mib))
 
 
 async def _serve(
-    make: Callable[[], Session], begin: Callable[[Session], None], announce: Callable[[str], None], own: socket.socket, token: str
+    make: Callable[[], Session],
+    begin: Callable[[Session], None],
+    announce: Callable[[str], None],
+    own: socket.socket,
+    upload_mib: int,
 ) -> None:
-    number = own.getsockname()[1]
+    number, token = own.getsockname()[1], secrets.token_urlsafe(24)
     workbench, prints, loop = Workbench(make), Prints(), asyncio.get_running_loop()
     first = workbench.open()
     settings = uvicorn.Config(
-        application(workbench, prints, token, number),
+        application(workbench, prints, token, number, upload_mib),
         log_config=None,
         lifespan="off",
         ws="websockets-sansio",

@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
-from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
@@ -35,16 +34,14 @@ from machine.app.workbench.web.page import workbench_page
 from machine.app.workbench.web.prints_line import print_log, prints_line
 from machine.app.workbench.web.profile_files import ProfileFiles
 from machine.app.workbench.web.snapshot import marks, marks_key, triangles
-from mdp.read import MOST_BYTES
-from profiles.errors import PlanError
+from machine.app.workbench.web.uploads import take_file
 from profiles.places import KINDS, known
 
-TEXT_SUFFIX = ".toml"  # of plans and profiles
 Answer = Callable[[Request], Awaitable[Response]]
 
 
-def application(workbench: Workbench, prints: Prints, token: str, port: int) -> ASGIApp:
-    """The whole server, below `/TOKEN/`; the number of a session follows."""
+def application(workbench: Workbench, prints: Prints, token: str, port: int, upload_mib: int) -> ASGIApp:
+    """The whole server, below `/TOKEN/`; the number of a session follows. upload_mib: the largest file that is taken."""
     below, files = "/{token}/{session:int}/", ProfileFiles()
 
     def route(path: str, act: Callable[[Session, Request], Awaitable[Response]], method: str = "GET") -> Route:
@@ -55,7 +52,7 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int) -> 
         route("model/{key}", _model),
         route("marks/{key}", _marks),
         route("pedestal/{key}", _pedestal),
-        route("file", _take_file(files), "POST"),
+        route("file", take_file(files, upload_mib), "POST"),
         route("plan.toml", plan),
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces),
@@ -107,7 +104,10 @@ def _connecting(
             await socket.accept()
             await socket.close(CLOSED_CODE, CLOSED)
         else:
-            await talk(session, socket)
+            try:
+                await talk(session, socket)
+            except ExceptionGroup as bugs:  # each becomes a sentence for the other lines, and a log
+                session.refuse(bugs.exceptions[0])
 
     return connect
 
@@ -135,33 +135,6 @@ async def _marks(session: Session, request: Request) -> Response:
     if not request.path_params["key"] or marks_key(bench) != request.path_params["key"]:
         return Response(status_code=204)  # there are others by now, which the page asks for next
     return Response(await asyncio.to_thread(marks, bench), media_type="application/octet-stream")
-
-
-def _take_file(files: ProfileFiles) -> Callable[[Session, Request], Awaitable[Response]]:
-    async def answer(session: Session, request: Request) -> Response:
-        """A model, a plan or a profile that the person has chosen or dropped, into the session's own folder."""
-        name = Path(request.query_params.get("name", "")).name
-        path = session.new_file(name)
-        await _receive(request, path, name)
-        if path.suffix.lower() != TEXT_SUFFIX:
-            await session.open_model(path, name)
-        elif not files.take(path, session):
-            await session.open_plan(path)
-        return JSONResponse({})
-
-    return answer
-
-
-async def _receive(request: Request, path: Path, name: str) -> None:
-    size = 0
-    with path.open("wb") as file:
-        async for piece in request.stream():
-            size += len(piece)
-            if size > MOST_BYTES:
-                raise PlanError(
-                    f"{name}: has more than {MOST_BYTES} bytes, at most so many are read: a model of fewer faces is needed"
-                )
-            file.write(piece)
 
 
 def _settings(files: ProfileFiles) -> Callable[[Session, Request], Awaitable[Response]]:

@@ -44,8 +44,8 @@ function lineTo(follow, lost, closed) {
   };
 }
 
-/** Sends a file of the person's to a bench; what is wrong with it comes back by the line. */
-const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name })}`, { method: "POST", body: file });
+/** Sends a file of the person's to a bench; what is wrong with it comes back by the line, also where it is not taken to its end. */
+const sendFile = (file, to = "") => fetch(`${to}file?${new URLSearchParams({ name: file.name })}`, { method: "POST", body: file }).catch(() => {});
 
 /** Has the browser save what the server makes at an address. */
 async function save(address) {

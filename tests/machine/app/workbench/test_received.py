@@ -1,0 +1,85 @@
+"""Files that pages send: how large, what is refused is not kept, and what a workbench that is killed leaves."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from machine.app.workbench.work.received import FOUND, KEPT_S, Received, tidy_left
+from mdp.save import stl
+from tests.machine.workbench import workbench
+from tests.shapes import tee
+
+HOLDS = """
+import sys, time
+from machine.app.workbench.work.received import Received
+received = Received()
+for name in sys.argv[1:]:
+    received.new_file(name).write_text("solid")
+print(received.path, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files, of this process and of those that it starts."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
+
+
+def files_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.rglob("*") if path.is_file())
+
+
+def left_by_a_killed_one(*names: str) -> Path:
+    """The folder of a program that had received such files when it was killed."""
+    with subprocess.Popen([sys.executable, "-c", HOLDS, *names], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        folder = Path(process.stdout.readline().strip())
+        process.send_signal(signal.SIGKILL)
+    return folder
+
+
+def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_goes_with_the_program(place: Path) -> None:
+    sent = place / "sent"
+    sent.mkdir()
+    (sent / "large.stl").write_bytes(bytes(2**20 + 1))
+    (sent / "broken.stl").write_bytes(stl(tee())[:400])
+    (sent / "tee.stl").write_bytes(stl(tee()))
+    (sent / "plan.toml").write_text("nothing = [")
+    with workbench("--upload-mib", "1") as bench, bench.line() as page:
+        with suppress(OSError):  # it is not heard to its end
+            bench.send(sent / "large.stl")
+        told = page.until(lambda state: state["problem"])["problem"]
+        assert told.startswith("large.stl: has more than 1 MiB, at most so many are taken from a page")
+        assert [bench.send(sent / name)[0] for name in ("broken.stl", "tee.stl", "plan.toml")] == [422, 200, 422]
+        assert [files_in(folder) for folder in place.glob("tiltprint-edit-*") if files_in(folder)] == [["tee.stl"]]
+    assert list(place.glob("tiltprint-edit-*")) == []
+
+
+def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(place: Path) -> None:
+    folder = left_by_a_killed_one("tee.stl")
+    assert tidy_left() == tidy_left() == (folder,)
+    assert files_in(folder) == [FOUND, "tee.stl"]
+    past_s = (folder / FOUND).stat().st_mtime - KEPT_S - 1.0
+    os.utime(folder / FOUND, (past_s, past_s))
+    assert tidy_left() == ()
+    assert not folder.exists()
+
+
+def test_a_folder_without_a_file_is_removed_and_that_of_a_program_that_runs_is_not_touched(place: Path) -> None:
+    received = Received()
+    received.new_file("tee.stl").write_text("solid")
+    empty = left_by_a_killed_one()
+    assert tidy_left() == ()
+    assert not empty.exists()
+    assert files_in(received.path) == ["tee.stl"]
+    received.remove()
+    assert list(place.iterdir()) == []
