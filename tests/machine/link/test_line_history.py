@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.link.line_history import PLANNER_BLOCKS, LineHistory, SentLine
+from machine.link.line_history import PLANNER_BLOCKS, LineHistory, SentLine, shifts
 
 POSE = (1.5, -2.0, 60.25, 30.0, 725.0, 12.34567)
 
@@ -72,3 +73,12 @@ def test_the_history_of_a_mute_printer_stays_small() -> None:
         history.acknowledge(step.number)
     assert len(history._planned) < 5000
     assert history.commands == 20000
+
+
+@pytest.mark.parametrize(("command", "shifted"), [
+    ("G0 Z5 F600", True), ("g01 z5", True), ("G1 X5 Z5 F600", True), ("G0 A30 C10", True),
+    ("MANUAL_STEPPER STEPPER=a MOVE=5", True),
+    ("G1 X5 Z5 E1", False), ("G0 X5 Y5", False), ("M104 S200", False), ("G28 Z", False),
+])  # fmt: skip
+def test_what_moves_the_tip_up_or_turns_the_table_without_filament_shifts(command: str, shifted: bool) -> None:
+    assert shifts(command, ("X", "Y", "Z", "A", "C", "E")) is shifted
