@@ -10,14 +10,13 @@ from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
 from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
-from machine.link.job import PrintJob
 from machine.link.journal import EVERY_LINES, FINISHED, LEFT, Checkpoint, Journal
 from machine.link.line_history import LineHistory, SentLine, shifts
 from machine.link.line_outcome import line_was_done, position_differences
 from machine.link.pause.park_moves import lift_move, plan_park
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
-from machine.link.progress import ProgramPosition, Progress
+from machine.link.progress import PrintJob, ProgramPosition, Progress
 from machine.link.protocol.events import Event, Ok, Position
 from machine.link.protocol.framing import command_of, name_of
 from machine.link.protocol.states import State

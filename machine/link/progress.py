@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from machine.gcode.landmarks import begins_layer, begun_part
 from machine.gcode.words import read_words, split_command
 from machine.link.protocol.events import Temperature
+from machine.link.protocol.framing import LINE_LIMIT
+from profiles.profile import Profile
 
 
 @dataclass(frozen=True)
@@ -97,3 +99,13 @@ class ProgramPosition:
         if self.percent is not None:
             return min(1.0, self.percent / 100.0)
         return acknowledged / total if total else None
+
+
+@dataclass(frozen=True)
+class PrintJob:
+    """What is fixed for a print before it begins. total: commands; limit: characters of a line that the firmware takes."""
+
+    total: int | None = None
+    schedule: Schedule | None = None
+    limit: int = LINE_LIMIT
+    profile: Profile | None = None

@@ -6,11 +6,10 @@ from threading import Event as Flag
 
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.feed import Feed
-from machine.link.job import PrintJob
 from machine.link.journal import Journal
 from machine.link.medium import SERIAL, Medium, reopen, stable_name
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
-from machine.link.progress import Progress, Schedule
+from machine.link.progress import PrintJob, Progress, Schedule
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint

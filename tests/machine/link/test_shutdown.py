@@ -114,7 +114,7 @@ def test_a_klipper_that_has_shut_down_wants_a_firmware_restart() -> None:
 def test_an_emergency_stop_of_a_klipper_is_confirmed() -> None:
     klipper = load(settings=["machine.dialect=klipper"])
     printer, control = VirtualPrinter(klipper.machine), Control()
-    medium = watching(printer, b"G1 X10", lambda: control.ask(Command.EMERGENCY_STOP))
+    medium = watching(printer.medium, b"G1 X10", lambda: control.ask(Command.EMERGENCY_STOP))
     with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; send FIRMWARE_RESTART"):
         print_lines(HOMING, PATH, control=control, medium=medium, profile=klipper)
     assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)  # once more: it answers M112 with a bare ok now
