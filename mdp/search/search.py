@@ -7,7 +7,6 @@ bounds all descendants), two orders of the same cuts take one slot, the slots of
 """
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from time import perf_counter
@@ -17,7 +16,7 @@ from mdp.decomposition import VOLUME_TOLERANCE, Decomposition, FrontRow, Part
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
-from mdp.plans.plan_file import PlanFile, PlannedRow
+from mdp.plans.plan_file import PlanFile
 from mdp.ranking.candidates import REASONS
 from mdp.ranking.ranker import Ranker, ranker_named
 from mdp.ranking.record import Trace
@@ -26,6 +25,7 @@ from mdp.search.by_hand import check_model, check_zones, cut_by_hand
 from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
+from mdp.search.plan_front import price_plan, with_own_row
 from mdp.search.polish import make_symmetric, polish
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
@@ -158,46 +158,17 @@ def cut_by_plan(
     problem = Problem(mesh, profile, plan.zones)
     node = cut_by_hand(problem, plan)
     if own.parts != plan.parts:
-        plan = replace(plan, front=_with_own_row(problem, own))
+        plan = replace(plan, front=with_own_row(problem, own))
     made = make_parts(node, problem.machine, profile)
     others = {len(row.parts): row for row in plan.front}
     rows = {count: FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2) for count, row in others.items()}
     rows[len(node.cuts)] = replace(front_row(node, problem.terms), chosen=True, reason=BY_PLAN)
     front = [rows[count] for count in sorted(rows)]
     if price is not None:
-        front = _price_plan(problem, plan, front, made, profile, price)
+        front = price_plan(problem, plan, front, made, profile, price)
     notes = _fewer_parts(parts, len(plan.parts) + 1, f"the plan {plan.name} holds")
     taken = Taken(node, made, tuple(front))
     return _decomposition(problem, taken, profile, Outcome(name, ranker, 0, perf_counter() - began, notes))
-
-
-def _with_own_row(problem: Problem, plan: PlanFile) -> tuple[PlannedRow, ...]:
-    """The front of a plan with its own parts, which a person may have changed, measured as the row of their number where they can
-    be cut."""
-    rows = {len(row.parts): row for row in plan.front}
-    known = rows.get(len(plan.parts))
-    if all(part.plane is not None for part in plan.parts) and (known is None or known.parts != plan.parts):
-        with suppress(PlanError):
-            row = front_row(cut_by_hand(problem, plan), problem.terms)
-            rows[len(plan.parts)] = PlannedRow(plan.parts, row.support_area_mm2, row.seam_mm, row.cost_mm2)
-    return tuple(rows.values())
-
-
-def _price_plan(
-    problem: Problem, plan: PlanFile, rows: Sequence[FrontRow], made: tuple[Part, ...], profile: Profile, price: Pricing
-) -> list[FrontRow]:
-    """The rows of a plan's front with their prices, those that cannot be cut again as they are; made: the chosen row's parts."""
-    planned = {len(row.parts) + 1: row.parts for row in plan.front}
-    priced = []
-    for row, good in zip(rows, pays(rows), strict=True):
-        with suppress(PlanError):
-            if row.chosen:
-                row = price_row(row, made, price)
-            elif good:
-                node = cut_by_hand(problem, replace(plan, parts=planned[row.parts]))
-                row = price_row(row, make_parts(node, problem.machine, profile), price)
-        priced.append(row)
-    return priced
 
 
 @dataclass(frozen=True)
