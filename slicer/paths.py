@@ -9,6 +9,8 @@ import numpy as np
 
 from mdp.mesh import Floats
 
+ON_PLATE_MM = 0.35  # so high above the plate a bead still sags onto it
+
 
 class Kind(StrEnum):
     """What a path is for; the values are the names that G-code viewers know from PrusaSlicer."""

@@ -22,7 +22,7 @@ from slicer.finish.vase import bottom_layers, vase_layers
 from slicer.geometry.polygons import union
 from slicer.interface.interface import begin_inside
 from slicer.interface.interlock import fill_grooves
-from slicer.paths import Kind, Layer, Path, SlicedPart, Unsupported
+from slicer.paths import ON_PLATE_MM, Kind, Layer, Path, SlicedPart, Unsupported
 from slicer.speed import first_layer_mm_s, layer_time_s, speeds_mm_s
 from slicer.stack import Stack, build_stack
 from slicer.support.beads import support_beads
@@ -38,7 +38,6 @@ from slicer.walls.unwanted_seam import unwanted_segments
 from slicer.walls.variable.pieces import in_pieces
 from slicer.walls.walls import wall_beads
 
-ON_PLATE_MM = 0.35  # so low a bead sags onto the plate
 DENSE = 0.5  # infill with lines nearer than a line's width to each other carries skin without bridges
 
 

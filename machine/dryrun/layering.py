@@ -12,13 +12,12 @@ from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import Beads
 from machine.reader.parsed import ParsedProgram
 from mdp.mesh import Floats
-from slicer.paths import Kind
+from slicer.paths import ON_PLATE_MM, Kind
 
 SUPPORT = (Kind.SUPPORT.value, Kind.SUPPORT_INTERFACE.value)
 LOOSE = (Kind.OVERHANG.value, Kind.BRIDGE.value, Kind.IRONING.value, Kind.PURGE.value, Kind.SKIRT.value, *SUPPORT)
 SLACK_MM, SLACK_SHARE = 0.02, 0.1  # of a layer's height
 STAND_OFF_MM = 0.5  # at most between a part and the support below it
-ON_PLATE_MM = 0.35  # so low a bead sags onto the plate
 NEW_OBJECT_MM = 1.0  # a fall of more begins another object beside the first one
 FLOATING_SHARE = 0.5  # of a layer's length
 LEAST_MM = 10.0
