@@ -167,9 +167,11 @@ class Feed:
         """Before the tip's height or the table changes, and before the first stroke after that: all moves are over, so that after
         a power cut it is known on which side of the change the tip stood. A printer that tells what it has executed needs none.
         """
+        if self.exchange.connection.advanced:
+            return
         shift = shifts(command, self.modal.axes.letters)
-        stroke = not shift and self._prints(command)
-        if not self.exchange.connection.advanced and (stroke if self._shifted else shift):
+        stroke = self._shifted and not shift and self._prints(command)
+        if stroke or (shift and not self._shifted):
             self.exchange.drain()
             self.history.end_moves()
             self._record()
