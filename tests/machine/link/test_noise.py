@@ -20,6 +20,7 @@ MACHINE = load().machine
 MOVES = [f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 E0.{1 + i:05d} F3000" for i in range(300)]
 PROGRAM = ["M83", "M104 S200", "M109 S200", *MOVES, "M400", "M105"]
 WANTED = np.array([[float(word[1:]) for word in line.split()[1:4]] for line in MOVES])
+DOUBLED = {6}  # seeds whose faults double the ok of a torn line: nothing can heal that, and it is said
 
 
 def noisy_print(seed: int, faults: int, torn: bool) -> tuple[PrinterError | None, np.ndarray]:
@@ -50,11 +51,12 @@ def _portions(data: bytes, rng: random.Random | None) -> list[bytes]:
     return [portion for portion in (data[:cut], data[cut:]) if portion]
 
 
-@pytest.mark.parametrize("seed", [seed for seed in range(41) if seed != 6])  # there the ok of a torn line is doubled
+@pytest.mark.parametrize("seed", range(40))
 def test_eight_faults_in_three_hundred_lines_are_healed_whole(seed: int) -> None:
     error, moves = noisy_print(seed, 8, torn=False)
-    assert error is None
-    assert moves == pytest.approx(WANTED, abs=1e-6)
+    assert (error is not None) == (seed in DOUBLED)
+    assert "what it did is not known" in str(error) or len(moves) == len(WANTED)
+    assert moves == pytest.approx(WANTED[: len(moves)], abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(40, 60))
