@@ -10,10 +10,11 @@ from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
 from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
-from machine.link.journal import EVERY_LINES, FINISHED, LEFT, Checkpoint, Journal
+from machine.link.journal import EVERY_LINES, FINISHED, LEFT, PAUSED, Checkpoint, Journal
 from machine.link.line_history import LineHistory, SentLine, shifts
 from machine.link.line_outcome import line_was_done, position_differences
-from machine.link.pause.park_moves import lift_move, plan_park
+from machine.link.pause.park_moves import lift_move
+from machine.link.pause.pause import Pause
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
 from machine.link.progress import PrintJob, ProgramPosition, Progress
@@ -60,7 +61,8 @@ class Feed:
         self.state, self._trouble, self.started, self.finished = "printing", "", False, False
         self.sent = self._skipped = 0
         self._program_pause = ""  # what the program says of the pause before its next command
-        self._layer_ended = self._reconnected = self._parked = self._shifted = False
+        self._layer_ended = self._reconnected = self._shifted = False
+        self._pause: Pause | None = None  # the one under way
         self._start_s = self._shown_s = self._asked_s = self._checked_s = start_s
 
     @property
@@ -135,8 +137,8 @@ class Feed:
 
     def _before(self, command: str) -> None:
         """What is due before the next command of the program."""
-        if self._pending.lines:
-            self._send_own()
+        for own in self._pending.next_lines(self.modal):
+            self.exchange.send(own)
         if self._reconnected:
             self._reconnected = False
             self._verify_position("after the port came back")
@@ -146,22 +148,14 @@ class Feed:
                 self._check_position()
         if self._program_pause:
             why, self._program_pause = self._program_pause, ""
-            self._pause(f"the program pauses: {why}")
+            self._rest(f"the program pauses: {why}")
         since_s = self._pending.pause_s
         if since_s is not None and (not self._prints(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
-            self._pause()
+            self._rest()
 
     def _prints(self, command: str) -> bool:
         """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
         return name_of(command) == "MANUAL_STEPPER" or self.modal.names_filament(command)
-
-    def _send_own(self) -> None:
-        """Commands of the person's own."""
-        while self._pending.lines:
-            command = self._pending.lines.popleft()
-            self.exchange.send(command)
-            if command[0] in "Mm":  # a person's temperature or fan holds beyond a pause
-                self.modal.take(command)
 
     def _secure(self, command: str) -> None:
         """Before the tip's height or the table changes, and before the first stroke after that: all moves are over, so that after
@@ -206,32 +200,19 @@ class Feed:
         if wrong := self._position_errors():
             raise RemoteProtocolError(f"{when} the printer stands at {', '.join(wrong)}: its position can no longer be trusted")
 
-    def _pause(self, why: str = "") -> None:
-        """Leave the print, wait until the print is to go on, and come back to the same place; why: shown meanwhile."""
+    def _rest(self, why: str = "") -> None:
+        """A pause; why: shown meanwhile. The print goes on where it stopped."""
         self.set_state("pausing", why)
         self._record()
         position_known = not self._position_errors()
-        moves = plan_park(self.modal, self._job.profile, self._bounds)
-        self._parked = moves.park is not None
-        for command in moves.away:
-            self.exchange.send(command)
-        self.exchange.drain()
-        if moves.park is not None:
-            self.history.pose = (*moves.park.stand_mm, *self.modal.at[3:])
-        self.set_state("paused", why)
-        self._record()
-        pending = self._pending
-        while not pending.resume:
-            self.exchange.wait(until=lambda: pending.resume or bool(pending.lines))
-            self._send_own()
-        self.set_state("resuming")
-        self._record()
-        for command in moves.back:
-            self.exchange.send(command)
-        pending.end_pause()
+        self._pause = Pause(self.exchange, self._pending, self.reports, self.modal, self._job.profile)
+        for state, words in self._pause.run(self._bounds, why):
+            self.set_state(state, words)
+            self._record()
+        self._pending.end_pause()
         if position_known:
             self._verify_position("after the pause")
-        self._parked = False
+        self._pause = None
         self.set_state("printing")
 
     def _finish(self) -> None:
@@ -299,13 +280,14 @@ class Feed:
     @contextmanager
     def in_state(self, state: str, message: str) -> Iterator[None]:
         """Another state for as long as something takes; the position is proved before the print goes on."""
-        before, self._reconnected, self._trouble = self.state, True, message
+        before, words = self.state, self._pending.message
+        self._reconnected, self._trouble = True, message
         self.set_state(state)
         try:
             yield
         finally:
             self._trouble = ""
-            self.set_state(before)
+            self.set_state(before, words)
 
     def line_was_done(self, status: PrinterStatus) -> bool | None:
         """Whether the one line of the program on its way has been done, by where the printer stands; None: nobody can say."""
@@ -317,7 +299,7 @@ class Feed:
 
     def lift_move(self) -> tuple[str, float] | None:
         """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or it is away already."""
-        if self._job.profile is None or self._parked:
+        if self._job.profile is None or (self._pause is not None and self._pause.aside):
             return None
         return lift_move(self.modal, self._job.profile.machine)
 
@@ -329,11 +311,11 @@ class Feed:
             self._journal.write(replace(self._checkpoint(), state=LEFT, pose=pose))
 
     def _checkpoint(self) -> Checkpoint:
-        history = self.history
+        history, waits = self.history, self._pause.stands if self._pause is not None else None
         number = self.exchange.connection.window.wire_number(history.number)
-        return Checkpoint(
-            history.sent, history.acknowledged, history.executed, number, history.pose, FINISHED if self.finished else self.state
-        )
+        # While it is heated again, or its port is lost, the tip still waits.
+        state = FINISHED if self.finished else PAUSED if waits is not None else self.state
+        return Checkpoint(history.sent, history.acknowledged, history.executed, number, waits or history.pose, state)
 
     def _record(self) -> None:
         if self._journal is not None:
