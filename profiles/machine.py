@@ -161,6 +161,14 @@ class Machine(Frozen):
     head: Head
     clearance_mm: float = Field(1.0, ge=0, le=100, description="least distance kept between head and table, mm")
     lift_mm: float = Field(10.0, ge=0, le=500, description="extra height above everything printed while the table moves, mm")
+    pause_cools_after_min: float = Field(
+        10.0,
+        ge=0,
+        le=1440,
+        description="minutes of a pause after which the nozzle is switched off, the bed not; it is heated and filled again when "
+        "the print goes on; as long as Prusa's M600 (M600_TIMEOUT 600 s) and Klipper (idle_timeout) wait, Marlin's M600 waits "
+        "45 s (PAUSE_PARK_NOZZLE_TIMEOUT); 0: never",
+    )
     purge_mm: float = Field(
         0.0,
         ge=0,

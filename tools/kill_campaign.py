@@ -1,12 +1,18 @@
-"""Kill a host at random moments of a print and resume from its journal; the printer lives on in another process.
+"""Kill a host, or cut the power, at random moments of a print and resume from its journal.
 
-Run: python tools/kill_campaign.py [MOMENTS] [SEED]     (default 200 moments; a run's figures stand in docs/serial.md)
+Run: python tools/kill_campaign.py [MOMENTS] [SEED] [--power stock|advanced]   (default 200 moments; figures: tools/RESULTS.md)
 A moment passes when the executed moves, both runs together, are the program's without a gap; what was done twice is counted.
+
+Without --power the host is killed and the printer, in another process, lives on. With it both lose their power: a printer in
+memory, as stock Marlins are built (no ADVANCED_OK) or with ADVANCED_OK, on a line of 115200 baud. Where the journal leaves the
+height in doubt it is counted, and the height that is nearest to the real one is chosen, as a person would who looks.
 """
 
+import argparse
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -14,7 +20,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from time import monotonic, sleep
@@ -22,12 +28,16 @@ from time import monotonic, sleep
 import numpy as np
 
 from machine.link.journal import Journal, JournalHeading, read_journal
+from machine.link.medium import Medium, Wire
 from machine.link.protocol.timeout import Timing
-from machine.link.resume import ResumePoint, plan_resume, read_interrupted_print
+from machine.link.resume import ResumePoint, heights_mm, is_in_doubt, plan_resume, read_interrupted_print
 from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
 from machine.reader.gcode_file import GcodeFile
+from machine.simulator.board import BuildOptions
 from machine.simulator.simulator import SimulatedPrinter
+from machine.simulator.virtual import PATH, VirtualPrinter
+from profiles.errors import JournalError
 from profiles.profile import load
 
 PROFILE = load()
@@ -38,6 +48,8 @@ START = ["G21", "G90", "M83", "M140 S25", "M104 S175", "G28 X Y Z", "G92 A0 C0",
 POSES = ((0, 0), (30, 725), (-20, 360))
 LAYERS, STROKES = 16, 40
 SPEED = 500.0  # times real time, of every other printer: its planner is full when the host dies
+BAUD, RING = 115200, 128
+LIFT_MM, GROUP = 0.6, 10  # every tenth stroke is reached by a lifted travel
 
 
 @dataclass(frozen=True)
@@ -194,17 +206,155 @@ def campaign(moments: int, seed: int) -> list[Result]:
     return found
 
 
+def lifted_program() -> list[str]:
+    """The same with travels as a slicer writes them: filament pulled back, up, across, down, filament pushed."""
+    lines: list[str] = []
+    z, strokes = 0.0, 0
+    for line in program():
+        if (height := re.match(r"G0 Z(\S+)", line)) is not None:
+            z, strokes = float(height[1]), 0
+        if re.match(r"G1 X", line) is not None:
+            strokes += 1
+            if strokes % GROUP == 0:
+                x, y = line.split()[1:3]
+                lines += [
+                    "G1 E-0.8 F2100",
+                    f"G0 Z{z + LIFT_MM:.2f} F900",
+                    f"G0 {x} {y}.5 F9000",
+                    f"G0 Z{z:.2f} F900",
+                    "G1 E0.8 F2100",
+                ]
+        lines.append(line)
+    return lines
+
+
+class PowerCutError(BaseException):
+    """The host has no power any more: nothing is done on its way out."""
+
+
+class _Plug:
+    """A wire whose host and printer lose their power at a time."""
+
+    def __init__(self, wire: Wire, printer: VirtualPrinter, cut_s: float) -> None:
+        self._wire, self._printer, self._cut_s, self.name = wire, printer, cut_s, wire.name
+        self.discard, self.close = wire.discard, wire.close
+
+    def write(self, data: bytes) -> None:
+        self._look()
+        self._wire.write(data)
+
+    def read(self) -> bytes:
+        self._look()
+        return self._wire.read()
+
+    def _look(self) -> None:
+        if self._printer.now_s >= self._cut_s:
+            self._printer.firmware.reset()
+            raise PowerCutError
+
+
+@dataclass(frozen=True)
+class Cut:
+    """What became of one power cut. heights: at how many the tip may have stood by the journal; off_mm: how much too high, or
+    low, the print went on.
+    """
+
+    result: Result
+    heights: int = 1
+    off_mm: float = 0.0
+
+
+def moves_of(printer: VirtualPrinter) -> list[list[float]]:
+    """X Y Z tilt turn where each executed move ended, and its filament."""
+    record = printer.record
+    rows: list[list[float]] = np.column_stack([record.end[:, :5], record.end[:, 5] - record.start[:, 5]]).round(4).tolist()
+    return rows
+
+
+def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float, whole: list[list[float]]) -> Cut:
+    """Cut the power of a print after some time, and resume it. whole: the moves of an undisturbed print."""
+    printer = VirtualPrinter(PROFILE.machine, build, baud=BAUD)
+    medium, heading = printer.medium, JournalHeading(str(text.path), text.sha256(), "campaign", {})
+    plugged = Medium(lambda name, baud: _Plug(medium.open(name, baud), printer, cut_s), medium.now_s, medium.wait)
+    try:
+        with Journal(journal, heading) as written:
+            print_lines(text, PATH, BAUD, journal=written, profile=PROFILE, medium=plugged)
+    except PowerCutError:
+        pass
+    stood_mm = printer.firmware.board.motion.at(printer.now_s)[2]
+    point, doubts = read_interrupted_print(text, read_journal(journal).last, PROFILE, LIMIT), [1]
+
+    def begin(status: PrinterStatus) -> ResumePoint:
+        way, told = plan_resume(point, status, PROFILE), point
+        if is_in_doubt(way, point, PROFILE):
+            doubts.append(len(heights_mm(point)))
+            told = replace(point, stood_mm=min(heights_mm(point), key=lambda z: abs(z - stood_mm)))
+        return plan_resume(told, status, PROFILE).start
+
+    done = len(moves_of(printer))
+    try:
+        with Journal(journal.with_suffix(".rest"), heading) as written:
+            print_lines(text, PATH, BAUD, journal=written, profile=PROFILE, begin=begin, medium=medium)
+    except JournalError as refused:
+        return Cut(Result(f"refused: {str(refused).partition(': ')[2].partition(',')[0]}", done, done, done))
+    how = "hardly begun: anew" if not point.stroked else "height in doubt, asked" if len(doubts) > 1 else "height known"
+    return judged_cut(how, done, doubts[-1], moves_of(printer), whole)
+
+
+def judged_cut(how: str, done: int, heights: int, moves: list[list[float]], whole: list[list[float]]) -> Cut:
+    """done: moves before the cut, the one under way included. The rest is compared without Z, whose error is measured."""
+    flat, planned = ([[*move[:2], *move[3:]] for move in rows] for rows in (moves, whole))
+    tail = 0
+    while tail < min(len(moves) - done, len(whole)) and flat[-1 - tail] == planned[-1 - tail]:
+        tail += 1
+    off_mm = max(
+        (abs(a[2] - b[2]) for a, b in zip(moves[len(moves) - tail :], whole[len(whole) - tail :], strict=True)), default=0.0
+    )
+    whole_moves = done - 1 if moves[done - 1] != whole[done - 1] else done  # the one under way has to be made again
+    return Cut(Result(how, whole_moves, len(whole) - tail, len(moves)), heights, off_mm)
+
+
+def cut_campaign(cuts: int, seed: int, build: BuildOptions) -> list[Cut]:
+    """Results of power cuts at random moments between the first stroke and the end."""
+    chance = random.Random(seed)
+    with tempfile.TemporaryDirectory() as name:
+        text = GcodeFile(Path(name) / "program.gcode")
+        text.path.write_text("\n".join(lifted_program()) + "\n", encoding="utf-8")
+        printer = VirtualPrinter(PROFILE.machine, build, baud=BAUD)
+        print_lines(text, PATH, BAUD, profile=PROFILE, medium=printer.medium)
+        whole, begun_s = moves_of(printer), float(printer.record.begin_s[0])
+        moments = [chance.uniform(begun_s, printer.now_s) for _ in range(cuts)]
+        return [power_cut(build, text, Path(name) / f"{number}", cut_s, whole) for number, cut_s in enumerate(moments)]
+
+
 def main() -> None:
     """Run the campaign and print a table."""
     if sys.argv[1:2] == ["--printer"]:
         serve(sys.argv[2], sys.argv[3], float(sys.argv[4]))
         return
-    given = [int(word) for word in sys.argv[1:]]
-    results = campaign(given[0] if given else 200, given[1] if given[1:] else 1)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("moments", type=int, nargs="?", default=200)
+    parser.add_argument("seed", type=int, nargs="?", default=1)
+    parser.add_argument("--power", choices=("stock", "advanced"))
+    given = parser.parse_args()
+    if given.power:
+        show_cuts(cut_campaign(given.moments, given.seed, BuildOptions(advanced_ok=given.power == "advanced", rx_ring=RING)))
+        return
+    results = campaign(given.moments, given.seed)
     print("| what the host found | moments | moves missing | moves made twice, most |\n|---|---|---|---|")
     for how, count in sorted(Counter(result.how for result in results).items()):
         mine = [result for result in results if result.how == how]
         print(f"| {how} | {count} | {sum(r.gap for r in mine)} | {max(r.twice for r in mine)} |")
+
+
+def show_cuts(cuts: list[Cut]) -> None:
+    """A row for each kind of end."""
+    print("| what the journal told | cuts | moves missing | moves made twice, most | Z wrong by at most, mm |")
+    print("|---|---|---|---|---|")
+    for how, count in sorted(Counter(cut.result.how for cut in cuts).items()):
+        mine = [cut for cut in cuts if cut.result.how == how]
+        missing, twice = sum(cut.result.gap for cut in mine), max(cut.result.twice for cut in mine)
+        print(f"| {how} | {count} | {missing} | {twice} | {max(cut.off_mm for cut in mine):.2f} |")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from dataclasses import replace
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
-from machine.firmware.simulation import SimulationRules
+from machine.firmware.simulation import Idle, SimulationRules
 from profiles.axes import RotaryAxis
 
 _STANDS = (
@@ -125,12 +125,20 @@ SIMULATED = SimulationRules(
     lacks=frozenset(
         {"M108", "M113", "M116", "M154", "M155", "M211", "M302", "M410", "M486", "M568", "M572", "M665", "M876", "M900", "G43.4"}
     ),
+    # klippy/extras/idle_timeout.py: timeout 600, TURN_OFF_HEATERS and M84; stepper_enable.py, motor_off: homing is forgotten.
+    idle=Idle(after_s=600.0, axes=5, shuts_down=True),
 )
 
 KLIPPER = Firmware(
     name="Klipper",
     signs=("klipper",),
     dialects={"klipper": AXES, "klipper_steppers": STEPPERS},
-    line=LineRules(resends=False, silence_s=1800.0, revival="send FIRMWARE_RESTART by tiltprint console"),
+    line=LineRules(
+        resends=False,
+        silence_s=1800.0,
+        revival="send FIRMWARE_RESTART by tiltprint console",
+        # toolhead.py, dwell: it moves the print time that idle_timeout.py counts from; M105 and M400 do not.
+        keep_awake="G4 P1",
+    ),
     simulated=SIMULATED,
 )

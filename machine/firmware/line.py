@@ -13,7 +13,8 @@ class LineRules:
     the receive buffer holds. silence_s: how long a line may stay without answer once it was asked about, None: as the
     stream's timing says. last_number: then the numbers begin anew. reports_rotary_axes: M114 names every axis that a program
     may move. waiting_moves: how many may wait behind the newest acknowledged one where its answers do not tell, None: any
-    number. revival: what lets it print again after it has halted.
+    number. revival: what lets it print again after it has halted. keep_awake: said every minute of a pause, or it lets its motors
+    go by itself; "": it does not.
     """
 
     resends: bool = True
@@ -27,4 +28,5 @@ class LineRules:
     last_number: int = 99_900
     reports_rotary_axes: bool = False
     waiting_moves: int | None = None
+    keep_awake: str = ""
     revival: str = "switch it off and on, or press its reset button,"

@@ -7,7 +7,7 @@ Line numbers, checksums and `ok` as in gcode/queue.cpp, bugfix-2.1.x of 2024-09.
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware
 from machine.firmware.line import LineRules
-from machine.firmware.simulation import SimulationRules
+from machine.firmware.simulation import Idle, SimulationRules
 
 DIALECT = Dialect(
     firmware="Marlin",
@@ -32,6 +32,9 @@ DIALECT = Dialect(
 
 BLOCK_BUFFER_SIZE, BUFSIZE = 16, 4  # Configuration_adv.h: planned moves, and commands read ahead of them
 
+# gcode/control/M17_M18_M84.cpp: the idle time after which manage_inactivity (MarlinCore.cpp) lets the motors go; 0: never.
+MOTORS_STAY_ON = "M84 S0"
+
 SIMULATED = SimulationRules(
     identity="FIRMWARE_NAME:Marlin bugfix-2.1.x (simulated) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin "
     "PROTOCOL_VERSION:1.0 MACHINE_TYPE:tiltprint EXTRUDER_COUNT:1 AXIS_COUNT:{axes} UUID:cede2a2f-41a2-4748-9b12-c55c62f367ff",
@@ -50,12 +53,14 @@ SIMULATED = SimulationRules(
     lacks=frozenset({"M116", "M568", "M572"}),
     # module/motion.cpp, bugfix-2.1.x: current_position begins with the home positions; apply_motion_limits asks axis_was_homed.
     starts_at_home=True,
+    # Configuration_adv.h: DEFAULT_STEPPER_TIMEOUT_SEC 120, DISABLE_IDLE_X, _Y, _Z and _E; _I and _J are commented out.
+    idle=Idle(after_s=120.0, axes=3),
 )
 
 MARLIN = Firmware(
     name="Marlin",
     signs=("marlin",),
     dialects={"marlin": DIALECT},
-    line=LineRules(reports_rotary_axes=True, waiting_moves=BLOCK_BUFFER_SIZE + BUFSIZE),
+    line=LineRules(reports_rotary_axes=True, waiting_moves=BLOCK_BUFFER_SIZE + BUFSIZE, keep_awake=MOTORS_STAY_ON),
     simulated=SIMULATED,
 )

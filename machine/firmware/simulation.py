@@ -25,6 +25,17 @@ def temperature_report(nozzle_c: float, nozzle_target_c: float, bed_c: float, be
 
 
 @dataclass(frozen=True)
+class Idle:
+    """What a firmware does by itself when nothing has moved for after_s: the motors of its first `axes` go off, which M84 S may
+    forbid. shuts_down: heaters, too, and nothing moves any more before it is homed; a dwell is a move, and M84 knows no S.
+    """
+
+    after_s: float
+    axes: int
+    shuts_down: bool = False
+
+
+@dataclass(frozen=True)
 class SimulationRules:
     """What a host sees of the firmware; {} is the command or the coordinates.
 
@@ -39,7 +50,7 @@ class SimulationRules:
     with options that a host can notice (BuildOptions of the simulator). reports_position: G28 and G92 print it. while_heating:
     behind the temperatures of a command that waits for them. lacks: commands it does not know. starts_at_home: after a restart
     it believes itself at its home positions, and keeps only axes that were homed inside the limits.
-    answers_blank: an empty line is answered with ok.
+    answers_blank: an empty line is answered with ok. idle: None: its motors stay on.
     """
 
     identity: str
@@ -67,3 +78,4 @@ class SimulationRules:
     lacks: frozenset[str] = frozenset()
     starts_at_home: bool = False
     answers_blank: bool = False
+    idle: Idle | None = None

@@ -8,12 +8,13 @@ from threading import Event as Flag
 
 from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import axes_of
-from machine.gcode.words import PAUSE_REMARK, split_command
+from machine.gcode.words import PAUSE_REMARK
 from machine.link.exchange import Exchange
-from machine.link.journal import EVERY_LINES, FINISHED, LEFT, Checkpoint, Journal
-from machine.link.line_history import LineHistory, SentLine, shifts
-from machine.link.line_outcome import line_was_done, position_differences
-from machine.link.pause.park_moves import lift_move, plan_park
+from machine.link.journal import EVERY_LINES, FINISHED, LEFT, PAUSED, Checkpoint, Journal
+from machine.link.line_history import Barriers, LineHistory, SentLine, shifts
+from machine.link.line_outcome import position_differences
+from machine.link.pause.park_moves import lift_move
+from machine.link.pause.pause import Pause
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
 from machine.link.progress import PrintJob, ProgramPosition, Progress
@@ -21,7 +22,6 @@ from machine.link.protocol.events import Event, Ok, Position
 from machine.link.protocol.framing import command_of, name_of
 from machine.link.protocol.states import State
 from machine.link.resume import ResumePoint
-from machine.link.status import PrinterStatus
 from machine.link.watchdog import PrinterReports, Watchdog
 from profiles.errors import RemoteProtocolError
 
@@ -29,8 +29,6 @@ PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
 BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
-CHECK_S = 30.0  # between looks at the position where a layer ends
-CHECK_MUTE_S = 10.0  # the same for a printer that does not report what it has executed
 MUTE_LINES = 4  # between records of the journal for such a one: what it may have done since is done twice
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
@@ -60,8 +58,9 @@ class Feed:
         self.state, self._trouble, self.started, self.finished = "printing", "", False, False
         self.sent = self._skipped = 0
         self._program_pause = ""  # what the program says of the pause before its next command
-        self._layer_ended = self._reconnected = self._parked = self._shifted = False
-        self._start_s = self._shown_s = self._asked_s = self._checked_s = start_s
+        self._barriers, self._reconnected = Barriers(self.modal.axes.letters, start_s), False
+        self._pause: Pause | None = None  # the one under way
+        self._start_s = self._shown_s = self._asked_s = start_s
 
     @property
     def acknowledged(self) -> int:
@@ -124,7 +123,7 @@ class Feed:
     def _commands(self, lines: Iterable[str]) -> Iterator[tuple[int, str]]:
         for line, text in enumerate(lines, 1):
             command = command_of(text, line, self._job.limit)
-            self._layer_ended |= self._position.read_comment(text)
+            self._barriers.layer_ended |= self._position.read_comment(text)
             if command:
                 if command[0] in "Mm":
                     self._position.read_m73(command, self.exchange.medium.now_s() - self._start_s)
@@ -135,59 +134,33 @@ class Feed:
 
     def _before(self, command: str) -> None:
         """What is due before the next command of the program."""
-        if self._pending.lines:
-            self._send_own()
+        for own in self._pending.next_lines(self.modal):
+            self.exchange.send(own)
         if self._reconnected:
             self._reconnected = False
             self._verify_position("after the port came back")
         if self._journal is not None:
-            self._secure(command)
-            if self._check_due(command):
+            history, now_s = self.history, self.exchange.medium.now_s()
+            if self._barriers.due(command, self._prints, history.tracked):
+                self.exchange.drain()
+                history.end_moves()
+                self._record()
+            if self._barriers.check_due(command, history.tracked, now_s):
                 self._check_position()
         if self._program_pause:
             why, self._program_pause = self._program_pause, ""
-            self._pause(f"the program pauses: {why}")
+            self._rest(f"the program pauses: {why}")
         since_s = self._pending.pause_s
         if since_s is not None and (not self._prints(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
-            self._pause()
+            self._rest()
 
     def _prints(self, command: str) -> bool:
         """Whether a command is a stroke, or one of a pair that turns the table: no place to pause before."""
         return name_of(command) == "MANUAL_STEPPER" or self.modal.names_filament(command)
 
-    def _send_own(self) -> None:
-        """Commands of the person's own."""
-        while self._pending.lines:
-            command = self._pending.lines.popleft()
-            self.exchange.send(command)
-            if command[0] in "Mm":  # a person's temperature or fan holds beyond a pause
-                self.modal.take(command)
-
-    def _secure(self, command: str) -> None:
-        """Before the tip's height or the table changes, and before the first stroke after that: all moves are over, so that after
-        a power cut it is known on which side of the change the tip stood. A printer that tells what it has executed needs none.
-        """
-        if self.exchange.connection.advanced:
-            return
-        shift = shifts(command, self.modal.axes.letters)
-        stroke = self._shifted and not shift and self._prints(command)
-        if stroke or (shift and not self._shifted):
-            self.exchange.drain()
-            self.history.end_moves()
-            self._record()
-        self._shifted = shift or (self._shifted and not stroke)
-
     def _new_history(self, before: int = 0) -> LineHistory:
         connection = self.exchange.connection
         return LineHistory(before, None if connection.advanced else connection.greeting.waiting_moves)
-
-    def _check_due(self, command: str) -> bool:
-        """Whether the position is to be looked at now: at a layer's end, or in a travel where the printer reports little."""
-        ended, self._layer_ended = self._layer_ended, False
-        since_s = self.exchange.medium.now_s() - self._checked_s
-        if self.exchange.connection.advanced:
-            return ended and since_s >= CHECK_S
-        return since_s >= CHECK_MUTE_S and (ended or split_command(command.upper())[0] == "G0")
 
     def _position_errors(self) -> list[str]:
         """Axes on which the printer's own position is not the program's, all moves over; none where it does not report it."""
@@ -196,7 +169,6 @@ class Feed:
         return position_differences(self.modal, position.axes, NEAR) if position is not None else []
 
     def _check_position(self) -> None:
-        self._checked_s = self.exchange.medium.now_s()
         wrong = self._position_errors()
         self._trouble = f"the printer stands at {', '.join(wrong)}" if wrong else ""
         self._record()
@@ -206,32 +178,19 @@ class Feed:
         if wrong := self._position_errors():
             raise RemoteProtocolError(f"{when} the printer stands at {', '.join(wrong)}: its position can no longer be trusted")
 
-    def _pause(self, why: str = "") -> None:
-        """Leave the print, wait until the print is to go on, and come back to the same place; why: shown meanwhile."""
+    def _rest(self, why: str = "") -> None:
+        """A pause; why: shown meanwhile. The print goes on where it stopped."""
         self.set_state("pausing", why)
         self._record()
         position_known = not self._position_errors()
-        moves = plan_park(self.modal, self._job.profile, self._bounds)
-        self._parked = moves.park is not None
-        for command in moves.away:
-            self.exchange.send(command)
-        self.exchange.drain()
-        if moves.park is not None:
-            self.history.pose = (*moves.park.stand_mm, *self.modal.at[3:])
-        self.set_state("paused", why)
-        self._record()
-        pending = self._pending
-        while not pending.resume:
-            self.exchange.wait(until=lambda: pending.resume or bool(pending.lines))
-            self._send_own()
-        self.set_state("resuming")
-        self._record()
-        for command in moves.back:
-            self.exchange.send(command)
-        pending.end_pause()
+        self._pause = Pause(self.exchange, self._pending, self.reports, self.modal, self._job.profile)
+        for state, words in self._pause.run(self._bounds, why):
+            self.set_state(state, words)
+            self._record()
+        self._pending.end_pause()
         if position_known:
             self._verify_position("after the pause")
-        self._parked = False
+        self._pause = None
         self.set_state("printing")
 
     def _finish(self) -> None:
@@ -299,25 +258,18 @@ class Feed:
     @contextmanager
     def in_state(self, state: str, message: str) -> Iterator[None]:
         """Another state for as long as something takes; the position is proved before the print goes on."""
-        before, self._reconnected, self._trouble = self.state, True, message
+        before, words = self.state, self._pending.message
+        self._reconnected, self._trouble = True, message
         self.set_state(state)
         try:
             yield
         finally:
             self._trouble = ""
-            self.set_state(before)
-
-    def line_was_done(self, status: PrinterStatus) -> bool | None:
-        """Whether the one line of the program on its way has been done, by where the printer stands; None: nobody can say."""
-        window, step = self.exchange.connection.window, self.history.only_unanswered
-        waiting = [line.number for line in window.flight if not line.asks_temperature]
-        if step is None or waiting != [step.number]:
-            return None
-        return line_was_done(window.command(step.number), self.history.pose, self.modal, status)
+            self.set_state(before, words)
 
     def lift_move(self) -> tuple[str, float] | None:
         """Words and mm/min of a step that takes the tip away from the print; None where Z is not known, or it is away already."""
-        if self._job.profile is None or self._parked:
+        if self._job.profile is None or (self._pause is not None and self._pause.aside):
             return None
         return lift_move(self.modal, self._job.profile.machine)
 
@@ -329,11 +281,11 @@ class Feed:
             self._journal.write(replace(self._checkpoint(), state=LEFT, pose=pose))
 
     def _checkpoint(self) -> Checkpoint:
-        history = self.history
+        history, waits = self.history, self._pause.stands if self._pause is not None else None
         number = self.exchange.connection.window.wire_number(history.number)
-        return Checkpoint(
-            history.sent, history.acknowledged, history.executed, number, history.pose, FINISHED if self.finished else self.state
-        )
+        # While it is heated again, or its port is lost, the tip still waits.
+        state = FINISHED if self.finished else PAUSED if waits is not None else self.state
+        return Checkpoint(history.sent, history.acknowledged, history.executed, number, waits or history.pose, state)
 
     def _record(self) -> None:
         if self._journal is not None:
@@ -344,25 +296,21 @@ class Feed:
         self._shown_s = now_s
         if self._on_progress is None:
             return
-        elapsed_s, at, done = now_s - self._start_s, self._position, self._skipped + self.history.commands
+        at, history, feed_percent = self._position, self.history, self._pending.feed_percent
+        elapsed_s, done = now_s - self._start_s, self._skipped + history.commands
         pausing = self.state == "printing" and self._pending.pause_s is not None  # begins at the end of the stroke under way
         self._on_progress(
             Progress(
                 sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
-                left_s=self._left_s(elapsed_s), share=at.share(done, self._job.total),
+                left_s=self._job.left_s(at, history.before, history.acknowledged, elapsed_s, feed_percent),
+                share=at.share(done, self._job.total),
                 temperature=self.reports.temperature, part=at.part, parts=at.parts, layer=at.layer,
                 state="pausing" if pausing else self.state,
-                file_line=self.history.acknowledged,
-                feed_percent=self._pending.feed_percent, flow_percent=self._pending.flow_percent,
+                file_line=history.acknowledged,
+                feed_percent=feed_percent, flow_percent=self._pending.flow_percent,
                 message=self._pending.message or self._trouble or self.reports.waiting or self._silence(),
             )
         )  # fmt: skip
-
-    def _left_s(self, elapsed_s: float) -> float | None:
-        schedule, history, feed = self._job.schedule, self.history, self._pending.feed_percent
-        if schedule is None:
-            return self._position.left_s(elapsed_s, feed)
-        return schedule.left_s(history.before, history.acknowledged, elapsed_s, feed)
 
     def _silence(self) -> str:
         """Said while an answer is overdue; a slow command may take its time."""

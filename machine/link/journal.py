@@ -28,7 +28,7 @@ if sys.platform == "win32":
     import msvcrt
 
 FORMAT = 2  # in 1 the height or the table might have changed after the line that was recorded last
-FINISHED, LEFT, RESUMED = "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
+PAUSED, FINISHED, LEFT, RESUMED = "paused", "finished", "left", "resumed in "  # left: the print was ended, the tip lifted
 EVERY_LINES = 16  # the sender never gets so many lines ahead of the newest record,
 EVERY_S = 0.1  # which is not older than this when something has happened since
 SYNC_S = 1.0  # so old may the disk be after a power cut of the computer

@@ -1,13 +1,17 @@
 """Line history: how far a program has come; its lines sent, acknowledged and surely executed."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from machine.gcode.words import read_words, split_command
 
 MOST_WAITING = 4096  # moves whose end is awaited; of further ones, without any word from the planner, nothing can be known
 PLANNER_BLOCKS = 16  # Marlin's BLOCK_BUFFER_SIZE; a printer that reports more free places has more
+
+
+CHECK_S = 30.0  # between looks at the position where a layer ends
+CHECK_MUTE_S = 10.0  # the same for a printer that does not report what it has executed
 
 
 class SentLine(NamedTuple):
@@ -34,6 +38,7 @@ class LineHistory:
         self._flight: deque[SentLine] = deque()
         self._planned: deque[SentLine] = deque()
         self._blocks, self._free, self._waiting = PLANNER_BLOCKS, 0, waiting
+        self.tracked = False  # the printer tells what it has executed
 
     @property
     def only_unanswered(self) -> SentLine | None:
@@ -55,6 +60,7 @@ class LineHistory:
             self.commands += 1
             if step.moves and len(planned) < MOST_WAITING:
                 planned.append(step)
+        self.tracked = self.tracked or free is not None
         waiting = self._waiting if free is None else self._waiting_beside(free)
         if waiting is None:
             return
@@ -74,6 +80,38 @@ class LineHistory:
         """Every move acknowledged so far is over."""
         self._planned.clear()
         self.executed = self.acknowledged
+
+
+class Barriers:
+    """Before which commands of a program all moves are to be over, so that after a power cut it is known where the tip stood.
+
+    layer_ended: a layer has ended since the last look at the position.
+    """
+
+    def __init__(self, letters: Sequence[str], now_s: float) -> None:
+        self.layer_ended = False
+        self._letters, self._shifted, self._checked_s = letters, False, now_s
+
+    def due(self, command: str, prints: Callable[[str], bool], tracked: bool) -> bool:
+        """Before the tip's height or the table changes, and before the first stroke after that.
+
+        Of a printer that tells what it has executed it is known when the change is over: it needs the first of the two only.
+        """
+        shift = shifts(command, self._letters)
+        stroke = self._shifted and not shift and prints(command)
+        due = (shift and not self._shifted) or (stroke and not tracked)
+        self._shifted = shift or (self._shifted and not stroke)
+        return due
+
+    def check_due(self, command: str, tracked: bool, now_s: float) -> bool:
+        """Where the position is to be looked at: at a layer's end, or in a travel where the printer reports little."""
+        ended, self.layer_ended = self.layer_ended, False
+        if tracked:
+            due = ended and now_s - self._checked_s >= CHECK_S
+        else:
+            due = now_s - self._checked_s >= CHECK_MUTE_S and (ended or split_command(command.upper())[0] == "G0")
+        self._checked_s = now_s if due else self._checked_s
+        return due
 
 
 def shifts(command: str, letters: Sequence[str]) -> bool:

@@ -5,11 +5,13 @@ Requests come from any thread through a Control; PendingCommands, in the thread 
 
 import re
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from threading import Event as Flag
 
 from machine.firmware import dialects
+from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import Axes
 from machine.gcode.words import read_words, split_command
 from machine.link.protocol.framing import LINE_LIMIT, REFUSED, command_of, name_of
@@ -123,6 +125,14 @@ class PendingCommands:
             self._queue_line(request.text, state)
         else:
             self._override(command, request.value)
+
+    def next_lines(self, modal: ModalState) -> Iterator[str]:
+        """The person's commands that are to be sent now; what they set holds for the rest of the print."""
+        while self.lines:
+            command = self.lines.popleft()
+            yield command
+            if name_of(command.upper()) not in MOVES:
+                modal.take(command)
 
     def end_pause(self) -> None:
         """The pause is over."""

@@ -109,3 +109,11 @@ class PrintJob:
     schedule: Schedule | None = None
     limit: int = LINE_LIMIT
     profile: Profile | None = None
+
+    def left_s(
+        self, position: ProgramPosition, begin: int, file_line: int, elapsed_s: float, feed_percent: float
+    ) -> float | None:
+        """Time left, s, by the schedule, else by what the program says itself; None: not known."""
+        if self.schedule is None:
+            return position.left_s(elapsed_s, feed_percent)
+        return self.schedule.left_s(begin, file_line, elapsed_s, feed_percent)

@@ -17,7 +17,7 @@ import numpy as np
 from machine.gcode.modal_state import ModalState
 from machine.gcode.modes import E_AXIS, axes_of
 from machine.kinematics.collision import Printed
-from machine.link.journal import EVERY_LINES, LEFT, Checkpoint
+from machine.link.journal import EVERY_LINES, LEFT, PAUSED, Checkpoint
 from machine.link.line_history import shifts
 from machine.link.pause.park_moves import filament_commands, heat_commands
 from machine.link.pause.printed_bounds import PrintedBounds
@@ -32,7 +32,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 TOO_LITTLE = "hardly anything was printed: the program begins anew"
-PARKED = ("paused", LEFT)  # states in which the journal's pose is where the tip has been taken
+PARKED = (PAUSED, LEFT)  # states in which the journal's pose is where the tip has been taken
 MOVING = ("pausing", "resuming")
 HOME_IT = (
     "write into machine.gcode.resume of a profile of this machine how it is homed with a print on it (docs/serial.md), and name "

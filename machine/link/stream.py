@@ -7,6 +7,7 @@ from threading import Event as Flag
 from machine.link.exchange import Exchange, Reconnection
 from machine.link.feed import Feed
 from machine.link.journal import Journal
+from machine.link.line_outcome import line_was_done
 from machine.link.medium import SERIAL, Medium, reopen, stable_name
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
 from machine.link.progress import PrintJob, Progress, Schedule
@@ -105,10 +106,18 @@ class _PortFinder:
                     return Reconnection(wire, None)
                 feed.exchange.wire = wire  # whoever cancels meanwhile wants the heaters off
                 try:
-                    return Reconnection(wire, feed.line_was_done(query_status(wire, medium, feed.poll)))
+                    return Reconnection(wire, self._line_was_done(query_status(wire, medium, feed.poll)))
                 except PortError:  # a plug that is still loose, or a printer that has stopped reading
                     wire.close()
         raise PortError(f"{error}; it did not come back within {medium.lost_s:.0f} s")
+
+    def _line_was_done(self, status: PrinterStatus) -> bool | None:
+        """Whether the one line of the program on its way has been done, by where the printer stands; None: nobody can say."""
+        window, history = self._feed.exchange.connection.window, self._feed.history
+        step, waiting = history.only_unanswered, [line.number for line in window.flight if not line.asks_temperature]
+        if step is None or waiting != [step.number]:
+            return None
+        return line_was_done(window.command(step.number), history.pose, self._feed.modal, status)
 
 
 @dataclass

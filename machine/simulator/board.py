@@ -1,6 +1,6 @@
 """The board of a simulated printer: its build options, clock, motion, heaters and fan, and the words its commands read."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
 
@@ -129,7 +129,9 @@ class Board:
 
     def forget(self) -> None:
         """The board restarts."""
-        self.powered = True
+        self.powered, self.must_home = True, self.build.must_home
+        self.idle_after_s = self.rules.idle.after_s if self.rules.idle is not None else inf
+        self.awake_s = 0.0  # what is no move has kept the motors on until then
         self.waits_for_heat = self.waits_for_person = self.impatient = self.cold_allowed = self.homes = False
         self.report_every_s = self.place_every_s = 0.0
         self.report_s = self.place_s = inf
@@ -154,6 +156,32 @@ class Board:
             for letter in motion.letters[3:5]:
                 del coordinates[letter], steps[letter]
         return self.rules.position(coordinates, steps)
+
+    @property
+    def idle_s(self) -> float:
+        """When the firmware lets its motors go if nothing moves before; inf: never."""
+        planner = self.motion.planner
+        next_s = planner.next_s() if self.motion.energised else inf
+        since_s = max(planner.ended_s, self.awake_s) if next_s == inf else next_s
+        return since_s + self.idle_after_s if self.motion.energised else inf
+
+    def idle(self) -> None:
+        """Nothing has moved for so long."""
+        self.motion.planner.run(self.now_s)
+        idle = self.rules.idle
+        if idle is None or self.idle_s > self.now_s:  # a move that was planned has begun meanwhile
+            return
+        self.let_go(range(idle.axes))
+        if idle.shuts_down:
+            self.nozzle.set(0.0, self.now_s)
+            self.bed.set(0.0, self.now_s)
+            self.motion.homed.clear()
+            self.must_home = True
+
+    def let_go(self, axes: Sequence[int]) -> None:
+        """Motors off."""
+        self.motion.let_go(axes)
+        self.note("motors off")
 
     def off(self) -> None:
         """Heaters and fan off, motion stopped: kill, reset."""

@@ -58,6 +58,7 @@ def heat_and_wait(board: Board, words: Words, text: str) -> Iterator[float]:
     board.waits_for_heat, board.impatient = True, False
     while board.now_s < arrived_s and not board.impatient:
         yield min(arrived_s, board.now_s + REPORT_S)
+        board.awake_s = board.now_s
         board.say(f"{board.temperatures()}{board.rules.while_heating}")
     board.waits_for_heat = False
 

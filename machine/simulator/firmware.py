@@ -115,7 +115,7 @@ class SimulatedFirmware:
         if self.dead:
             return inf
         board = self.board
-        due_s = min(board.report_s, board.place_s, board.nozzle.trip_s, board.bed.trip_s)
+        due_s = min(board.report_s, board.place_s, board.nozzle.trip_s, board.bed.trip_s, board.idle_s)
         if self._wake_s is None:
             return board.now_s if self._queue or len(self._receiver) else min(due_s, self._wait_s)
         return min(self._wake_s, due_s, inf if board.waits_for_heat else self._busy_s)  # no busy while it tells temperatures
@@ -315,7 +315,7 @@ class SimulatedFirmware:
             busy_s = self._busy_s if self._wake_s is not None and not board.waits_for_heat else inf
             trip_s = min(board.nozzle.trip_s, board.bed.trip_s)
             wait_s = self._wait_s if self._wake_s is None and not self._queue else inf
-            due_s = min(busy_s, wait_s, board.report_s, board.place_s, trip_s)
+            due_s = min(busy_s, wait_s, board.report_s, board.place_s, trip_s, board.idle_s)
             if due_s > to_s or due_s == inf:
                 break
             board.now_s = max(board.now_s, due_s, min(to_s - CHATTER_S, trip_s))
@@ -330,6 +330,8 @@ class SimulatedFirmware:
             heater, index = (board.nozzle, "0") if board.nozzle.trip_s == trip_s else (board.bed, "bed")
             heater.trip_s = inf
             self.kill(f"{heater.trip}, system stopped! Heater_ID: {index}")
+        elif due_s == board.idle_s:
+            board.idle()
         elif due_s == self._wait_s:
             self._said.append("wait")
             self._wait_s = board.now_s + IDLE_S

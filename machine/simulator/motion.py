@@ -14,6 +14,7 @@ from profiles.machine import Machine
 FIRST_FEED = 25.0  # mm/s until a program gives an F: Marlin's 1500 mm/min
 TINY_MM = 1e-9
 SLACK = 1e-6  # a coordinate printed with few decimals may stand this far outside a limit
+SLIP_MM = 0.4  # and deg: a motor without current is turned by hand or weight, and catches at another step
 HARD_MM = 2.0  # from a soft limit to where the axis meets its end
 ARC_MM, CIRCLE_CHORDS = 1.0, 72  # Marlin's MAX_ARC_SEGMENT_MM and MIN_CIRCLE_SEGMENTS
 SEGMENTS_PER_S = 200.0  # into which the firmware cuts a turn that it follows
@@ -93,6 +94,7 @@ class Motion:
         self.follows = False
         self.soft_limits = True
         self.homed: set[int] = set()
+        self.energised = False
         self.feed_share = self.flow_share = 1.0
         axes = (machine.x, machine.y, machine.z)
         self.speeds = [a.speed_mm_s for a in axes]
@@ -195,6 +197,7 @@ class Motion:
         block = block_of(real, end, feed, self.speeds, self.accelerations, most_mm_s2)
         self.place, self._real = list(place), end
         if block is not None:
+            self.energised = True
             block.feed = self.feed_mm_s if feed_mm_s is None else feed_mm_s / self.feed_share
             self.planner.add(block, self.jerk_mm_s, now_s)
 
@@ -214,6 +217,7 @@ class Motion:
     def home(self, axes: Sequence[int]) -> float:
         """Put axes at their home positions (X Y least, Z greatest, table level); returns how long it takes, s."""
         self.homed.update(axes)
+        self.energised = True
         travel_s = max((abs(self._home[a] - self._real[a]) / self.speeds[a] for a in axes), default=0.0)
         real = self._real[:]
         for axis in axes:
@@ -221,6 +225,16 @@ class Motion:
         self._real = real
         self._believe()
         return 2.0 * travel_s + 1.0
+
+    def let_go(self, axes: Sequence[int]) -> None:
+        """Motors go off: the axes do not stay where they were, and the firmware does not know."""
+        self.energised = False
+        real = self._real[:]
+        for axis in axes:
+            slip = min(SLIP_MM, real[axis] - (self.limits[axis][0] - HARD_MM))
+            real[axis] -= slip
+            self._offset[axis] -= slip
+        self._real = real
 
     def follow(self, on: bool) -> None:
         """G43.4, G49: the place stays, as in the firmware that knows them; a turned table is believed elsewhere then."""

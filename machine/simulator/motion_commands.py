@@ -1,6 +1,7 @@
 """What the commands that move do in a simulated printer: moves, arcs, dwelling, homing, modes, limits, overrides."""
 
 from collections.abc import Iterator, Sequence
+from math import inf
 
 from machine.gcode.words import read_letters, split_command
 from machine.simulator.board import Board, Command, Words, Work, wait_for_moves
@@ -11,7 +12,7 @@ COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP
 def move(board: Board, words: Words, text: str) -> Work:
     """G0, G1; the caller has made sure of a free block."""
     motion, pushes = board.motion, True
-    if board.build.must_home and (unhomed := motion.unhomed(words)) is not None:
+    if board.must_home and (unhomed := motion.unhomed(words)) is not None:
         board.say(board.rules.unhomed.format(_coordinates(unhomed)))
         return None
     if "E" in words and not board.cold_allowed and board.nozzle.at(board.now_s) < COLD_C:
@@ -64,6 +65,8 @@ def _dwell(board: Board, words: Words, text: str) -> Iterator[float]:
     until_s = board.now_s + max(0.0, words.get("S", words.get("P", 0.0) / 1000.0))
     while board.now_s < until_s:
         yield until_s
+    if board.rules.idle is not None and board.rules.idle.shuts_down:
+        board.awake_s = board.now_s
 
 
 def _drain(board: Board, words: Words, text: str) -> Iterator[float]:
@@ -82,7 +85,7 @@ def seek_endstops(board: Board, axes: Sequence[int]) -> Iterator[float]:
     """Seek the endstops of axes."""
     yield from wait_for_moves(board)
     until_s = board.now_s + board.motion.home(axes)
-    board.homes = True
+    board.homes, board.awake_s = True, until_s
     while board.now_s < until_s:
         yield until_s
     board.homes = False
@@ -166,9 +169,15 @@ def _rename(board: Board, words: Words, text: str) -> Work:
 
 
 def _rest(board: Board, words: Words, text: str) -> Iterator[float]:
+    """M18, M84: motors off; with S only after so many idle seconds, 0: never."""
+    idle = board.rules.idle
+    if "S" in words and (idle is None or not idle.shuts_down):
+        if idle is not None:
+            board.idle_after_s, board.awake_s = words["S"] or inf, board.now_s
+        return
     yield from wait_for_moves(board)
     board.motion.homed.clear()
-    board.note("motors off")
+    board.let_go(range(5))
 
 
 def _stop(board: Board, words: Words, text: str) -> Work:

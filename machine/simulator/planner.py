@@ -110,7 +110,8 @@ class ExecutedMoves:
 class Planner:
     """Blocks come with add(); run() begins those whose time has come and hands them to `begun`.
 
-    underruns: how often it ran dry although the machine need not have stopped; slowed: blocks made slower since few waited.
+    underruns: how often it ran dry although the machine need not have stopped; slowed: blocks made slower since few waited;
+    ended_s: when the newest block ended that is over.
     """
 
     def __init__(self, begun: Callable[[Block], None], blocks: int, min_segment_s: float) -> None:
@@ -119,6 +120,7 @@ class Planner:
         self._current: Block | None = None
         self._last: Block | None = None  # the one that ended last, while nothing has made the machine wait
         self._gate_s = 0.0
+        self.ended_s = 0.0
         self.underruns = self.slowed = 0
 
     def free(self, now_s: float) -> int:
@@ -140,7 +142,7 @@ class Planner:
                 end_s = current.begin_s + current.duration_s
                 if end_s > now_s:
                     return
-                self._last, self._current = current, None
+                self._last, self._current, self.ended_s = current, None, end_s
                 begin_s, v0 = end_s, current.v1
             else:
                 begin_s, v0 = self._gate_s, 0.0
@@ -196,7 +198,7 @@ class Planner:
         The block under way is cut short: its end and duration are changed.
         """
         self.run(now_s)
-        cut, self._current, self._last = self._current, None, None
+        cut, self._current, self._last, self.ended_s = self._current, None, None, now_s
         place = self._waiting[0].start if self._waiting else None
         self._waiting.clear()
         if cut is not None:

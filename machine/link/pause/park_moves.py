@@ -1,7 +1,7 @@
 """Park moves: the commands that take the tip away from the print, and back to the very place where it stopped.
 
-Away: filament pulled back, straight up along the nozzle, aside. Back: heat, the same way in reverse, filament pushed, and
-everything the firmware is to remember. The rotary axes never move.
+Away: filament pulled back, straight up along the nozzle, aside. Back: the same way in reverse, filament pushed. The rotary axes
+never move.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,20 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 PULL_MM, PULL_MM_S = 1.0, 30.0  # where no material says otherwise
+FILL_MM_S = 3.0  # Marlin's ADVANCED_PAUSE_PURGE_FEEDRATE
 SLOWLY = 0.25  # the last stretch down goes at this share of the Z axis' speed
 NEAR_MM = 2.0
 
 
 @dataclass(frozen=True)
 class ParkMoves:
-    """Commands away and back. park: None where the tip stays because its place is not known or no way is clear."""
+    """Commands away from the print, down to it again, and those that push the filament then. park: None where the tip stays
+    because its place is not known or no way is clear.
+    """
 
     away: tuple[str, ...]
-    back: tuple[str, ...]
+    down: tuple[str, ...]
+    push: tuple[str, ...]
     park: Park | None
 
 
@@ -38,8 +42,7 @@ def plan_park(modal: ModalState, profile: Profile | None, bounds: PrintedBounds 
     standby_c = profile.material.standby_c if profile is not None else None
     if standby_c is not None and profile is not None and pull and standby_c < modal.nozzle_c:
         away.append(dialect_of(profile.machine).nozzle.format(number(standby_c)))
-    back = [*heat_commands(modal, profile), "G21", "G90", *down, *push, *modal.lines()]
-    return ParkMoves(tuple(away), tuple(back), park)
+    return ParkMoves(tuple(away), ("G21", "G90", *down), tuple(push), park)
 
 
 def lift_move(modal: ModalState, machine: Machine) -> tuple[str, float] | None:
@@ -66,6 +69,16 @@ def filament_commands(modal: ModalState, profile: Profile | None) -> tuple[list[
         return [], []
     feed = f"F{60 * speed:.0f}"
     return ["M83", f"G1 E-{pull:.5f} {feed}"], ["M83", f"G1 E{pull + extra:.5f} {feed}"]
+
+
+def fill_commands(modal: ModalState, profile: Profile) -> list[str]:
+    """Commands that fill a nozzle again that has cooled while the tip waited: what has run out of it is taken for as much as a
+    retraction holds back. Filament stands as far back after them as before.
+    """
+    pull, speed, _ = _filament(modal, profile)
+    back = pull + modal.pulled_mm
+    push = back + max(profile.material.retract_mm, PULL_MM)
+    return ["M83", f"G1 E{push:.5f} F{60 * FILL_MM_S:.0f}", f"G1 E-{back:.5f} F{60 * speed:.0f}"]
 
 
 def _filament(modal: ModalState, profile: Profile | None) -> tuple[float, float, float]:

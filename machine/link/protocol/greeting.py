@@ -38,6 +38,11 @@ class Greeting:
         """How many moves may wait behind the newest acknowledged one; None: any number, as of a firmware that has no name."""
         return None if identify(self.identity) is None else self.firmware.line.waiting_moves
 
+    @property
+    def keep_awake(self) -> str:
+        """What keeps its motors on in a pause; of a firmware that has no name M84 might switch them off (Smoothieware's does)."""
+        return "" if identify(self.identity) is None else self.firmware.line.keep_awake
+
     def learn(self, answer: Identity | Capability | Area) -> None:
         """A line of the answer to M115."""
         if isinstance(answer, Identity):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.link.line_history import PLANNER_BLOCKS, LineHistory, SentLine, shifts
+from machine.link.line_history import CHECK_MUTE_S, CHECK_S, PLANNER_BLOCKS, Barriers, LineHistory, SentLine, shifts
 
 POSE = (1.5, -2.0, 60.25, 30.0, 725.0, 12.34567)
 
@@ -82,3 +82,25 @@ def test_the_history_of_a_mute_printer_stays_small() -> None:
 ])  # fmt: skip
 def test_what_moves_the_tip_up_or_turns_the_table_without_filament_shifts(command: str, shifted: bool) -> None:
     assert shifts(command, ("X", "Y", "Z", "A", "C", "E")) is shifted
+
+
+LETTERS = ("X", "Y", "Z", "A", "C", "E")
+LIFTED = ["G1 X5 E1", "G0 Z2 F600", "G0 X9 F9000", "G0 Z1 F600", "M106 S9", "G1 E0.8", "G1 X7 E1"]
+
+
+@pytest.mark.parametrize(("tracked", "held"), [(False, ["G0 Z2 F600", "G1 E0.8"]), (True, ["G0 Z2 F600"])])
+def test_a_lifted_travel_begins_when_all_moves_are_over_and_a_mute_printer_is_waited_for_at_its_end(
+    tracked: bool, held: list[str]
+) -> None:
+    barriers = Barriers(LETTERS, 0.0)
+    assert [command for command in LIFTED if barriers.due(command, lambda line: "E" in line, tracked)] == held
+
+
+@pytest.mark.parametrize(("tracked", "after_s", "command"), [(True, CHECK_S, "G1 X5 E1"), (False, CHECK_MUTE_S, "G0 X5")])
+def test_the_position_is_looked_at_now_and_then(tracked: bool, after_s: float, command: str) -> None:
+    barriers, looked = Barriers(LETTERS, 0.0), []
+    for second in range(100):
+        barriers.layer_ended = True
+        looked += [second] if barriers.check_due(command, tracked, float(second)) else []
+    assert looked == [second for second in range(1, 100) if second % after_s == 0]
+    assert not barriers.check_due("G1 X5 E1", tracked, 1000.0)  # no layer has ended

@@ -243,11 +243,24 @@ def test_after_a_power_cut_of_a_stock_marlin_few_moves_are_done_twice_and_the_he
     assert len(at) == 1 or not stroked
 
 
+@pytest.mark.parametrize("line", range(60, len(PROGRAM), 23))
+def test_after_a_power_cut_of_a_marlin_that_tells_what_waits_the_height_is_known_while_it_prints(
+    text: GcodeFile, line: int
+) -> None:
+    printer = VirtualPrinter(PROFILE.machine, faults=FaultScript((Fault("reset", at=line, unit="line"),)))
+    with journal_of(text, "first") as journal, pytest.raises(FirmwareError):
+        print_lines(text, PATH, medium=printer.medium, profile=PROFILE, journal=journal)
+    at, record = heights_mm(read_interrupted_print(text, read_journal(journal.path).last, PROFILE, LIMIT)), printer.record
+    stroked = record.end[-1, 5] > record.start[-1, 5]
+    assert any(abs(z - record.end[-1, 2]) < 0.01 for z in at)
+    assert len(at) == 1 or not stroked
+
+
 def doubtful(text: GcodeFile, journal: Path, printer: SimulatedPrinter) -> None:
     assert main(["print", str(text.path), "--port", printer.path, "--journal", str(journal), "--force"]) == 1
 
 
-IN_DOUBT = [Fault("reset", at=PROGRAM.index("G0 Z62.2 F900") + 8, unit="line")]
+IN_DOUBT = [Fault("reset", at=PROGRAM.index("G0 Z62.2 F900") + 20, unit="line")]
 
 
 def test_a_height_in_doubt_is_not_guessed(text: GcodeFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

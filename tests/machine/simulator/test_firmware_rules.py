@@ -8,6 +8,7 @@ from machine.link.protocol.framing import frame
 from machine.simulator.board import BuildOptions
 from machine.simulator.cable import Cable
 from machine.simulator.firmware import SimulatedFirmware
+from machine.simulator.motion import SLIP_MM
 from machine.simulator.simulator import SimulatedPrinter
 from tests.machine.firmware.test_dialects import profile
 
@@ -166,3 +167,43 @@ def test_a_printer_may_refuse_to_move_before_it_is_homed(machine, said: str) -> 
     firmware = SimulatedFirmware(machine, BuildOptions(advanced_ok=False, must_home=True, home_start=False))
     assert answer(firmware, "G1 X5\nG1 A5\nG28\nG1 X5\nM84\nG1 X6\n").count(said) >= 1
     assert [move[0] for move in firmware.record().end.tolist()] == [0.0, 5.0]
+
+
+def test_marlin_lets_x_y_and_z_go_after_two_idle_minutes_and_does_not_know_where_they_are_then() -> None:
+    """Configuration_adv.h: DEFAULT_STEPPER_TIMEOUT_SEC 120, DISABLE_IDLE_X, _Y and _Z."""
+    firmware = SimulatedFirmware(MARLIN, BuildOptions(advanced_ok=False))
+    answer(firmware, "G28\nG1 X5 Y5 Z50 F6000\nM400\n")
+    answer(firmware, "", firmware.board.now_s + 119.0)
+    assert not firmware.record().happened("motors off")
+    answer(firmware, "M105\n", firmware.board.now_s + 2.0)  # no move: it does not count
+    answer(firmware, "G1 X6 Y6 Z51\n")
+    assert firmware.record().happened("motors off")
+    assert answer(firmware, "M114\n")[0].startswith("X:6.00 Y:6.00 Z:51.00")
+    assert firmware.record().end[-1, :3] == pytest.approx([6.0 - SLIP_MM, 6.0 - SLIP_MM, 51.0 - SLIP_MM])
+
+
+def test_m84_with_an_idle_time_of_0_keeps_marlin_s_motors_on() -> None:
+    firmware = SimulatedFirmware(MARLIN)
+    answer(firmware, "G28\nG1 X5\nM84 S0\nM400\n")
+    answer(firmware, "", firmware.board.now_s + 10000.0)
+    assert not firmware.record().happened("motors off")
+
+
+def test_klipper_shuts_down_after_ten_idle_minutes_and_moves_nothing_any_more() -> None:
+    """klippy/extras/idle_timeout.py: TURN_OFF_HEATERS, M84; a dwell begins the time anew, M105 and M400 do not."""
+    firmware = SimulatedFirmware(KLIPPER)
+    answer(firmware, "G28\nM104 S200\nG1 X5\nM400\n")
+    answer(firmware, "", firmware.board.now_s + 599.0)
+    answer(firmware, "G4 P1\n", firmware.board.now_s + 599.0)
+    assert not firmware.record().happened("motors off")
+    answer(firmware, "M105\nM400\n", firmware.board.now_s + 2.0)
+    assert (firmware.record().happened("motors off"), firmware.record().nozzle_target_c) == (True, 0.0)
+    assert answer(firmware, "G1 X6\n")[0].startswith("!! Must home axis first: 6.000")
+
+
+def test_reprapfirmware_holds_its_motors_with_less_current() -> None:
+    """RepRapFirmware's Configuration.h: DefaultIdleCurrentFactor 0.3."""
+    firmware = SimulatedFirmware(RRF)
+    answer(firmware, "G28\nG1 X5\nM84 S30\nM400\n")
+    answer(firmware, "", firmware.board.now_s + 10000.0)
+    assert not firmware.record().happened("motors off")

@@ -70,7 +70,7 @@ def test_a_pause_before_the_place_is_known_moves_filament_only() -> None:
     modal.take("M104 S200")
     way = plan_park(modal, PROFILE, PrintedBounds(MACHINE))
     assert way.park is None
-    assert not [line for line in (*way.away, *way.back) if re.match(r"G[01] .*[XYZ]", line)]
+    assert not [line for line in (*way.away, *way.down) if re.match(r"G[01] .*[XYZ]", line)]
 
 
 def test_filament_that_the_program_has_pulled_back_already_is_not_pulled_again() -> None:
@@ -101,4 +101,3 @@ def test_a_material_may_want_the_nozzle_cooler_while_a_print_rests() -> None:
     cool, hot = (load(settings=[f"material.standby_c={c}"]) for c in (150, 250))
     ways = [plan_park(modal, profile, PrintedBounds(MACHINE)) for profile in (PROFILE, cool, hot)]
     assert ["M104 S150" in way.away for way in ways] == [False, True, False]
-    assert all("M109 S200" in way.back for way in ways)

@@ -1,0 +1,136 @@
+"""Pause: a print that stands still until a person lets it go on: leave it, wait, come back to the same place.
+
+Meanwhile the firmware is kept from letting its motors go, and a nozzle that nobody comes back to is switched off: it would drip,
+and char what is in it.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from math import inf
+
+from machine.firmware import dialect_of
+from machine.gcode.modal_state import MOVES, ModalState, Place
+from machine.gcode.pen import number
+from machine.link.exchange import Exchange
+from machine.link.pause.park_moves import fill_commands, heat_commands, plan_park
+from machine.link.pause.printed_bounds import PrintedBounds
+from machine.link.pending_commands import PendingCommands
+from machine.link.protocol.framing import name_of
+from machine.link.watchdog import PrinterReports
+from profiles.profile import Profile
+
+AWAKE_S = 60.0  # half of the shortest idle time, Marlin's DEFAULT_STEPPER_TIMEOUT_SEC
+COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP and Klipper's min_extrude_temp
+NEAR_C = 10.0  # a print that is to be colder than that shows that its firmware allows it
+NOZZLE_HEAT = ("M104", "M109", "M568", "SET_HEATER_TEMPERATURE")
+
+
+@dataclass
+class Pause:
+    """modal: the firmware's state where the print stopped; what a person sets meanwhile is taken into it.
+
+    stands: X Y Z tilt turn E where the tip waits, None on its way; aside: it has left the print; off: its nozzle is switched off.
+    """
+
+    exchange: Exchange
+    pending: PendingCommands
+    reports: PrinterReports
+    modal: ModalState
+    profile: Profile | None
+    stands: Place | None = None
+    aside: bool = False
+    off: bool = False
+    printing_c: float = 0.0  # the nozzle's target where the print stopped
+
+    def run(self, bounds: PrintedBounds | None, why: str) -> Iterator[tuple[str, str]]:
+        """The whole pause: each of its states as it begins, with the words to be shown. bounds: what was printed."""
+        modal, bed_c, self.printing_c = self.modal, self.modal.bed_c, self.modal.nozzle_c
+        moves = plan_park(modal, self.profile, bounds)
+        self._send(moves.away)
+        self.exchange.drain()
+        self.aside = moves.park is not None
+        self.stands = (*moves.park.stand_mm, *modal.at[3:]) if moves.park is not None else modal.place()
+        yield "paused", why
+        for words in self._wait(why):
+            yield "paused", words
+        # A heater that the person has switched off is off for the pause only: a print cannot go on cold.
+        modal.nozzle_c, modal.bed_c = modal.nozzle_c or self.printing_c, modal.bed_c or bed_c
+        cooled = modal.nozzle_c > 0 and (self.off or self._has_cooled())
+        yield "resuming", f"the nozzle is {self._heating()}" if cooled else ""
+        self._send(heat_commands(modal, self.profile))
+        if cooled and self.aside and self.profile is not None:
+            self._send(fill_commands(modal, self.profile))
+        self.exchange.drain()
+        self.stands, self.aside = None, False
+        yield "resuming", ""
+        self._send((*moves.down, *moves.push, *modal.lines()))
+
+    def _wait(self, why: str) -> Iterator[str]:
+        """Until the print is to go on; the words to be shown when they change."""
+        pending, exchange, now_s = self.pending, self.exchange, self.exchange.medium.now_s
+        awake = exchange.connection.greeting.keep_awake
+        awake_s, since_s = now_s(), now_s()
+        while pending.lines or not pending.resume:
+            if awake and now_s() >= awake_s:
+                exchange.send(awake)
+                awake_s = now_s() + AWAKE_S
+            if pending.lines:
+                refused = self._send_own()
+                since_s = now_s()
+                yield refused or self._words(why)
+            elif now_s() >= since_s + self._cools_after_s():
+                self._switch_off()
+                yield self._words(why)
+            due_s = min(awake_s if awake else inf, since_s + self._cools_after_s())
+            exchange.wait(due_s - now_s(), until=lambda: pending.resume or bool(pending.lines))
+
+    def _cools_after_s(self) -> float:
+        """How long the nozzle stays hot while nobody does anything, s."""
+        minutes = self.profile.machine.pause_cools_after_min if self.profile is not None else 0.0
+        return 60.0 * minutes if minutes and self.modal.nozzle_c > 0 and not self.off else inf
+
+    def _switch_off(self) -> None:
+        if self.profile is not None:
+            self.exchange.send(dialect_of(self.profile.machine).nozzle.format(number(0.0)))
+            self.off = True
+
+    def _send_own(self) -> str:
+        """The person's commands; why one of them was not sent, "" when all were: a firmware ends the print at cold filament."""
+        refused = ""
+        for command in self.pending.next_lines(self.modal):
+            name = name_of(command.upper())
+            if name in MOVES:
+                self.exchange.send("M105")
+                self.exchange.settle()  # whatever heats is waited for
+                if self._is_cold():
+                    nozzle_c = self.reports.temperature.nozzle_c
+                    refused = f"not sent: {command[:40]!r}: the nozzle has only {nozzle_c:.0f} deg C: heat it first (M109)"
+                    continue
+            self.exchange.send(command)
+            self.off = self.off and name not in NOZZLE_HEAT
+        return refused
+
+    def _is_cold(self) -> bool:
+        """Whether the printer says that no filament can be pushed."""
+        nozzle_c, hot_c = self.reports.temperature.nozzle_c, self.modal.nozzle_c or self.printing_c
+        return nozzle_c is not None and nozzle_c < (min(COLD_C, hot_c - NEAR_C) if hot_c else COLD_C)
+
+    def _has_cooled(self) -> bool:
+        """Whether the nozzle was switched off by somebody else: a person, the firmware."""
+        return self._is_cold() and (self.profile is None or self.profile.material.standby_c is None)
+
+    def _words(self, why: str) -> str:
+        """Why it pauses, and what will happen when it goes on."""
+        if not self.off or self.profile is None:
+            return why
+        minutes = self.profile.machine.pause_cools_after_min
+        cooled = f"the nozzle was switched off after {minutes:g} min; when the print goes on it is {self._heating()}"
+        return f"{why}; {cooled}" if why else cooled
+
+    def _heating(self) -> str:
+        filled = " and filled where the tip waits: take the drop off" if self.aside else ""
+        return f"heated to {self.modal.nozzle_c:g} deg C{filled}"
+
+    def _send(self, commands: Iterable[str]) -> None:
+        for command in commands:
+            self.exchange.send(command)
