@@ -22,7 +22,7 @@ function printsLine(follow, refused, expired) {
       clearTimeout(waiting);
       notice("", "sent");
       const told = JSON.parse(event.data);
-      if (told.problem) return refused(told.problem);
+      if (told.problem) return refused(told);
       follow(told);
       sendOwed(told.prints);
     };
