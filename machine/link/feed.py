@@ -350,9 +350,9 @@ class Feed:
             Progress(
                 sent=self.sent, acknowledged=done, total=self._job.total, elapsed_s=elapsed_s,
                 left_s=self._left_s(elapsed_s), share=at.share(done, self._job.total),
-                temperature=self.reports.temperature, part=at.part, parts=at.parts, layer=at.layer,
-                state="pausing" if pausing else self.state,
-                file_line=self.history.acknowledged,
+                temperature=self.reports.temperature, heat_age_s=now_s - self.reports.temperature_s,
+                part=at.part, parts=at.parts, layer=at.layer,
+                state="pausing" if pausing else self.state, file_line=self.history.acknowledged,
                 feed_percent=self._pending.feed_percent, flow_percent=self._pending.flow_percent,
                 message=self._pending.message or self._trouble or self.reports.waiting or self._silence(),
             )

@@ -49,6 +49,7 @@ def state_of(progress: Progress | None, state: str = "") -> dict[str, Any]:
         "nozzle_target_c": heat.nozzle_target_c,
         "bed_c": heat.bed_c,
         "bed_target_c": heat.bed_target_c,
+        "heat_is_old": bool(state) or progress.heat_is_old,
         "message": progress.message,
     }
 

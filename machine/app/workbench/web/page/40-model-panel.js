@@ -46,8 +46,12 @@ function showResting(resting, bench) {
   }));
 }
 
+/** Pairs of a name and a text, and of a class where the text has one; what has not changed stays, and what is selected in it. */
 function tellIn(id, pairs) {
-  $(id).replaceChildren(...pairs.flatMap(([name, text]) => [made("dt", { text: name }), made("dd", { text })]));
+  const told = JSON.stringify(pairs);
+  if ($(id).told === told) return;
+  $(id).told = told;
+  $(id).replaceChildren(...pairs.flatMap(([name, text, className]) => [made("dt", { text: name }), made("dd", { text, className })]));
 }
 
 const listIn = (id, sentences) => $(id).replaceChildren(...sentences.map((text) => made("li", { text })));

@@ -34,6 +34,7 @@ function printPanel(bench) {
   }
 
   setInterval(() => {
+    if (print()?.progress) showProgress(print()); // its temperatures grow old
     if (!state.prints.some((each) => silence(each))) return;
     showPrint(print(), print()?.holder === OWN_PAGE);
     showBar(state.prints.filter((each) => each.phase !== "over"), print());
