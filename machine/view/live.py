@@ -5,6 +5,7 @@ for the local host by name are answered, or a page from elsewhere could try by l
 """
 
 import json
+import os
 import secrets
 import sys
 from collections.abc import Iterator
@@ -109,6 +110,7 @@ def serve(page: bytes, port: int = 0) -> Iterator[Watched]:
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
+    allow_reuse_address = os.name == "posix"  # Windows would let a second program listen at the port
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Who asked has gone: nothing to tell. Anything else is told as the library does."""

@@ -19,6 +19,7 @@ function modelPanel(bench) {
   $("as-read").addEventListener("click", () => bench.send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }));
   $("lay").addEventListener("click", () => bench.lay($("lay").getAttribute("aria-pressed") !== "true"));
   dropping();
+  leftFiles();
   return {
     told: ({ model, rotation, resting, overhang_mm2: area }, before) => {
       if (JSON.stringify(rotation) !== JSON.stringify(before?.rotation)) {

@@ -81,20 +81,21 @@ function printPanel(bench) {
   };
   addEventListener("keydown", byKey, true);
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
+  const which = ({ sliced }) => sliced && [sliced.key, sliced.stale];
   return {
     told: (now, before) => {
       const why = unsliced(now);
       $("check").disabled = Boolean(why);
       $("unsliced").hidden = !why;
       $("unsliced").textContent = `Nothing to print: ${why}.`;
-      if (now.sliced?.key !== before?.sliced?.key) unforce(); // what was found of others
+      if (!alike(which(now), which(before || {}))) { unforce(); problem(""); } // what was found of others
       follow.told();
     },
   };
 }
 
 function problem(text) {
-  $("print-problem").textContent = text;
+  $("print-problem").replaceChildren(...withWholeOptions(text));
   $("print-problem").hidden = !text;
 }
 
