@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from machine.dryrun import clearance, contents, extrusion, heat, layering, motion, placement, provenance, sequence
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
-from machine.dryrun.strokes import beads_of
+from machine.dryrun.strokes import Beads, beads_of
 from machine.kinematics.table import workpiece_path
 from machine.planning.limits import axis_limits
 from machine.planning.timing import move_times
@@ -32,7 +32,8 @@ class DryRun:
 
     times_s: (n,) seconds of each row of program; dwell_s: waiting told by G4 (heating and homing are not counted).
     segments_mm: (m, 2, 3) deposited segments, workpiece frame; segment_row: (m,) their rows in program, which hold line,
-    part, layer, type, width and height; segment_mm3: (m,) their volumes. contacts: what lay under each row.
+    part, layer, type, width and height; segment_mm3: (m,) their volumes. contacts: what lay under each row; None where
+    it was known before what there is to find.
     """
 
     program: ParsedProgram
@@ -41,7 +42,7 @@ class DryRun:
     segments_mm: Floats
     segment_row: NDArray[np.int64]
     segment_mm3: Floats
-    contacts: Contacts
+    contacts: Contacts | None
     findings: tuple[Finding, ...]
     letters: tuple[str, ...]
 
@@ -61,8 +62,11 @@ class DryRun:
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
-def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
-    """Read G-code lines and play them: times, deposited plastic, findings. Raises GcodeError for what is not G-code."""
+def dry_run(lines: Iterable[str], profile: Profile, found: Sequence[Finding] | None = None) -> DryRun:
+    """Read G-code lines and play them: times, deposited plastic, findings. Raises GcodeError for what is not G-code.
+
+    found: the findings of an earlier dry run of these very lines with this very profile, which are not looked for again.
+    """
     machine, text = profile.machine, lines if isinstance(lines, Sequence) else list(lines)
     program = parse_gcode(text, machine)
     _refuse_far_places(program)
@@ -72,11 +76,32 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     area = pi * profile.material.diameter_mm**2 / 4.0
     stop = np.zeros(len(program.line), dtype=np.bool_)
     stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
-    deposited = beads_of(program, segments, rows, profile)
-    contacts = replay(program, deposited, profile)
+    contacts = None
+    if found is None:
+        deposited = beads_of(program, segments, rows, profile)
+        contacts = replay(program, deposited, profile)
+        found = _findings(text, program, deposited, contacts, profile)
+    return DryRun(
+        program=program,
+        times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration),
+        dwell_s=sum(event.value for event in program.events if event.code == "G4"),
+        segments_mm=segments,
+        segment_row=rows,
+        segment_mm3=program.e_mm[rows] * area,
+        contacts=contacts,
+        findings=tuple(found),
+        letters=tuple(axis_limits(machine)),
+    )
+
+
+def _findings(
+    text: Sequence[str], program: ParsedProgram, deposited: Beads, contacts: Contacts, profile: Profile
+) -> list[Finding]:
+    """What speaks against a program, the worst first."""
+    segments, rows = deposited.segments_mm, deposited.rows
     findings = [
-        *motion.findings(program, machine),
-        *clearance.findings(program, segments, rows, machine),
+        *motion.findings(program, profile.machine),
+        *clearance.findings(program, segments, rows, profile.machine),
         *placement.findings(program, deposited, contacts),
         *layering.findings(program, deposited, contacts),
         *extrusion.findings(program, deposited, profile),
@@ -87,18 +112,7 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
         *placement.purged_into(program, deposited),
         *heat.findings(program, profile, provenance.has_material(text, profile)),
     ]
-    findings = sorted(dict.fromkeys(findings), key=lambda finding: (finding.severity, finding.line))
-    return DryRun(
-        program=program,
-        times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration),
-        dwell_s=sum(event.value for event in program.events if event.code == "G4"),
-        segments_mm=segments,
-        segment_row=rows,
-        segment_mm3=program.e_mm[rows] * area,
-        contacts=contacts,
-        findings=tuple(findings),
-        letters=tuple(axis_limits(machine)),
-    )
+    return sorted(dict.fromkeys(findings), key=lambda finding: (finding.severity, finding.line))
 
 
 def _refuse_far_places(program: ParsedProgram) -> None:

@@ -1,12 +1,15 @@
 """Findings: what a person must know before a print is started."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from machine.reader.parsed import OWN, ParsedProgram
+from profiles.profile import Profile
 
 Severity = Literal["error", "warning"]
 MOST = 20
@@ -22,6 +25,29 @@ class Finding:
     part: int
     layer: int
     message: str
+
+
+@dataclass(frozen=True)
+class KnownFindings:
+    """What a dry run has found of the lines of a digest for a profile."""
+
+    digest: str
+    profile: Profile
+    findings: tuple[Finding, ...]
+
+    def of(self, lines: Sequence[str], profile: Profile) -> tuple[Finding, ...] | None:
+        """What a dry run of lines for a profile would find, where they are the very same; None: that is not known."""
+        return self.findings if profile == self.profile and _digest(lines) == self.digest else None
+
+
+def known_findings(lines: Sequence[str], profile: Profile, findings: Iterable[Finding]) -> KnownFindings:
+    """The findings of a dry run of lines for a profile, to be known of the very same."""
+    return KnownFindings(_digest(lines), profile, tuple(findings))
+
+
+def _digest(lines: Sequence[str]) -> str:
+    """Of lines and how many they are: one that held a line's end would be two when the text is read again."""
+    return sha256("\n".join((str(len(lines)), *lines)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def per_part(

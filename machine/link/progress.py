@@ -11,13 +11,17 @@ from machine.link.protocol.events import Temperature
 from machine.link.protocol.framing import LINE_LIMIT
 from profiles.profile import Profile
 
+OLD_HEAT_S = 15.0  # a printer reports every few seconds, and is asked when it does not
+UNHEARD = ("cancelling", "reconnecting")  # states of a print in which no report is taken
+
 
 @dataclass(frozen=True)
 class Progress:
     """A moment of a print. None: not known (yet).
 
     state: printing, pausing, paused, resuming, cancelling, finishing, reconnecting. file_line: line in the program's file of the
-    newest acknowledged command, from 1. message: the newest word to the person watching, "" when there is none.
+    newest acknowledged command, from 1. message: the newest word to the person watching, "" when there is none. heat_age_s: since
+    the temperatures were reported.
     """
 
     sent: int
@@ -35,6 +39,17 @@ class Progress:
     feed_percent: float = 100.0
     flow_percent: float = 100.0
     message: str = ""
+    heat_age_s: float = 0.0
+
+    @property
+    def heat_is_old(self) -> bool:
+        """Whether the temperatures are only those last known."""
+        return self.heat_age_s >= OLD_HEAT_S or self.state in UNHEARD
+
+
+def last_known(heat: Temperature, age_s: float) -> str:
+    """Temperatures behind the last words of a print, for what hears no more of its heaters; "" where none were told."""
+    return f"; {heat.words} as last known, {age_s:.0f} s before" if heat.words else ""
 
 
 @dataclass(frozen=True)

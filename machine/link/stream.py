@@ -10,7 +10,7 @@ from machine.link.journal import Journal
 from machine.link.line_outcome import line_was_done
 from machine.link.medium import SERIAL, Medium, reopen, stable_name
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
-from machine.link.progress import PrintJob, Progress, Schedule
+from machine.link.progress import PrintJob, Progress, Schedule, last_known
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.resume import ResumePoint
@@ -159,25 +159,32 @@ class _Print:
 
     def _stop(self) -> str:
         """The emergency stop, in words."""
+        heat = self._last_known()
         halted = emergency_stop(self.exchange.wire, self.medium)
         self.feed.set_state("cancelling")
         if halted:
-            return f"emergency stop: the printer has halted; {self._revival()}"
-        return "emergency stop: the printer did not confirm M112: cut the power"
+            return f"emergency stop: the printer has halted; {self._revival()}{heat}"
+        return f"emergency stop: the printer did not confirm M112: cut the power{heat}"
 
     def _revival(self) -> str:
         """What a person does about a printer that has halted."""
         return f"{self.exchange.connection.greeting.firmware.line.revival} before the next print"
 
     def _leave(self, error: PrinterError) -> str:
-        """Heaters off before an error goes its way; words on whether the printer proved it."""
+        """Heaters off before an error goes its way; words on whether the printer proved it, and how hot it was if not."""
+        heat = self._last_known()
         if isinstance(error, PortError):
-            return Heaters.UNPROVED.value
+            return f"{Heaters.UNPROVED.value}{heat}"
         timeout_s = HEATERS_OFF_S.get(type(error), SETTLE_S)
         alive = not isinstance(error, FirmwareError)
         waits = alive and not isinstance(error, SilenceError)  # whose homing has been waited for already
         heaters = self._shut_down(timeout_s, alive, waits)
-        return f"{heaters.value}: {self._revival()}" if heaters is Heaters.HALTED else heaters.value
+        told = f"{heaters.value}: {self._revival()}" if heaters is Heaters.HALTED else heaters.value
+        return told if heaters is Heaters.OFF else f"{told}{heat}"
+
+    def _last_known(self) -> str:
+        reports = self.feed.reports
+        return last_known(reports.temperature, self.medium.now_s() - reports.temperature_s)
 
     def _shut_down(self, timeout_s: float, alive: bool = True, waits: bool = True) -> Heaters:
         """Heaters off, the tip lifted where the printer is alive and knows its place; waits: for the end of homing."""

@@ -14,6 +14,7 @@ from enum import Enum
 from functools import partial
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control, PendingCommand, percent_refusal
+from machine.link.progress import last_known
 from machine.link.protocol.events import Temperature
 from machine.network.server import ACTIVE, JobStatus, Phase, PrintServer
 from profiles.errors import NoAnswerError, ServerError
@@ -152,7 +153,8 @@ class _Follower:
         silent_s = time.monotonic() - heard.answered_s
         if silent_s > LOST_S:
             where = heard.error or self._server.name
-            raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer")
+            heat = last_known(self._heat, silent_s)
+            raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer{heat}")
         if heard.status is None:
             return None
         quiet = heard.error is not None or silent_s > QUIET_S
@@ -166,7 +168,7 @@ class _Follower:
         if self._began_s is None:
             return None
         heat = status.temperature
-        self._heat = heat if (heat.nozzle_c, heat.bed_c) != (None, None) else self._heat
+        self._heat = heat if heat.words else self._heat
         if status.phase in ACTIVE:
             if self._last_active is not None and status.file not in ("", self._file):
                 raise ServerError(f"{self._server.name} prints {status.file} now: what became of {self._file} is not known")
@@ -188,9 +190,7 @@ class _Follower:
 
     def _ended_there(self, status: JobStatus) -> str:
         """A server that has died and come back, or somebody else who has cancelled: the heaters may still be on."""
-        degrees = (("nozzle", self._heat.nozzle_c), ("bed", self._heat.bed_c))
-        heat = [f"{what} {value_c:.0f} deg C" for what, value_c in degrees if value_c is not None]
-        known = ", ".join([*([f"{self._reached} read"] if self._reached else []), *heat])
+        known = ", ".join(filter(None, (f"{self._reached} read" if self._reached else "", self._heat.words)))
         return (
             f"{self._server.name} no longer prints {self._file or 'its file'} ({status.message or status.phase.value})"
             f"{f'; last known: {known}' if known else ''}: look at the printer"

@@ -5,6 +5,7 @@ for the local host by name are answered, or a page from elsewhere could try by l
 """
 
 import json
+import os
 import secrets
 import sys
 from collections.abc import Iterator
@@ -49,6 +50,7 @@ def state_of(progress: Progress | None, state: str = "") -> dict[str, Any]:
         "nozzle_target_c": heat.nozzle_target_c,
         "bed_c": heat.bed_c,
         "bed_target_c": heat.bed_target_c,
+        "heat_is_old": bool(state) or progress.heat_is_old,
         "message": progress.message,
     }
 
@@ -108,6 +110,7 @@ def serve(page: bytes, port: int = 0) -> Iterator[Watched]:
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
+    allow_reuse_address = os.name == "posix"  # Windows would let a second program listen at the port
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Who asked has gone: nothing to tell. Anything else is told as the library does."""

@@ -10,7 +10,8 @@ const fake = (() => {
       id, hidden: id === "emergency", textContent: "", value: "", dataset: {}, options: [], children: [], contentWindow: { addEventListener() {} },
       addEventListener: (event, act) => { (listeners[event] ||= []).push(act); },
       fire: (event) => (listeners[event] || []).forEach((act) => act({ target: {} })),
-      setAttribute() {}, getAttribute() {}, append() {}, replaceChildren() {}, querySelector: () => element(""),
+      setAttribute() {}, getAttribute() {}, append() {}, querySelector: () => element(""),
+      replaceChildren(...children) { this.children = children; },
     };
   }
 
@@ -30,7 +31,7 @@ const fake = (() => {
     location: { href: "http://127.0.0.1:8000/token/1/", origin: "http://127.0.0.1:8000", pathname: "/token/1/" },
     document: { getElementById: (id) => (elements[id] ||= element(id)), documentElement: element(""), createElement: element, querySelector: () => null },
     addEventListener: (event, act) => { if (event === "keydown") keys.push(act); },
-    setInterval() {},
+    setInterval: (act, every_ms) => { const again = () => { act(); setTimeout(again, every_ms); }; setTimeout(again, every_ms); },
     setTimeout: (act, after_ms, ...given) => timers.push({ act, given, at_ms: now_ms + after_ms }),
     clearTimeout: (number) => { if (number) timers[number - 1].done = true; },
   });

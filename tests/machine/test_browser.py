@@ -451,5 +451,8 @@ def test_a_running_print_is_followed(browser: Browser, monkeypatch: pytest.Monke
         browser.open(watched.address)
         browser.wait("Number(document.getElementById('position').value) === 40")
         assert text(browser, "live").startswith(f"printing 50 % · line {line} · nozzle 210 of 210 °C")
+        assert "as last known" not in text(browser, "live")
         assert {address.rsplit("/", 1)[1] for address in browser.requests} == {"", "state"}
         assert browser.complaints == []
+        watched.end("stopped")
+        browser.wait("document.getElementById('live').textContent.includes('nozzle 210 of 210 °C · as last known')")

@@ -232,8 +232,8 @@ def test_a_page_without_a_workbench_says_so_and_above_all_that_a_stop_has_not_ar
     with workbench() as running:
         browser.open(running.address)
         browser.wait("document.documentElement.dataset.line === 'open'")
-    browser.wait("document.documentElement.dataset.line === 'lost'")
-    assert "line to tiltprint is lost" in browser.value("$('notice').textContent")
+    browser.wait("document.documentElement.dataset.line === 'ended'")
+    assert browser.value("$('notice').textContent").startswith("tiltprint has ended")
     browser.value("$('emergency').click()")
     counting = "WebSocket = class extends WebSocket { constructor(at) { super(at); tries++; } }"
     browser.value(f"window.tries = 0; {counting}")

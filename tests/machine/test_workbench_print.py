@@ -1,6 +1,7 @@
 """The workbench prints: what is refused, who commands, and what is sent, on the simulated printer."""
 
 import json
+import re
 import signal
 import socket
 from collections.abc import Iterator
@@ -171,6 +172,9 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.wait(f"{PRINTING} === 'over' && $('emergency').hidden")
         assert browser.value("$('stop-words').textContent").startswith("box.stl: emergency stop: the printer has halted")
         assert browser.value("$('run-state').textContent").startswith("emergency stop: the printer has halted")
+        heat = browser.value("[...$('run-told').querySelectorAll('dd.old')].map((each) => each.textContent)")
+        assert len(heat) == 2
+        assert all(re.fullmatch(r"[\d.]+ of \d+ °C, as last known \d+ s ago", told) for told in heat)
         assert "M112" in commands_sent(Path(other.until(lambda one: one["phase"] == "over")["log"]))
         other.command("forget")
         browser.wait(f"{PRINTING} === ''")

@@ -29,7 +29,7 @@ def export(request: ModelRequest) -> int:
     decomposed = decompose_model(request, to_build=True)
     profile = decomposed.profile
     program = build(decomposed.decomposition, profile, pictures=True, stops=request.stops)
-    refuse_errors(program, request.force)
+    refuse_errors(program.run.errors, request.force)
     picture = b"" if outputs.svg is None else draw_layer(program.sliced, part, layer)
     if outputs.gcode is not None:
         write_lines(outputs.gcode, program.lines)

@@ -1,5 +1,6 @@
 """Programs: of a model, which is cut, sliced and planned, or of a G-code file as it is; dry-run either way."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
+from machine.dryrun.findings import Finding
 from machine.view.program import Program
 from profiles.errors import GcodeError, MoveError
 from profiles.profile import Profile
@@ -56,9 +58,8 @@ def read_gcode_lines(path: Path) -> tuple[str, ...]:
     return lines
 
 
-def refuse_errors(program: Program, force: bool) -> None:
+def refuse_errors(errors: Sequence[Finding], force: bool) -> None:
     """Raise MoveError for a program whose dry run found errors; force: only say so."""
-    errors = program.run.errors
     if not errors:
         return
     if force:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 
 from machine.app.printer.attendance import Observers, ServerAttendance
 from machine.app.printer.rescue import STOPPED
@@ -14,7 +15,7 @@ from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import reporting, say
 from machine.app.terminal.screen import Course, UnknownCourse
 from machine.link.pending_commands import CancelledError
-from machine.link.progress import ProgramPosition, Progress
+from machine.link.progress import ProgramPosition, Progress, last_known
 from machine.network.follow import End, OnStatus, follow_print, follow_running
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import ACTIVE, JobStatus, PrintServer
@@ -135,7 +136,7 @@ def _shown(
 
 def _report_end(end: End, file: str, server: str, progress: "ProgressToldByServer") -> None:
     if end is End.STOPPED:
-        raise FirmwareError(STOPPED.format(server=server))
+        raise FirmwareError(f"{STOPPED.format(server=server)}{progress.last_known}")
     if end is End.DONE:
         show(f"printed {file} on {server} in {duration(progress.elapsed_s)}\n")
         return
@@ -152,9 +153,18 @@ class ProgressToldByServer:
 
     def __init__(self) -> None:
         self.line, self.elapsed_s = 0, 0.0
+        self._told: JobStatus | None = None  # last
+        self._told_s = monotonic()
+
+    @property
+    def last_known(self) -> str:
+        """The temperatures that were told last, behind the last words of a print."""
+        return "" if self._told is None else last_known(self._told.temperature, monotonic() - self._told_s)
 
     def at(self, status: JobStatus, message: str) -> Progress:
         """The progress at a moment. message: goes before the server's own."""
+        if status is not self._told:  # a server that does not answer leaves what it told last
+            self._told, self._told_s = status, monotonic()
         self.elapsed_s = max(self.elapsed_s, status.elapsed_s or 0.0)
         return Progress(
             sent=0,
@@ -164,6 +174,7 @@ class ProgressToldByServer:
             left_s=None,
             share=status.share,
             temperature=status.temperature,
+            heat_age_s=monotonic() - self._told_s,
             part=None,
             parts=None,
             layer=None,

@@ -16,7 +16,7 @@ def ready_program(
 ) -> Program:
     """The program with what the dry run finds of this line's rate. Raises PrinterError, MoveError; force: only says so."""
     check_program(answer, program, profile, name, force)
-    refuse_errors(program, force)
+    refuse_errors(program.run.errors, force)
     if not is_rate_limited(printing.port):
         return program
     return replace(program, run=find_starvation(program.run, program.lines, profile.machine, printing.baud))

@@ -18,11 +18,16 @@ from profiles.profile import Profile
 
 def check_server_machine(address: ServerAddress, greeting: Greeting, machine: Machine, force: bool) -> None:
     """Refuse a machine whose dialect the server's firmware does not read, whose axes or macros it lacks. Raises PrinterError."""
-    if sentence := dialect_mismatch(address, machine.name, machine.dialect):
-        raise PrinterError(sentence)
+    check_server_dialect(address, machine)
     check_printer(_answer(greeting), machine, force)
     refuse(lacking_steppers(greeting, machine), force)
     refuse(_unknown_macros(lacking_macros(greeting, _block_lines(machine)), machine.name), force)
+
+
+def check_server_dialect(address: ServerAddress, machine: Machine) -> None:
+    """The first of that, which is known before the server is asked. Raises PrinterError."""
+    if sentence := dialect_mismatch(address, machine.name, machine.dialect):
+        raise PrinterError(sentence)
 
 
 def ready_for_server(greeting: Greeting, program: Program, profile: Profile, file: str, force: bool) -> None:
@@ -32,7 +37,7 @@ def ready_for_server(greeting: Greeting, program: Program, profile: Profile, fil
     check_program(_answer(greeting), program, profile, file, force)
     told = lacking_macros(greeting, _block_lines(profile.machine))
     refuse(_unknown_macros([name for name in lacking_macros(greeting, program.lines) if name not in told], file), force)
-    refuse_errors(program, force)
+    refuse_errors(program.run.errors, force)
 
 
 def check_free(server: str, status: JobStatus) -> None:

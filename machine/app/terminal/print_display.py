@@ -78,7 +78,8 @@ def status(progress: Progress) -> str:
         phrases.append(f"layer {progress.layer}")
     nozzle, bed = progress.temperature.nozzle_c, progress.temperature.bed_c
     if nozzle is not None:
-        phrases.append(f"nozzle {nozzle:.0f} C" + (f", bed {bed:.0f} C" if bed is not None else ""))
+        old = f" as last known {progress.heat_age_s:.0f} s ago" if progress.heat_is_old else ""
+        phrases.append(f"nozzle {nozzle:.0f} C" + (f", bed {bed:.0f} C" if bed is not None else "") + old)
     if progress.left_s is not None:
         phrases.append(f"{duration(progress.left_s)} left")
     return f"{progress.state}: " + ", ".join(phrases) + (f"; {progress.message}" if progress.message else "")

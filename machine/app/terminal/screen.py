@@ -192,6 +192,7 @@ def _of(count: int | None) -> str:
 
 def _heat(progress: Progress) -> Text:
     heat = progress.temperature
+    old = [f"as last known {progress.heat_age_s:.0f} s ago:"] if progress.heat_is_old and heat.words else []
     phrases = [
         f"{name} {now_c:.1f}" + (f" / {target_c:.0f}" if target_c is not None else "") + " deg C"
         for name, now_c, target_c in (
@@ -201,7 +202,7 @@ def _heat(progress: Progress) -> Text:
         if now_c is not None
     ]
     overrides = [f"feed {progress.feed_percent:.0f} %", f"flow {progress.flow_percent:.0f} %"]
-    return _phrases_line([*phrases, *overrides])
+    return _phrases_line([*old, *phrases, *overrides])
 
 
 def _bar(progress: Progress) -> RenderableType:

@@ -36,13 +36,15 @@ class Agreement:
 
 
 def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, DryRun]:
-    """How the plastic of a dry run agrees with the closed model (workpiece frame); the run with what that found added.
+    """How the plastic of a dry run, one that has looked for its findings itself, agrees with the closed model (workpiece frame);
+    the run with what that found added.
 
     Findings: outside and shift (errors), unfilled (warning; only at 100 % infill, for sparse infill is meant to leave room).
     """
     share = inside_share(run, mesh, 0.5 * profile.process.line_width_mm + reach_mm(profile.process))
     filled = filled_share(run, mesh, profile).share
     deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
+    assert run.contacts is not None
     length, loose, reported = unsupported_mm(run.program, deposited, run.contacts)
     whole = max(length, 1e-9)
     moved = registration.shifts(run, mesh, profile)

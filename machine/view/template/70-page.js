@@ -23,7 +23,8 @@ const NOTICES = new Map(); // what is said now, by what it is about
 /** Says something over the picture, or ("") says it no more; shown is what began to be said last.
  * What one thing says stays until the same thing takes it back: a picture that is ready does not wipe away a warning. */
 function notice(text, about) {
-  if (text) NOTICES.set(about, text); else NOTICES.delete(about);
+  if (NOTICES.get(about) !== text) NOTICES.delete(about); // what is said anew goes to the end
+  if (text) NOTICES.set(about, text);
   const said = [...NOTICES.values()].at(-1) || "";
   if ($("notice").textContent !== said) $("notice").textContent = said; // read aloud once
   $("notice").hidden = !said;

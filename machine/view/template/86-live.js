@@ -32,6 +32,7 @@ function liveTold(told) {
     told.line && `line ${told.line}`,
     heat("nozzle", told.nozzle_c, told.nozzle_target_c),
     heat("bed", told.bed_c, told.bed_target_c),
+    told.heat_is_old && told.nozzle_c != null && "as last known",
     told.left_s && `${duration(told.left_s)} left`,
     told.message,
   ].filter(Boolean).join(" · ");

@@ -87,6 +87,7 @@ def _run(moves: str, z: float = 0.2) -> DryRun:
 
 
 def _sums(run: DryRun) -> list[float]:
+    assert run.contacts is not None
     return [float(values.sum()) for values in (run.contacts.air_mm, run.contacts.overlapping_mm, run.contacts.beside_mm)]
 
 

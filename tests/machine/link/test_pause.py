@@ -194,8 +194,11 @@ def test_the_emergency_stop_is_the_next_thing_on_the_wire_and_no_line_follows() 
     watcher = watched()
     watcher.when = {150: watcher.ask(Command.EMERGENCY_STOP)}
     written: list[bytes] = []
-    with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"):
+    known = "nozzle 200 deg C, bed 60 deg C as last known, [0-5] s before"
+    with pytest.raises(FirmwareError, match=f"emergency stop: the printer has halted; .*; {known}$"):
         watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written))
+    assert watcher.shown[-1].heat_is_old
+    assert not watcher.shown[-2].heat_is_old
     assert written[-1] == b"\nM112\n"
     assert watcher.printer.record.happened("M112")
 
@@ -204,7 +207,7 @@ def test_an_emergency_stop_without_answer_is_given_twice_and_says_to_cut_the_pow
     watcher = watched()
     written: list[bytes] = []
     watcher.when = {150: watcher.ask(Command.EMERGENCY_STOP)}
-    with pytest.raises(FirmwareError, match="did not confirm M112: cut the power"):
+    with pytest.raises(FirmwareError, match=r"did not confirm M112: cut the power; nozzle 200 .* as last known, \d s before"):
         watcher.run(PROGRAM, medium=_written(watcher.printer.medium, written, deaf=b"M112"))
     assert written[-2:] == [b"\nM112\n", b"\nM112\nM107\n"]
 
@@ -304,7 +307,10 @@ def test_a_port_that_comes_back_to_a_printer_that_went_on_loses_and_doubles_noth
     watcher = watched((Fault("disconnect", at=120, unit="line", seconds=length_s),))
     assert not watcher.run(PROGRAM).cancelled
     assert np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6
-    assert "reconnecting" in {progress.state for progress in watcher.shown}
+    lost = [progress for progress in watcher.shown if progress.state == "reconnecting"]
+    assert all(progress.heat_is_old for progress in lost)
+    assert lost[-1].heat_age_s - lost[0].heat_age_s == pytest.approx(lost[-1].elapsed_s - lost[0].elapsed_s)
+    assert lost[0].elapsed_s > 0.0
 
 
 @pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
@@ -349,7 +355,8 @@ def test_a_port_that_comes_back_to_a_restarted_printer_ends_the_print() -> None:
 
 def test_a_port_that_stays_away_ends_the_print_in_bounded_time() -> None:
     watcher = watched((Fault("disconnect", at=120, unit="line", seconds=1e6),))
-    with pytest.raises(PortError, match=r"did not come back within 120 s; its heaters may still be on"):
+    known = "nozzle 200 deg C, bed 60 deg C as last known, 12[0-9] s before"
+    with pytest.raises(PortError, match=f"did not come back within 120 s; its heaters may still be on, .*; {known}"):
         watcher.run(PROGRAM)
     assert watcher.printer.now_s < 1000.0
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from queue import SimpleQueue
 from threading import Event as Flag
+from time import time
 from typing import Any
 
 from machine.app.printer.attendance import Observers
@@ -115,7 +116,8 @@ class _Shown:
 
 
 def told(progress: Progress, course: Course) -> dict[str, Any]:
-    """A moment of a print for the page: what every page that watches is told, and what a terminal's screen adds."""
+    """A moment of a print for the page: what every page that watches is told, and what a terminal's screen adds. heat_s: since
+    when the temperatures are known, seconds since 1970, for the page goes on counting when nothing more comes."""
     return {
         **state_of(progress),
         "parts": progress.parts,
@@ -123,4 +125,5 @@ def told(progress: Progress, course: Course) -> dict[str, Any]:
         "at": course.at(progress.file_line),
         "feed_percent": progress.feed_percent,
         "flow_percent": progress.flow_percent,
+        "heat_s": time() - progress.heat_age_s,
     }

@@ -39,10 +39,12 @@ class Checks:
 
 
 def program_of(order: PrintOrder) -> Program:
-    """The order's very lines, dry-run."""
+    """The order's very lines, dry-run; what the dry run of the very same has found for the very same profile is not looked for
+    again."""
     compilers.wait_for(compilers.DRY_RUN)
     lines = tuple(order.gcode.decode().removesuffix("\n").split("\n"))
-    return Program(lines, dry_run(lines, order.profile), None)
+    found = None if order.known is None else order.known.of(lines, order.profile)
+    return Program(lines, dry_run(lines, order.profile, found), None)
 
 
 def figures(program: Program) -> dict[str, Any]:

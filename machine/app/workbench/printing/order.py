@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from machine.app.requests import PrintRequest
+from machine.dryrun.findings import KnownFindings
 from machine.network.address import is_server_address
 from profiles.profile import Profile
 
@@ -17,7 +18,7 @@ State = dict[str, Any]  # of a print, as JSON: order, phase and all that process
 @dataclass(frozen=True, eq=False)
 class PrintOrder:
     """gcode: the file that `export` writes of the same parts; force: go on as `print --force` does; key: of the slices; starts:
-    False where a print server is only to keep the file, as of `send`."""
+    False where a print server is only to keep the file, as of `send`; known: what has been found of a dry run already."""
 
     name: str
     gcode: bytes
@@ -26,6 +27,7 @@ class PrintOrder:
     force: bool = False
     key: str = ""
     starts: bool = True
+    known: KnownFindings | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,17 +1,38 @@
-"""Ordering: what lies sliced on a workbench, as an order to print it."""
+"""Ordering: what lies sliced on a workbench, as an order to print it; refused here is what is known before a printer is asked."""
 
+from machine.app.pipeline.programs import refuse_errors
+from machine.app.printer.compatibility import check_dialect, check_speed
+from machine.app.printer.server_checks import check_server_dialect
 from machine.app.requests import PrintRequest
 from machine.app.workbench.printing.order import PrintOrder
 from machine.app.workbench.session.session import Session
+from machine.dryrun.starvation import check_baud
+from machine.network.address import is_server_address, parse_server_address
 from profiles.errors import PlanError
+from profiles.machine import Machine
 
 
 def order_of(session: Session, printing: PrintRequest, force: bool, starts: bool = True) -> PrintOrder:
-    """The G-code that the session would save, for the profile that it was made with. Raises PlanError where there is none."""
+    """The G-code that the session would save, for the profile that it was made with. Raises PlanError where there is none,
+    PrinterError for a machine or a rate that cannot print there, MoveError where the slices' dry run found errors; force: not for
+    those."""
     bench = session.bench
     if session.closed:
         raise PlanError("this bench is not open any more: print from another one")
     if bench.model is None:
         raise PlanError("there is no model on the workbench yet: choose a file first")
     sliced = session.slicing.needed()
-    return PrintOrder(bench.model.name, sliced.gcode, bench.profile, printing, force, sliced.key, starts)
+    known = sliced.known
+    _check_place(printing, known.profile.machine)
+    if not force:  # what that goes past the print itself says
+        refuse_errors(sliced.errors, force=False)
+    return PrintOrder(bench.model.name, sliced.gcode, known.profile, printing, force, sliced.key, starts, known)
+
+
+def _check_place(printing: PrintRequest, machine: Machine) -> None:
+    if is_server_address(printing.port):
+        check_server_dialect(parse_server_address(printing.port), machine)
+        return
+    check_baud(printing.baud)
+    check_speed(printing.sim_speed)
+    check_dialect(machine)

@@ -72,10 +72,10 @@ async def shared_page(session: Session, request: Request) -> Response:
 async def gcode(session: Session, request: Request) -> Response:
     """The G-code; with errors only for who has said that he wants it all the same, as with `export --force`."""
     sliced = session.slicing.needed()
-    if sliced.errors and request.query_params.get("force") != "yes":
+    if (errors := sliced.errors) and request.query_params.get("force") != "yes":
         raise PlanError(
-            f"the dry run found {len(sliced.errors)} errors, the first: {sliced.errors[0]}: no G-code is saved unless you say"
-            " that you want it all the same (--force)"
+            f"the dry run found {len(errors)} errors, the first: {errors[0].message}: no G-code is saved unless you say that you"
+            " want it all the same (--force)"
         )
     return _download(sliced.gcode, "text/plain", f"{file_stem(session.bench)}.gcode")
 

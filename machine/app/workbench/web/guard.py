@@ -23,7 +23,7 @@ SAFE = ("GET", "HEAD")
 REFUSED_SOCKET = 1008  # policy violation, RFC 6455
 FOREIGN = "this page is for this computer only\n"
 LONG_NUMBER = re.compile(r"/\d{10}\d*(/|$)")  # nothing here has such a one
-UNKNOWN = "the workbench is at the address that tiltprint edit has told\n"
+UNKNOWN = "the workbench is at the address that tiltprint edit has told, which is another one with each start\n"
 
 
 def refusal(headers: Iterable[tuple[bytes, bytes]], method: str, path: str, token: str, port: int) -> tuple[int, str] | None:

@@ -12,7 +12,7 @@ from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
 from machine.app.crash import log_bug
-from machine.app.requests import PrintRequest
+from machine.app.requests import FORCE_GOES_ON, PrintRequest
 from machine.app.workbench.bench.planes import is_number
 from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder
 from machine.app.workbench.printing.ordering import order_of
@@ -75,7 +75,7 @@ async def _hear(prints: Prints, session: Session, socket: WebSocket, page: str) 
             asked = parsed(text, MOST_COMMAND)
             prints.command(page, asked, lambda given: _order(session, given))
         except UserError as error:
-            await send(socket, json.dumps({"problem": str(error)}))
+            await send(socket, json.dumps({"problem": str(error), "forcible": FORCE_GOES_ON in str(error)}))
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
             log = log_bug(error, ())
             told = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"

@@ -1,6 +1,7 @@
 """Serve: the workbench run from its address to Ctrl-C: nothing of it goes on afterwards."""
 
 import asyncio
+import os
 import secrets
 import socket
 from collections.abc import Callable, Iterator
@@ -16,8 +17,9 @@ from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.guard import HOST
 from machine.app.workbench.web.server import application
+from machine.app.workbench.web.uploads import Uploads
 from machine.app.workbench.work.processes import hear_the_ends
-from machine.app.workbench.work.received import tidy_left
+from machine.app.workbench.work.received import files_in, tidy_left
 from profiles.errors import OutputError
 
 GRACE_S = 1  # for answers under way when it ends, and for its processes
@@ -42,7 +44,12 @@ def listen(port: int) -> socket.socket:
     """A socket at a port of this computer, 0: any free one. Raises OutputError for one that cannot be had."""
     own = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     try:
+        if os.name == "posix":  # lines of a server that died keep its port for a minute; a second listener is refused as ever
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        elif hasattr(socket, "SO_EXCLUSIVEADDRUSE"):  # Windows keeps no port, and would let a second program listen there
+            own.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
         own.bind((HOST, port))
+        own.listen()  # at once: of two that are bound so, the second is refused here
     except (OSError, OverflowError) as error:
         own.close()
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
@@ -61,9 +68,11 @@ def serve_workbench(
     its address when it answers; upload_mib: the largest file that is taken from a page."""
     own = listen(port)
     with own:
-        for folder in tidy_left():
-            say(f"a workbench that was killed has left the files of its benches in {folder}: they go with a start in a day")
-        asyncio.run(_serve(make, begin, announce, own, upload_mib))
+        folders = tidy_left()
+        for folder in folders:
+            left = f"a workbench that was killed has left the files of its benches in {folder}"
+            say(f"{left}: the page offers them, and they go with a start in a day")
+        asyncio.run(_serve(make, begin, announce, own, Uploads(upload_mib, files_in(*folders))))
 
 
 async def _serve(
@@ -71,13 +80,13 @@ async def _serve(
     begin: Callable[[Session], None],
     announce: Callable[[str], None],
     own: socket.socket,
-    upload_mib: int,
+    uploads: Uploads,
 ) -> None:
     number, token = own.getsockname()[1], secrets.token_urlsafe(24)
     workbench, prints, loop = Workbench(make), Prints(), asyncio.get_running_loop()
     first = workbench.open()
     settings = uvicorn.Config(
-        application(workbench, prints, token, number, upload_mib),
+        application(workbench, prints, token, number, uploads),
         log_config=None,
         lifespan="off",
         ws="websockets-sansio",

@@ -34,15 +34,15 @@ from machine.app.workbench.web.page import workbench_page
 from machine.app.workbench.web.prints_line import print_log, prints_line
 from machine.app.workbench.web.profile_files import ProfileFiles
 from machine.app.workbench.web.snapshot import marks, marks_key, triangles
-from machine.app.workbench.web.uploads import take_file
+from machine.app.workbench.web.uploads import Uploads
 from profiles.places import KINDS, known
 
 Answer = Callable[[Request], Awaitable[Response]]
 
 
-def application(workbench: Workbench, prints: Prints, token: str, port: int, upload_mib: int) -> ASGIApp:
-    """The whole server, below `/TOKEN/`; the number of a session follows. upload_mib: the largest file that is taken."""
-    below, files = "/{token}/{session:int}/", ProfileFiles()
+def application(workbench: Workbench, prints: Prints, token: str, port: int, uploads: Uploads) -> ASGIApp:
+    """The whole server, below `/TOKEN/`; the number of a session follows."""
+    below = "/{token}/{session:int}/"
 
     def route(path: str, act: Callable[[Session, Request], Awaitable[Response]], method: str = "GET") -> Route:
         return Route(below + path, _answering(workbench, act), methods=[method])
@@ -52,7 +52,9 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int, upl
         route("model/{key}", _model),
         route("marks/{key}", _marks),
         route("pedestal/{key}", _pedestal),
-        route("file", take_file(files, upload_mib), "POST"),
+        route("file", uploads.take, "POST"),
+        route("left", uploads.list_left),
+        route("left/{number:int}", uploads.open_left, "POST"),
         route("plan.toml", plan),
         route("profile/{kind}.toml", profile),
         route("pieces", _pieces),
@@ -63,7 +65,7 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int, upl
         route("walls/{number:int}/{part:int}", print_walls),
         route("print.html", shared_page),
         route("print.gcode", gcode),
-        route("settings.json", _settings(files)),
+        route("settings.json", _settings(uploads.profiles)),
         Route(below + "prints/{print:int}/log", print_log(prints)),
         WebSocketRoute(below + "line", _connecting(workbench, talk)),
         WebSocketRoute(below + "prints", _connecting(workbench, prints_line(prints))),

@@ -52,5 +52,5 @@ def _sliced(session: Session) -> dict[str, Any] | None:
         "filament_mm": sliced.filament_mm,
         "findings": [asdict(each) for each in sliced.findings[:MOST_FINDINGS]],
         "more_findings": max(len(sliced.findings) - MOST_FINDINGS, 0),
-        "errors": sliced.errors[:MOST_FINDINGS],
+        "errors": [each.message for each in sliced.errors[:MOST_FINDINGS]],
     }

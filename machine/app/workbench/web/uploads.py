@@ -1,6 +1,10 @@
-"""Uploads: a model, a plan or a profile that a page sends, kept as long as it lies on its bench."""
+"""Uploads: a model, a plan or a profile that a page sends, kept as long as it lies on its bench, and those that a workbench which
+was killed has left, to be opened again."""
 
-from collections.abc import Awaitable, Callable
+import asyncio
+import shutil
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from starlette.requests import Request
@@ -15,25 +19,57 @@ TEXT_SUFFIX = ".toml"  # of plans and profiles
 MIB = 2**20
 
 
-def take_file(files: ProfileFiles, most_mib: int) -> Callable[[Session, Request], Awaitable[Response]]:
-    """What answers a file that the person has chosen or dropped; what is refused is not kept."""
+class Uploads:
+    """profiles: the profile files among them; most_mib: the largest file that is taken; left: files of a workbench that was
+    killed, each known to the pages by its place."""
 
-    async def answer(session: Session, request: Request) -> Response:
+    def __init__(self, most_mib: int, left: Sequence[Path] = ()) -> None:
+        self.profiles = ProfileFiles()
+        self._most_mib, self._left = most_mib, left
+
+    async def take(self, session: Session, request: Request) -> Response:
+        """A file that the person has chosen or dropped; what is refused is not kept."""
         name = Path(request.query_params.get("name", "")).name
+        return await self._open(session, name, lambda path: _receive(request, path, name, self._most_mib))
+
+    async def list_left(self, session: Session, request: Request) -> Response:
+        """What has been left and is still there."""
+        rows = []
+        for number, path in enumerate(self._left):
+            with suppress(OSError):
+                told = path.stat()
+                rows.append({"number": number, "name": path.name, "bytes": told.st_size, "written_s": told.st_mtime})
+        return JSONResponse(rows)
+
+    async def open_left(self, session: Session, request: Request) -> Response:
+        """The same opened on a bench, which gets a copy: what was left stays until its day is over."""
+        number = request.path_params["number"]
+        if number >= len(self._left):
+            raise PlanError("no such file has been left by a workbench that was killed")
+        path = self._left[number]
+
+        async def copy_to(copy: Path) -> None:
+            try:
+                await asyncio.to_thread(shutil.copyfile, path, copy)
+            except OSError as error:
+                why = (error.strerror or str(error)).lower()
+                raise PlanError(f"{path.name}, left by a workbench that was killed, cannot be read: {why}") from None
+
+        return await self._open(session, path.name, copy_to)
+
+    async def _open(self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]]) -> Response:
         path, taken = session.received.new_file(name), False
         try:
-            await _receive(request, path, name, most_mib)
+            await fill(path)
             if path.suffix.lower() != TEXT_SUFFIX:
                 await session.open_model(path, name)
                 taken = True
-            elif not files.take(path, session):
+            elif not self.profiles.take(path, session):
                 await session.open_plan(path)
         finally:
             if not taken:  # refused, or a text, of which nothing more is read
                 remove_file(path)
         return JSONResponse({})
-
-    return answer
 
 
 async def _receive(request: Request, path: Path, name: str, most_mib: int) -> None:

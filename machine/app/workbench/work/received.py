@@ -73,9 +73,15 @@ def tidy_left() -> tuple[Path, ...]:
     return tuple(left)
 
 
+def files_in(*folders: Path) -> list[Path]:
+    """The files of the folders of some Received, the newest ones first."""
+    files = [path for folder in folders for path in folder.glob("*/*") if path.is_file()]
+    return sorted(files, key=lambda path: (path.stat().st_mtime, path), reverse=True)
+
+
 def _is_done_with(folder: Path) -> bool:
     found = folder / FOUND
-    if not any(path.is_file() for path in folder.glob("*/*")):
+    if not files_in(folder):
         return True
     if not found.exists():
         found.touch()

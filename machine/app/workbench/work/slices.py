@@ -13,7 +13,7 @@ from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
 from machine.app.workbench.work.walls import walls
 from machine.app.workbench.work.worker import Tell
 from machine.dryrun.dryrun import summary
-from machine.dryrun.findings import Finding
+from machine.dryrun.findings import Finding, KnownFindings, known_findings
 from machine.view.comparison import Alternative
 from machine.view.page import print_page
 from mdp.decomposition import Decomposition
@@ -33,19 +33,25 @@ class SlicesSoFar:
 
 @dataclass(frozen=True, eq=False)
 class Sliced:
-    """A sliced bench: the page of the print and its G-code, what it takes, what its dry run complains of, and what it costs."""
+    """A sliced bench: the page of the print and its G-code, what it takes, what its dry run for a profile complains of, and what
+    it costs."""
 
     page: bytes
     gcode: bytes
     time_s: float
     filament_mm: float
-    findings: tuple[Finding, ...]
+    known: KnownFindings
     cost: Alternative
 
     @property
-    def errors(self) -> tuple[str, ...]:
-        """The findings that are errors, with which the command line writes no file without --force."""
-        return tuple(each.message for each in self.findings if each.severity == "error")
+    def findings(self) -> tuple[Finding, ...]:
+        """What the dry run complains of."""
+        return self.known.findings
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Those that are errors, with which the command line writes no file and prints nothing without --force."""
+        return tuple(each for each in self.findings if each.severity == "error")
 
     @cached_property
     def key(self) -> str:
@@ -87,7 +93,7 @@ def slice_bench(tell: Tell, bench: Bench) -> Sliced:
         ("\n".join(program.lines) + "\n").encode(),
         values["time_s"],
         values["filament_mm"],
-        tuple(program.run.findings),
+        known_findings(program.lines, profile, program.run.findings),
         in_parts(program, profile),
     )
 

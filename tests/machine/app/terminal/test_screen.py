@@ -3,11 +3,13 @@
 import io
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 import pytest
 from rich.console import Console
 
 from machine.app.terminal.keys import MORE
+from machine.app.terminal.print_display import status
 from machine.app.terminal.screen import KEYS, Course, ScreenState, Words, printer_message, render
 from machine.dryrun.dryrun import dry_run
 from machine.link.progress import Progress
@@ -73,6 +75,16 @@ def test_what_is_not_known_is_left_out() -> None:
     _, place, heat, bar, times, _ = lines(unknown)
     assert (place, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far")
     assert "%" not in bar
+
+
+@pytest.mark.parametrize("old", [{"heat_age_s": 40.0}, {"heat_age_s": 2.0, "state": "reconnecting"}])
+def test_temperatures_that_may_be_true_no_more_are_marked_with_their_age(old: dict[str, Any]) -> None:
+    moment = replace(MOMENT, **old)
+    mark = f"as last known {old['heat_age_s']:.0f} s ago"
+    assert lines(moment)[2].startswith(f"{mark}:   nozzle 209.8 / 210 deg C   bed 60.1 / 60 deg C")
+    assert f"nozzle 210 C, bed 60 C {mark}, " in status(moment)
+    for fresh in (replace(MOMENT, heat_age_s=14.0), replace(moment, temperature=Temperature())):
+        assert not any("as last known" in line for line in (*lines(fresh), status(fresh)))
 
 
 def test_an_end_on_another_day_is_told_with_its_day() -> None:

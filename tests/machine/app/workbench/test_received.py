@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.app.workbench.work.received import FOUND, KEPT_S, Received, tidy_left
+from machine.app.workbench.work.received import FOUND, KEPT_S, Received, files_in, tidy_left
 from mdp.save import stl
 from tests.machine.workbench import workbench
 from tests.shapes import tee
@@ -34,7 +34,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def files_in(folder: Path) -> list[str]:
+def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.rglob("*") if path.is_file())
 
 
@@ -60,14 +60,14 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
         told = page.until(lambda state: state["problem"])["problem"]
         assert told.startswith("large.stl: has more than 1 MiB, at most so many are taken from a page")
         assert [bench.send(sent / name)[0] for name in ("broken.stl", "tee.stl", "plan.toml")] == [422, 200, 422]
-        assert [files_in(folder) for folder in place.glob("tiltprint-edit-*") if files_in(folder)] == [["tee.stl"]]
+        assert [names_in(folder) for folder in place.glob("tiltprint-edit-*") if names_in(folder)] == [["tee.stl"]]
     assert list(place.glob("tiltprint-edit-*")) == []
 
 
 def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(place: Path) -> None:
     folder = left_by_a_killed_one("tee.stl")
     assert tidy_left() == tidy_left() == (folder,)
-    assert files_in(folder) == [FOUND, "tee.stl"]
+    assert names_in(folder) == [FOUND, "tee.stl"]
     past_s = (folder / FOUND).stat().st_mtime - KEPT_S - 1.0
     os.utime(folder / FOUND, (past_s, past_s))
     assert tidy_left() == ()
@@ -80,6 +80,15 @@ def test_a_folder_without_a_file_is_removed_and_that_of_a_program_that_runs_is_n
     empty = left_by_a_killed_one()
     assert tidy_left() == ()
     assert not empty.exists()
-    assert files_in(received.path) == ["tee.stl"]
+    assert names_in(received.path) == ["tee.stl"]
     received.remove()
     assert list(place.iterdir()) == []
+
+
+def test_what_was_left_in_several_folders_is_listed_together_the_newest_first(place: Path) -> None:
+    one, other = left_by_a_killed_one("old.stl", "newest.stl"), left_by_a_killed_one("newer.stl")
+    for age_s, name in enumerate(("newest.stl", "newer.stl", "old.stl")):
+        (path,) = place.glob(f"*/*/{name}")
+        os.utime(path, (1e9 - age_s, 1e9 - age_s))
+    assert [path.name for path in files_in(*tidy_left())] == ["newest.stl", "newer.stl", "old.stl"]
+    assert {path.parents[1] for path in files_in(*tidy_left())} == {one, other}

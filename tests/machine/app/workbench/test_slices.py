@@ -11,7 +11,7 @@ from starlette.requests import Request
 from machine.app.workbench.web.downloads import gcode
 from machine.app.workbench.work.slices import Sliced
 from machine.app.workbench.work.walls import walls
-from machine.dryrun.findings import Finding
+from machine.dryrun.findings import Finding, known_findings
 from machine.view.comparison import Alternative
 from profiles.errors import PlanError
 from slicer.parts import slice_parts
@@ -43,7 +43,8 @@ def test_the_walls_of_a_part_lie_on_its_surface_wherever_it_is_printed_to(most: 
 def test_g_code_with_errors_is_saved_only_for_who_wants_it_all_the_same() -> None:
     error = Finding("error", "contact", 12, 1, 3, "the nozzle touches the part")
     cost = Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
-    session: Any = SimpleNamespace(slicing=SimpleNamespace(needed=lambda: Sliced(b"", b"G28\n", 60.0, 1.0, (error,), cost)))
+    known = known_findings(["G28"], profile(), [error])
+    session: Any = SimpleNamespace(slicing=SimpleNamespace(needed=lambda: Sliced(b"", b"G28\n", 60.0, 1.0, known, cost)))
     session.bench = SimpleNamespace(model=SimpleNamespace(name="demo:tree"))
     refused, forced = (Request({"type": "http", "query_string": query}) for query in (b"", b"force=yes"))
     with pytest.raises(PlanError, match="found 1 errors, the first: the nozzle touches the part: no G-code is saved unless"):

@@ -3,11 +3,39 @@
 const AGAIN_MS = 1000;
 
 const NOT_SENT = "the line to tiltprint is lost, so this was not done";
+const LINE_TOLD = {
+  open: "",
+  lost: "The line to tiltprint is lost; trying again.",
+  ended: "tiltprint has ended. Start it again and open the address that it tells; if it was killed, the files dropped here can be opened there.",
+  replaced: "This page is of a tiltprint that has ended. Another one is here now: open the address that its terminal has told.",
+  closed: "This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.",
+};
 
-/** {send(command), ask(command, answered)}: follow(state) is called with every new state, lost(whether) when the line goes and comes,
- * closed() when the bench has been closed; answered(refusal) after the state by which a command is done ("") or refused. */
-function lineTo(follow, lost, closed) {
+/** A websocket below the page's address that comes back by itself: heard(what is told), and stands(a word of LINE_TOLD) whenever that changes. */
+function lineAt(path, heard, stands) {
   let socket = null;
+  const open = () => {
+    let opened = false;
+    socket = new WebSocket(new URL(path, location.href.replace(/^http/, "ws")));
+    socket.onopen = () => { opened = true; stands("open"); };
+    socket.onmessage = ({ data }) => heard(JSON.parse(data));
+    socket.onclose = async ({ code }) => {
+      const how = code === CLOSED_CODE ? "closed" : opened ? "lost" : await whyUnanswered();
+      stands(how);
+      if (how !== "closed" && how !== "replaced") setTimeout(open, AGAIN_MS);
+    };
+  };
+  open();
+  return { isOpen: () => socket.readyState === WebSocket.OPEN, send: (command) => socket.send(JSON.stringify(command)) };
+}
+
+/** Why no line can be opened: nobody is there, or one that does not know the page's address, which has another token at each start. */
+const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSignal.timeout(AGAIN_MS) }).then(
+  ({ status }) => (status === 404 ? "replaced" : "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
+
+/** {send(command), ask(command, answered)}: follow(state) is called with every new state, stands(how) with a word of LINE_TOLD;
+ * answered(refusal) after the state by which a command is done ("") or refused. */
+function lineTo(follow, stands) {
   const page = crypto.randomUUID(), asked = new Map(); // by a name that no other page has
   const answer = ({ answers }) => {
     for (const [name, refusal] of Object.entries(answers)) {
@@ -16,27 +44,13 @@ function lineTo(follow, lost, closed) {
       answered?.(refusal);
     }
   };
-  const open = () => {
-    socket = new WebSocket(new URL("line", location.href.replace(/^http/, "ws")));
-    socket.onopen = () => lost(false);
-    socket.onmessage = (event) => {
-      const state = JSON.parse(event.data);
-      follow(state);
-      answer(state);
-    };
-    socket.onclose = ({ code }) => {
-      if (code === CLOSED_CODE) return closed();
-      lost(true);
-      setTimeout(open, AGAIN_MS);
-    };
-  };
-  open();
-  const send = (command) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command)); };
+  const line = lineAt("line", (state) => { follow(state); answer(state); }, stands);
+  const send = (command) => { if (line.isOpen()) line.send(command); };
   let count = 0;
   return {
     send,
     ask: (command, answered) => {
-      if (socket.readyState !== WebSocket.OPEN) return answered(NOT_SENT);
+      if (!line.isOpen()) return answered(NOT_SENT);
       const name = `${page} ${++count}`;
       asked.set(name, answered);
       send({ ...command, ask: name });

@@ -33,19 +33,19 @@ function saveMenu(bench) {
     $(id).querySelector("small").textContent = why || otherwise;
   };
   return {
-    told: ({ model, parts, zones, sliced, compared, given }) => {
+    told: (state) => {
+      const { model, parts, zones, sliced, compared, given } = state, lacking = unsliced(state);
       const uncut = !model ? "no model yet" : parts || zones.length ? "" : "no parts yet: find them, or add a plane";
-      const unsliced = !model ? "no model yet" : !sliced ? "not sliced yet" : sliced.stale ? "out of date: slice again" : "";
       tell("save-plan", uncut, "the command line takes it with --plan");
       tell("save-parts", uncut, "zip of an STL each, a coloured 3MF and the plan");
       tell("save-pictures", uncut, "zip of PNGs: the parts, the print order, every number of parts");
-      tell("save-gcode", unsliced, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
+      tell("save-gcode", lacking, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "as export writes it");
       for (const [kind, sections] of Object.entries(SECTIONS_OF)) {
         const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length;
         const name = given[kind].split(/[\\/]/).at(-1), changed = `${name} with ${count} change${count === 1 ? "" : "s"}: --${kind} takes it, profiles save writes the same`;
         tell(`save-${kind}`, count ? "" : `nothing of ${name} is changed`, changed);
       }
-      tell("save-page", unsliced, `one HTML file to open anywhere, as view writes it${compared.length ? ", with the comparison" : ""}`);
+      tell("save-page", lacking, `one HTML file to open anywhere, as view writes it${compared.length ? ", with the comparison" : ""}`);
     },
   };
 }

@@ -19,6 +19,7 @@ function modelPanel(bench) {
   $("as-read").addEventListener("click", () => bench.send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }));
   $("lay").addEventListener("click", () => bench.lay($("lay").getAttribute("aria-pressed") !== "true"));
   dropping();
+  leftFiles();
   return {
     told: ({ model, rotation, resting, overhang_mm2: area }, before) => {
       if (JSON.stringify(rotation) !== JSON.stringify(before?.rotation)) {
@@ -46,8 +47,12 @@ function showResting(resting, bench) {
   }));
 }
 
+/** Pairs of a name and a text, and of a class where the text has one; what has not changed stays, and what is selected in it. */
 function tellIn(id, pairs) {
-  $(id).replaceChildren(...pairs.flatMap(([name, text]) => [made("dt", { text: name }), made("dd", { text })]));
+  const told = JSON.stringify(pairs);
+  if ($(id).told === told) return;
+  $(id).told = told;
+  $(id).replaceChildren(...pairs.flatMap(([name, text, className]) => [made("dt", { text: name }), made("dd", { text, className })]));
 }
 
 const listIn = (id, sentences) => $(id).replaceChildren(...sentences.map((text) => made("li", { text })));

@@ -1,5 +1,8 @@
 // Slices panel: the parts sliced, how far each is, what the print takes, and what the dry run complains of.
 
+/** Why there are no slices of what lies on the bench to save or to print; "" where there are. */
+const unsliced = ({ model, sliced }) => (!model ? "no model yet" : !sliced ? "not sliced yet" : sliced.stale ? "the slices are out of date: slice again" : "");
+
 function slicesPanel(bench) {
   $("slice").addEventListener("click", () => bench.send({ do: "slice" }));
   $("again").addEventListener("click", () => { bench.lookAtPrint(false); $("tab-slices").click(); bench.send({ do: "slice" }); });

@@ -5,7 +5,7 @@ const STOP_KEY = "e";
 
 function printPanel(bench) {
   let state = { ports: null, asking: false, journals: null, prints: [] }, chosen = 0, mine = new Set(), taken = 0;
-  const socket = printsLine((told) => { const before = state; state = told; show(before); }, problem, () => stops.expired());
+  const socket = printsLine((told) => { const before = state; state = told; show(before); }, refused, () => stops.expired());
   const follow = followIn(bench, () => print());
   const send = (command) => { problem(""); socket.send(command); };
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
@@ -34,6 +34,7 @@ function printPanel(bench) {
   }
 
   setInterval(() => {
+    if (print()?.progress) showProgress(print()); // its temperatures grow old
     if (!state.prints.some((each) => silence(each))) return;
     showPrint(print(), print()?.holder === OWN_PAGE);
     showBar(state.prints.filter((each) => each.phase !== "over"), print());
@@ -80,10 +81,25 @@ function printPanel(bench) {
   };
   addEventListener("keydown", byKey, true);
   $("print-page").addEventListener("load", () => $("print-page").contentWindow.addEventListener("keydown", byKey, true));
-  return { told: ({ sliced, model }) => { $("check").disabled = !model; $("unsliced").hidden = Boolean(sliced && !sliced.stale); follow.told(); } };
+  const which = ({ sliced }) => sliced && [sliced.key, sliced.stale];
+  return {
+    told: (now, before) => {
+      const why = unsliced(now);
+      $("check").disabled = Boolean(why);
+      $("unsliced").hidden = !why;
+      $("unsliced").textContent = `Nothing to print: ${why}.`;
+      if (!alike(which(now), which(before || {}))) { unforce(); problem(""); } // what was found of others
+      follow.told();
+    },
+  };
 }
 
 function problem(text) {
-  $("print-problem").textContent = text;
+  $("print-problem").replaceChildren(...withWholeOptions(text));
   $("print-problem").hidden = !text;
+}
+
+function refused({ problem: text, forcible }) {
+  problem(text);
+  if (forcible) $("force-line").hidden = false;
 }

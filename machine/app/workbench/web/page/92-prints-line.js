@@ -8,35 +8,28 @@ const OWED_MS = 10000; // so long an emergency stop waits for a line: after that
  * stop that finds no line is sent as soon as there is one, if that is soon and its print still there, else expired() is called; a command
  * to which nothing answers is told. */
 function printsLine(follow, refused, expired) {
-  let socket = null, owed = [], waiting = 0;
+  let owed = [], waiting = 0;
   const sendOwed = (prints) => {
     const meant = owed.filter(({ command, at }) => Date.now() - at < OWED_MS && prints.some(({ number }) => number === command.print));
-    meant.forEach(({ command }) => socket.send(JSON.stringify(command)));
+    meant.forEach(({ command }) => line.send(command));
     if (meant.length < owed.length) expired();
     owed = [];
   };
-  const open = () => {
-    socket = new WebSocket(new URL(`prints?page=${OWN_PAGE}`, location.href.replace(/^http/, "ws")));
-    socket.onopen = () => notice("", "sent");
-    socket.onmessage = (event) => {
-      clearTimeout(waiting);
-      notice("", "sent");
-      const told = JSON.parse(event.data);
-      if (told.problem) return refused(told.problem);
-      follow(told);
-      sendOwed(told.prints);
-    };
-    socket.onclose = ({ code }) => { if (code !== CLOSED_CODE) setTimeout(open, AGAIN_MS); };
+  const heard = (told) => {
+    clearTimeout(waiting);
+    notice("", "sent");
+    if (told.problem) return refused(told);
+    follow(told);
+    sendOwed(told.prints);
   };
-  const isOpen = () => socket.readyState === WebSocket.OPEN;
-  open();
+  const line = lineAt(`prints?page=${OWN_PAGE}`, heard, (how) => { if (how === "open") notice("", "sent"); });
   return {
-    isOpen,
+    isOpen: line.isOpen,
     send: (command) => {
       clearTimeout(waiting);
-      if (isOpen()) {
+      if (line.isOpen()) {
         waiting = setTimeout(notice, ANSWER_MS, "tiltprint does not answer: what was asked for may not have arrived.", "sent");
-        return socket.send(JSON.stringify(command));
+        return line.send(command);
       }
       if (command.do === "emergency") owed.push({ command, at: Date.now() });
       else notice("The line to tiltprint is lost; nothing was sent.", "sent");

@@ -49,7 +49,7 @@ function showPrint(print, commands) {
   $("begin").textContent = print.resumes ? "Yes, go on" : print.starts ? "Print now" : "Hand it over";
   $("leave").textContent = print.resumes ? "No, leave it" : "Leave it";
   $("run-live").hidden = !progress && !uploads;
-  if (progress) showProgress(progress, over);
+  if (progress) showProgress(print);
   else if (uploads) showUpload(upload);
   $("run-upload").hidden = !uploads || !commands;
   $("leave-printing").hidden = !print.server;
@@ -87,15 +87,22 @@ function showUpload(upload) {
 const figuresTold = ({ lines, time_s: time, filament_mm: filament, errors }) =>
   `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m of filament${errors ? `, ${errors} errors in the dry run` : ""}`;
 
-function showProgress(progress, over) {
+/** How long ago a moment was, in seconds since 1970. */
+function ago(moment_s) {
+  const past_s = Math.max(0, Date.now() / 1000 - moment_s), [size, unit] = past_s < 60 ? [1, "s"] : past_s < 3600 ? [60, "min"] : [3600, "h"];
+  return `${Math.floor(past_s / size)} ${unit} ago`;
+}
+
+function showProgress(print) {
+  const { progress, phase } = print, over = phase === "over", old = over || progress.heat_is_old || silence(print);
   const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
-  const heat = (now, target) => `${now.toFixed(1)}${target == null ? "" : ` of ${target.toFixed(0)}`} °C`;
+  const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target == null ? "" : ` of ${target.toFixed(0)}`} °C${old ? `, as last known ${ago(progress.heat_s)}` : ""}`, old ? "old" : ""];
   $("run-progress").value = progress.share || 0;
   tellIn("run-told", [
     progress.part != null && ["part", of(progress.part, progress.parts)],
     progress.layer != null && ["layer", of(progress.layer, progress.layers)],
-    progress.nozzle_c != null && ["nozzle", heat(progress.nozzle_c, progress.nozzle_target_c)],
-    progress.bed_c != null && ["bed", heat(progress.bed_c, progress.bed_target_c)],
+    heat("nozzle", progress.nozzle_c, progress.nozzle_target_c),
+    heat("bed", progress.bed_c, progress.bed_target_c),
     Object.keys(progress.at).length && ["position", Object.entries(progress.at).map(([letter, value]) => `${letter} ${value.toFixed(1)}`).join("  ")],
     (progress.total != null || progress.acknowledged) && ["line", of(progress.acknowledged, progress.total)],
     [over ? "took" : "so far", duration(progress.elapsed_s)],

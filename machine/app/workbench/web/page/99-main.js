@@ -6,12 +6,9 @@ function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera, () => { bench.placeHandles(); bench.placeRings(); bench.placeMarks(); }), root = document.documentElement;
   const bench = { state: null, triangles: null, key: "", tab: "model", laying: false, snapping: false, selected: 0, hand: null, rowInHand: null, placeHandles: () => {}, placeRings: () => {}, placeMarks: () => {} };
   const dark = themeOf((now) => { bench.themed?.(now); if (picture && bench.state) picture.machine(bench.state.machine, now); });
-  const line = lineTo((state) => follow(state), (gone) => {
-    root.dataset.line = gone ? "lost" : "open";
-    notice(gone ? "The line to tiltprint is lost; trying again." : "", "line");
-  }, () => {
-    root.dataset.line = "closed";
-    notice("This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.", "line");
+  const line = lineTo((state) => follow(state), (how) => {
+    root.dataset.line = how;
+    notice(LINE_TOLD[how], "line");
   });
   [bench.send, bench.ask] = [line.send, line.ask];
   bench.lay = (whether) => {

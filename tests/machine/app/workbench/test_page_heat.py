@@ -1,0 +1,46 @@
+"""Temperatures on a page: fresh ones stand alone, old ones are marked with their age, which goes on when nothing more comes."""
+
+import pytest
+
+from tests.machine.fake_page import needs_node, on_fake_page
+
+# A print that is heard of once, at the beginning of time.
+HEARD = """
+    printPanel({ state: null });
+    const heats = { nozzle_c: 209.6, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, heat_s: 0, heat_is_old: false };
+    const moment = { state: "printing", ...heats, at: {}, elapsed_s: 5 };
+    const known = { number: 1, name: "box", port: "sim", phase: "printing", checks: [], words: [], said: [] };
+    const tell = (more, told = {}) => {
+      const print = { ...known, ...more, progress: { ...moment, ...told } };
+      fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [print] });
+    };
+    const heat = () => [1, 3].map((place) => $("run-told").children[place].textContent);
+    fake.sockets[0].open();
+    tell({});
+"""
+FRESH = ["209.6 of 210 °C", "60.0 °C"]
+
+
+def marked(ago: str) -> list[str]:
+    return [f"{each}, as last known {ago} ago" for each in FRESH]
+
+
+@needs_node
+def test_what_has_just_been_told_is_not_marked() -> None:
+    assert on_fake_page(f"{HEARD} return heat();") == FRESH
+
+
+@needs_node
+@pytest.mark.parametrize("tell", [
+    "tell({ phase: 'over', end: 'failed', sentence: 'emergency stop: the printer has halted' });",
+    "tell({}, { state: 'reconnecting', heat_is_old: true });",
+    "",  # the line to the workbench is lost, or the print hangs
+])  # fmt: skip
+@pytest.mark.parametrize(("after_ms", "ago"), [(12_000, "12 s"), (5 * 60_000 + 30_000, "5 min"), (2 * 3_600_000, "2 h")])
+def test_what_nobody_tells_any_more_is_marked_with_its_age(tell: str, after_ms: int, ago: str) -> None:
+    assert on_fake_page(f"{HEARD} {tell} fake.wait({after_ms}); return heat();") == marked(ago)
+
+
+@needs_node
+def test_at_the_end_of_a_print_it_is_marked_at_once() -> None:
+    assert on_fake_page(f"{HEARD} fake.wait(2000); tell({{ phase: 'over', end: 'done' }}); return heat();") == marked("2 s")
