@@ -136,6 +136,7 @@ def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: 
     browser.click("[data-view=top]")
     browser.click("#fit")
     browser.click("#lay")
+    browser.wait("$('rings').hasAttribute('hidden')")  # one of them goes through the middle
     browser.press(
         *browser.value(
             "(() => { const b = $('canvas').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
