@@ -2,10 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from profiles.errors import MeshError
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -82,3 +87,19 @@ class Mesh:
         """The mesh with every vertex v at rotation @ v + shift_mm; rotation is (3, 3)."""
         vertices = self.vertices @ np.asarray(rotation, dtype=np.float64).T + np.asarray(shift_mm, dtype=np.float64)
         return Mesh(vertices, self.faces, self.colours)
+
+    def to_trimesh(self) -> "Trimesh":
+        """The same as a trimesh.Trimesh, the door to other programs; vertices and faces stay as they are."""
+        from trimesh import Trimesh
+
+        return Trimesh(self.vertices, self.faces, process=False)
+
+    @classmethod
+    def from_trimesh(cls, mesh: "Trimesh") -> "Mesh":
+        """A closed trimesh.Trimesh in mm as it is, nothing repaired or moved; mdp.read does both with a file.
+
+        Raises MeshError for one that is open, wound both ways or inside out.
+        """
+        if not (mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0):
+            raise MeshError("the trimesh is no solid: closed, one way wound and outside out is expected")
+        return cls(np.asarray(mesh.vertices), np.asarray(mesh.faces))

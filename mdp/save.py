@@ -1,4 +1,4 @@
-"""Save: a decomposition as STL files, one coloured 3MF and JSON values."""
+"""Save: a decomposition as STL files, one coloured 3MF, one coloured GLB and JSON values."""
 
 import io
 import zipfile
@@ -27,8 +27,14 @@ _MODEL = (
     'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>'
 )
 
+_GLTF = 0.001 * np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000.0]])  # mm with z up to metres with y up
 
-FOLDER_FILES = ("decomposition.3mf", "decomposition.json", "plan.toml")  # beside the parts in a folder that is asked for
+FOLDER_FILES = (
+    "decomposition.3mf",
+    "decomposition.json",
+    "plan.toml",
+    "decomposition.glb",
+)  # beside the parts in a folder that is asked for
 PART_FILES = "part-[0-9][0-9]*.stl"  # what part_file gives
 HEADING = b"tiltprint part"  # of the STL files that stl() gives
 
@@ -62,6 +68,24 @@ def threemf(decomposition: Decomposition) -> bytes:
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, text)
     return content.getvalue()
+
+
+def glb(decomposition: Decomposition) -> bytes:
+    """All parts in place as one scene for viewers, named and coloured, in print order, the same bytes every time.
+
+    As glTF wants it, in metres with y up: a node above the parts, which are in mm with z up, turns and scales them.
+    """
+    from trimesh import Scene
+    from trimesh.visual.material import PBRMaterial
+    from trimesh.visual.texture import TextureVisuals
+
+    scene = Scene(base_frame="workpiece")
+    for part in decomposition.parts:
+        body, name = part.mesh.to_trimesh(), part_file(part.index).removesuffix(".stl")
+        colour = [int(COLOURS[(part.index - 1) % len(COLOURS)][k : k + 2], 16) for k in (1, 3, 5)]
+        body.visual = TextureVisuals(material=PBRMaterial(name, baseColorFactor=[*colour, 255], metallicFactor=0.0))
+        scene.add_geometry(body, node_name=name, geom_name=name, transform=_GLTF)
+    return bytes(scene.export(file_type="glb"))
 
 
 def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> dict[str, Any]:

@@ -26,7 +26,12 @@ def read(path: Path) -> list[Surface]:
 
     Raises MeshError for a damaged file, compressed geometry, outside buffers and primitives that are not plain triangles.
     """
-    document, binary = _chunks(path, path.read_bytes())
+    return read_scene(path, path.read_bytes())
+
+
+def read_scene(path: Path, content: bytes) -> list[Surface]:
+    """The same for the content of such a file; path: what messages name."""
+    document, binary = _chunks(path, content)
     try:
         surfaces = _place_all(path, document, binary)
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:

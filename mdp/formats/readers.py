@@ -1,13 +1,13 @@
 """Readers: one file a format with `read(path) -> list[Surface]`; READERS is the family.
 
-Not trimesh's: it reads some valid files as other solids (tools/RESULTS.md, "Reading") and takes longer to import than these
-readers take for a model.
+The six that printers know are read by our own: trimesh reads some valid files of them as other solids (tools/RESULTS.md,
+"Reading") and takes longer to import than these readers take for a model. What else it knows it reads.
 """
 
 from collections.abc import Callable
 from pathlib import Path
 
-from mdp.formats import glb, obj, off, ply, stl, threemf
+from mdp.formats import cad, glb, obj, off, ply, scene, stl, threemf
 from mdp.formats.surface import Surface
 
 READERS: dict[str, Callable[[Path], list[Surface]]] = {
@@ -17,4 +17,7 @@ READERS: dict[str, Callable[[Path], list[Surface]]] = {
     ".ply": ply.read,
     ".3mf": threemf.read,
     ".glb": glb.read,
+    ".gltf": scene.read,
+    ".dae": scene.read,
+    **dict.fromkeys(cad.KINDS, cad.read),
 }

@@ -58,7 +58,8 @@ def test_files_that_cannot_be_opened_are_named(tmp_path: Path) -> None:
     (tmp_path / "folder.stl").mkdir()
     assert "is a folder" in refusal(tmp_path / "folder.stl")
     assert "is empty" in refusal(save(tmp_path / "empty.stl", b""))
-    assert "allowed are .stl, .obj, .off, .ply, .3mf, .glb" in refusal(save(tmp_path / "a.step", b"x"))
+    allowed = ".stl, .obj, .off, .ply, .3mf, .glb, .gltf, .dae, .step, .stp, .iges, .igs"
+    assert f"allowed are {allowed}" in refusal(save(tmp_path / "a.blend", b"x"))
 
 
 def test_a_file_without_permission_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

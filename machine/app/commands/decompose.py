@@ -16,10 +16,10 @@ from machine.app.terminal.report import part_settings_lines, parts_table
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition
 from mdp.plans.writing import plan_text
-from mdp.save import FOLDER_FILES, HEADING, PART_FILES, json_values, part_file, stl, threemf
+from mdp.save import FOLDER_FILES, HEADING, PART_FILES, glb, json_values, part_file, stl, threemf
 from profiles.profile import Profile
 
-MODEL, FIGURES, PLAN = FOLDER_FILES
+MODEL, FIGURES, PLAN, SCENE = FOLDER_FILES
 
 
 def decompose(request: ModelRequest) -> int:
@@ -36,6 +36,7 @@ def decompose(request: ModelRequest) -> int:
             write_bytes(outputs.folder / part_file(part.index), stl(part.mesh))
         _drop_earlier_parts(outputs.folder, len(decomposition.parts))
         write_bytes(outputs.folder / MODEL, threemf(decomposition))
+        write_bytes(outputs.folder / SCENE, glb(decomposition))
         write_json(outputs.folder / FIGURES, figures)
     for file in (outputs.plan, None if outputs.folder is None else outputs.folder / PLAN):
         if file is not None and not _is_same(file, request.cuts.plan):

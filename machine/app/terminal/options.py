@@ -16,7 +16,7 @@ def _profile_option(kind: str, otherwise: str = "") -> Any:
     return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=names_of(kind), help=f"{kind} profile{otherwise}")
 
 
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF or GLB file, or demo:NAME")]
+Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME")]
 ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model file, demo:NAME, or a G-code file")]
 MachineName = Annotated[str, _profile_option("machine")]
 MaterialName = Annotated[str, _profile_option("material")]

@@ -12,7 +12,7 @@ import pytest
 
 from machine.app import start
 from machine.app.cli import main
-from mdp.save import stl
+from mdp.save import FOLDER_FILES, stl
 from tests import shapes
 
 FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "process.first_layer_height_mm=0.3"]
@@ -175,7 +175,7 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
         "index", "direction", "base", "tilt_deg", "turn_deg", "volume_mm3", "risky_area_mm2", "feather_share", "faces", "file",
     }  # fmt: skip
     assert sum(part["volume_mm3"] for part in told["parts"]) == pytest.approx(told["volume_mm3"], rel=1e-6)
-    files = {part["file"] for part in told["parts"]} | {"decomposition.3mf", "decomposition.json", "plan.toml"}
+    files = {part["file"] for part in told["parts"]} | set(FOLDER_FILES)
     assert {file.name for file in Path("parts").iterdir()} == files
     assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png", "front.png"))
 

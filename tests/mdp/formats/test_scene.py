@@ -1,0 +1,81 @@
+"""Scenes that trimesh reads: glTF in several files, COLLADA."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from trimesh.exchange.gltf import export_gltf
+
+from mdp.read import read_mesh
+from tests.mdp import files
+from tests.mdp.files import refusal, save
+
+DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>{asset}</asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="24">{positions}</float_array>
+<technique_common><accessor source="#a" count="8" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+</accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="12"><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+def dae(asset: str) -> bytes:
+    box = files.placed(20, 30, 40)
+    positions, corners = (" ".join(map(str, rows.ravel().tolist())) for rows in (box.vertices, box.faces))
+    return DAE.format(asset=asset, positions=positions, corners=corners).encode()
+
+
+def test_a_gltf_with_its_buffers_beside_it_is_read_as_a_glb_is(tmp_path: Path) -> None:
+    box = trimesh.creation.box((20, 30, 40))
+    for name, content in export_gltf(trimesh.Scene({"a": box})).items():
+        (tmp_path / name).write_bytes(content)
+    mesh, notes = read_mesh(tmp_path / "model.gltf")
+    assert (notes, mesh.volume_mm3) == ((), pytest.approx(24_000))
+    assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx([20, 30, 40])
+
+
+def test_what_the_nodes_mirror_and_move_is_read_so(tmp_path: Path) -> None:
+    mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])
+    mirrored[0, 3] = 60.0
+    scene = trimesh.Scene({"a": trimesh.creation.box((20, 30, 40))})
+    scene.add_geometry(trimesh.creation.cone(10, 20), transform=mirrored)
+    for name, content in export_gltf(scene).items():
+        (tmp_path / name).write_bytes(content)
+    mesh, notes = read_mesh(tmp_path / "model.gltf")
+    assert not any("wound" in note for note in notes)
+    assert mesh.volume_mm3 == pytest.approx(sum(body.volume for body in scene.geometry.values()), rel=1e-6)
+    assert np.ptp(mesh.bounds_mm, axis=0)[0] == pytest.approx(80.0, abs=0.01)
+
+
+def test_a_gltf_without_its_buffers_or_of_nothing_ends_in_a_sentence(tmp_path: Path) -> None:
+    assert "places no mesh" in refusal(save(tmp_path / "a.gltf", b'{"asset": {"version": "2.0"}}'))
+    assert "cannot be read as .gltf" in refusal(save(tmp_path / "b.gltf", b"x"))
+    lost = b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "lost.bin", "byteLength": 8}]}'
+    assert refusal(save(tmp_path / "c.gltf", lost)).startswith("cannot be read as .gltf (FileNotFoundError: ")
+
+
+@pytest.mark.parametrize(
+    ("asset", "sides_mm"),
+    [
+        ("", (20, 30, 40)),
+        ('<unit name="meter" meter="1"/><up_axis>Z_UP</up_axis>', (20, 30, 40)),
+        ('<unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis>', (200, 300, 400)),
+        ('<unit name="millimeter" meter="0.001"/><up_axis>Y_UP</up_axis>', (20, 40, 30)),
+    ],
+)
+def test_collada_tells_its_unit_and_its_upward_axis(tmp_path: Path, asset: str, sides_mm: tuple[float, ...]) -> None:
+    pytest.importorskip("collada")
+    mesh, notes = read_mesh(save(tmp_path / "a.dae", dae(asset)))
+    assert notes == ()
+    assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx(sides_mm)
+
+
+def test_without_its_library_collada_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "collada", None)
+    assert refusal(save(tmp_path / "a.dae", dae(""))) == "reading .dae files needs collada: pip install 'tiltprint[dae]'"

@@ -1,0 +1,22 @@
+"""The door between our meshes and trimesh's."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from mdp.mesh import Mesh
+from profiles.errors import MeshError
+from tests.shapes import tee
+
+
+def test_a_mesh_goes_to_trimesh_and_back_as_it_is() -> None:
+    there = tee().to_trimesh()
+    back = Mesh.from_trimesh(there)
+    assert there.volume == pytest.approx(tee().volume_mm3)
+    assert (back.vertices.tobytes(), back.faces.tobytes()) == (tee().vertices.tobytes(), tee().faces.tobytes())
+
+
+@pytest.mark.parametrize("faces", [tee().faces[1:], tee().faces[:, ::-1]])
+def test_what_is_open_or_inside_out_does_not_come_back(faces: np.ndarray) -> None:
+    with pytest.raises(MeshError, match="is no solid"):
+        Mesh.from_trimesh(trimesh.Trimesh(tee().vertices, faces, process=False))
