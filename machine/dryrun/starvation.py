@@ -15,24 +15,19 @@ from numpy.typing import NDArray
 from machine.dryrun.dryrun import STANDSTILLS, DryRun
 from machine.dryrun.findings import Finding
 from machine.dryrun.motion import deltas
+from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
+from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
 from machine.planning.timing import TINY, Blocks, axis_accelerations, axis_speeds, block_time, corner_speed, lengths
 from machine.reader.parsed import ParsedProgram
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
-from profiles.errors import PrinterError
 from profiles.machine import Machine
 
-BITS = 10.0  # of a byte on the line: start, eight, stop
-FRAME_BYTES = 6  # N, blank, *, two digits of the checksum, newline; the line's number comes on top
-GREETING, DIGITS = 3, 5  # lines sent before the program; digits after which the numbers begin anew
-BAUDS = (1200, 4_000_000)
+USUAL_FRAME_BYTES = FRAME_BYTES - 1  # of the checksums of ASCII, 0 to 127, most have two digits; the line's number comes on top
+GREETING = 3  # lines sent before the program
 FREE_BAUD = 1e12  # a line that takes no time
-LINES = 4  # Marlin's BUFSIZE: more lines are never in flight
-OK_BYTES = 17.0  # of `ok N12345 P15 B3`, during which the printer reads nothing
-BLOCKS = 15  # of Marlin's BLOCK_BUFFER_SIZE 16 one place stays empty
-SEGMENT_S = 0.02  # DEFAULT_MINSEGMENTTIME
-DELIVER_S, DELIVER_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE
+OK_BYTES = float(len("ok N12345 P15 B3\n"))  # during which the printer reads nothing
 NONE = -1
 
 
@@ -64,12 +59,6 @@ class Planned(NamedTuple):
     state: Floats
     span: NDArray[np.int64]
     entry2: Floats
-
-
-def check_baud(baud: int) -> None:
-    """Raises PrinterError for a rate that no line has."""
-    if not BAUDS[0] <= baud <= BAUDS[1]:
-        raise PrinterError(f"--baud is {baud}: {BAUDS[0]} to {BAUDS[1]} is allowed, printers use 115200 or 250000")
 
 
 def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: int) -> DryRun:
@@ -114,7 +103,7 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
     own, ahead = _bytes(lines, program.line[blocks])
     flags = np.zeros((2, len(blocks)), dtype=np.bool_)
     planned = Blocks(moved / length[:, None], length, speed, acceleration, measure, halts)
-    line = Line(own, ahead, machine.receive_bytes - 1.0, BITS / baud)
+    line = Line(own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud)
     time_s = _play(planned, line, machine.junction_speed_mm_s, flags[0], flags[1])
     whole = np.zeros((2, len(program.line)), dtype=np.bool_)
     whole[:, blocks] = flags
@@ -128,8 +117,8 @@ def _bytes(lines: Sequence[str], at: NDArray[np.int64]) -> tuple[Floats, Floats]
     """
     texts = (line.partition(";")[0].strip() for line in lines)
     letters = np.array([0, *(len(text) for text in texts)], dtype=np.float64)
-    digits = np.minimum(np.floor(np.log10(np.cumsum(letters > 0) + GREETING)) + 1, DIGITS)
-    sizes = np.where(letters > 0, letters + FRAME_BYTES + digits, 0.0)
+    digits = np.minimum(np.floor(np.log10(np.cumsum(letters > 0) + GREETING)) + 1, NUMBER_DIGITS)
+    sizes = np.where(letters > 0, letters + USUAL_FRAME_BYTES + digits, 0.0)
     sums = np.cumsum(sizes)
     before = np.concatenate([[0], at[:-1]])
     first = at != before
@@ -181,7 +170,7 @@ def _play(blocks: Blocks, line: Line, jerk: float, slowed: NDArray[np.bool_], st
     sent, flight, oldest, now = 0.0, 0.0, 0, 0.0
     for i in range(n):
         flight += line.own[i]
-        while oldest < i and (flight > line.ring or i - oldest >= LINES):
+        while oldest < i and (flight > line.ring or i - oldest >= BUFSIZE):
             flight -= line.own[oldest]
             oldest += 1
         begin = max(sent, taken[oldest - 1] + OK_BYTES * line.byte_s) if oldest > 0 else sent
@@ -190,20 +179,20 @@ def _play(blocks: Blocks, line: Line, jerk: float, slowed: NDArray[np.bool_], st
         if blocks.halts[i]:
             now = _wait_for_room(now, 1, planned, blocks)
             span[1] = NONE
-        now = _wait_for_room(now, BLOCKS, planned, blocks)
+        now = _wait_for_room(now, PLANNED_BLOCKS, planned, blocks)
         taken[i] = now
         queued = span[3] - span[2] + (1 if span[0] != NONE else 0)
-        if 2 <= queued < BLOCKS // 2 + 1 and length[i] / cruise[i] < SEGMENT_S:
+        if 2 <= queued < PLANNED_BLOCKS // 2 + 1 and length[i] / cruise[i] < MIN_SEGMENT_S:
             seconds = length[i] / cruise[i]
-            cruise[i] = length[i] / (seconds + 2.0 * (SEGMENT_S - seconds) / queued)
+            cruise[i] = length[i] / (seconds + 2.0 * (MIN_SEGMENT_S - seconds) / queued)
             slowed[i] = True
         if span[3] > span[2]:
             corner2[i] = corner_speed(blocks, i - 1, i, jerk) ** 2
         elif span[0] == NONE:
             stopped[i] = span[1] != NONE and corner_speed(blocks, span[1], i, jerk) > 0.0
-            state[3] = now + DELIVER_S
+            state[3] = now + FIRST_MOVE_DELAY_S
         span[3] = i + 1
-        if span[3] - span[2] >= DELIVER_BLOCKS:
+        if span[3] - span[2] >= FIRST_MOVE_BLOCKS:
             state[3] = min(state[3], now)
         after2 = 0.0
         for k in range(i, span[2] - 1, -1):

@@ -30,7 +30,11 @@ DIALECT = Dialect(
     wait_for_person=("M0 {text}",),
 )
 
-BLOCK_BUFFER_SIZE, BUFSIZE = 16, 4  # Configuration_adv.h: planned moves, and commands read ahead of them
+# Configuration_adv.h and module/planner.h, bugfix-2.1.x of 2024-09, which the dry run's planner and the simulated one share.
+BLOCK_BUFFER_SIZE, BUFSIZE = 16, 4  # planned moves, and commands read ahead of them
+PLANNED_BLOCKS = BLOCK_BUFFER_SIZE - 1  # one place of its ring stays empty
+MIN_SEGMENT_S = 0.02  # DEFAULT_MINSEGMENTTIME: a shorter move is stretched while few wait
+FIRST_MOVE_DELAY_S, FIRST_MOVE_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE: an idle machine waits so long for so many
 
 SIMULATED = SimulationRules(
     identity="FIRMWARE_NAME:Marlin bugfix-2.1.x (simulated) SOURCE_CODE_URL:github.com/MarlinFirmware/Marlin "
@@ -38,8 +42,8 @@ SIMULATED = SimulationRules(
     banner=("start", "Marlin bugfix-2.1.x (simulated)", "echo: Last Updated: 2024-09-29 | Author: (none, default config)"),
     numbers="resend",
     queue_lines=BUFSIZE,
-    blocks=BLOCK_BUFFER_SIZE - 1,  # one place of its ring stays empty
-    min_segment_s=0.02,  # DEFAULT_MINSEGMENTTIME
+    blocks=PLANNED_BLOCKS,
+    min_segment_s=MIN_SEGMENT_S,
     urgent="bytes",
     unknown='echo:Unknown command: "{}"',
     cold=("echo: cold extrusion prevented",),

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from math import pi
 
 from machine.firmware.klipper import stepper_name
+from machine.firmware.line import FRAME_CHARACTERS
 from machine.gcode.settings import clock
 from machine.planning.moves import BeginPart
 from mdp.mesh import Floats
@@ -14,7 +15,6 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
-FRAME = 12  # "N1234567 " and "*123": what the stream adds to a command
 
 
 def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: float, filament_mm: float) -> dict[str, object]:
@@ -79,10 +79,10 @@ def fill_block(block: str, name: str, values: Mapping[str, object], longest: int
     for line in block.splitlines():
         text = PLACEHOLDER.sub(lambda found: _value(found[1], name, values), line).strip()
         command = text.partition(";")[0].strip()
-        if len(command) + FRAME > longest:
+        if len(command) + FRAME_CHARACTERS > longest:
             raise ProfileError(
                 f"{name}: the line {command[:40]!r}... has {len(command)} characters, "
-                f"at most {longest - FRAME} are allowed (the firmware's {longest} less line number and checksum)"
+                f"at most {longest - FRAME_CHARACTERS} are allowed (the firmware's {longest} less line number and checksum)"
             )
         if text:
             lines.append(text)

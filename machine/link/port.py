@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any, Self
 from urllib.parse import urlsplit
 
+from machine.firmware.line import check_baud
 from profiles.errors import PortError
 
 try:
@@ -24,7 +25,6 @@ READ_S = 0.02  # read() gives up after this: an emergency stop is to be on the w
 READ_BYTES = 4096
 WRITE_S = 10.0  # a printer whose buffers stay full for longer has stopped reading
 CONNECT_S = 5.0
-BAUDS = (1200, 4_000_000)  # slowest and fastest rate that an adapter is known to take
 
 # termios.error is no OSError; pyserial lets it through when a setting is refused. An rfc2217:// port that is closed or
 # refuses a setting may show it as AttributeError or NotImplementedError.
@@ -198,12 +198,6 @@ class _Socket:
     def close(self) -> None:
         """Hang up."""
         self._socket.close()
-
-
-def check_baud(baud: int) -> None:
-    """Refuse a rate that no adapter takes; raises PortError."""
-    if not BAUDS[0] <= baud <= BAUDS[1]:
-        raise PortError(f"baud rate {baud} is not possible: {BAUDS[0]} to {BAUDS[1]} is allowed, printers use 115200 or 250000")
 
 
 def _descriptor(device: Any) -> int | None:

@@ -6,7 +6,7 @@ from threading import Event
 from machine.app.printer.port_reports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
-from machine.link.port import check_baud
+from machine.firmware.line import check_baud
 
 
 def ports(baud: int, as_json: bool, ask: bool) -> int:

@@ -14,7 +14,7 @@ from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.report import print_table
-from machine.dryrun.starvation import check_baud
+from machine.firmware.line import check_baud
 from machine.network.address import is_server_address
 
 

@@ -11,7 +11,8 @@ from machine.app.terminal.plain import show
 from machine.app.terminal.report import agreement_line, print_table
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
-from machine.dryrun.starvation import check_baud, find_starvation
+from machine.dryrun.starvation import find_starvation
+from machine.firmware.line import check_baud
 from machine.view.page import print_page
 from mdp.read import check_file, locate, read_mesh
 from profiles.errors import ProfileError

@@ -10,7 +10,7 @@ from machine.app.terminal.interrupts import stopping
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.firmware import dialect_of, dialects
-from machine.link.port import BAUDS
+from machine.firmware.line import check_baud
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.faults import FaultScript, read_script
 from machine.simulator.record import Record
@@ -55,8 +55,8 @@ def _check(request: SimulatorRequest) -> None:
         raise PrinterError(f"{machine.name} speaks {machine.dialect}, which takes no lines: {streamed} are simulated")
     if not (isfinite(speed) and speed >= 0):
         raise PrinterError(f"--speed is {speed:g}: it must be 0 (as fast as possible) or a number above")
-    if baud is not None and not BAUDS[0] <= baud <= BAUDS[1]:
-        raise PrinterError(f"--baud is {baud}: {BAUDS[0]} to {BAUDS[1]} is allowed")
+    if baud is not None:
+        check_baud(baud)
     if tcp is not None and not 0 <= tcp <= 65535:
         raise PrinterError(f"--tcp is {tcp}: 0 (a free port) to 65535 is allowed")
     if request.link is not None and tcp is not None:

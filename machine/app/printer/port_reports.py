@@ -8,12 +8,13 @@ from typing import Any
 
 from machine.app.printer.compatibility import describe_answer
 from machine.app.printer.running_simulators import running_simulators
-from machine.link.identification import QUICK_S, RATES, Answer, Kind, ask_at_any_rate
+from machine.firmware.line import BAUDS
+from machine.link.identification import QUICK_S, Answer, Kind, ask_at_any_rate
 from machine.link.port import SerialDevice, open_port, serial_devices
 from profiles.errors import PortError
 
 TIMEOUT_S = 4.0
-LONGEST_S = TIMEOUT_S + QUICK_S * len(RATES)
+LONGEST_S = TIMEOUT_S + QUICK_S * len(BAUDS)
 AT_A_TIME = 16  # ports asked at once: each takes seconds when nothing answers
 
 

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
+from machine.firmware.line import FRAME_CHARACTERS
+from machine.firmware.marlin import DIALECT
 from machine.gcode.words import PAUSE_REMARK
 from profiles.errors import LocalProtocolError
 
-FRAME = 11  # N, five digits (numbers begin anew in time), blank, *, three digits of the checksum
-LINE_LIMIT = 95  # Marlin keeps MAX_CMD_SIZE - 1 characters; a longer line loses its checksum and is asked for again for ever
+LINE_LIMIT = DIALECT.longest_line
 FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers refuses it with the one it wants
 REFUSED = {
     "M0": "waits for a person at the printer's own buttons",
@@ -66,10 +67,10 @@ def command_of(line: str, line_number: int, limit: int = LINE_LIMIT) -> str:
         raise LocalProtocolError(f"line {line_number} ({command[:40]!r}) holds a '*': checksums are added by the sender")
     if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
         raise LocalProtocolError(f"line {line_number} holds {name_of(command)}, which {reason}: remove it from the program")
-    if len(command) > limit - FRAME:
+    if len(command) > limit - FRAME_CHARACTERS:
         raise LocalProtocolError(
             f"line {line_number} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
-            f"{limit} are allowed, {limit - FRAME} without"
+            f"{limit} are allowed, {limit - FRAME_CHARACTERS} without"
         )
     return command
 

@@ -190,7 +190,7 @@ def test_an_unknown_placeholder_is_named_with_the_allowed_ones() -> None:
 
 
 def test_a_block_s_line_too_long_for_the_firmware_is_refused() -> None:
-    with pytest.raises(ProfileError, match=r"machine.gcode.start: the line .* has 104 characters, at most 83 are allowed"):
+    with pytest.raises(ProfileError, match=r"machine.gcode.start: the line .* has 104 characters, at most 84 are allowed"):
         write_gcode(printed()[3], _with_block("start", "M117" + " long" * 20))
 
 

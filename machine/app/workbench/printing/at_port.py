@@ -7,7 +7,7 @@ from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.checks import CLEAN, DONE, LEFT, STOPPED, Checks, figures, program_of
 from machine.app.workbench.printing.order import PrintOrder, State
-from machine.dryrun.starvation import check_baud
+from machine.firmware.line import check_baud
 from machine.link.identification import Answer
 
 
