@@ -2,12 +2,11 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from math import pi
 
 from machine.firmware.klipper import stepper_name
 from machine.firmware.line import FRAME_CHARACTERS
-from machine.gcode.settings import clock
 from machine.planning.moves import BeginPart
+from machine.quantities import duration, filament_g
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.errors import ProfileError
@@ -37,10 +36,10 @@ def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: f
         "tilt_deg": pose.tilt_deg,
         "turn_deg": pose.turn_deg,
         "z_mm": 0.0,
-        "time": clock(seconds),
+        "time": duration(seconds),
         "time_s": round(seconds),
         "filament_mm": round(filament_mm, 2),
-        "filament_g": round(filament_mm * pi * material.diameter_mm**2 / 4000.0 * material.density_g_cm3, 2),
+        "filament_g": round(filament_g(filament_mm, material), 2),
         "model": "".join(c if "!" <= c <= "~" and c not in "(){};*" else "_" for c in name),
         "material": material.name,
         "process": process.name,

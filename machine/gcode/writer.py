@@ -39,14 +39,14 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
     letter = next(each for each in dialect.filament if each not in (machine.tilt.letter, machine.turn.letter))
     pen = Pen(dialect, machine, letter, level(machine))
     parts = [move for move in program.moves if isinstance(move, BeginPart)]
-    elapsed, filament_mm = clock(program, profile)
+    elapsed, filament_mm = elapsed_s(program, profile)
     pen.values = placeholders(program.name, profile, parts, float(elapsed[-1]), filament_mm)
     for name in BLOCKS:
         _block(name, pen)
     return _lines(program, profile, parts, elapsed, filament_mm, pen)
 
 
-def clock(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
+def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
     """(number of moves + 1,) seconds from the first move to the beginning of each, and to the end; filament in mm."""
     machine = profile.machine
     straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)

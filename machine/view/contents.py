@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.program import Alternative, Program
 from machine.reader.parsed import ParsedProgram
 from machine.view import findings, layers, paths, scene
-from machine.view.comparison import Alternative, front_records
 from machine.view.encoding import pack
+from machine.view.front import front_records
 from machine.view.parts import page_colours
-from machine.view.program import Program
 from machine.view.report import parts_report, print_report, with_alternatives
 from machine.view.text import line_patterns
 from mdp.decomposition import Decomposition

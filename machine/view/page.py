@@ -7,10 +7,9 @@ from hashlib import sha256
 from html import escape
 from importlib import resources
 
-from machine.view.comparison import Alternative
+from machine.program import Alternative, Program
 from machine.view.contents import compared, of_parts, of_print
 from machine.view.encoding import with_header
-from machine.view.program import Program
 from mdp.decomposition import Decomposition
 from profiles.profile import Profile
 

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun, summary
+from machine.program import Alternative, Program
+from machine.quantities import duration, filament_g
 from machine.reader.parsed import MoveKind
-from machine.view.comparison import Alternative
 from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
 from machine.view.paths import PRIME, WIPE, page_kinds
-from machine.view.program import Program
-from machine.view.quantities import duration, filament_g
 from machine.view.settings import settings_tables
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
@@ -99,7 +98,8 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
     for index in parsed.parts or (0,):
         mine = parsed.part == index
         count = int((parsed.part[layers.first] == index).sum())
-        figures = [str(count), duration(float(seconds[mine].sum())), f"{filament_g(parsed.e_mm[mine], profile.material):.1f}"]
+        mass_g = filament_g(float(parsed.e_mm[mine].sum()), profile.material)
+        figures = [str(count), duration(float(seconds[mine].sum())), f"{mass_g:.1f}"]
         stands_on = [f"{interfaces.get(index, 0.0) / 1000:.2f}"] if interfaces else []
         rows.append([*solids.get(index, [str(index) if index else "all"]), *figures, *stands_on])
     head = [*(SOLID if solids else SOLID[:1]), "layers", "time", "g", *([STANDS_ON] if interfaces else [])]
@@ -135,16 +135,10 @@ def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
     spent = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]
     if run.dwell_s > 0:
         spent.append(("waiting", run.dwell_s, 0.0))
-    rows = [
-        [
-            name,
-            duration(s),
-            _share(s, run.time_s),
-            _format_fixed(e_mm / 1000, 2),
-            _format_fixed(filament_g(e_mm, profile.material), 1),
-        ]
-        for name, s, e_mm in spent
-    ]
+    rows = []
+    for name, seconds, e_mm in spent:
+        filament = [_format_fixed(e_mm / 1000, 2), _format_fixed(filament_g(e_mm, profile.material), 1)]
+        rows.append([name, duration(seconds), _share(seconds, run.time_s), *filament])
     notes = ["heating and homing are not counted", *([f"times as on {guess}"] if guess else [])]
     return _table("Time and material", ["kind", "time", "share", "m", "g"], rows, notes)
 
@@ -185,9 +179,10 @@ def _alternatives(alternatives: Sequence[Alternative]) -> Table:
 def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
     values = summary(run)
     count = str(len(layers.first)) if layers.by == "comments" else f"{len(layers.first)}, by their heights"
+    mass_g = filament_g(float(run.program.e_mm.sum()), profile.material)
     return [
         ["time", duration(values["time_s"])],
-        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {filament_g(run.program.e_mm, profile.material):.1f} g"],
+        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {mass_g:.1f} g"],
         *([["parts", str(values["parts"])]] if values["parts"] else []),
         ["layers", count],
         *[[key, str(values[key])] for key in ("reorientations", "retractions")],

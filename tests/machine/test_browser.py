@@ -13,9 +13,9 @@ import pytest
 from machine.dryrun.dryrun import dry_run
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
+from machine.program import Program
 from machine.view.live import serve
 from machine.view.page import parts_page, print_page
-from machine.view.program import Program
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from profiles.profile import load

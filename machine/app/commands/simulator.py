@@ -11,11 +11,11 @@ from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.firmware import dialect_of, dialects
 from machine.firmware.line import check_baud
+from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.faults import FaultScript, read_script
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
-from machine.view.quantities import duration
 from profiles.errors import PrinterError
 
 KEPT = 10000  # moves on record; of the others only the sums are reported

@@ -10,10 +10,10 @@ from machine.app.pipeline.programs import load_program
 from machine.app.requests import ModelRequest
 from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import say
+from machine.program import Program
 from machine.view.findings import relevant_findings
 from machine.view.page import DATA, print_page
 from machine.view.paths import MOST_ROWS
-from machine.view.program import Program
 from profiles.errors import GcodeError, OutputError, ProfileError
 
 

@@ -5,8 +5,8 @@ import numpy as np
 from machine.app.pictures.lettering import write_text
 from machine.app.pictures.picture import FLOOR, add_title, best_view, floor_of, tile
 from machine.app.pictures.raster import Image, View, draw
+from machine.quantities import minutes
 from machine.view.parts import part_colours
-from machine.view.quantities import minutes
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh

@@ -8,9 +8,8 @@ import numpy as np
 from machine.app.pipeline.pipeline import build
 from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
-from machine.view.comparison import Alternative
-from machine.view.program import Program
-from machine.view.quantities import duration, filament_g
+from machine.program import Alternative, Program
+from machine.quantities import duration, filament_g
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh

@@ -1,6 +1,6 @@
 """Lying: how a model is best laid down, in words."""
 
-from machine.view.quantities import minutes
+from machine.quantities import minutes
 from mdp.decomposition import Decomposition
 from mdp.search.laying import OtherWay
 from mdp.search.orientation import Orientation, in_words, side_in_words

@@ -25,7 +25,7 @@ from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
 from machine.planning.purge import has_purge
 from machine.planning.stops import Stop
-from machine.view.program import Program
+from machine.program import Program
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, plan_of

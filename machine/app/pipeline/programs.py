@@ -10,7 +10,7 @@ from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
-from machine.view.program import Program
+from machine.program import Program
 from profiles.errors import GcodeError, MoveError
 from profiles.profile import Profile
 

@@ -11,7 +11,7 @@ from machine.dryrun.dryrun import summary
 from machine.firmware import dialect_of, dialects, firmware_of, identify
 from machine.link.identification import Answer, Kind, ask_at_any_rate
 from machine.link.port import Port, open_port
-from machine.view.program import Program
+from machine.program import Program
 from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError, SilenceError
 from profiles.machine import Machine
 from profiles.profile import Profile

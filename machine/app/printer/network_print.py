@@ -19,7 +19,7 @@ from machine.network.follow import End, OnStatus, follow_print, follow_running
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import ACTIVE, JobStatus, PrintServer
 from machine.network.servers import open_server
-from machine.view.quantities import duration
+from machine.quantities import duration
 from profiles.errors import FirmwareError, ServerError
 
 LIMITS = (

@@ -7,7 +7,7 @@ from machine.app.printer.compatibility import check_program, is_rate_limited
 from machine.app.requests import PrintRequest
 from machine.dryrun.starvation import find_starvation
 from machine.link.identification import Answer
-from machine.view.program import Program
+from machine.program import Program
 from profiles.profile import Profile
 
 

@@ -45,8 +45,8 @@ from machine.link.resume import (
     read_interrupted_print,
 )
 from machine.link.status import PrinterStatus
+from machine.program import Program
 from machine.reader.gcode_file import GcodeFile
-from machine.view.program import Program
 from profiles.errors import JournalError, ProfileError
 from profiles.profile import Profile, profile_of_tables
 

@@ -10,7 +10,7 @@ from machine.link.identification import Answer, Kind
 from machine.network.address import ServerAddress, is_server_address
 from machine.network.server import ACTIVE, Greeting, JobStatus, Phase
 from machine.network.servers import dialect_mismatch
-from machine.view.program import Program
+from machine.program import Program
 from profiles.errors import PrinterError, ServerError
 from profiles.machine import Machine
 from profiles.profile import Profile

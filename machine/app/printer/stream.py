@@ -23,10 +23,10 @@ from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
 from machine.link.stream import Outcome, print_lines
+from machine.program import Program
+from machine.quantities import duration
 from machine.simulator.board import BuildOptions
 from machine.simulator.simulator import SimulatedPrinter
-from machine.view.program import Program
-from machine.view.quantities import duration
 from profiles.errors import OutputError, PrinterError
 from profiles.profile import Profile
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from machine.app.terminal.progress import say
 from machine.link.progress import Progress
+from machine.program import Program
 from machine.view.live import serve
 from machine.view.page import print_page
-from machine.view.program import Program
 from profiles.profile import Profile
 
 Follow = Callable[[Progress], None]

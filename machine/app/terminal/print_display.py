@@ -7,7 +7,7 @@ from machine.app.terminal.keys import Keyboard, can_type, typing
 from machine.app.terminal.progress import PlainLines, is_terminal
 from machine.app.terminal.screen import Course, Screen, Words
 from machine.link.progress import Progress
-from machine.view.quantities import duration
+from machine.quantities import duration
 
 Follow = Callable[[Progress], None]
 

@@ -5,9 +5,9 @@ from textwrap import wrap
 
 from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
+from machine.program import Program
+from machine.quantities import duration, minutes
 from machine.view.parts import risky_before_mm2
-from machine.view.program import Program
-from machine.view.quantities import duration, minutes
 from mdp.decomposition import Decomposition, FrontRow
 from profiles.profile import Profile
 

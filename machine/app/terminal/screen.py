@@ -18,8 +18,8 @@ from machine.app.terminal.plain import plain_line
 from machine.dryrun.dryrun import DryRun
 from machine.link.progress import Progress
 from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event, unknown_command
+from machine.quantities import duration
 from machine.reader.parsed import MoveKind
-from machine.view.quantities import duration
 
 WORDS_KEPT = 4  # last words of the printer
 WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell
