@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, contents, extrusion, heat, layering, motion, placement, provenance, sequence
+from machine.dryrun import clearance, extrusion, heat, layering, motion, own_comments, placement, sequence
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import beads_of
@@ -80,12 +80,11 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
         *placement.findings(program, deposited, contacts),
         *layering.findings(program, deposited, contacts),
         *extrusion.findings(program, deposited, profile),
-        *contents.findings(program),
         *sequence.findings(program, profile),
-        *provenance.findings(text, program, profile),
+        *own_comments.findings(text, program, profile),
         *placement.off_plate(program, segments, rows, profile),
         *placement.purged_into(program, deposited),
-        *heat.findings(program, profile, provenance.has_material(text, profile)),
+        *heat.findings(program, profile, own_comments.has_material(text, profile)),
     ]
     findings = sorted(dict.fromkeys(findings), key=lambda finding: (finding.severity, finding.line))
     return DryRun(

@@ -42,7 +42,7 @@ class Feeding:
     time_s: float
 
 
-class Line(NamedTuple):
+class SerialLine(NamedTuple):
     """How blocks come: (m,) bytes of the line of each, (m,) of other lines before it, bytes in flight at most, seconds a byte."""
 
     own: Floats
@@ -103,7 +103,7 @@ def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud
     own, ahead = _bytes(lines, program.line[blocks])
     flags = np.zeros((2, len(blocks)), dtype=np.bool_)
     planned = Blocks(moved / length[:, None], length, speed, acceleration, measure, halts)
-    line = Line(own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud)
+    line = SerialLine(own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud)
     time_s = _play(planned, line, machine.junction_speed_mm_s, flags[0], flags[1])
     whole = np.zeros((2, len(program.line)), dtype=np.bool_)
     whole[:, blocks] = flags
@@ -160,7 +160,7 @@ def _wait_for_room(now: float, places: int, planned: Planned, blocks: Blocks) ->
 
 
 @kernel
-def _play(blocks: Blocks, line: Line, jerk: float, slowed: NDArray[np.bool_], stopped: NDArray[np.bool_]) -> float:
+def _play(blocks: Blocks, line: SerialLine, jerk: float, slowed: NDArray[np.bool_], stopped: NDArray[np.bool_]) -> float:
     """Seconds until the last block is over; slowed and stopped (m,) are filled in, some cruise speeds lowered."""
     n = len(blocks.length)
     corner2, taken = floats(n, 0.0), floats(n, 0.0)

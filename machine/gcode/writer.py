@@ -11,7 +11,7 @@ from machine.firmware import dialect_of
 from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
 from machine.gcode.blocks import check_blocks
-from machine.gcode.contents import contents_comment
+from machine.gcode.part_totals import totals_comment
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_path
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
@@ -177,7 +177,7 @@ def _contents(program: MachineProgram, place: int) -> Iterator[str]:
         elif isinstance(move, Stroke):
             strokes.append(move)
             layers.add(layer)
-    comment = contents_comment(strokes, len(layers))
+    comment = totals_comment(strokes, len(layers))
     if comment:
         yield comment
 

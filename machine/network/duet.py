@@ -15,7 +15,7 @@ from machine.network.answers import entry, number, table, whole
 from machine.network.credentials import how_to_give_a_key
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals, Reply, plain
-from machine.network.server import ACTIVE, Greeting, JobStatus, Phase
+from machine.network.server import ACTIVE, JobStatus, Phase, ServerIdentity
 from profiles.errors import ServerError
 
 FOLDER = "0:/gcodes/"
@@ -51,7 +51,7 @@ class Duet:
         self._last: Phase | None = None  # of the print, for idle says nothing of how it ended
         self._up_s = 0.0  # since the board was reset
 
-    def greet(self) -> Greeting:
+    def greet(self) -> ServerIdentity:
         """Log in, and learn firmware, axes with their limits and which heaters are nozzle and bed."""
         self._connect()
         board = table(self._model("boards[0]"))
@@ -62,7 +62,7 @@ class Duet:
         nozzle = whole(entry(table(entry(self._array("tools"), 0)).get("heaters"), 0))
         bed = whole(entry(table(self._model("heat")).get("bedHeaters"), 0))
         self._nozzle, self._bed = self._nozzle if nozzle is None else nozzle, -1 if bed is None else bed
-        return Greeting(f"{name} {version}".strip(), f"{name} {version}".strip(), "".join(limits), known)
+        return ServerIdentity(f"{name} {version}".strip(), f"{name} {version}".strip(), "".join(limits), known)
 
     def _connect(self) -> None:
         password = self._http.credentials.key or DEFAULT_PASSWORD

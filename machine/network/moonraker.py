@@ -12,7 +12,7 @@ from machine.link.protocol.events import Temperature
 from machine.network.answers import entry, number, table, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals
-from machine.network.server import Greeting, JobStatus, Phase
+from machine.network.server import JobStatus, Phase, ServerIdentity
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers
@@ -39,21 +39,22 @@ class Moonraker:
         if http.credentials.key:
             http.set_header("X-Api-Key", http.credentials.key)
 
-    def greet(self) -> Greeting:
+    def greet(self) -> ServerIdentity:
         """Its version; axes, limits, steppers and commands of its Klipper where that is ready."""
         server = table(self._get("/server/info"))
         if "klippy_state" not in server:
             raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
         text = f"Moonraker {server.get('moonraker_version') or ''}".strip()
         if server["klippy_state"] != "ready":
-            return Greeting(text, "Klipper")
+            return ServerIdentity(text, "Klipper")
         version = str(table(self._get("/printer/info")).get("software_version") or "")
         objects = table(self._get("/printer/objects/list")).get("objects")
         names = frozenset(name for name in objects if isinstance(name, str)) if isinstance(objects, list) else frozenset()
         steppers = frozenset(name.removeprefix(STEPPER) for name in names if name.startswith(STEPPER))
         limits = self._limits() if "toolhead" in names else {}
         commands = self._commands() if "gcode" in names else None
-        return Greeting(f"{text}, Klipper {version}".strip(), f"Klipper {version}".strip(), "XYZ", limits, steppers, commands)
+        klipper = f"Klipper {version}".strip()
+        return ServerIdentity(f"{text}, {klipper}", klipper, "XYZ", limits, steppers, commands)
 
     def _commands(self) -> frozenset[str] | None:
         """All that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to tell."""

@@ -11,7 +11,7 @@ from machine.link.protocol.events import Temperature
 from machine.network.answers import number, table, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals
-from machine.network.server import Greeting, JobStatus, Phase
+from machine.network.server import JobStatus, Phase, ServerIdentity
 from profiles.errors import ServerError
 
 STORED_S = 120.0  # the server copies and reads a file before it answers
@@ -34,7 +34,7 @@ class OctoPrint:
         if http.credentials.key:
             http.set_header("X-Api-Key", http.credentials.key)
 
-    def greet(self) -> Greeting:
+    def greet(self) -> ServerIdentity:
         """Its version; what it drives is not told by the API."""
         value = self._get("/api/version", "to say who it is")
         text = value.get("text") if isinstance(value, dict) else None
@@ -42,7 +42,7 @@ class OctoPrint:
             raise ServerError(f"{self.name} is no OctoPrint: it does not answer /api/version as one")
         if "moonraker" in text.lower():
             raise ServerError(f"{self.name} is a Moonraker that speaks as OctoPrint: use moonraker:HOST")
-        return Greeting(text)
+        return ServerIdentity(text)
 
     def status(self) -> JobStatus:
         """From /api/job, and from /api/printer where its printer is connected."""

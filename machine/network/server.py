@@ -46,7 +46,7 @@ class JobStatus:
 
 
 @dataclass(frozen=True)
-class Greeting:
+class ServerIdentity:
     """Who answers. text: server, version and what it drives; firmware: as M115 names it, "" when it does not tell.
 
     letters: axes of the printer; limits: letter -> least and greatest place, mm or deg; steppers: names of the [manual_stepper]
@@ -68,7 +68,7 @@ class PrintServer(Protocol):
     def name(self) -> str:
         """As the user names it."""
 
-    def greet(self) -> Greeting:
+    def greet(self) -> ServerIdentity:
         """Make sure that it is such a server, that the key is good, and learn what it drives."""
 
     def status(self) -> JobStatus:

@@ -38,7 +38,7 @@ def parsed_program(reader: Reader) -> ParsedProgram:
         width_mm=table[:, 17], height_mm=table[:, 18], acceleration=table[:, 19],
         events=events, ignored=reader.ignored,
         layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
-        announced=reader.announced, contents=tuple(reader.contents),
+        announced=reader.announced, part_totals=tuple(reader.part_totals),
     )  # fmt: skip
 
 

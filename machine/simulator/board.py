@@ -1,17 +1,16 @@
 """The board of a simulated printer: its build options, clock, motion, heaters and fan, and the words its commands read."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import exp, inf, log
 
 from machine.firmware import simulation_of
-from machine.simulator.motion import Motion
+from machine.simulator.motion import Motion, WordValues
 from profiles.machine import Machine
 
-Words = Mapping[str, float]
 # None: done, answered with ok; a text: its own ok; else the virtual times at which a slow command wants to look again.
 Work = Iterator[float] | str | None
-Command = Callable[["Board", Words, str], Work]
+Command = Callable[["Board", WordValues, str], Work]
 
 NOZZLE_S, BED_S = 60.0, 240.0  # time constants of a 40 W hot end and a 300 W plate
 EVENTS = 10000  # kept where the moves are not all kept either

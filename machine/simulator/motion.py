@@ -7,7 +7,7 @@ from machine.firmware import simulation_of
 from machine.gcode.arcs import centre_of, chords, sweep_rad
 from machine.gcode.modes import Modes, axes_of
 from machine.kinematics.coordinates import origin_mm
-from machine.simulator.planner import ExecutedMoves, Planner, block_of
+from machine.simulator.planner import ExecutedMoves, Place, Planner, block_of
 from mdp.pose import Pose, rotation, shift
 from profiles.machine import Machine
 
@@ -19,8 +19,7 @@ ARC_MM, CIRCLE_CHORDS = 1.0, 72  # Marlin's MAX_ARC_SEGMENT_MM and MIN_CIRCLE_SE
 SEGMENTS_PER_S = 200.0  # into which the firmware cuts a turn that it follows
 STEPS = (80.0, 80.0, 400.0, 80.0, 80.0)  # a mm or degree, for M114's Count
 
-Words = Mapping[str, float]
-Place = Sequence[float]
+WordValues = Mapping[str, float]  # by letter
 
 
 class TcpKinematics:
@@ -103,7 +102,7 @@ class Motion:
         self.jerk_mm_s = machine.junction_speed_mm_s
         self._printing = self._travelling = inf  # mm/s2 set by M204 for X Y Z; inf: what the axes allow
 
-    def target(self, words: Words, extrude: bool = True) -> list[float]:
+    def target(self, words: WordValues, extrude: bool = True) -> list[float]:
         """Where a G0 or G1 leads, its F taken over; without `extrude` (cold nozzle) the filament stands still."""
         place = self._wanted(words)
         if self.soft_limits:
@@ -131,22 +130,22 @@ class Motion:
             self._clamp(place)
         return place
 
-    def pushes(self, words: Words) -> bool:
+    def pushes(self, words: WordValues) -> bool:
         """Whether a move turns the extruder."""
         return abs(self._wanted(words)[5] - self.place[5]) > TINY_MM
 
-    def unhomed(self, words: Words) -> list[float] | None:
+    def unhomed(self, words: WordValues) -> list[float] | None:
         """The program's coordinates of a target that moves X, Y or Z before they are homed; None for any other."""
         wanted = [axis for axis, letter in enumerate(self.letters[:3]) if letter in words and axis not in self.homed]
         return [p + s for p, s in zip(self._wanted(words), self.modes.offset, strict=True)] if wanted else None
 
-    def beyond(self, words: Words) -> list[float] | None:
+    def beyond(self, words: WordValues) -> list[float] | None:
         """The program's coordinates of a target outside the soft limits; None for one inside."""
         place = self._wanted(words)
         inside = all(low - SLACK <= p <= high + SLACK for p, (low, high) in zip(place, self.limits, strict=False))
         return None if inside else [p + s for p, s in zip(place, self.modes.offset, strict=True)]
 
-    def _wanted(self, words: Words) -> list[float]:
+    def _wanted(self, words: WordValues) -> list[float]:
         place = self.place[:]
         self.modes.move(place, words.items())
         return place
@@ -163,7 +162,7 @@ class Motion:
             return [list(target)]
         return _evenly(here, target, max(1, ceil(self._seconds(here, target) * SEGMENTS_PER_S)))
 
-    def arc(self, words: Words, clockwise: bool, extrude: bool) -> list[list[float]]:
+    def arc(self, words: WordValues, clockwise: bool, extrude: bool) -> list[list[float]]:
         """Where the chords of a G2 or G3 end; [] for what Marlin answers with "Bad arc parameters"."""
         scale = self.modes.unit_mm
         start, end = self.place, self.target(words, extrude)
@@ -229,7 +228,7 @@ class Motion:
             positions = self._tcp.positions(self.place) if on else self.place[:5]
             self._offset = [r - p for r, p in zip(self._real, positions, strict=False)]
 
-    def accelerate(self, words: Words) -> None:
+    def accelerate(self, words: WordValues) -> None:
         """M204: P for moves that push filament, T for those that do not, S for both; what is not above 0 changes nothing."""
         scale = self.modes.unit_mm
         for letter, value in words.items():
@@ -238,13 +237,13 @@ class Motion:
             if value > 0 and letter in "TS":
                 self._travelling = value * scale
 
-    def bound(self, words: Words, bounds: list[float]) -> None:
+    def bound(self, words: WordValues, bounds: list[float]) -> None:
         """M201, M203: greatest accelerations or speeds of single axes."""
         for axis, most in self.modes.named(words.items()):
             if most > 0:
                 bounds[axis] = most
 
-    def rename(self, words: Words) -> None:
+    def rename(self, words: WordValues) -> None:
         """G92: the place where the axes stand gets these coordinates."""
         for axis, coordinate in self.modes.named(words.items()):
             self.set_coordinate(axis, coordinate)

@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Sequence
 
 from machine.gcode.words import read_letters, split_command
-from machine.simulator.board import Board, Command, Words, Work, wait_for_moves
+from machine.simulator.board import Board, Command, Work, wait_for_moves
+from machine.simulator.motion import WordValues
 
 COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP
 
 
-def move(board: Board, words: Words, text: str) -> Work:
+def move(board: Board, words: WordValues, text: str) -> Work:
     """G0, G1; the caller has made sure of a free block."""
     motion, pushes = board.motion, True
     if board.build.must_home and (unhomed := motion.unhomed(words)) is not None:
@@ -48,7 +49,7 @@ def _run(board: Board, pieces: Sequence[Sequence[float]]) -> Iterator[float]:
         motion.reach(piece, board.now_s)
 
 
-def _arc(board: Board, words: Words, text: str) -> Work:
+def _arc(board: Board, words: WordValues, text: str) -> Work:
     pushes = "E" not in words or board.cold_allowed or board.nozzle.at(board.now_s) >= COLD_C or not board.motion.pushes(words)
     if not pushes:
         for line in board.rules.cold:
@@ -59,18 +60,18 @@ def _arc(board: Board, words: Words, text: str) -> Work:
     return _run(board, pieces)
 
 
-def _dwell(board: Board, words: Words, text: str) -> Iterator[float]:
+def _dwell(board: Board, words: WordValues, text: str) -> Iterator[float]:
     yield from wait_for_moves(board)
     until_s = board.now_s + max(0.0, words.get("S", words.get("P", 0.0) / 1000.0))
     while board.now_s < until_s:
         yield until_s
 
 
-def _drain(board: Board, words: Words, text: str) -> Iterator[float]:
+def _drain(board: Board, words: WordValues, text: str) -> Iterator[float]:
     yield from wait_for_moves(board)
 
 
-def _home(board: Board, words: Words, text: str) -> Iterator[float]:
+def _home(board: Board, words: WordValues, text: str) -> Iterator[float]:
     letters = read_letters(split_command(text)[1])
     axes = [axis for axis, letter in enumerate(board.motion.letters[:5]) if letter in letters] or list(range(5))
     yield from seek_endstops(board, axes)
@@ -89,7 +90,7 @@ def seek_endstops(board: Board, axes: Sequence[int]) -> Iterator[float]:
     board.note("homed " + "".join(board.motion.letters[axis] for axis in axes))
 
 
-def _wait_for_person(board: Board, words: Words, text: str) -> Iterator[float]:
+def _wait_for_person(board: Board, words: WordValues, text: str) -> Iterator[float]:
     """M0, M1: until M108, or for P milliseconds or S seconds."""
     yield from wait_for_moves(board)
     seconds = words.get("S", words.get("P", 0.0) / 1000.0)
@@ -100,38 +101,38 @@ def _wait_for_person(board: Board, words: Words, text: str) -> Iterator[float]:
     board.waits_for_person = False
 
 
-def _mode(board: Board, words: Words, text: str) -> Work:
+def _mode(board: Board, words: WordValues, text: str) -> Work:
     board.motion.modes.set(split_command(text)[0])
     return None
 
 
-def _follow(board: Board, words: Words, text: str) -> Iterator[float]:
+def _follow(board: Board, words: WordValues, text: str) -> Iterator[float]:
     yield from wait_for_moves(board)
     board.motion.follow(text.startswith("G43"))
 
 
-def _accelerate(board: Board, words: Words, text: str) -> Work:
+def _accelerate(board: Board, words: WordValues, text: str) -> Work:
     board.motion.accelerate(words)
     return None
 
 
-def _bound_accelerations(board: Board, words: Words, text: str) -> Work:
+def _bound_accelerations(board: Board, words: WordValues, text: str) -> Work:
     board.motion.bound(words, board.motion.accelerations)
     return None
 
 
-def _bound_speeds(board: Board, words: Words, text: str) -> Work:
+def _bound_speeds(board: Board, words: WordValues, text: str) -> Work:
     board.motion.bound(words, board.motion.speeds)
     return None
 
 
-def _corner(board: Board, words: Words, text: str) -> Work:
+def _corner(board: Board, words: WordValues, text: str) -> Work:
     if words.get("X", -1.0) >= 0:
         board.motion.jerk_mm_s = words["X"]
     return None
 
 
-def _override_feed(board: Board, words: Words, text: str) -> Work:
+def _override_feed(board: Board, words: WordValues, text: str) -> Work:
     if words.get("S", 0.0) > 0:
         board.motion.feed_share = words["S"] / 100.0
     elif "S" not in words:
@@ -139,7 +140,7 @@ def _override_feed(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _override_flow(board: Board, words: Words, text: str) -> Work:
+def _override_flow(board: Board, words: WordValues, text: str) -> Work:
     if words.get("S", -1.0) >= 0:
         board.motion.flow_share = words["S"] / 100.0
     elif "S" not in words:
@@ -147,7 +148,7 @@ def _override_flow(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _limit(board: Board, words: Words, text: str) -> Work:
+def _limit(board: Board, words: WordValues, text: str) -> Work:
     """M211: soft limits on, off, reported."""
     motion = board.motion
     if "S" in words:
@@ -158,20 +159,20 @@ def _limit(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _rename(board: Board, words: Words, text: str) -> Work:
+def _rename(board: Board, words: WordValues, text: str) -> Work:
     board.motion.rename(words)
     if board.rules.reports_position:
         board.say(board.position())
     return None
 
 
-def _rest(board: Board, words: Words, text: str) -> Iterator[float]:
+def _rest(board: Board, words: WordValues, text: str) -> Iterator[float]:
     yield from wait_for_moves(board)
     board.motion.homed.clear()
     board.note("motors off")
 
 
-def _stop(board: Board, words: Words, text: str) -> Work:
+def _stop(board: Board, words: WordValues, text: str) -> Work:
     board.motion.halt(board.now_s)
     board.note("M410")
     return None

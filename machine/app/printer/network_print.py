@@ -5,14 +5,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from machine.app.pipeline.programs import LoadedProgram
 from machine.app.printer.attendance import Observers, ServerAttendance
 from machine.app.printer.rescue import STOPPED
 from machine.app.printer.serial_log import SerialLog, new_log
 from machine.app.printer.server_checks import check_free
-from machine.app.printer.stream import PrintJob
 from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import reporting, say
-from machine.app.terminal.screen import Course, UnknownCourse
+from machine.dryrun.timeline import Timeline, UnknownTimeline
 from machine.link.pending_commands import CancelledError
 from machine.link.progress import ProgramPosition, Progress
 from machine.network.follow import End, OnStatus, follow_print, follow_running
@@ -66,7 +66,7 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str, person: Serv
     return file
 
 
-def print_there(server: PrintServer, job: PrintJob, observers: Observers, person: ServerAttendance) -> End:
+def print_there(server: PrintServer, job: LoadedProgram, observers: Observers, person: ServerAttendance) -> End:
     """Hand a program over, have it printed and show it until it ends or the person leaves; says how it ended.
 
     Raises ServerError, FirmwareError after an emergency stop, CancelledError when the person gives it up before it has begun.
@@ -77,9 +77,9 @@ def print_there(server: PrintServer, job: PrintJob, observers: Observers, person
     if person.gives_up():
         raise CancelledError
     say(LIMITS)
-    course = Course(job.program.run)
-    progress = ServerProgress(upload, job.program.lines, course.remaining_s)
-    with _shown(person, observers, course, progress) as on_status:
+    timeline = Timeline(job.program.run)
+    progress = ServerProgress(upload, job.program.lines, timeline.remaining_s)
+    with _shown(person, observers, timeline, progress) as on_status:
         end = follow_print(server, file, len(upload.content), on_status, person.control, person.gone)
     _report_end(end, file, server.name, progress)
     return end
@@ -101,7 +101,7 @@ def follow_there(server: PrintServer, now: JobStatus, observers: Observers, pers
     Raises ServerError, FirmwareError after an emergency stop.
     """
     progress = ProgressToldByServer()
-    with _shown(person, observers, UnknownCourse(), progress) as on_status:
+    with _shown(person, observers, UnknownTimeline(), progress) as on_status:
         end = follow_running(server, now, on_status, person.control, person.gone)
     _report_end(end, file_name(now), server.name, progress)
     return end
@@ -114,10 +114,10 @@ def file_name(status: JobStatus) -> str:
 
 @contextmanager
 def _shown(
-    person: ServerAttendance, observers: Observers, course: Course, progress: "ProgressToldByServer"
+    person: ServerAttendance, observers: Observers, timeline: Timeline, progress: "ProgressToldByServer"
 ) -> Iterator[OnStatus]:
     """Takes what the server tells, and shows it."""
-    with person.show(observers, course) as display:
+    with person.show(observers, timeline) as display:
         display.open()
 
         def on_status(status: JobStatus, message: str) -> None:

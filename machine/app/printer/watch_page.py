@@ -4,12 +4,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from machine.app.pipeline.programs import LoadedProgram
 from machine.app.terminal.progress import say
 from machine.link.progress import Progress
-from machine.program import Program
 from machine.view.live import serve
 from machine.view.page import print_page
-from profiles.profile import Profile
 
 Follow = Callable[[Progress], None]
 
@@ -23,11 +22,11 @@ class Watchers:
 
 
 @contextmanager
-def serve_watch_page(name: str, program: Program, profile: Profile, port: int | None) -> Iterator[Watchers]:
+def serve_watch_page(job: LoadedProgram, port: int | None) -> Iterator[Watchers]:
     """Serve the page of a print on a port of this computer, 0: on any free one; None: serve nothing."""
     if port is None:
         yield Watchers()
         return
-    with serve(print_page(name, program, profile, live=True), port) as watched:
+    with serve(print_page(job.name, job.program, job.profile, live=True), port) as watched:
         say(f"watch the print at {watched.address}")
         yield Watchers(watched.follow, watched.end)
