@@ -37,7 +37,7 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     program = ready_program(answer, loaded.program, loaded.profile, loaded.name, printing, request.force)
     show(print_table(program, loaded.profile))
     job = replace(loaded, program=program)
-    with serve_watch_page(job, printing.watch_port) as watchers:
-        code = print_program(job, printing, watchers.follow)
-        watchers.end("stopped" if code else "done")
+    with serve_watch_page(job, printing.watch_port) as watched:
+        code = print_program(job, printing, watched.follow)
+        watched.end("stopped" if code else "done")
     return code

@@ -59,9 +59,9 @@ def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:
         )
     with _session(request, printing.port, printing.log, "print") as (server, log):
         job = _checked(request, server, printing.port, True)
-        with serve_watch_page(job, printing.watch_port) as watchers:
-            end = print_there(server, job, Observers(log, None, watchers.follow), AtServerTerminal(server.name))
-            watchers.end("done" if end is End.DONE else "stopped")
+        with serve_watch_page(job, printing.watch_port) as watched:
+            end = print_there(server, job, Observers(log, None, watched.follow), AtServerTerminal(server.name))
+            watched.end("done" if end is End.DONE else "stopped")
     return 0 if end is End.DONE else 130
 
 

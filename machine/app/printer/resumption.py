@@ -139,10 +139,10 @@ def print_rest(
 
         with (
             new_log("print", f"the rest of {job.name} to {printing.port}", printing.log) as log,
-            serve_watch_page(job, printing.watch_port) as watchers,
+            serve_watch_page(job, printing.watch_port) as watched,
         ):
-            outcome = stream_program(job, printing, Observers(log, further, watchers.follow), begin, attendance=attendance)
-            watchers.end("stopped" if outcome.cancelled else "done")
+            outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin, attendance=attendance)
+            watched.end("stopped" if outcome.cancelled else "done")
         if outcome.cancelled and outcome.heaters_off is None:
             say("nothing was moved or heated")
             return NOTHING

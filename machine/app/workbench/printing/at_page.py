@@ -8,6 +8,7 @@ from typing import Any
 
 from machine.app.printer.attendance import Observers
 from machine.app.printer.serial_log import SerialLog
+from machine.app.printer.watch_page import state_of
 from machine.app.terminal.plain import plain_line
 from machine.app.terminal.printer_messages import PrinterMessages
 from machine.app.terminal.progress import Report
@@ -15,7 +16,6 @@ from machine.app.workbench.printing.teller import Teller
 from machine.dryrun.timeline import Timeline
 from machine.link.pending_commands import Command, Control
 from machine.link.progress import Progress
-from machine.view.live import state_of
 
 WORDS_KEPT = 50
 COMMANDS = {
