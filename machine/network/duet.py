@@ -125,9 +125,7 @@ class Duet:
         """Hand over a file with its CRC."""
         self._connect()  # the one before may have ended while the program was made
         params = {"name": FOLDER + upload.name, "crc32": upload.crc32}
-        headers = {"Content-Type": "application/octet-stream"}
-        pieces = upload.pieces(sent)
-        reply = self._http.upload("/rr_upload", pieces, len(upload.content), headers, params, answer_s=WRITTEN_S)
+        reply = self._http.upload("/rr_upload", params, upload.read_by(sent), answer_s=WRITTEN_S)
         if table(self._http.check(reply, "the file")).get("err") != 0:
             said = plain(self._get("/rr_reply").body.decode("utf-8", "replace"))
             raise ServerError(f"{self.name} has not kept the file ({said or 'no reason given'}): is the card full or damaged?")

@@ -105,8 +105,8 @@ class Moonraker:
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file with its checksum, without which half a file would be taken for a whole one."""
-        pieces, length, headers = upload.form({"root": "gcodes", "checksum": upload.sha256}, sent)
-        reply = self._http.upload("/server/files/upload", pieces, length, headers, answer_s=READ_S)
+        fields, file = {"root": "gcodes", "checksum": upload.sha256}, upload.read_by(sent)
+        reply = self._http.upload_form("/server/files/upload", fields, upload.name, file, answer_s=READ_S)
         sentences = {
             400: f"{self.name} does not take the file: {{words}}; it takes files up to max_upload_size of its [server]",
             403: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})",

@@ -68,8 +68,7 @@ class OctoPrint:
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file; the name is the one that the server has made of it."""
-        pieces, length, headers = upload.form({}, sent)
-        reply = self._http.upload("/api/files/local", pieces, length, headers, answer_s=STORED_S)
+        reply = self._http.upload_form("/api/files/local", {}, upload.name, upload.read_by(sent), answer_s=STORED_S)
         sentence = {409: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})"}
         value = table(self._http.check(reply, "the file", Refusals(sentence)))
         local = table(table(value.get("files")).get("local"))
