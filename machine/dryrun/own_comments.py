@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_row
 from machine.gcode.part_totals import PartTotals
-from machine.gcode.settings import comment, flat
+from machine.gcode.settings import CONFIG_BEGIN, CONFIG_END, comment, flat
 from machine.reader.parsed import MoveKind, ParsedProgram
 from profiles.profile import Profile
 from slicer.paths import Kind
 
-BEGIN, END = "; tiltprint_config = begin", "; tiltprint_config = end"
 CENTRE = ("machine.tilt.point_mm", "machine.turn.point_mm", "machine.tool_mm")
 SIGN = tuple(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("sign", "axis", "letter", "zero_deg"))
 POSE = re.compile(r";POSE:([A-Z])(-?[0-9.]+) ([A-Z])(-?[0-9.]+)")
@@ -58,9 +57,9 @@ def _configuration(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
     inside = False
     for number in range(len(lines), 0, -1):
         text = lines[number - 1].rstrip()
-        if text == END:
+        if text == CONFIG_END:
             inside = True
-        elif text == BEGIN or (text and not text.startswith(";")):
+        elif text == CONFIG_BEGIN or (text and not text.startswith(";")):
             break
         elif inside:
             recorded.setdefault(text[2:].partition(" = ")[0], (number, text))

@@ -7,6 +7,7 @@ from machine.quantities import duration, filament_cm3, filament_g
 from profiles.profile import Profile
 
 LONGEST_COMMENT = 190
+CONFIG_BEGIN, CONFIG_END = "; tiltprint_config = begin", "; tiltprint_config = end"
 
 
 def head(name: str, profile: Profile) -> Iterator[str]:
@@ -25,10 +26,10 @@ def foot(profile: Profile, filament_mm: float, seconds: float) -> Iterator[str]:
     yield f"; filament used [cm3] = {filament_cm3(filament_mm, material):.2f}"
     yield f"; filament used [g] = {filament_g(filament_mm, material):.2f}"
     yield f"; estimated printing time (normal mode) = {duration(seconds)}"
-    yield "; tiltprint_config = begin"
+    yield CONFIG_BEGIN
     for key, value in flat(profile.model_dump(), ""):
         yield comment(f"{key} = {value}")
-    yield "; tiltprint_config = end"
+    yield CONFIG_END
 
 
 def comment(text: str) -> str:
