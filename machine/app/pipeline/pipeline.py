@@ -8,13 +8,13 @@ from time import perf_counter
 import numpy as np
 
 from machine.app.output import write_bytes
-from machine.app.pictures.thumbnail import with_thumbnails
+from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.copies import check_copies, in_copies
 from machine.app.pipeline.given_plan import check_parts_named, read_given_plan, with_plan_settings
-from machine.app.pipeline.lying import better_in_words, laid_in_words
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
+from machine.app.terminal.advice import better_in_words, laid_in_words
 from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
