@@ -118,6 +118,7 @@ class Board:
         self.nozzle = Heater("nozzle", machine.nozzle_limit_c, NOZZLE_S)
         self.bed = Heater("bed", machine.bed_limit_c, BED_S)
         self.events: list[tuple[float, str]] = []
+        self.troubles: list[tuple[float, str]] = []
         self._most_events = None if kept is None else EVENTS
         self.unknown = 0
         self.turning: dict[int, tuple[float, float]] = {}
@@ -133,9 +134,11 @@ class Board:
         self.report_every_s = self.place_every_s = 0.0
         self.report_s = self.place_s = inf
 
-    def note(self, what: str) -> None:
-        """Put an event on record."""
+    def note(self, what: str, trouble: bool = False) -> None:
+        """Put an event on record; trouble: it is none that a program asks for."""
         self.events.append((self.now_s, what))
+        if trouble:
+            self.troubles.append((self.now_s, what))
         if self._most_events is not None and len(self.events) > 2 * self._most_events:
             del self.events[: self._most_events]
 

@@ -4,9 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from math import ceil, hypot, inf, pi, sqrt
 
 from machine.firmware import simulation_of
-from machine.gcode.arcs import centre_of, chords, sweep_rad
+from machine.gcode.arcs import chords, sweep_rad, told_centre
 from machine.gcode.modes import Modes, axes_of
 from machine.kinematics.coordinates import origin_mm
+from machine.planning.timing import axis_accelerations, axis_speeds
 from machine.simulator.planner import ExecutedMoves, Place, Planner, block_of
 from mdp.pose import Pose, rotation, shift
 from profiles.machine import Machine
@@ -61,7 +62,7 @@ class Motion:
     def __init__(
         self,
         machine: Machine,
-        note: Callable[[str], None] = lambda what: None,
+        note: Callable[[str, bool], None] = lambda what, trouble: None,
         kept: int | None = None,
         home_start: bool = True,
     ) -> None:
@@ -93,12 +94,8 @@ class Motion:
         self.soft_limits = True
         self.homed: set[int] = set()
         self.feed_share = self.flow_share = 1.0
-        axes = (machine.x, machine.y, machine.z)
-        self.speeds = [a.speed_mm_s for a in axes]
-        self.speeds += [machine.tilt.speed_deg_s, machine.turn.speed_deg_s, machine.extruder_speed_mm_s]
-        self.accelerations = [a.acceleration_mm_s2 for a in axes]
-        self.accelerations += [machine.tilt.acceleration_deg_s2, machine.turn.acceleration_deg_s2]
-        self.accelerations += [machine.extruder_acceleration_mm_s2]
+        self.speeds: list[float] = axis_speeds(machine).tolist()
+        self.accelerations: list[float] = axis_accelerations(machine).tolist()
         self.jerk_mm_s = machine.junction_speed_mm_s
         self._printing = self._travelling = inf  # mm/s2 set by M204 for X Y Z; inf: what the axes allow
 
@@ -167,10 +164,7 @@ class Motion:
         scale = self.modes.unit_mm
         start, end = self.place, self.target(words, extrude)
         begin, finish = (start[0], start[1]), (end[0], end[1])
-        if "R" in words:
-            centre = centre_of(begin, finish, words["R"] * scale, clockwise)
-        else:
-            centre = (start[0] + words.get("I", 0.0) * scale, start[1] + words.get("J", 0.0) * scale)
+        centre = told_centre(begin, finish, {letter: scale * words[letter] for letter in "RIJ" if letter in words}, clockwise)
         if centre is None or centre == begin:
             return []
         sweep = sweep_rad(begin, finish, centre, clockwise)
@@ -208,7 +202,7 @@ class Motion:
                 stopped = min(max(end[axis], low - HARD_MM), high + HARD_MM)
                 self._offset[axis] += stopped - end[axis]
                 end[axis] = stopped
-                self._note(f"{self.letters[axis]} driven against its end")
+                self._note(f"{self.letters[axis]} driven against its end", True)
 
     def home(self, axes: Sequence[int]) -> float:
         """Put axes at their home positions (X Y least, Z greatest, table level); returns how long it takes, s."""
