@@ -22,8 +22,8 @@ class Record:
     begin_s, duration_s (n,) of the virtual clock; first: how many moves before these are not kept; moves, strokes,
     pushed_mm, moving_s: count of all moves and strokes, filament of the strokes, time of all moves; events (virtual s, what) and
     those of them that no program asks for; targets and fan at the end; clamped: coordinates outside the soft limits;
-    unknown: commands not understood; underruns: how often the planner ran dry in mid-motion; slowed: moves slowed down since the host sent too few; lost_bytes: what a full
-    receive ring dropped.
+    unknown: commands not understood; underruns: how often the planner ran dry in mid-motion; slowed: moves slowed down since
+    the host sent too few; lost_bytes: what a full receive ring dropped.
     """
 
     machine: Machine
