@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.findings import Finding, at_line, at_row, per_part, unless_own
+from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.profile import Profile
@@ -59,7 +59,7 @@ def _left_on(program: ParsedProgram) -> list[Finding]:
         if events and events[-1].value > 0:
             severity, unless = unless_own(program, max(events[-1].row, last + 1), len(program.line))
             message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing{unless}"
-            problems.append(at_line(program, events[-1].row, events[-1].line, severity, "heater-on", message))
+            problems.append(at_event(program, events[-1], severity, "heater-on", message))
     return problems
 
 
@@ -110,31 +110,30 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     if not beads.any():
         return []
     fan = _levels(program, ("M106", "M107"))
-    layer = program.part * (int(program.layer.max()) + 1) + program.layer
+    layer = program.layer_keys()
     length = np.linalg.norm((program.end - program.start)[:, :3], axis=1)
     seconds = np.bincount(layer[beads], weights=(length / np.maximum(program.feed, 1e-9))[beads] * 60.0)
     blown = np.bincount(layer[beads], weights=(length * (fan > 0.0))[beads])
     at, first = np.unique(layer[beads], return_index=True)
     rows = np.flatnonzero(beads)[first]
     part = program.part[rows]
-    begun = np.array([np.searchsorted(at, at[part == each][0]) for each in part])
+    begun = np.array([np.searchsorted(at, at[part == index][0]) for index in part])
     settled = np.arange(len(at)) - begun >= SETTLED
     still = (blown[at] == 0.0) & settled
     if own:
         expected = min(profile.material.fan_least, profile.material.fan) > 0.0
-        quiet = {each: _without_fan(each, profile) for each in set(part.tolist())}
-        still &= expected & (np.arange(len(at)) - begun >= np.array([quiet[each] for each in part.tolist()]))
+        quiet = {index: _without_fan(index, profile) for index in set(part.tolist())}
+        still &= expected & (np.arange(len(at)) - begun >= np.array([quiet[index] for index in part.tolist()]))
     else:
         quick = seconds[at] < QUICKER * float(np.median(seconds[at][blown[at] > 0.0])) if (blown > 0.0).any() else ~still
         once = np.count_nonzero(np.diff(still.astype(np.int8), prepend=0) > 0) == 1
         if not once or not quick[still].all():
             return []
     problems = []
-    for each in np.unique(part[still]):
-        mine = np.flatnonzero(still & (part == each))
+    for mine in by_part(program, rows[still]):
         if len(mine) < FEWEST_STILL:
             continue
-        row = int(rows[mine[0]])
+        row = int(mine[0])
         message = f"no fan blows in layer {program.layer[row]}, where the file's other layers have one (layers: {len(mine)})"
         problems.append(at_row(program, row, "error", "fan", message))
     return problems

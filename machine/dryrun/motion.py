@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from machine.dryrun.findings import Finding, at_line, per_part, unless_own
+from machine.dryrun.findings import Finding, at_event, at_row, per_part, unless_own
 from machine.firmware import dialect_of
 from machine.planning.limits import ROUNDING, axis_limits
 from machine.planning.timing import axis_speeds, lengths
@@ -69,17 +69,16 @@ def _homing(program: ParsedProgram, machine: Machine) -> list[Finding]:
         later = [e for e in program.events if e.code == "G92" and machine.tilt.letter in e.letters and e.row == event.row]
         if abs(tilt - machine.tilt.zero_deg) > LEVEL_DEG and not any(e.line < event.line for e in later):
             message = f"homing while the table stands at {machine.tilt.letter}{tilt:.3f}: it must be level"
-            problems.append(at_line(program, event.row, event.line, "error", "homing-tilted", message))
+            problems.append(at_event(program, event, "error", "homing-tilted", message))
         printed = program.kind[: event.row] == MoveKind.EXTRUDE
         if printed.any() and (not set(event.letters) & set("XYZ") or "Z" in event.letters):
             message = "Z is homed after plastic was laid: the tip may run into the print unless the machine homes upwards"
-            problems.append(at_line(program, event.row, event.line, "warning", "homing-over-print", message))
+            problems.append(at_event(program, event, "warning", "homing-over-print", message))
     return problems
 
 
 def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
     """The first move of a linear axis that has been neither homed nor given a position."""
-    known: set[str] = set()
     events = sorted((e for e in program.events if e.code in ("G28", "G92")), key=lambda e: e.row)
     change = np.abs(program.end - program.start) > 1e-9
     for axis, letter in enumerate("XYZ"):
@@ -89,11 +88,8 @@ def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
             e for e in events if e.row <= first and (letter in e.letters or (e.code == "G28" and not set(e.letters) & set("XYZ")))
         ]
         if len(moved) and not homed:
-            known.add(letter)
-            row = first
-            severity, unless = unless_own(program, 0, row)
-            place = int(program.line[row]), int(program.part[row]), int(program.layer[row])
-            return [Finding(severity, "not-homed", *place, f"{letter} moves before it is homed{unless}")]
+            severity, unless = unless_own(program, 0, first)
+            return [at_row(program, first, severity, "not-homed", f"{letter} moves before it is homed{unless}")]
     return []
 
 
@@ -119,5 +115,5 @@ def _following_switches(program: ParsedProgram, machine: Machine) -> list[Findin
             stands_at = f"{machine.tilt.letter}{stands[0]:g} {machine.turn.letter}{stands[1]:g}"
             home = f"{machine.tilt.letter}{level[0]:g} {machine.turn.letter}{level[1]:g}"
             message = f"{event.code} while the table stands at {stands_at}: Marlin loses the position; turn it to {home} first"
-            problems.append(at_line(program, event.row, event.line, "error", "following-switched", message))
+            problems.append(at_event(program, event, "error", "following-switched", message))
     return problems

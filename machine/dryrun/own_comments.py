@@ -85,9 +85,7 @@ def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> li
                 f"the part is printed at {letters[0]}{at[0]:.3f} {letters[1]}{at[1]:.3f}, "
                 f"it was made for {letters[0]}{wanted[0]:.3f} {letters[1]}{wanted[1]:.3f}"
             )
-            problems.append(
-                Finding("error", "pose", int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
-            )
+            problems.append(at_row(program, row, "error", "pose", message))
     return problems
 
 

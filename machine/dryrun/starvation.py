@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import STANDSTILLS, DryRun
-from machine.dryrun.findings import Finding
+from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.motion import deltas
 from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
 from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
@@ -72,17 +72,15 @@ def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: i
 def _findings(
     program: ParsedProgram, rows: NDArray[np.bool_], stopped: NDArray[np.bool_], times_s: Floats, baud: int
 ) -> list[Finding]:
-    problems, marked = [], np.flatnonzero(rows)
-    for index in np.unique(program.part[marked]):
-        mine = marked[program.part[marked] == index]
+    problems = []
+    for mine in by_part(program, np.flatnonzero(rows)):
         needed = 1.0 / max(float(np.median(times_s[mine])), TINY)
         stops = int(stopped[mine].sum())
         message = (
             f"{baud} baud bring {len(mine)} moves too late, {needed:.0f} lines/s are needed there: the printer slows down"
             f"{f' and stops {stops} times' if stops else ''}; a faster line or longer segments help"
         )
-        row = int(mine[0])
-        problems.append(Finding("warning", "starvation", int(program.line[row]), int(index), int(program.layer[row]), message))
+        problems.append(at_row(program, int(mine[0]), "warning", "starvation", message))
     return problems
 
 

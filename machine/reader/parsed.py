@@ -79,6 +79,11 @@ class ParsedProgram:
     announced: int
     part_totals: tuple[PartTotals, ...]
 
+    def layer_keys(self, rows: NDArray[np.int64] | slice = slice(None)) -> NDArray[np.int64]:
+        """(m,) a number for the layer of each row, another in each part."""
+        keys: NDArray[np.int64] = self.part[rows] * (int(self.layer.max(initial=0)) + 1) + self.layer[rows]
+        return keys
+
     def rows_of_types(self, *names: str) -> NDArray[np.bool_]:
         """(n,) which rows belong to these ;TYPE: names."""
         marked: NDArray[np.bool_] = np.array([name in names for name in self.types], dtype=np.bool_)[self.type]
