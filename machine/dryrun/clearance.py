@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from machine.dryrun.findings import MOST, Finding, at_row, cut_short
 from machine.kinematics.collision import Printed, Reach, gaps_of, hull, refined_gap, solids, sweep_gaps, swept, swing_mm
 from machine.planning.limits import axis_limits
-from machine.reader.parsed import MoveKind, ParsedProgram, pose_runs
+from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
 from mdp.head import Body, bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
@@ -44,14 +44,13 @@ def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
             for body in bodies(machine):
                 close = gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM
                 if close.any():
-                    problems += _body(program, pose_run.rows[close], body, machine, pose_run.pose, solid)
+                    problems += _body(program, PoseRun(pose_run.rows[close], pose_run.pose), body, solid, machine)
     return problems
 
 
-def _body(
-    program: ParsedProgram, rows: NDArray[np.int64], body: Body, machine: Machine, pose: Pose, solid: tuple[str, Reach]
-) -> list[Finding]:
+def _body(program: ParsedProgram, run: PoseRun, body: Body, solid: tuple[str, Reach], machine: Machine) -> list[Finding]:
     """One body and one solid in one pose: the moves that two directions left open, by all directions and a search."""
+    rows, pose = run.rows, run.pose
     start, end = program.start[rows, :3], program.end[rows, :3]
     need = body.need_mm - ROUNDING_MM
     normal = rotation(machine, pose) @ UP

@@ -108,8 +108,9 @@ def _distance_across(px: float, py: float, a: Point, b: Point) -> float:
 
 
 @part
-def _comes_over(px: float, py: float, half: float, a: Point, b: Point, box: Floats) -> bool:
-    """True when a box that goes with the tip from a to b comes over a square of half a side `half` about a point."""
+def _comes_over(square: Point, a: Point, b: Point, box: Floats) -> bool:
+    """True when a box that goes with the tip from a to b comes over a square; square: its middle and half of its side."""
+    px, py, half = square
     low, high = 0.0, 1.0
     for k in range(2):
         delta, p = b[k] - a[k], (px if k == 0 else py) - a[k]
@@ -135,7 +136,7 @@ def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point,
     if depth > slack:
         deepest = depth
     for k in range(len(head.boxes)):
-        if rise - head.boxes[k, 2] > max(deepest, slack) and _comes_over(px, py, half, a, b, head.boxes[k]):
+        if rise - head.boxes[k, 2] > max(deepest, slack) and _comes_over((px, py, half), a, b, head.boxes[k]):
             deepest = rise - head.boxes[k, 2]
     return deepest
 

@@ -39,6 +39,7 @@ def of_print(
     name: str,
     program: Program,
     profile: Profile,
+    *,
     known: bool = True,
     alternatives: Sequence[Alternative] = (),
     live: bool = False,
@@ -64,7 +65,9 @@ def of_print(
         "parts": _with_colours(_parts(program, profile, by_layer, ends_s, shown)),
         "front": [] if program.decomposition is None else front_records(program.decomposition),
         "findings": findings.finding_records(run, profile.machine, known, shown),
-        "report": print_report(program, profile, by_layer, ends_s, alternatives, known, source != "foreign"),
+        "report": print_report(
+            program, profile, by_layer, ends_s, alternatives=alternatives, known=known, ours=source != "foreign"
+        ),
     }
     table = layers.columns(run.program, by_layer, ends_s, height, shown)
     return pack(header, rows | text | table | scene.surfaces(program.decomposition, profile))

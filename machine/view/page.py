@@ -26,12 +26,13 @@ def print_page(
     name: str,
     program: Program,
     profile: Profile,
+    *,
     known: bool = True,
     alternatives: Sequence[Alternative] = (),
     live: bool = False,
 ) -> bytes:
     """The page of a whole print; arguments as of_print takes them."""
-    return page(name, of_print(name, program, profile, known, alternatives, live), live)
+    return page(name, of_print(name, program, profile, known=known, alternatives=alternatives, live=live), live)
 
 
 def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> bytes:

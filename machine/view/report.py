@@ -50,6 +50,7 @@ def print_report(
     profile: Profile,
     layers: Layers,
     ends_s: Floats,
+    *,
     alternatives: Sequence[Alternative] = (),
     known: bool = True,
     ours: bool = True,

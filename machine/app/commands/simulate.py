@@ -44,7 +44,7 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     if baud is not None:
         program = replace(program, run=find_starvation(program.run, program.lines, profile.machine, baud))
     if outputs.html is not None:
-        write_bytes(outputs.html, print_page(request.name, program, profile, loaded.machine_known))
+        write_bytes(outputs.html, print_page(request.name, program, profile, known=loaded.machine_known))
     if outputs.json is not None:
         write_json(outputs.json, summary(program.run) | ({} if agreed is None else {"model": asdict(agreed)}))
     if outputs.json != STDOUT:

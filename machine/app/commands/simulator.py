@@ -30,9 +30,12 @@ def simulate_printer(request: SimulatorRequest) -> int:
     machine, baud = request.profile.machine, request.baud
     build = read_build_options(request.habits, build_options(machine, baud))
     stop = threading.Event()
+    simulated = SimulatedPrinter(
+        machine, request.speed or inf, build=build, faults=script, link=request.link, tcp=request.tcp, baud=baud, kept=KEPT
+    )
     with (
         stopping(stop),
-        SimulatedPrinter(machine, request.speed or inf, build, script, request.link, request.tcp, baud, KEPT) as printer,
+        simulated as printer,
         announced(f"simulated printer ({machine.name}, {dialect_of(machine).firmware})", printer.path) as announce,
     ):
         show(f"{printer.path}\n")

@@ -31,7 +31,7 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
     if not known:
         say(f"{request.name} does not tell its machine: shown for {profile.machine.name}, --machine names another")
     alternatives = compare_with_one_part(program, profile) if request.compare else ()
-    content = print_page(request.name, program, profile, known, alternatives)
+    content = print_page(request.name, program, profile, known=known, alternatives=alternatives)
     write_bytes(path, content)
     show(plain_line(f"{path}: {len(content) / 1e6:.1f} MB, {_in_words(program, known)}") + "\n")
     if open_browser and not webbrowser.open(path.resolve().as_uri()):

@@ -30,7 +30,7 @@ def _frame(row: FrontRow, model: Mesh, profile: Profile, view: View, pixels: int
     parts, reds = _cut(row, model, profile)
     span = 1.25 * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     colours = [FLOOR, *part_colours(len(parts))]
-    frame = draw([floor_of(model), *parts], colours, [None, *reds], view, (pixels, pixels), span)
+    frame = draw([floor_of(model), *parts], colours, reds=[None, *reds], view=view, size=(pixels, pixels), span_mm=span)
     left, height = pixels / 32, pixels / 24
     frame = write_text(frame, "one piece" if row.parts == 1 else f"{row.parts} parts", (left, pixels / 12), pixels / 16, 90)
     figures = f"{max(row.support_area_mm2, 0.0):.0f} mm2 on support, {row.seam_mm:.0f} mm of seams"

@@ -32,11 +32,11 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
     model, parts = decomposition.mesh, decomposition.parts
     risky = needing_upright(model, profile)
     floor, view, half = floor_of(model), best_view(model, risky), (size[0] // 2, size[1])
-    plain = draw([floor, model], [FLOOR, PLAIN], [None, risky], view, half)
+    plain = draw([floor, model], [FLOOR, PLAIN], reds=[None, risky], view=view, size=half)
     gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     apart = [part.mesh.transform(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
     reds = [residual_faces(part, profile) for part in parts]
-    exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], [None, *reds], view, half)
+    exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], reds=[None, *reds], view=view, size=half)
     return np.concatenate([plain, exploded], axis=1)
 
 
@@ -44,7 +44,7 @@ def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[i
     """The parts in colour where they belong. Returns (h, w, 3), uint8; size is width and height in pixels."""
     risky = needing_upright(decomposition.mesh, profile)
     parts = [part.mesh for part in decomposition.parts]
-    return draw(parts, list(part_colours(len(parts))), None, best_view(decomposition.mesh, risky), size)
+    return draw(parts, list(part_colours(len(parts))), view=best_view(decomposition.mesh, risky), size=size)
 
 
 def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: int = 480) -> Image:
@@ -61,7 +61,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
         printed = [earlier.mesh.transform(part.rotation) for earlier in parts[: part.index]]
         meshes = [floor.transform(part.rotation), *printed, nozzle.transform(np.eye(3), _last_point(printed[-1]))]
         paints = [FLOOR, *([PRINTED] * (part.index - 1)), colour, NOZZLE]
-        frame = draw(meshes, paints, None, view, (frame_pixels, frame_pixels), span)
+        frame = draw(meshes, paints, view=view, size=(frame_pixels, frame_pixels), span_mm=span)
         frames.append(_label(frame, part, machine))
     return add_title(tile(frames), decomposition.name, frame_pixels)
 

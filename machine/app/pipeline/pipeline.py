@@ -148,6 +148,7 @@ class _Search:
 def build(
     decomposition: Decomposition,
     profile: Profile,
+    *,
     pictures: bool = False,
     stops: Sequence[Stop] = (),
     report: Report | None = None,

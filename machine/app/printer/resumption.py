@@ -141,7 +141,7 @@ def print_rest(
             new_log("print", f"the rest of {job.name} to {printing.port}", printing.log) as log,
             serve_watch_page(job, printing.watch_port) as watched,
         ):
-            outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin, attendance=attendance)
+            outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin=begin, attendance=attendance)
             watched.end("stopped" if outcome.cancelled else "done")
         if outcome.cancelled and outcome.heaters_off is None:
             say("nothing was moved or heated")

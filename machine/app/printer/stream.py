@@ -70,7 +70,7 @@ def _print_simulated(job: LoadedProgram, request: PrintRequest, observers: Obser
     machine = job.profile.machine
     usb = job.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
     speed = request.sim_speed or inf
-    with SimulatedPrinter(machine, speed, BuildOptions(queue=QUEUE)) as printer:
+    with SimulatedPrinter(machine, speed, build=BuildOptions(queue=QUEUE)) as printer:
         pace = speed if isfinite(speed) else None
         there = replace(request, port=printer.path)
         outcome = stream_program(replace(job, profile=usb), there, observers, pace=pace, attendance=attendance)
@@ -93,6 +93,7 @@ def stream_program(
     job: LoadedProgram,
     request: PrintRequest,
     observers: Observers,
+    *,
     begin: Callable[[PrinterStatus], ResumePoint] | None = None,
     pace: float | None = 1.0,
     attendance: Attendance | None = None,

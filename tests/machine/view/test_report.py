@@ -24,7 +24,7 @@ def seconds(told: str) -> int:
 def tables(program: Program, alternatives: tuple[Alternative, ...] = ()) -> dict[str, Any]:
     profile = example()[0]
     run = program.run
-    report = print_report(program, profile, layers_of(run.program, 0.2), end_times_s(run), alternatives)
+    report = print_report(program, profile, layers_of(run.program, 0.2), end_times_s(run), alternatives=alternatives)
     return {"facts": dict(report["facts"]), **{table["title"]: table for table in report["tables"]}}
 
 

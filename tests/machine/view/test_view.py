@@ -237,7 +237,7 @@ def test_a_guessed_machine_finds_nothing_of_its_own() -> None:
     text = "G28\nG1 Z0.2 F600\nG1 X9999\nG1 X0 E1"
     lines = tuple(text.split("\n"))
     codes = [
-        {finding["code"] for finding in unpacked(of_print("text", program, PLAIN, known))[0]["findings"]}
+        {finding["code"] for finding in unpacked(of_print("text", program, PLAIN, known=known))[0]["findings"]}
         for program, known in [(Program(lines, dry_run(lines, PLAIN), None), known) for known in (True, False)]
     ]
     assert codes[0] - codes[1] == {"axis-limit", "off-plate"}
