@@ -21,18 +21,18 @@ def read_embedded_profile(lines: Sequence[str], profile: Profile, named: frozens
     Returns it and the names of the sections taken over. A file without the comments, or with ones that make no valid
     section, changes nothing.
     """
-    found = _tables(lines)
-    tables = {name: table for name, table in found.items() if name in SECTIONS and name not in named}
+    embedded = _tables(lines)
+    tables = {name: table for name, table in embedded.items() if name in SECTIONS and name not in named}
     sections = {name: sound_section(name, table) for name, table in tables.items()}
     taken = {name: section for name, section in sections.items() if section is not None}
-    told = profile.model_copy(update=taken)
-    return _with_parts(told, found.get("parts", [])) if "process" in taken else told, tuple(taken)
+    read = profile.model_copy(update=taken)
+    return _with_parts(read, embedded.get("parts", [])) if "process" in taken else read, tuple(taken)
 
 
 def _with_parts(profile: Profile, tables: Any) -> Profile:
     """The profile with the file's settings of single parts; without them where they are not valid."""
     try:
-        return with_part_settings(profile, [PartSettings.model_validate(each) for each in tables])
+        return with_part_settings(profile, [PartSettings.model_validate(settings) for settings in tables])
     except (ProfileError, ValueError):
         return profile
 
@@ -79,7 +79,7 @@ def _with_lists(value: Any) -> Any:
     """Tables whose keys count from 0 as lists, the text None as none."""
     if not isinstance(value, dict):
         return None if value == "None" else value
-    below = {key: _with_lists(each) for key, each in value.items()}
+    below = {key: _with_lists(item) for key, item in value.items()}
     places = [str(place) for place in range(len(below))]
     return [below[place] for place in places] if places and below.keys() == {*places} else below
 

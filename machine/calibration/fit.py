@@ -73,8 +73,8 @@ def calibrate(
         fits += [_fit(machine, signs, start_deg, touches, mark_height_mm) for signs in SIGNS]
         if min(fits, key=lambda fit: fit[0])[0] < GOOD_MM**2:
             break
-    each = [min((fit for fit in fits if fit[1] == signs), key=lambda fit: fit[0]) for signs in SIGNS]
-    ranked = sorted(each, key=lambda fit: fit[0])
+    best = [min((fit for fit in fits if fit[1] == signs), key=lambda fit: fit[0]) for signs in SIGNS]
+    ranked = sorted(best, key=lambda fit: fit[0])
     (cost, signs, numbers), (next_cost, next_signs, _) = ranked[:2]
     if next_cost < APART**2 * cost + LEAST_MM**2:
         axis = machine.tilt if signs[0] != next_signs[0] else machine.turn

@@ -123,13 +123,13 @@ def _tilts(machine: Machine, mark: tuple[float, float, float]) -> tuple[float, f
     ahead, behind = able[1.0], able[-1.0]
     if ahead is not None and behind is not None:
         return ahead, behind
-    one = ahead if ahead is not None else behind
-    if one is None:
+    tilt = ahead if ahead is not None else behind
+    if tilt is None:
         raise MoveError(
             f"no tilt of {TILTS_DEG[-1]:g} deg or more can be measured on {machine.name} with a mark {mark[2]:g} mm high: "
             "its head or its limits stand in the way; take a higher mark, nearer to the middle"
         )
-    return one, 0.5 * (one + zero)
+    return tilt, 0.5 * (tilt + zero)
 
 
 def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> bool:

@@ -33,13 +33,13 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> list
     """Errors of code extrusion and extruding-travel; a warning of code extrusion where the file tells no widths."""
     if not len(deposited.rows):
         return []
-    told = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
+    sized = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
     counted = ~program.rows_of_types(*UNEVEN)[deposited.rows] & ~_climbs(program, deposited)
     length = deposited.length_mm
     problems = _fast(program, deposited.rows, length)
     spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
     for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
-        mine = np.flatnonzero(counted & (told == known) & (length > 0))
+        mine = np.flatnonzero(counted & (sized == known) & (length > 0))
         rows = deposited.rows[mine]
         if not len(rows):
             continue

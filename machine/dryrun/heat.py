@@ -73,9 +73,9 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
     usual = float(np.median(wanted[beads]))
     least, most = usual - FAR_C, min(usual + FAR_C, machine.nozzle_limit_c)
     if own:
-        told = (material.first_layer_nozzle_c, material.nozzle_c)
+        own_c = (material.first_layer_nozzle_c, material.nozzle_c)
         hotter = max(profile.of_part(part).process.interface_temperature_add_c for part in (0, *program.parts))
-        least, most = min(told) - 0.5, min(max(told) + hotter, machine.nozzle_limit_c) + 0.5
+        least, most = min(own_c) - 0.5, min(max(own_c) + hotter, machine.nozzle_limit_c) + 0.5
     message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
     cool, hot = beads & (wanted < least), beads & (wanted > most)
     return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted, "error", "temperature", message)]

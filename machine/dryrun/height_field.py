@@ -68,20 +68,20 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
     along = 0 if abs(b[0] - a[0]) >= abs(b[1] - a[1]) else 1
     if a[along] > b[along]:
         a, b = b, a
-    other = 1 - along
+    across_axis = 1 - along
     length = b[along] - a[along]
-    slope = (b[other] - a[other]) / length if length > 1e-9 else 0.0
+    slope = (b[across_axis] - a[across_axis]) / length if length > 1e-9 else 0.0
     rise = (b[2] - a[2]) / length if length > 1e-9 else 0.0
     across, cell = half * np.sqrt(1.0 + slope * slope), field.cell
     first = max(int(np.floor((a[along] - field.origin[along]) / cell)), 0)
     last = min(int(np.floor((b[along] - field.origin[along]) / cell)), field.shape[along] - 1)
     for p in range(first, last + 1):
         u = min(max(field.origin[along] + (p + 0.5) * cell, a[along]), b[along]) - a[along]
-        v, z = a[other] + slope * u - field.origin[other], a[2] + rise * u
+        v, z = a[across_axis] + slope * u - field.origin[across_axis], a[2] + rise * u
         low = max(int(np.floor((v - across) / cell + 0.5)), 0)
-        high = min(int(np.floor((v + across) / cell - 0.5)), field.shape[other] - 1)
+        high = min(int(np.floor((v + across) / cell - 0.5)), field.shape[across_axis] - 1)
         if high < low:
-            low = high = min(max(int(np.floor(v / cell)), 0), field.shape[other] - 1)
+            low = high = min(max(int(np.floor(v / cell)), 0), field.shape[across_axis] - 1)
         for q in range(low, high + 1):
             if along == 0:
                 _raise_cell(p, q, z, row, field)

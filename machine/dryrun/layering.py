@@ -39,8 +39,8 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
 
     What stands off by most of a layer may stand on support that ends as high as the part does there: the replay knows.
     """
-    told = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
-    rows = deposited.rows[told]
+    sized = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
+    rows = deposited.rows[sized]
     turned = np.any(program.end[rows[1:], 3:] != program.end[rows[:-1], 3:], axis=1)
     groups = np.split(np.arange(len(rows)), np.flatnonzero((np.diff(program.part[rows]) != 0) | turned) + 1)
     problems, seen = [], set()
@@ -50,7 +50,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             continue
         mine = rows[group]
         gap = _gaps(program, mine)
-        laid_mm = np.bincount(program.layer[mine], weights=deposited.length_mm[told][group])[program.layer[mine]]
+        laid_mm = np.bincount(program.layer[mine], weights=deposited.length_mm[sized][group])[program.layer[mine]]
         height_mm = program.height_mm[mine]
         in_air = (contacts.air_mm + contacts.beside_mm > 0.0) & ~program.rows_of_types(*LOOSE)
         hangs = (gap < SEEN_SHARE * height_mm) | in_air[mine]

@@ -93,10 +93,10 @@ def _part_totals(program: ParsedProgram) -> list[Finding]:
     """Parts whose beads do not come to what the file tells of them, and parts that are missing."""
     beads = (program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value)
     problems = _missing(program, beads)
-    for told in program.part_totals:
-        rows = np.flatnonzero(beads & (program.part == told.part))
+    for totals in program.part_totals:
+        rows = np.flatnonzero(beads & (program.part == totals.part))
         if len(rows):
-            problems += _of_part(program, rows, told)
+            problems += _of_part(program, rows, totals)
     return problems
 
 
@@ -112,27 +112,29 @@ def _missing(program: ParsedProgram, beads: NDArray[np.bool_]) -> list[Finding]:
     return [Finding("error", "missing", line, absent[0], 0, message)]
 
 
-def _of_part(program: ParsedProgram, rows: NDArray[np.int64], told: PartTotals) -> list[Finding]:
+def _of_part(program: ParsedProgram, rows: NDArray[np.int64], totals: PartTotals) -> list[Finding]:
     """What differs in a part: its layers, its filament, where it lies."""
     problems = []
     layers = len(np.unique(program.layer[rows]))
-    if layers != told.layers:
-        message = f"beads are laid in {layers} layers of part {told.part}, the file tells of {told.layers}"
+    if layers != totals.layers:
+        message = f"beads are laid in {layers} layers of part {totals.part}, the file tells of {totals.layers}"
         problems.append(at_row(program, int(rows[-1]), "error", "contents", message))
     pushed = float(program.e_mm[rows].sum())
-    if abs(pushed - told.filament_mm) > max(FILAMENT_MM, FILAMENT_SHARE * told.filament_mm):
-        message = f"part {told.part} pushes {pushed:.2f} mm of filament, the file tells of {told.filament_mm:.2f} mm"
+    if abs(pushed - totals.filament_mm) > max(FILAMENT_MM, FILAMENT_SHARE * totals.filament_mm):
+        message = f"part {totals.part} pushes {pushed:.2f} mm of filament, the file tells of {totals.filament_mm:.2f} mm"
         problems.append(at_row(program, int(rows[0]), "error", "contents", message))
     ends = np.stack([program.start[rows, :3], program.end[rows, :3]])
     bounds = np.stack([ends.min(axis=(0, 1)), ends.max(axis=(0, 1))])
-    apart = bounds - told.bounds_mm
+    apart = bounds - totals.bounds_mm
     if np.abs(apart).max() <= PLACE_MM:
         return problems
     side, axis = (int(v) for v in np.unravel_index(np.abs(apart).argmax(), apart.shape))
     extreme = np.abs(ends[:, :, axis] - bounds[side, axis]).min(axis=0).argmin()
-    moved = f"part {told.part} lies {abs(apart[side, axis]):.2f} mm aside" if _is_shift(apart) else f"part {told.part} reaches"
+    moved = (
+        f"part {totals.part} lies {abs(apart[side, axis]):.2f} mm aside" if _is_shift(apart) else f"part {totals.part} reaches"
+    )
     message = (
-        f"{moved} to {'XYZ'[axis]}{bounds[side, axis]:.3f}, the file tells of {'XYZ'[axis]}{told.bounds_mm[side, axis]:.3f} "
+        f"{moved} to {'XYZ'[axis]}{bounds[side, axis]:.3f}, the file tells of {'XYZ'[axis]}{totals.bounds_mm[side, axis]:.3f} "
         f"({PLACE_MM:g} mm are allowed)"
     )
     row = int(rows[0] if _is_shift(apart) else rows[extreme])

@@ -176,15 +176,15 @@ def _classify_support(
     """0: a bead hangs in air, 1: lies on something, 2: overlaps others, 3: only has a neighbour; side: unit vector across."""
     x, y, z, at = place
     half, height, plate = strokes.half[row], strokes.height[row], about.plate
-    overlapping, carried = 0, 0
+    overlapping, bearing = 0, 0
     for k in range(-1, 2):
         off = 2.0 * INNER * half * k
         under = _under((x + off * side[0], y + off * side[1], z, at), row, False, strokes, about)
         overlapping += (2 if k == 0 else 1) if under == 2 else 0
-        carried += 1 if under == 1 else 0
+        bearing += 1 if under == 1 else 0
     if overlapping > 2:
         return 2
-    if carried > 0 or abs(z - height - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height:
+    if bearing > 0 or abs(z - height - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height:
         return 1
     if overlapping > 0:
         return 3
@@ -247,16 +247,16 @@ def _replay_run(
             for k in range(count):
                 t = (k + 0.5) / count
                 way = strokes.way[row] - (1.0 - t) * length
-                carried = _classify_support(
+                support = _classify_support(
                     (a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]), way), side, row, strokes, about
                 )
-                if carried in (0, 3):
+                if support in (0, 3):
                     most = moves.span[row] if open_mm == 0.0 else min(most, moves.span[row])
-                    pending[at, carried // 3] += length / count
+                    pending[at, support // 3] += length / count
                     open_mm += length / count
                 else:
                     _settle((first, at, open_mm - held * most), rows, pending, measured)
                     first, open_mm, held = at, 0.0, 1.0
-                    measured.overlapping[row] += length / count if carried == 2 else 0.0
+                    measured.overlapping[row] += length / count if support == 2 else 0.0
         lay_bead(a, b, strokes.half[row], row, about.field)
     _settle((first, len(rows) - 1, open_mm - _free_mm(most, held)), rows, pending, measured)

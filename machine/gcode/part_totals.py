@@ -43,8 +43,8 @@ def totals_comment(strokes: Iterable[Stroke], layers: int) -> str:
 
 def read_totals(text: str, line: int, part: int) -> PartTotals | None:
     """What the comment's text behind its colon tells of a part; None where it is no such text."""
-    told = FORM.fullmatch(text.strip())
-    if told is None:
+    match = FORM.fullmatch(text.strip())
+    if match is None:
         return None
-    figures = [float(value) for value in told.groups()[:7]]
-    return PartTotals(line, part, np.array(figures[:6]).reshape(3, 2).T, figures[6], int(told[8]))
+    figures = [float(value) for value in match.groups()[:7]]
+    return PartTotals(line, part, np.array(figures[:6]).reshape(3, 2).T, figures[6], int(match[8]))

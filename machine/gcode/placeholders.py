@@ -76,7 +76,7 @@ def fill_block(block: str, name: str, values: Mapping[str, object], longest: int
     """
     lines = []
     for line in block.splitlines():
-        text = PLACEHOLDER.sub(lambda found: _value(found[1], name, values), line).strip()
+        text = PLACEHOLDER.sub(lambda match: _value(match[1], name, values), line).strip()
         command = text.partition(";")[0].strip()
         if len(command) + FRAME_CHARACTERS > longest:
             raise ProfileError(

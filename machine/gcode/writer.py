@@ -36,7 +36,7 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
     check_blocks(profile)
     machine = profile.machine
     dialect = dialect_of(machine)
-    letter = next(each for each in dialect.filament if each not in (machine.tilt.letter, machine.turn.letter))
+    letter = next(word for word in dialect.filament if word not in (machine.tilt.letter, machine.turn.letter))
     pen = Pen(dialect, machine, letter, level(machine))
     parts = [move for move in program.moves if isinstance(move, BeginPart)]
     elapsed, filament_mm = elapsed_s(program, profile)
@@ -52,8 +52,8 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
     straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)
     stop = np.zeros(len(straight.speed), dtype=np.bool_)
     times = move_times(straight.end - straight.start, straight.speed, stop, machine, straight.acceleration)
-    each = np.bincount(straight.move, weights=times, minlength=len(program.moves))
-    elapsed: Floats = np.concatenate([[0.0], np.cumsum(each)])
+    seconds = np.bincount(straight.move, weights=times, minlength=len(program.moves))
+    elapsed: Floats = np.concatenate([[0.0], np.cumsum(seconds)])
     return elapsed, float(straight.end[:, 5].max(initial=0.0))
 
 
@@ -62,7 +62,7 @@ def _lines(
 ) -> Iterator[str]:
     total = float(elapsed[-1])
     coming = iter(parts)
-    following = next(coming, None)
+    next_part = next(coming, None)
     last_strokes = _last_strokes(program)
     yield from settings.head(program.name, profile)
     yield from _start(profile, parts, pen)
@@ -82,11 +82,11 @@ def _lines(
             yield f"{pen.dialect.stroke}{pen.filament()}{pen.speed(move.speed_mm_s)}"
         elif isinstance(move, Reorient):
             yield from _heat_ahead(program, place, profile, pen)
-            yield from _reorient(move, following, pen)
+            yield from _reorient(move, next_part, pen)
         elif isinstance(move, Pause):
             yield from _pause(move, pen)
         elif isinstance(move, BeginPart):
-            following = next(coming, None)
+            next_part = next(coming, None)
             yield from _begin_part(move, len(parts), pen)
             yield from _contents(program, place)
         else:
@@ -296,15 +296,15 @@ def _travel(move: Travel, pen: Pen) -> Iterator[str]:
             yield f"{pen.dialect.travel}{place}{pen.speed(move.speed_mm_s)}"
 
 
-def _reorient(move: Reorient, following: BeginPart | None, pen: Pen) -> Iterator[str]:
+def _reorient(move: Reorient, next_part: BeginPart | None, pen: Pen) -> Iterator[str]:
     """The blocks around a turn of the table, and the turn."""
     yield ";TYPE:Custom"
     pen.kind = None
-    if pen.turned and following is not None:
+    if pen.turned and next_part is not None:
         yield from _block("after_part", pen)
     values: dict[str, object] = {"tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "z_mm": pen.z / 1000}
-    if following is not None:
-        values |= {"part": following.index, "part_layers": following.layers}
+    if next_part is not None:
+        values |= {"part": next_part.index, "part_layers": next_part.layers}
     yield from _block("before_part", pen, **values)
     pen.turned = True
     yield from turn(move.pose, move.speed_deg_s, pen)

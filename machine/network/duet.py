@@ -85,8 +85,8 @@ class Duet:
         """From what the object model calls frequently changing, and what the firmware has said since."""
         before = self._last  # an answer that was on its way when the print began is none of its end
         model = table(table(self._value("/rr_model", {"flags": "d99fn"})).get("result"))
-        job, told = table(model.get("job")), table(model.get("state"))
-        state, up_s = str(told.get("status") or ""), number(told.get("upTime"))
+        job, machine_state = table(model.get("job")), table(model.get("state"))
+        state, up_s = str(machine_state.get("status") or ""), number(machine_state.get("upTime"))
         if up_s is not None:
             if up_s < self._up_s:  # reset since (Platform/RepRap.cpp): idle is not the end of the print
                 before = self._last = None
@@ -114,8 +114,8 @@ class Duet:
         return Phase.CANCELLED if self._last in STOPPED else Phase.DONE
 
     def _temperature(self, heaters: Any) -> Temperature:
-        found = (table(entry(heaters, index)) for index in (self._nozzle, self._bed))
-        return Temperature(*(number(each.get(key)) for each in found for key in ("current", "active")))
+        reported = (table(entry(heaters, index)) for index in (self._nozzle, self._bed))
+        return Temperature(*(number(heater.get(key)) for heater in reported for key in ("current", "active")))
 
     def has(self, file: str) -> bool:
         """Whether it holds a file of this name."""
@@ -196,10 +196,10 @@ class Duet:
         for _ in range(MOST_PAGES):
             page = table(self._value("/rr_model", {"key": key, "flags": flags}))
             entries += page["result"] if isinstance(page.get("result"), list) else []
-            following = whole(page.get("next"))
-            if not following:
+            next_page = whole(page.get("next"))
+            if not next_page:
                 break
-            flags = f"d99vna{following}"
+            flags = f"d99vna{next_page}"
         return entries
 
     def _value(self, path: str, params: Mapping[str, str]) -> Any:

@@ -61,9 +61,9 @@ def server_name(name: str) -> str:
     Klipper reads it from between quotes, RepRapFirmware from a card with FAT names, OctoPrint replaces what it does not like.
     """
     stem, suffix = name.removeprefix("demo:"), ""
-    for each in (*TAKEN, ".nc", ".ngc"):
-        if stem.lower().endswith(each):
-            stem, suffix = stem[: -len(each)], stem[-len(each) :].lower()
+    for ending in (*TAKEN, ".nc", ".ngc"):
+        if stem.lower().endswith(ending):
+            stem, suffix = stem[: -len(ending)], stem[-len(ending) :].lower()
             break
     plain = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode()
     plain = STRANGE.sub("_", plain).strip("._-")[:LONGEST_NAME]

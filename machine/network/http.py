@@ -227,20 +227,20 @@ def _certificates(address: ServerAddress, credentials: Credentials) -> ssl.SSLCo
 def _transport_sentence(error: httpx.TransportError, address: ServerAddress, httpx_: Any) -> str:
     """What went wrong below HTTP, and what to look at."""
     where, chain = f"{address.host} at port {address.port}", _causes(error)
-    if any(isinstance(each, socket.gaierror) for each in chain):
+    if any(isinstance(cause, socket.gaierror) for cause in chain):
         return f"{address.text}: no computer of the name {address.host} is known here: an IP address will do, too"
-    if trust := next((each for each in chain if isinstance(each, ssl.SSLCertVerificationError)), None):
+    if trust := next((cause for cause in chain if isinstance(cause, ssl.SSLCertVerificationError)), None):
         return (
             f"{address.text}: its certificate cannot be trusted ({plain(trust.verify_message)}): for one of your own name "
             f'its authority as ca_file below [servers."{address.host}"] in {servers_file()}'
         )
-    if any(isinstance(each, ssl.SSLError) for each in chain):
+    if any(isinstance(cause, ssl.SSLError) for cause in chain):
         return f"{address.text}: {where} speaks no TLS: is it http:// instead of https://?"
-    if any(isinstance(each, ConnectionRefusedError) for each in chain):
+    if any(isinstance(cause, ConnectionRefusedError) for cause in chain):
         return f"{address.text}: nothing listens on {where}: is {NAMES[address.kind]} switched on and the port right?"
     if isinstance(error, httpx_.ConnectTimeout):
-        other = ", and does it speak TLS" if address.scheme == "https" else ""
-        return f"{address.text}: {where} does not answer within {CONNECT_S:g} s: is it switched on, in this network{other}?"
+        doubt = ", and does it speak TLS" if address.scheme == "https" else ""
+        return f"{address.text}: {where} does not answer within {CONNECT_S:g} s: is it switched on, in this network{doubt}?"
     if isinstance(error, httpx_.ConnectError):
         return f"{address.text}: {where} cannot be reached: {_reason(error)}"
     if isinstance(error, httpx_.TimeoutException):

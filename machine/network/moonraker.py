@@ -58,29 +58,33 @@ class Moonraker:
 
     def _commands(self) -> frozenset[str] | None:
         """All that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to tell."""
-        told = table(self._query(("gcode",)).get("gcode")).get("commands")
-        return frozenset(name.upper() for name in told) if isinstance(told, dict) else None
+        commands = table(self._query(("gcode",)).get("gcode")).get("commands")
+        return frozenset(name.upper() for name in commands) if isinstance(commands, dict) else None
 
     def _limits(self) -> dict[str, tuple[float, float]]:
         toolhead = table(self._query(("toolhead",)).get("toolhead"))
         pairs = ((number(entry(toolhead.get(f"axis_{end}"), k)) for end in ("minimum", "maximum")) for k in range(3))
-        found = zip("XYZ", (tuple(pair) for pair in pairs), strict=True)
-        return {letter: (low, high) for letter, (low, high) in found if low is not None and high is not None}
+        limits = zip("XYZ", (tuple(pair) for pair in pairs), strict=True)
+        return {letter: (low, high) for letter, (low, high) in limits if low is not None and high is not None}
 
     def status(self) -> JobStatus:
         """From the objects that Klipper reports; where it does not run, from what Moonraker says of it."""
         server = table(self._get("/server/info"))
         if server.get("klippy_state") != "ready":
             return JobStatus(Phase.OFFLINE, message=self._trouble(server))
-        found = self._query(REPORTED)
-        job, card, moves = table(found.get("print_stats")), table(found.get("virtual_sdcard")), table(found.get("gcode_move"))
+        objects = self._query(REPORTED)
+        job, card, moves = (
+            table(objects.get("print_stats")),
+            table(objects.get("virtual_sdcard")),
+            table(objects.get("gcode_move")),
+        )
         feed, flow = number(moves.get("speed_factor")), number(moves.get("extrude_factor"))
         return JobStatus(
             STATES.get(str(job.get("state")), Phase.READY),
             str(job.get("filename") or ""),
             whole(card.get("file_position")),
             number(job.get("total_duration")),
-            _temperature(found),
+            _temperature(objects),
             None if feed is None else 100.0 * feed,
             None if flow is None else 100.0 * flow,
             str(job.get("message") or ""),
@@ -101,7 +105,7 @@ class Moonraker:
         """
         reply = self._http.get("/server/files/directory", {"path": "gcodes"})
         files = table(table(self._value(reply, "to tell of its files")).get("result")).get("files")
-        return any(table(each).get("filename") == file for each in files) if isinstance(files, list) else False
+        return any(table(item).get("filename") == file for item in files) if isinstance(files, list) else False
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file with its checksum, without which half a file would be taken for a whole one."""
@@ -165,6 +169,6 @@ class Moonraker:
         return self._http.check(reply, purpose, Refusals(sentence, KEY))
 
 
-def _temperature(found: Mapping[str, Any]) -> Temperature:
-    nozzle, bed = table(found.get("extruder")), table(found.get("heater_bed"))
-    return Temperature(*(number(each.get(key)) for each in (nozzle, bed) for key in ("temperature", "target")))
+def _temperature(objects: Mapping[str, Any]) -> Temperature:
+    nozzle, bed = table(objects.get("extruder")), table(objects.get("heater_bed"))
+    return Temperature(*(number(heater.get(key)) for heater in (nozzle, bed) for key in ("temperature", "target")))

@@ -125,4 +125,4 @@ def _phase(flags: Mapping[str, Any], progress: Mapping[str, Any]) -> Phase:
 
 def _temperature(reported: Mapping[str, Any]) -> Temperature:
     nozzle, bed = table(reported.get("tool0")), table(reported.get("bed"))
-    return Temperature(*(number(each.get(key)) for each in (nozzle, bed) for key in ("actual", "target")))
+    return Temperature(*(number(heater.get(key)) for heater in (nozzle, bed) for key in ("actual", "target")))

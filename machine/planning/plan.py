@@ -133,12 +133,12 @@ def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
 def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate: bool) -> Iterator[Move]:
     accelerations = stroke_accelerations(profile, on_plate)
     z = layer.z_mm + float(shift[2])
-    for path, following in zip(layer.paths, [*layer.paths[1:], None], strict=True):
+    for path, next_path in zip(layer.paths, [*layer.paths[1:], None], strict=True):
         points = np.column_stack([path.points + shift[:2], z + path.z_mm])
         before = tip.trail
         yield from to_path(tip, path, points[0], shift, profile)
         yield from prime(tip, profile)
-        coast = profile.material.coast_mm if following is not None and following.retract else 0.0
+        coast = profile.material.coast_mm if next_path is not None and next_path.retract else 0.0
         stroke = _stroke(path, layer.height_mm, points, profile, accelerations, coast_mm=coast)
         yield run_in(stroke, layer, tip, profile)
         tip.trail = trail_after(points, path, before if tip.trail is before else before[:0], shift, profile.material.wipe_mm)

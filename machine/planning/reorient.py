@@ -109,8 +109,8 @@ def _upward(machine: Machine, turning: list[Pose]) -> Floats:
     tried = np.vstack([UP[None], *fans, spread(2 * FIELD)])
     around = np.radians(np.arange(0.0, 360.0, 15.0))
     tried = np.vstack([tried, np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])])
-    kept: Floats = tried[tried[:, 2] >= -1e-12]
-    return np.unique(np.round(kept, 12), axis=0)
+    upward: Floats = tried[tried[:, 2] >= -1e-12]
+    return np.unique(np.round(upward, 12), axis=0)
 
 
 def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Speeds) -> Route:

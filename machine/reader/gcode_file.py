@@ -27,11 +27,11 @@ class GcodeFile:
 
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the file's bytes; raises GcodeError."""
-        found = sha256()
+        digest = sha256()
         try:
             with self.path.open("rb") as file:
                 while chunk := file.read(CHUNK_BYTES):
-                    found.update(chunk)
+                    digest.update(chunk)
         except OSError as error:
             raise GcodeError(f"G-code file {self.path} cannot be read: {(error.strerror or str(error)).lower()}") from None
-        return found.hexdigest()
+        return digest.hexdigest()

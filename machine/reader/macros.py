@@ -68,7 +68,7 @@ def _turn(reader: Reader, values: Values) -> None:
         reader.note("G28", 0.0, axis.letter)
         reader.at[index] = reader.home[index]
         return
-    if any(index == other for other, _, _ in reader.turning):
+    if any(index == turned for turned, _, _ in reader.turning):
         flush(reader)
     reader.turning.append((index, value, speed))
     if values.get("SYNC", "1") != "0":

@@ -85,10 +85,10 @@ def _feed_length(change: Floats, largest: bool = False) -> Floats:
 def _feeds(feed: Floats, asked: Floats, change: Floats, speeds: Floats) -> Floats:
     """Units per minute along what NIST counts, from the firmware's own measure, inverse time, or as fast as the axes can."""
     length = _feed_length(change)
-    other = (feed < 0) | np.isinf(feed) | (np.abs(asked - length) > STILL)
-    if not other.any():
+    differs = (feed < 0) | np.isinf(feed) | (np.abs(asked - length) > STILL)
+    if not differs.any():
         return feed
-    rows = np.flatnonzero(other)
+    rows = np.flatnonzero(differs)
     given, of, want = feed[rows], length[rows], asked[rows]
     with np.errstate(divide="ignore", invalid="ignore"):
         fastest = 60.0 * of / (np.abs(change[rows]) / speeds).max(axis=1)

@@ -113,8 +113,8 @@ class Motion:
         """Marlin stops at soft limits without a word, on axes that were homed; on others what the program meant is counted."""
         for axis, (low, high) in enumerate(self.limits):
             limited = axis in self.homed or not self._starts_at_home
-            told = place[axis] + (0.0 if limited else self.modes.offset[axis])
-            if not low - SLACK <= told <= high + SLACK:
+            coordinate = place[axis] + (0.0 if limited else self.modes.offset[axis])
+            if not low - SLACK <= coordinate <= high + SLACK:
                 self.clamped += 1
                 place[axis] = min(max(place[axis], low), high) if limited else place[axis]
 

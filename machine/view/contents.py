@@ -51,14 +51,14 @@ def of_print(
     height = np.zeros(len(ends_s))
     height[shown] = rows["height"].values
     count = len(ends_s)
-    told, text = line_patterns(program.lines, rows)
+    patterns, text = line_patterns(program.lines, rows)
     source = _source(program)
     header = _head(name, source, profile, known) | {
         "live": live,
         "time_s": run.time_s,
         "filament_mm": float(np.max(run.program.filament_mm, initial=0.0)),
         "lines": len(program.lines),
-        "text": told,
+        "text": patterns,
         "types": list(run.program.types),
         "layers_by": by_layer.by,
         "thinned": {"rows": count, "kept": len(shown)} if len(shown) < count else None,

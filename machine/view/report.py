@@ -164,17 +164,21 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
 def _alternatives(alternatives: Sequence[Alternative]) -> Table:
     """This print beside the model in one part, a row for each cost: a row for each way would be broader than a phone."""
     columns = []
-    for each in alternatives:
+    for way in alternatives:
         costs = ["-"] * 7
-        if each.time_s is not None:
-            filament_mm, mass_g, support_mm3 = each.filament_mm or 0.0, each.filament_g or 0.0, each.support_mm3 or 0.0
-            volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(each.interface_mm3.values()) / 1000:.2f}"]
-            scars = [f"{each.seam_mm:.0f}", str(each.findings)]
-            costs = [duration(each.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
-        columns.append([*costs, f"{max(each.risky_mm2, 0.0):.1f}"])
-    notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
+        if way.time_s is not None:
+            filament_mm, mass_g, support_mm3 = (
+                way.filament_mm or 0.0,
+                way.filament_g or 0.0,
+                way.support_mm3 or 0.0,
+            )
+            volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(way.interface_mm3.values()) / 1000:.2f}"]
+            scars = [f"{way.seam_mm:.0f}", str(way.findings)]
+            costs = [duration(way.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
+        columns.append([*costs, f"{max(way.risky_mm2, 0.0):.1f}"])
+    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
     rows = [[cost, *values] for cost, *values in zip(COSTS, *columns, strict=True)]
-    return _table(COMPARED, ["", *(each.name for each in alternatives)], rows, notes)
+    return _table(COMPARED, ["", *(way.name for way in alternatives)], rows, notes)
 
 
 def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:

@@ -135,7 +135,7 @@ class _Search:
 
     def record_of(self, decomposition: Decomposition) -> bytes:
         """What was recorded of the search that ended with a decomposition."""
-        return next(record[0] for found, record in self._records if found is decomposition)
+        return next(record[0] for searched, record in self._records if searched is decomposition)
 
     def _show(self, progress: Progress) -> None:
         if progress.stage == 0:
@@ -164,24 +164,24 @@ def build(
     check_blocks(profile)
     check_parts(parts, profile)
     compilers.wait_for(compilers.PROGRAM, report)
-    with reporting() if report is None else nullcontext(report) as told:
+    with reporting() if report is None else nullcontext(report) as tell:
 
         def show(slicing: SlicingProgress) -> None:
             if on_slices is not None:
                 on_slices(slicing)
             begun, share = max(slicing.begun, 1), slicing.share
-            told(f"slicing part {begun} of {len(parts)}: {int(100 * share)} % of all layers", share)
+            tell(f"slicing part {begun} of {len(parts)}: {int(100 * share)} % of all layers", share)
 
         sliced = slice_parts(parts, profile, show)
-        told("planning moves")
+        tell("planning moves")
         program = plan(decomposition, sliced, profile, stops)
         for note in (*_too_thin(sliced, profile), *_left_out(program, profile)):
             say(f"{decomposition.name}: {note}")
         lines = tuple(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
-            compilers.wait_for(compilers.PICTURES, told)
+            compilers.wait_for(compilers.PICTURES, tell)
             lines = with_thumbnails(lines, decomposition, profile)
-        told("dry run")
+        tell("dry run")
         run = dry_run(lines, profile)
     return Program(lines, run, _with_own_figures(decomposition, run), sliced)
 
@@ -191,8 +191,8 @@ def _with_own_figures(decomposition: Decomposition, run: DryRun) -> Decompositio
     chosen = decomposition.chosen
     if chosen is None or chosen.time_s is not None or chosen.parts != len(decomposition.parts):
         return decomposition
-    row = replace(chosen, time_s=run.time_s, filament_mm=float(np.max(run.program.filament_mm, initial=0.0)))
-    return replace(decomposition, front=tuple(row if each is chosen else each for each in decomposition.front))
+    printed = replace(chosen, time_s=run.time_s, filament_mm=float(np.max(run.program.filament_mm, initial=0.0)))
+    return replace(decomposition, front=tuple(printed if row is chosen else row for row in decomposition.front))
 
 
 def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:

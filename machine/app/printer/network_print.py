@@ -59,8 +59,8 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str, person: Serv
         try:
             file = server.upload(upload, sent)
         except (KeyboardInterrupt, CancelledError):
-            kept = "keeps nothing of" if gone < total else "may hold all of"
-            say(f"upload broken off: {server.name} {kept} {upload.name}")
+            holds = "keeps nothing of" if gone < total else "may hold all of"
+            say(f"upload broken off: {server.name} {holds} {upload.name}")
             raise
     say(f"{file} is on {server.name}, {_megabytes(total)}, complete")
     return file
@@ -184,15 +184,15 @@ class ServerProgress(ProgressToldByServer):
 
     def at(self, status: JobStatus, message: str) -> Progress:
         """The progress at a moment. message: goes before the server's own."""
-        told = super().at(status, message)
+        progress = super().at(status, message)
         self._read_to(self._line_at(status.bytes_read or 0))
         return replace(
-            told,
+            progress,
             sent=self.line,
             acknowledged=self.line,
             total=len(self._lines),
             file_line=self.line,
-            left_s=self._remaining_s(self.line) * 100.0 / told.feed_percent,
+            left_s=self._remaining_s(self.line) * 100.0 / progress.feed_percent,
             share=self._place.share(self.line, len(self._lines)),
             part=self._place.part,
             parts=self._place.parts,

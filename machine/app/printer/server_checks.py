@@ -30,8 +30,8 @@ def ready_for_server(greeting: ServerIdentity, program: Program, profile: Profil
     there, or with errors of the dry run. Raises PrinterError, MoveError.
     """
     check_program(_answer(greeting), program, profile, file, force)
-    told = lacking_macros(greeting, _block_lines(profile.machine))
-    refuse(_unknown_macros([name for name in lacking_macros(greeting, program.lines) if name not in told], file), force)
+    lacking = lacking_macros(greeting, _block_lines(profile.machine))
+    refuse(_unknown_macros([name for name in lacking_macros(greeting, program.lines) if name not in lacking], file), force)
     refuse_errors(program, force)
 
 

@@ -21,8 +21,8 @@ def with_option_groups(command: Callable[..., int]) -> Callable[..., int]:
 
     @wraps(command)
     def run(**given: Any) -> int:
-        made = {name: group(**{field.name: given.pop(field.name) for field in fields(group)}) for name, group in groups.items()}
-        return command(**given, **made)
+        values = {name: group(**{field.name: given.pop(field.name) for field in fields(group)}) for name, group in groups.items()}
+        return command(**given, **values)
 
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     return run
