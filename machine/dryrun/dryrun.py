@@ -23,7 +23,6 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 MOST_MM = 10_000.0  # five times what the largest printers reach
-STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1", "M226", "M600")
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +69,7 @@ def dry_run(lines: Iterable[str], profile: Profile) -> DryRun:
     ends = [workpiece_path(machine, side[rows]) for side in (program.start, program.end)]
     segments = np.stack(ends, axis=1)
     area = pi * profile.material.diameter_mm**2 / 4.0
-    stop = np.zeros(len(program.line), dtype=np.bool_)
-    stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
+    stop = motion.standstills(program)
     deposited = beads_of(program, segments, rows, profile)
     contacts = replay(program, deposited, profile)
     findings = [

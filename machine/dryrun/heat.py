@@ -5,8 +5,8 @@ from math import pi
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
+from machine.reader.levels import fan_shares, temperatures
 from machine.reader.parsed import MoveKind, ParsedProgram
-from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -66,7 +66,7 @@ def _left_on(program: ParsedProgram) -> list[Finding]:
 def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     """In every part the first bead at another temperature than the material's, or far from the rest of the file's."""
     material, machine = profile.material, profile.machine
-    wanted = _levels(program, ("M104", "M109"))
+    wanted = temperatures(program, "M104", "M109")
     beads = (program.kind == MoveKind.EXTRUDE) & (wanted >= MELTING_C)
     if not beads.any():
         return []
@@ -83,21 +83,13 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
 
 def _bed_off(program: ParsedProgram) -> list[Finding]:
     """The bed switched off while beads are still to come: what is printed lets go of the plate."""
-    bed = _levels(program, ("M140", "M190"))
+    bed = temperatures(program, "M140", "M190")
     beads = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0))
     if not len(beads) or bed[beads[0]] <= 0.0:
         return []
     off = beads[bed[beads] <= 0.0]
     message = f"the bed is switched off while {len(off)} moves of the print are still to come"
     return [at_row(program, int(off[0]), "warning", "bed-off", message)] if len(off) else []
-
-
-def _levels(program: ParsedProgram, codes: tuple[str, ...]) -> Floats:
-    """(n,) what events of these codes have set before each row, 0 before the first."""
-    events = [event for event in program.events if event.code in codes]
-    values = np.array([0.0, *(1.0 if event.code == "M106" and not event.letters else event.value for event in events)])
-    order = np.searchsorted([event.row for event in events], np.arange(len(program.line)), side="right")
-    return np.asarray(values[order])
 
 
 def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
@@ -109,7 +101,7 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     beads = (program.kind == MoveKind.EXTRUDE) & ~program.rows_of_types(Kind.PURGE.value)
     if not beads.any():
         return []
-    fan = _levels(program, ("M106", "M107"))
+    fan = fan_shares(program, profile.machine)
     layer = program.layer_keys()
     length = np.linalg.norm((program.end - program.start)[:, :3], axis=1)
     seconds = np.bincount(layer[beads], weights=(length / np.maximum(program.feed, 1e-9))[beads] * 60.0)

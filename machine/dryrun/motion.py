@@ -1,6 +1,7 @@
 """Motion: findings about axes: limits, speeds, homing, turning while plastic flows or while the firmware begins to follow."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from machine.dryrun.findings import Finding, at_event, at_row, per_part, unless_own
 from machine.firmware import dialect_of
@@ -10,6 +11,7 @@ from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
+STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1", "M226", "M600")
 SLACK = 1.001
 WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # how much a step may differ by its ends' rounding
 LEVEL_DEG = 0.01
@@ -43,6 +45,13 @@ def _outside(program: ParsedProgram, machine: Machine) -> list[Finding]:
 def deltas(program: ParsedProgram) -> Floats:
     """(n, 6) changes of X Y Z tilt turn E."""
     return np.column_stack([program.end - program.start, program.e_mm])
+
+
+def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
+    """(n,) before which rows the machine stands still, whatever comes after."""
+    stop = np.zeros(len(program.line), dtype=np.bool_)
+    stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
+    return stop
 
 
 def _too_fast(program: ParsedProgram, machine: Machine) -> list[Finding]:

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.dryrun import STANDSTILLS, DryRun
+from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding, at_row, by_part
-from machine.dryrun.motion import deltas
+from machine.dryrun.motion import deltas, standstills
 from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
 from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
-from machine.planning.timing import TINY, Blocks, axis_accelerations, axis_speeds, block_time, corner_speed, lengths
+from machine.planning.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 from machine.reader.parsed import ParsedProgram
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, part
@@ -86,25 +86,13 @@ def _findings(
 
 def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> Feeding:
     """Play a program's lines over a line and its blocks in the printer's planner."""
-    moved = deltas(program)
-    length, measure = lengths(moved)
-    blocks = np.flatnonzero(measure < 3)
-    moved, length, measure = moved[blocks], length[blocks], measure[blocks]
-    share = np.abs(moved) / length[:, None]
-    with np.errstate(divide="ignore"):
-        speed = np.minimum(program.feed[blocks] / 60.0, (axis_speeds(machine) / share).min(axis=1))
-        acceleration = (axis_accelerations(machine) / share).min(axis=1)
-    acceleration = np.where(measure == 0, np.minimum(acceleration, program.acceleration[blocks]), acceleration)
-    stop = np.zeros(len(program.line), dtype=np.bool_)
-    stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
-    halts = np.diff(np.cumsum(stop)[blocks], prepend=0) > 0
-    own, ahead = _bytes(lines, program.line[blocks])
-    flags = np.zeros((2, len(blocks)), dtype=np.bool_)
-    planned = Blocks(moved / length[:, None], length, speed, acceleration, measure, halts)
+    blocks, moving = blocks_of(deltas(program), program.feed / 60.0, standstills(program), machine, program.acceleration)
+    own, ahead = _bytes(lines, program.line[moving])
+    flags = np.zeros((2, len(own)), dtype=np.bool_)
     line = SerialLine(own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud)
-    time_s = _play(planned, line, machine.junction_speed_mm_s, flags[0], flags[1])
+    time_s = _play(blocks, line, machine.junction_speed_mm_s, flags[0], flags[1])
     whole = np.zeros((2, len(program.line)), dtype=np.bool_)
-    whole[:, blocks] = flags
+    whole[:, moving] = flags
     return Feeding(whole[0], whole[1], float(time_s))
 
 

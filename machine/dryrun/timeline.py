@@ -45,15 +45,5 @@ class UnknownTimeline(Timeline):
     beginning = "a file that is not known here"
 
     def __init__(self) -> None:
-        self.letters = ()
-
-    def at(self, file_line: int) -> dict[str, float]:
-        """{}."""
-        return {}
-
-    def remaining_s(self, file_line: int) -> float:
-        """0."""
-        return 0.0
-
-    def layers(self, part: int | None) -> None:
-        """None."""
+        self.letters, self._waits, self._layers = (), [], {}
+        self._line, self._ends, self._done_s = np.zeros(0, dtype=np.int64), np.zeros((0, 5)), np.zeros(1)

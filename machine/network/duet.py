@@ -15,7 +15,7 @@ from machine.network.answers import entry, number, table, whole
 from machine.network.credentials import how_to_give_a_key
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals, Reply, plain
-from machine.network.server import ACTIVE, JobStatus, Phase, ServerIdentity
+from machine.network.server import ACTIVE, JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 FOLDER = "0:/gcodes/"
@@ -40,12 +40,11 @@ STATES = {
 }
 
 
-class Duet:
+class Duet(PrintServer):
     """PrintServer of a Duet."""
 
     def __init__(self, http: HttpSession) -> None:
-        self._http = http
-        self.name = http.name
+        super().__init__(http)
         self._nozzle, self._bed = 1, 0  # heaters
         self._connected = False
         self._last: Phase | None = None  # of the print, for idle says nothing of how it ended
@@ -118,11 +117,9 @@ class Duet:
         return Temperature(*(number(heater.get(key)) for heater in reported for key in ("current", "active")))
 
     def has(self, file: str) -> bool:
-        """Whether it holds a file of this name."""
         return table(self._value("/rr_fileinfo", {"name": FOLDER + file})).get("err") == 0
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
-        """Hand over a file with its CRC."""
         self._connect()  # the one before may have ended while the program was made
         params = {"name": FOLDER + upload.name, "crc32": upload.crc32}
         reply = self._http.upload("/rr_upload", params, upload.read_by(sent), answer_s=WRITTEN_S)
@@ -132,7 +129,6 @@ class Duet:
         return upload.name
 
     def start(self, file: str) -> None:
-        """Begin to print a file that it holds."""
         self._last = None
         self.command(f'M32 "{FOLDER}{file}"')
         deadline_s = time.monotonic() + START_S
@@ -152,7 +148,6 @@ class Duet:
         self.command("M25")
 
     def resume(self) -> None:
-        """Go on with it."""
         self.command("M24")
 
     def cancel(self) -> None:
@@ -167,7 +162,6 @@ class Duet:
             self.command("M0")
 
     def command(self, line: str) -> None:
-        """Have a line of G-code executed."""
         value = table(self._value("/rr_gcode", {"gcode": line}))
         if value.get("err", 0) != 0:
             raise ServerError(f"{self.name} has not taken {line}: it is busy")
@@ -184,7 +178,7 @@ class Duet:
         except ServerError:
             pass
         finally:
-            self._http.close()
+            super().close()
 
     def _model(self, key: str) -> Any:
         return table(self._value("/rr_model", {"key": key, "flags": "d99vn"})).get("result")

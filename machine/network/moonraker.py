@@ -12,7 +12,7 @@ from machine.link.protocol.events import Temperature
 from machine.network.answers import entry, number, table, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals
-from machine.network.server import JobStatus, Phase, ServerIdentity
+from machine.network.server import JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers
@@ -30,12 +30,11 @@ STATES = {
 REPORTED = ("webhooks", "print_stats", "virtual_sdcard", "extruder", "heater_bed", "gcode_move")
 
 
-class Moonraker:
+class Moonraker(PrintServer):
     """PrintServer of a Moonraker."""
 
     def __init__(self, http: HttpSession) -> None:
-        self._http = http
-        self.name = http.name
+        super().__init__(http)
         if http.credentials.key:
             http.set_header("X-Api-Key", http.credentials.key)
 
@@ -123,16 +122,13 @@ class Moonraker:
         return path
 
     def start(self, file: str) -> None:
-        """Begin to print a file that it holds."""
         sentence = {400: f"{self.name} cannot start it now: {{words}}"}
         self._order("/printer/print/start", {"filename": file}, sentence)
 
     def pause(self) -> None:
-        """Pause the print."""
         self._order("/printer/print/pause")
 
     def resume(self) -> None:
-        """Go on with it."""
         self._order("/printer/print/resume")
 
     def cancel(self) -> None:
@@ -146,10 +142,6 @@ class Moonraker:
     def emergency_stop(self) -> None:
         """Klipper shuts down at once."""
         self._value(self._http.post("/printer/emergency_stop"), "the emergency stop")
-
-    def close(self) -> None:
-        """Leave."""
-        self._http.close()
 
     def _query(self, names: tuple[str, ...]) -> Mapping[str, Any]:
         value = self._value(

@@ -11,7 +11,7 @@ from machine.link.protocol.events import Temperature
 from machine.network.answers import number, table, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals
-from machine.network.server import JobStatus, Phase, ServerIdentity
+from machine.network.server import JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 STORED_S = 120.0  # the server copies and reads a file before it answers
@@ -25,12 +25,11 @@ FLAGS = (
 )
 
 
-class OctoPrint:
+class OctoPrint(PrintServer):
     """PrintServer of an OctoPrint."""
 
     def __init__(self, http: HttpSession) -> None:
-        self._http = http
-        self.name = http.name
+        super().__init__(http)
         if http.credentials.key:
             http.set_header("X-Api-Key", http.credentials.key)
 
@@ -62,7 +61,6 @@ class OctoPrint:
         )
 
     def has(self, file: str) -> bool:
-        """Whether it holds a file of this name."""
         reply = self._http.get(f"/api/files/local/{file}")
         return reply.status != 404 and self._http.check(reply, "to tell of its files") is not None
 
@@ -77,16 +75,13 @@ class OctoPrint:
         return str(local["path"])
 
     def start(self, file: str) -> None:
-        """Begin to print a file that it holds."""
         sentence = {409: f"{self.name} cannot start it now: {{words}}"}
         self._order(f"/api/files/local/{file}", {"command": "select", "print": True}, "to start it", sentence)
 
     def pause(self) -> None:
-        """Pause the print."""
         self._order("/api/job", {"command": "pause", "action": "pause"}, "to pause")
 
     def resume(self) -> None:
-        """Go on with it."""
         self._order("/api/job", {"command": "pause", "action": "resume"}, "to resume")
 
     def cancel(self) -> None:
@@ -94,16 +89,11 @@ class OctoPrint:
         self._order("/api/job", {"command": "cancel"}, "to cancel")
 
     def command(self, line: str) -> None:
-        """Have a line of G-code sent."""
         self._order("/api/printer/command", {"command": line}, f"{line}")
 
     def emergency_stop(self) -> None:
         """M112, which OctoPrint sends ahead of its queue."""
         self.command("M112")
-
-    def close(self) -> None:
-        """Leave."""
-        self._http.close()
 
     def _get(self, path: str, purpose: str) -> Any:
         return self._http.check(self._http.get(path), purpose)

@@ -34,6 +34,7 @@ CAPABILITIES = {
 }
 ENDSTOP_MM = 0.01
 TEXTS = ("M117", "M118")  # what follows them are no words
+WITHOUT_EFFECT = ("M17", "M73", "M117", "M486", "M572", "M665", "M876", "M900", "T0")
 
 
 def heat(board: Board, words: WordValues, text: str) -> Work:
@@ -85,11 +86,6 @@ def _allow_cold(board: Board, words: WordValues, text: str) -> Work:
     return None
 
 
-def _stop_waiting(board: Board, words: WordValues, text: str) -> Work:
-    board.impatient = True
-    return None
-
-
 def _power(board: Board, words: WordValues, text: str) -> Work:
     """M80, M81: without the power supply nothing heats; what moves is planned and does not matter."""
     if text.startswith("M81"):
@@ -125,15 +121,6 @@ def _area(board: Board) -> str:
     least, most = (",".join(f"{a}:{b[side]:.2f}" for a, b in zip("xyzij", limits, strict=False)) for side in (0, 1))
     reach = f"min:{{{least}}},max:{{{most}}}"
     return f"area:{{full:{{{reach}}},work:{{{reach}}}}}"
-
-
-def _report_temperatures(board: Board, words: WordValues, text: str) -> Work:
-    return f"ok {board.temperatures()}"
-
-
-def _report_position(board: Board, words: WordValues, text: str) -> Work:
-    board.say(board.position())
-    return None
 
 
 def _autoreport_temperatures(board: Board, words: WordValues, text: str) -> Work:
@@ -185,45 +172,31 @@ def _report_endstops(board: Board, words: WordValues, text: str) -> Work:
     return None
 
 
-def _nothing(board: Board, words: WordValues, text: str) -> Work:
+def _stop_waiting(board: Board, words: WordValues, text: str) -> Work:
+    board.impatient = True
     return None
 
 
-HEAT: dict[str, Command] = {
-    "M80": _power,
-    "M81": _power,
-    "M104": heat,
-    "M106": _fan,
-    "M107": _fan,
+COMMANDS: dict[str, Command] = {
+    **MOVING,
+    **dict.fromkeys(("M80", "M81"), _power),
+    **dict.fromkeys(("M104", "M140", "M568"), heat),
+    **dict.fromkeys(("M109", "M190"), heat_and_wait),
+    **dict.fromkeys(("M106", "M107"), _fan),
+    "M105": lambda board, words, text: f"ok {board.temperatures()}",
     "M108": _stop_waiting,
-    "M109": heat_and_wait,
-    "M116": _wait_for_all,
-    "M140": heat,
-    "M190": heat_and_wait,
-    "M302": _allow_cold,
-    "M568": heat,
-}
-REPORTS: dict[str, Command] = {
-    "M17": _nothing,
-    "M73": _nothing,
-    "M105": _report_temperatures,
     "M110": _number_lines,
     "M113": _keep_alive,
+    "M114": lambda board, words, text: board.say(board.position()),
     "M115": _identify_firmware,
-    "M114": _report_position,
-    "M117": _nothing,
+    "M116": _wait_for_all,
     "M118": _send_to_host,
     "M119": _report_endstops,
     "M154": _autoreport_position,
     "M155": _autoreport_temperatures,
-    "M486": _nothing,
-    "M572": _nothing,
-    "M665": _nothing,
-    "M876": _nothing,
-    "M900": _nothing,
-    "T0": _nothing,
+    "M302": _allow_cold,
+    **dict.fromkeys(WITHOUT_EFFECT, lambda board, words, text: None),
 }
-COMMANDS: dict[str, Command] = {**MOVING, **HEAT, **REPORTS}
 
 
 def commands_of(rules: SimulationRules) -> dict[str, Command]:

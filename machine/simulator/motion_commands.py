@@ -6,6 +6,7 @@ from machine.gcode.words import read_letters, split_command
 from machine.simulator.board import Board, Command, Work, wait_for_moves
 from machine.simulator.motion import WordValues
 
+MODES = ("G20", "G21", "G90", "G91", "M82", "M83")
 COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP
 
 
@@ -67,10 +68,6 @@ def _dwell(board: Board, words: WordValues, text: str) -> Iterator[float]:
         yield until_s
 
 
-def _drain(board: Board, words: WordValues, text: str) -> Iterator[float]:
-    yield from wait_for_moves(board)
-
-
 def _home(board: Board, words: WordValues, text: str) -> Iterator[float]:
     letters = read_letters(split_command(text)[1])
     axes = [axis for axis, letter in enumerate(board.motion.letters[:5]) if letter in letters] or list(range(5))
@@ -101,29 +98,9 @@ def _wait_for_person(board: Board, words: WordValues, text: str) -> Iterator[flo
     board.waits_for_person = False
 
 
-def _mode(board: Board, words: WordValues, text: str) -> Work:
-    board.motion.modes.set(split_command(text)[0])
-    return None
-
-
 def _follow(board: Board, words: WordValues, text: str) -> Iterator[float]:
     yield from wait_for_moves(board)
     board.motion.follow(text.startswith("G43"))
-
-
-def _accelerate(board: Board, words: WordValues, text: str) -> Work:
-    board.motion.accelerate(words)
-    return None
-
-
-def _bound_accelerations(board: Board, words: WordValues, text: str) -> Work:
-    board.motion.bound(words, board.motion.accelerations)
-    return None
-
-
-def _bound_speeds(board: Board, words: WordValues, text: str) -> Work:
-    board.motion.bound(words, board.motion.speeds)
-    return None
 
 
 def _corner(board: Board, words: WordValues, text: str) -> Work:
@@ -178,29 +155,23 @@ def _stop(board: Board, words: WordValues, text: str) -> Work:
     return None
 
 
-MODES = ("G20", "G21", "G90", "G91", "M82", "M83")
 MOVING: dict[str, Command] = {
-    **dict.fromkeys(MODES, _mode),
-    "G0": move,
-    "G1": move,
-    "G2": _arc,
-    "G3": _arc,
+    **dict.fromkeys(MODES, lambda board, words, text: board.motion.modes.set(split_command(text)[0])),
+    **dict.fromkeys(("G0", "G1"), move),
+    **dict.fromkeys(("G2", "G3"), _arc),
     "G4": _dwell,
     "G28": _home,
-    "G43.4": _follow,
-    "G49": _follow,
+    **dict.fromkeys(("G43.4", "G49"), _follow),
     "G92": _rename,
-    "M0": _wait_for_person,
-    "M1": _wait_for_person,
-    "M18": _rest,
-    "M84": _rest,
-    "M201": _bound_accelerations,
-    "M203": _bound_speeds,
-    "M204": _accelerate,
+    **dict.fromkeys(("M0", "M1"), _wait_for_person),
+    **dict.fromkeys(("M18", "M84"), _rest),
+    "M201": lambda board, words, text: board.motion.bound(words, board.motion.accelerations),
+    "M203": lambda board, words, text: board.motion.bound(words, board.motion.speeds),
+    "M204": lambda board, words, text: board.motion.accelerate(words),
     "M205": _corner,
     "M211": _limit,
     "M220": _override_feed,
     "M221": _override_flow,
-    "M400": _drain,
+    "M400": lambda board, words, text: wait_for_moves(board),
     "M410": _stop,
 }

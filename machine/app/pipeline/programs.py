@@ -11,6 +11,7 @@ from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.program import Program
+from machine.reader.gcode_file import GcodeFile
 from profiles.errors import GcodeError, MoveError
 from profiles.profile import Profile
 
@@ -49,13 +50,7 @@ def load_program(request: ModelRequest) -> LoadedProgram:
 
 def read_gcode_lines(path: Path) -> tuple[str, ...]:
     """The lines of a G-code file. Raises GcodeError when it cannot be read, is no text or is empty."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise GcodeError(f"G-code file {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
-    except UnicodeDecodeError as error:
-        raise GcodeError(f"G-code file {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
-    lines = tuple(text.removesuffix("\n").split("\n"))  # as GcodeFile counts them, which a resume reads
+    lines = tuple(GcodeFile(path))
     if not any(line.strip() for line in lines):
         raise GcodeError(f"G-code file {path} is empty")
     return lines
