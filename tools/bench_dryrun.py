@@ -21,7 +21,7 @@ import numpy as np
 
 from machine.app.pipeline.pipeline import decompose_model
 from machine.app.requests import ModelRequest
-from machine.dryrun import clearance, contents, dry_run, extrusion, heat, layering, motion, placement, provenance, sequence
+from machine.dryrun import clearance, dry_run, extrusion, heat, layering, motion, own_comments, placement, sequence
 from machine.dryrun.replay import replay
 from machine.dryrun.strokes import beads_of
 from machine.gcode.writer import write_gcode
@@ -90,8 +90,7 @@ def stages(file: Path, profile: Profile) -> None:
         lambda: [
             *placement.findings(program, deposited, contacts), *sequence.findings(program, profile),
             *layering.findings(program, deposited, contacts), *extrusion.findings(program, deposited, profile),
-            *contents.findings(program),
-            *provenance.findings(lines, program, profile), *motion.findings(program, machine),
+            *own_comments.findings(lines, program, profile), *motion.findings(program, machine),
             *placement.off_plate(program, segments, rows, profile), *heat.findings(program, profile, True),
         ],
     )  # fmt: skip

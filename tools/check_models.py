@@ -19,8 +19,8 @@ from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import ModelRequest
 from machine.dryrun.conformity.agreement import agreement
 from machine.link.stream import print_lines
+from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
-from machine.view.program import Program
 from mdp.decomposition import Decomposition
 from profiles.errors import UserError
 from profiles.profile import Profile, load

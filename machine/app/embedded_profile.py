@@ -1,18 +1,18 @@
 """Embedded profile: the profile that a G-code file of ours was made with, read from the comments at its end."""
 
-import json
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import Any
 
+from machine.gcode.settings import CONFIG_BEGIN, CONFIG_END
 from profiles.errors import ProfileError
 from profiles.part_settings import PartSettings
 from profiles.profile import SECTIONS, Profile, sound_section, with_part_settings
+from profiles.toml_text import read_toml, value_text
 
-BEGIN, END = "; tiltprint_config = begin", "; tiltprint_config = end"
-WHOLE = re.compile(r"machine\.(gcode|sources)\.")  # below these, keys are names and values are text
-STEP = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
+SOURCE = re.compile(r"(machine\.sources\.)(.+)")  # the key of another setting, dots and all
+TEXT = re.compile(r"machine\.(?:gcode|sources)\.|.*\.(?:name|stepper)$")  # whatever it looks like
+INDEX = re.compile(r"\[(\d+)\]")
 
 
 def read_embedded_profile(lines: Sequence[str], profile: Profile, named: frozenset[str]) -> tuple[Profile, tuple[str, ...]]:
@@ -21,78 +21,67 @@ def read_embedded_profile(lines: Sequence[str], profile: Profile, named: frozens
     Returns it and the names of the sections taken over. A file without the comments, or with ones that make no valid
     section, changes nothing.
     """
-    found = _tables(lines)
-    tables = {name: table for name, table in found.items() if name in SECTIONS and name not in named}
+    embedded = _tables(lines)
+    tables = {name: table for name, table in embedded.items() if name in SECTIONS and name not in named}
     sections = {name: sound_section(name, table) for name, table in tables.items()}
     taken = {name: section for name, section in sections.items() if section is not None}
-    told = profile.model_copy(update=taken)
-    return _with_parts(told, found.get("parts", [])) if "process" in taken else told, tuple(taken)
+    read = profile.model_copy(update=taken)
+    return _with_parts(read, embedded.get("parts", [])) if "process" in taken else read, tuple(taken)
 
 
 def _with_parts(profile: Profile, tables: Any) -> Profile:
     """The profile with the file's settings of single parts; without them where they are not valid."""
     try:
-        return with_part_settings(profile, [PartSettings.model_validate(each) for each in tables])
+        return with_part_settings(profile, [PartSettings.model_validate(settings) for settings in tables])
     except (ProfileError, ValueError):
         return profile
 
 
 def _tables(lines: Sequence[str]) -> dict[str, Any]:
-    """Section -> nested table of the values as they were written."""
+    """Section -> nested table of the values as they were written; {} where that is no TOML."""
     comments = [line.rstrip() for line in lines]
-    if BEGIN not in comments or END not in comments:
+    if CONFIG_BEGIN not in comments or CONFIG_END not in comments:
         return {}
-    root: dict[str, Any] = {}
-    texts: dict[tuple[str, ...], dict[int, str]] = {}
-    for line in comments[comments.index(BEGIN) + 1 : comments.index(END)]:
-        key, sign, value = line.removeprefix("; ").partition(" =")
-        if sign:
-            _put(root, texts, key, value.removeprefix(" "))
-    for path, numbered in texts.items():
-        _place(root, list(path), "\n".join(numbered[k] for k in sorted(numbered)) + "\n")
-    return root
-
-
-def _put(root: dict[str, Any], texts: dict[tuple[str, ...], dict[int, str]], key: str, value: str) -> None:
-    whole = WHOLE.match(key)
-    if whole is None:
-        named = key.endswith((".name", ".stepper"))
-        _place(root, [name or int(index) for name, index in STEP.findall(key)], value if named else _value(value))
-        return
-    name = key[whole.end() :]
-    line = re.fullmatch(r"(\w+)\[(\d+)\]", name)
-    if line:
-        texts.setdefault(("machine", whole[1], line[1]), {})[int(line[2])] = value
-    else:
-        _place(root, ["machine", whole[1], name], value)
-
-
-def _place(root: Any, path: Sequence[str | int], value: Any) -> None:
-    """Put a value at its place, making tables and lists on the way."""
-    for step, following in pairwise(path):
-        empty: Any = [] if isinstance(following, int) else {}
-        if isinstance(root, dict):
-            root = root.setdefault(step, empty)
-        elif isinstance(root, list) and isinstance(step, int) and step <= len(root):
-            if step == len(root):
-                root.append(empty)
-            root = root[step]
-        else:
-            return
-    last = path[-1] if path else None
-    if isinstance(root, dict):
-        root[last] = value
-    elif isinstance(root, list) and last == len(root):
-        root.append(value)
-
-
-def _value(text: str) -> Any:
-    """The number, list, truth or text that was written as such."""
-    plain = {"None": "null", "True": "true", "False": "false"}.get(text, text)
+    settings = comments[comments.index(CONFIG_BEGIN) + 1 : comments.index(CONFIG_END)]
     try:
-        return json.loads(plain)
-    except (ValueError, RecursionError):
-        return text
+        whole: dict[str, Any] = _with_lists(read_toml("\n".join(map(_as_toml, settings))))
+    except ValueError:
+        return {}
+    machine = whole.get("machine")
+    if isinstance(machine, dict) and isinstance(blocks := machine.get("gcode"), dict):
+        machine["gcode"] = {name: _block(block) for name, block in blocks.items()}
+    return whole
+
+
+def _block(value: Any) -> Any:
+    """A block of several lines as the text that it was."""
+    return "".join(f"{line}\n" for line in value) if isinstance(value, list) else value
+
+
+def _as_toml(comment: str) -> str:
+    """A setting as a line of TOML; the places of a list are the keys of a table."""
+    key, _, value = comment.removeprefix("; ").partition(" =")
+    value = value.removeprefix(" ")
+    source = SOURCE.fullmatch(key)
+    path = INDEX.sub(r".\1", key) if source is None else source[1] + value_text(source[2])
+    return f"{path} = {value_text(value) if TEXT.match(key) or not _is_toml(value) else value}"
+
+
+def _is_toml(value: str) -> bool:
+    try:
+        read_toml(f"value = {value}")
+    except ValueError:
+        return False
+    return True
+
+
+def _with_lists(value: Any) -> Any:
+    """Tables whose keys count from 0 as lists, the text None as none."""
+    if not isinstance(value, dict):
+        return None if value == "None" else value
+    below = {key: _with_lists(item) for key, item in value.items()}
+    places = [str(place) for place in range(len(below))]
+    return [below[place] for place in places] if places and below.keys() == {*places} else below
 
 
 def in_words(taken: Sequence[str], profile: Profile) -> str:

@@ -7,53 +7,34 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import UPLOAD_MIB, Cuts, ModelRequest, Outputs
+from machine.app.requests import UPLOAD_MIB, Cuts, Outputs
+from machine.app.terminal.option_groups import with_option_groups
 from machine.app.terminal.options import (
-    BeamWidth,
-    Copies,
-    FilamentChanges,
     Force,
     HtmlFile,
     JsonFile,
-    MachineGiven,
-    MachineName,
-    MaterialGiven,
-    MaterialName,
     Model,
     ModelOrGcode,
-    Orient,
-    PartSettingsGiven,
-    PartsGiven,
-    Pauses,
-    PlanGiven,
-    ProcessGiven,
-    ProcessName,
-    RankerName,
-    SearchName,
-    Settings,
-    TimeLimit,
-    chosen_sections,
-    profile_of,
-    with_search,
+    ModelProfileOptions,
+    ProfileOptions,
+    ProgramOptions,
+    SearchOptions,
+    model_request,
+    program_request,
 )
 
 
 def decompose(
     model: Model,
+    *,
+    search: SearchOptions,
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="folder for part-NN.stl, 3MF, JSON")] = None,
-    beam_width: BeamWidth = None,
-    search: SearchName = None,
-    time_limit: TimeLimit = None,
-    ranker: RankerName = "classic",
-    orient: Orient = False,
     plan: Annotated[
         Path | None, typer.Option("--plan", metavar="FILE", help="where FILE exists: cut by it without a search; else write it")
     ] = None,
     planes: Annotated[
         Path | None, typer.Option("--planes", metavar="FILE", help="planes by hand, cut first; the search finds the others")
     ] = None,
-    parts: PartsGiven = None,
-    part: PartSettingsGiven = None,
     json: JsonFile = None,
     png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the parts")] = None,
     sheet: Annotated[
@@ -66,37 +47,24 @@ def decompose(
     record: Annotated[
         Path | None, typer.Option("--record", metavar="FILE", help="what the search saw, as .npz for training")
     ] = None,
-    machine: MachineName = "generic_ac",
-    material: MaterialName = "pla",
-    process: ProcessName = "standard",
-    settings: Settings = None,
+    given: ModelProfileOptions,
 ) -> int:
     """Cut a model into parts, each with its own printing direction."""
     from machine.app.commands.decompose import decompose
 
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
-    names = (machine, material, process)
     known = plan is not None and exists(plan)
-    written = None if known else plan
-    outputs = Outputs(folder=out, json=json, html=html, png=png, sheet=sheet, front=front, record=record, plan=written)
-    cuts = Cuts(plan if known else None, parts, planes)
-    return decompose(ModelRequest(model, profile, ranker=ranker, orient=orient, outputs=outputs, cuts=cuts, profile_names=names))
+    outputs = Outputs(
+        folder=out, json=json, html=html, png=png, sheet=sheet, front=front, record=record, plan=None if known else plan
+    )
+    cuts = Cuts(plan if known else None, search.parts, planes)
+    return decompose(model_request(model, search, given, outputs=outputs, cuts=cuts))
 
 
 def export(
     model: Model,
+    *,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write; - for standard output")],
-    beam_width: BeamWidth = None,
-    search: SearchName = None,
-    time_limit: TimeLimit = None,
-    ranker: RankerName = "classic",
-    orient: Orient = False,
-    plan: PlanGiven = None,
-    parts: PartsGiven = None,
-    part: PartSettingsGiven = None,
-    pause: Pauses = None,
-    filament_change: FilamentChanges = None,
-    copies: Copies = 1,
+    program: ProgramOptions,
     json: JsonFile = None,
     svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer, see --layer")] = None,
     html: HtmlFile = None,
@@ -105,49 +73,19 @@ def export(
         bool, typer.Option("--compare", help="tell also time, material, support and risky area printed in one part")
     ] = False,
     force: Force = False,
-    machine: MachineName = "generic_ac",
-    material: MaterialName = "pla",
-    process: ProcessName = "standard",
-    settings: Settings = None,
+    given: ModelProfileOptions,
 ) -> int:
     """Write the G-code of a model, dry-run first."""
     from machine.app.commands.export import export
-    from machine.planning.stops import parse_stops
 
-    stops = parse_stops(pause or (), filament_change or ())
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
-    names = (machine, material, process)
     outputs = Outputs(gcode=out, json=json, html=html, svg=svg, layer=layer)
-    cuts = Cuts(plan, parts)
-    request = ModelRequest(
-        model,
-        profile,
-        ranker=ranker,
-        orient=orient,
-        outputs=outputs,
-        compare=compare,
-        force=force,
-        cuts=cuts,
-        stops=stops,
-        copies=copies,
-        profile_names=names,
-    )
-    return export(request)
+    return export(program_request(model, program, given, outputs=outputs, compare=compare, force=force))
 
 
 def simulate(
     model: ModelOrGcode,
-    beam_width: BeamWidth = None,
-    search: SearchName = None,
-    time_limit: TimeLimit = None,
-    ranker: RankerName = "classic",
-    orient: Orient = False,
-    plan: PlanGiven = None,
-    parts: PartsGiven = None,
-    part: PartSettingsGiven = None,
-    pause: Pauses = None,
-    filament_change: FilamentChanges = None,
-    copies: Copies = 1,
+    *,
+    program: ProgramOptions,
     json: JsonFile = None,
     reference: Annotated[
         str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
@@ -156,77 +94,36 @@ def simulate(
     baud: Annotated[
         int | None, typer.Option("--baud", metavar="N", help="find moves that a line of N bits a second brings too late")
     ] = None,
-    machine: MachineGiven = None,
-    material: MaterialGiven = None,
-    process: ProcessGiven = None,
-    settings: Settings = None,
+    given: ProfileOptions,
 ) -> int:
     """Dry-run a model or a G-code file. The plastic is held against the model; exit 1 when a finding is an error."""
     from machine.app.commands.simulate import simulate
-    from machine.planning.stops import parse_stops
 
-    stops = parse_stops(pause or (), filament_change or ())
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
-    names = (machine, material, process)
-    chosen = chosen_sections(settings, machine=machine, material=material, process=process)
-    outputs = Outputs(json=json, html=html)
-    request = ModelRequest(
-        model, profile, chosen, ranker, orient, outputs, cuts=Cuts(plan, parts), stops=stops, copies=copies, profile_names=names
-    )
-    return simulate(request, reference, baud)
+    return simulate(program_request(model, program, given, outputs=Outputs(json=json, html=html)), reference, baud)
 
 
 def view(
     model: ModelOrGcode,
+    *,
+    program: ProgramOptions,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="VIEW.html", help="page to write; else named after the model, here")
     ] = None,
     open_: Annotated[bool, typer.Option("--open", help="show the page in the browser")] = False,
-    beam_width: BeamWidth = None,
-    search: SearchName = None,
-    time_limit: TimeLimit = None,
-    ranker: RankerName = "classic",
-    orient: Orient = False,
-    plan: PlanGiven = None,
-    parts: PartsGiven = None,
-    part: PartSettingsGiven = None,
-    pause: Pauses = None,
-    filament_change: FilamentChanges = None,
-    copies: Copies = 1,
     compare: Annotated[bool, typer.Option("--compare", help="tell also time and material printed in one part")] = False,
-    machine: MachineGiven = None,
-    material: MaterialGiven = None,
-    process: ProcessGiven = None,
-    settings: Settings = None,
+    given: ProfileOptions,
 ) -> int:
     """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
     from machine.app.commands.view import view
-    from machine.planning.stops import parse_stops
 
-    stops = parse_stops(pause or (), filament_change or ())
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
-    names = (machine, material, process)
-    chosen = chosen_sections(settings, machine=machine, material=material, process=process)
-    request = ModelRequest(
-        model,
-        profile,
-        chosen,
-        ranker,
-        orient,
-        Outputs(html=out),
-        compare,
-        cuts=Cuts(plan, parts),
-        stops=stops,
-        copies=copies,
-        profile_names=names,
-    )
-    return view(request, open_)
+    return view(program_request(model, program, given, outputs=Outputs(html=out), compare=compare), open_)
 
 
 def edit(
     model: Annotated[
         str | None, typer.Argument(metavar="[MODEL|PLAN]", show_default=False, help="a model file, demo:NAME, or a plan (.toml)")
     ] = None,
+    *,
     port: Annotated[
         int,
         typer.Option(
@@ -237,24 +134,16 @@ def edit(
     upload_mib: Annotated[
         int, typer.Option("--upload-mib", metavar="N", min=1, max=1024, help="the largest file that is taken from a page")
     ] = UPLOAD_MIB,
-    machine: MachineName = "generic_ac",
-    material: MaterialName = "pla",
-    process: ProcessName = "standard",
-    settings: Settings = None,
+    given: ModelProfileOptions,
 ) -> int:
     """Open the workbench: a page to look, cut, slice and print. It is on this computer alone; Ctrl-C ends it."""
     from machine.app.commands.edit import edit
     from machine.app.requests import EditRequest, Given
 
-    given = Given(machine, material, process, tuple(settings or ()))
-    profile = profile_of(machine, material, process, settings)
-    return edit(EditRequest(profile, given, model, port, not no_browser, upload_mib))
+    names = Given(given.machine, given.material, given.process, tuple(given.settings or ()))
+    return edit(EditRequest(given.profile(), names, model, port, not no_browser, upload_mib))
 
 
 COMMANDS: dict[str, Callable[..., int]] = {
-    "decompose": decompose,
-    "export": export,
-    "simulate": simulate,
-    "view": view,
-    "edit": edit,
+    command.__name__: with_option_groups(command) for command in (decompose, export, simulate, view, edit)
 }

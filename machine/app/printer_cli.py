@@ -6,54 +6,38 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import ConsoleRequest, Cuts, ModelRequest, PrintRequest, SendRequest, SimulatorRequest
+from machine.app.requests import ConsoleRequest, Given, PrintRequest, SendRequest, SimulatorRequest
+from machine.app.terminal.option_groups import with_option_groups
 from machine.app.terminal.options import (
     Baud,
-    BeamWidth,
-    Copies,
-    FilamentChanges,
+    ForceAll,
     LogFile,
     MachineGiven,
     MachineName,
-    MaterialGiven,
     ModelOrGcode,
-    Orient,
-    PartSettingsGiven,
-    PartsGiven,
-    Pauses,
-    PlanGiven,
     PortOrSim,
-    ProcessGiven,
-    RankerName,
-    SearchName,
+    ProfileOptions,
+    ProgramOptions,
+    SearchOptions,
     Settings,
     SimSpeed,
-    TimeLimit,
     Watch,
     WatchPort,
-    chosen_sections,
     machine_profile,
+    model_request,
     page_port,
-    profile_of,
-    with_search,
+    program_request,
 )
+
+BAUD = PrintRequest.baud
 
 
 def print_(
     model: ModelOrGcode,
+    *,
     port: PortOrSim,
-    baud: Baud = 115200,
-    beam_width: BeamWidth = None,
-    search: SearchName = None,
-    time_limit: TimeLimit = None,
-    ranker: RankerName = "classic",
-    orient: Orient = False,
-    plan: PlanGiven = None,
-    parts: PartsGiven = None,
-    part: PartSettingsGiven = None,
-    pause: Pauses = None,
-    filament_change: FilamentChanges = None,
-    copies: Copies = 1,
+    program: ProgramOptions,
+    baud: Baud = BAUD,
     speed: SimSpeed = 0.0,
     watch: Watch = False,
     watch_port: WatchPort = None,
@@ -61,13 +45,8 @@ def print_(
     journal: Annotated[
         Path | None, typer.Option("--journal", metavar="FILE", help="for resume; else a new file in the state folder")
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")
-    ] = False,
-    machine: MachineGiven = None,
-    material: MaterialGiven = None,
-    process: ProcessGiven = None,
-    settings: Settings = None,
+    force: ForceAll = False,
+    given: ProfileOptions,
 ) -> int:
     """Print a model or a G-code file on a printer or a simulated one.
 
@@ -76,29 +55,14 @@ def print_(
     Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
     """
     from machine.app.commands.print import print_model
-    from machine.planning.stops import parse_stops
 
-    stops = parse_stops(pause or (), filament_change or ())
-    profile = profile_of(machine, material, process, with_search(settings, beam_width, search, time_limit), part)
-    names = (machine, material, process)
-    chosen = chosen_sections(settings, machine=machine, material=material, process=process)
-    request = ModelRequest(
-        model,
-        profile,
-        chosen,
-        ranker,
-        orient,
-        force=force,
-        cuts=Cuts(plan, parts),
-        stops=stops,
-        copies=copies,
-        profile_names=names,
-    )
-    return print_model(request, PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port)))
+    printing = PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port))
+    return print_model(program_request(model, program, given, force=force), printing)
 
 
 def send(
     file: Annotated[str, typer.Argument(metavar="FILE.gcode", help="a G-code file")],
+    *,
     to: Annotated[
         str,
         typer.Option(
@@ -107,13 +71,8 @@ def send(
     ],
     start: Annotated[bool, typer.Option("--start", help="print it at once; print --port SERVER follows it, too")] = False,
     log: LogFile = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")
-    ] = False,
-    machine: MachineGiven = None,
-    material: MaterialGiven = None,
-    process: ProcessGiven = None,
-    settings: Settings = None,
+    force: ForceAll = False,
+    given: ProfileOptions,
 ) -> int:
     """Hand a G-code file to a print server. It is dry-run and held against machine and server first.
 
@@ -121,15 +80,12 @@ def send(
     """
     from machine.app.commands.send import send
 
-    profile = profile_of(machine, material, process, settings)
-    names = (machine, material, process)
-    chosen = chosen_sections(settings, machine=machine, material=material, process=process)
-    request = ModelRequest(file, profile, chosen, force=force, profile_names=names)
-    return send(request, SendRequest(to, start, log))
+    return send(model_request(file, SearchOptions(), given, force=force), SendRequest(to, start, log))
 
 
 def follow(
     server: Annotated[str, typer.Argument(metavar="SERVER", help="octoprint:HOST, moonraker:HOST or duet:HOST")],
+    *,
     log: LogFile = None,
 ) -> int:
     """Follow and command what a print server prints already.
@@ -145,8 +101,9 @@ def resume(
     journal: Annotated[
         Path | None, typer.Argument(metavar="[JOURNAL]", help="journal of the print that was cut off; without it they are listed")
     ] = None,
+    *,
     port: Annotated[str | None, typer.Option("--port", metavar="PORT", help="serial port")] = None,
-    baud: Baud = 115200,
+    baud: Baud = BAUD,
     yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
     watch: Watch = False,
     watch_port: WatchPort = None,
@@ -169,7 +126,8 @@ def resume(
 
 
 def ports(
-    baud: Annotated[int, typer.Option("--baud", metavar="N", help="rate tried first, bits a second")] = 115200,
+    *,
+    baud: Annotated[int, typer.Option("--baud", metavar="N", help="rate tried first, bits a second")] = BAUD,
     json: Annotated[bool, typer.Option("--json", help="the list as JSON")] = False,
     ask: Annotated[
         bool, typer.Option("--ask/--no-ask", help="open each port and ask what is there; many boards restart when opened")
@@ -182,15 +140,16 @@ def ports(
 
 
 def console(
+    *,
     port: PortOrSim,
-    baud: Baud = 115200,
+    baud: Baud = BAUD,
     speed: SimSpeed = 0.0,
     reports: Annotated[bool, typer.Option("--reports/--no-reports", help="show temperatures that the printer reports")] = True,
     leave_heaters: Annotated[
         bool, typer.Option("--leave-heaters", help="heaters stay as they are on leaving; else they are switched off")
     ] = False,
     log: LogFile = None,
-    machine: MachineName = "generic_ac",
+    machine: MachineName = Given.machine,
     settings: Settings = None,
 ) -> int:
     """Talk to a printer. Lines typed, or piped in, are sent; its answers are shown.
@@ -203,6 +162,7 @@ def console(
 
 
 def simulator(
+    *,
     pty: Annotated[Path | None, typer.Option("--pty", metavar="PATH", help="a link to keep on the terminal's path")] = None,
     tcp: Annotated[int | None, typer.Option("--tcp", metavar="PORT", help="for socket://localhost:PORT; 0: a free one")] = None,
     faults: Annotated[Path | None, typer.Option("--faults", metavar="FILE", help="fault script: what goes wrong")] = None,
@@ -211,7 +171,7 @@ def simulator(
     habits: Annotated[
         str | None, typer.Option("--habits", metavar="LIST", help="how the firmware was built: no-advanced-ok,no-busy,...")
     ] = None,
-    machine: MachineName = "generic_ac",
+    machine: MachineName = Given.machine,
     settings: Settings = None,
 ) -> int:
     """A simulated printer for any host to print on; Ctrl-C ends it."""
@@ -221,11 +181,6 @@ def simulator(
 
 
 COMMANDS: dict[str, Callable[..., int]] = {
-    "print": print_,
-    "send": send,
-    "follow": follow,
-    "resume": resume,
-    "ports": ports,
-    "console": console,
-    "simulator": simulator,
+    command.__name__.rstrip("_"): with_option_groups(command)
+    for command in (print_, send, follow, resume, ports, console, simulator)
 }

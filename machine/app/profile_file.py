@@ -51,12 +51,12 @@ def _differing(shared: Mapping[str, Any], whole: Mapping[str, Any]) -> Tables:
     """What of tables is not in others; an empty text for what is left out."""
     out: Tables = {}
     for key, value in whole.items():
-        other = shared.get(key)
-        if isinstance(value, Mapping) and isinstance(other, Mapping):
-            below = _differing(other, value)
+        base = shared.get(key)
+        if isinstance(value, Mapping) and isinstance(base, Mapping):
+            below = _differing(base, value)
             if below:
                 out[key] = below
-        elif value != other:
+        elif value != base:
             out[key] = "" if value is None else value
     return out
 
@@ -85,7 +85,7 @@ def _value(value: Any) -> str:
         isinstance(value, str)
         and "\n" in value
         and "'''" not in value
-        and all(each == "\n" or each.isprintable() for each in value)
+        and all(character == "\n" or character.isprintable() for character in value)
     ):
         return f"'''\n{value}'''"
     line = value_text(value)

@@ -6,13 +6,14 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import CalibrationRequest
+from machine.app.requests import CalibrationRequest, Given
 from machine.app.terminal.options import MachineName, Settings, machine_profile
 
 profiles_app = typer.Typer(rich_markup_mode=None, help="List, show and check machines, materials and processes.")
 
 
 def calibrate(
+    *,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="OUT.gcode", help="program to write, with a sheet beside it to fill in")
     ] = None,
@@ -28,7 +29,7 @@ def calibrate(
     save: Annotated[str | None, typer.Option("--save", metavar="NAME", help="name of your profile; else the machine's")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="write over a file that exists")] = False,
     force: Annotated[bool, typer.Option("--force", help="save although the touches are far off")] = False,
-    machine: MachineName = "generic_ac",
+    machine: MachineName = Given.machine,
     settings: Settings = None,
 ) -> int:
     """Find signs, zeros and centres of the rotary axes. A few touches of a mark tell them; your own profile keeps them.
@@ -58,6 +59,7 @@ def profiles_list() -> int:
 @profiles_app.command("show")
 def profiles_show(
     name: Annotated[str, typer.Argument(metavar="NAME", help="name of a profile, or a .toml file")],
+    *,
     json: Annotated[bool, typer.Option("--json", help="resolved values as JSON")] = False,
     settings: Settings = None,
 ) -> int:

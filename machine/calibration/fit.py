@@ -59,6 +59,81 @@ class Calibration:
         return int(np.argmax(self.residuals_mm)) + 1
 
 
+@dataclass(frozen=True, eq=False)
+class _Guess:
+    """One choice of both signs, and the touches that (8,) numbers in the order of UNKNOWN are to explain."""
+
+    machine: Machine
+    signs: tuple[int, int]
+    touches: Sequence[Touch]
+    height_mm: float
+
+    def fit(self, start_deg: float) -> tuple[float, Floats]:
+        """Mean square and numbers of the best fit from a zero so far from the profile's, by Levenberg's damped least squares."""
+        numbers = self._start(start_deg)
+        damping, here = 1e-3, self.residuals(numbers)
+        for _ in range(ROUNDS):
+            slope = self._slope(numbers)
+            normal = slope.T @ slope
+            step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-9), -slope.T @ here, rcond=None)[0]
+            tried = self.residuals(numbers + step)
+            if tried @ tried < here @ here:
+                numbers, here, damping = numbers + step, tried, damping * 0.2
+            else:
+                damping *= 8.0
+            if np.abs(step).max() < 1e-9 or damping > 1e7:
+                break
+        if abs(numbers[5] - self.machine.tilt.zero_deg) > UPSIDE_DOWN_DEG:  # the other way round fits a table seen from below
+            return np.inf, numbers
+        return float(here @ here) / len(here), numbers
+
+    def _start(self, start_deg: float) -> Floats:
+        """The profile's own numbers, the mark where the first touches put it."""
+        machine = self.machine
+        tilt_across = _across(machine) @ np.array(machine.tilt.point_mm)
+        numbers = np.array([*machine.turn.point_mm, *tilt_across, machine.tilt.zero_deg + start_deg, 0.0, 0.0])
+        of_mark = [touch for touch in self.touches if not touch.on_plate] or self.touches
+        numbers[6:8] = workpiece_path(self.machine_with(numbers), _positions(of_mark))[:, :2].mean(axis=0)
+        return numbers
+
+    def residuals(self, numbers: Floats) -> Floats:
+        """Where the touches lie from the mark, x y z each; of a touch on the plate the height over the table alone."""
+        seen = workpiece_path(self.machine_with(numbers), _positions(self.touches))
+        off = seen - np.array([numbers[6], numbers[7], self.height_mm])
+        off[[touch.on_plate for touch in self.touches], 2] += self.height_mm
+        residuals: Floats = off[np.array([[not touch.on_plate, not touch.on_plate, True] for touch in self.touches])]
+        return residuals
+
+    def _slope(self, numbers: Floats) -> Floats:
+        """Derivative of the residuals by each number, from both sides."""
+        steps = STEP * np.eye(len(numbers))
+        return np.column_stack([(self.residuals(numbers + h) - self.residuals(numbers - h)) / (2.0 * STEP) for h in steps])
+
+    def sigma(self, numbers: Floats) -> dict[str, float]:
+        """How sure each number is; raises ProfileError for those that the touches do not tell."""
+        _, sizes, directions = np.linalg.svd(self._slope(numbers), full_matrices=False)
+        if len(sizes) < len(numbers) or sizes[-1] < LEAST_SHARE * sizes[0]:
+            lost = np.abs(directions[-1])
+            names = dict.fromkeys(name for name, share in zip(UNKNOWN, lost, strict=True) if share > 0.3 * lost.max())
+            unknown = " and ".join(names)
+            raise ProfileError(f"the touches do not tell {unknown}: touch the mark at four turns and at two more tilts")
+        off = self.residuals(numbers)
+        variance = float(off @ off) / max(1, len(off) - len(numbers))
+        spread = np.sqrt(np.diag((directions.T / sizes**2) @ directions) * variance)
+        sigma: dict[str, float] = {}
+        for name, value in zip(UNKNOWN, spread.tolist(), strict=True):
+            sigma[name] = max(value, sigma.get(name, 0.0))
+        return sigma
+
+    def machine_with(self, numbers: Floats) -> Machine:
+        """The machine with these numbers; along its own axis the tilt's point stays where the profile has it."""
+        machine, along = self.machine, unit(self.machine.tilt.axis)
+        point = along * (along @ np.array(machine.tilt.point_mm)) + numbers[3:5] @ _across(machine)
+        found = {"sign": self.signs[0], "zero_deg": float(numbers[5]), "point_mm": tuple(point.tolist())}
+        turn = machine.turn.model_copy(update={"sign": self.signs[1], "point_mm": tuple(numbers[:3].tolist())})
+        return machine.model_copy(update={"tilt": machine.tilt.model_copy(update=found), "turn": turn})
+
+
 def calibrate(
     machine: Machine, touches: Sequence[Touch], mark_height_mm: float = 0.0, mark_angle_deg: float | None = None
 ) -> Calibration:
@@ -68,21 +143,23 @@ def calibrate(
     too, else it stays. Raises ProfileError when the touches cannot tell all numbers or both signs.
     """
     _check_count(touches)
-    fits: list[tuple[float, tuple[int, int], Floats]] = []
+    guesses = [_Guess(machine, signs, touches, mark_height_mm) for signs in SIGNS]
+    best: dict[tuple[int, int], tuple[float, Floats]] = {}
     for start_deg in STARTS_DEG:
-        fits += [_fit(machine, signs, start_deg, touches, mark_height_mm) for signs in SIGNS]
-        if min(fits, key=lambda fit: fit[0])[0] < GOOD_MM**2:
+        for guess in guesses:
+            fit = guess.fit(start_deg)
+            best[guess.signs] = min(best.get(guess.signs, fit), fit, key=lambda fit: fit[0])
+        if min(cost for cost, _ in best.values()) < GOOD_MM**2:
             break
-    each = [min((fit for fit in fits if fit[1] == signs), key=lambda fit: fit[0]) for signs in SIGNS]
-    ranked = sorted(each, key=lambda fit: fit[0])
-    (cost, signs, numbers), (next_cost, next_signs, _) = ranked[:2]
-    if next_cost < APART**2 * cost + LEAST_MM**2:
-        axis = machine.tilt if signs[0] != next_signs[0] else machine.turn
+    first, second = sorted(guesses, key=lambda guess: best[guess.signs][0])[:2]
+    cost, numbers = best[first.signs]
+    if best[second.signs][0] < APART**2 * cost + LEAST_MM**2:
+        axis = machine.tilt if first.signs[0] != second.signs[0] else machine.turn
         raise ProfileError(
             f"the touches do not tell the sign of {axis.letter}: touch the mark at turns 0, 90, 180 and 270 and at two tilts"
         )
-    sigma = _sigma(machine, signs, numbers, touches, mark_height_mm)
-    calibrated = _machine_with(machine, signs, numbers)
+    sigma = first.sigma(numbers)
+    calibrated = first.machine_with(numbers)
     mark = (float(numbers[6]), float(numbers[7]), mark_height_mm)
     if mark_angle_deg is not None:
         calibrated, mark = _set_turn_zero(calibrated, mark, mark_angle_deg)
@@ -92,7 +169,7 @@ def calibrate(
             f"the table would be level at {machine.tilt.letter}{calibrated.tilt.zero_deg:.2f}, outside tilt.limits_deg "
             f"{list(machine.tilt.limits_deg)}: check the touches"
         )
-    off = _residuals(machine, signs, numbers, touches, mark_height_mm)
+    off = first.residuals(numbers)
     owner = np.repeat(np.arange(len(touches)), [1 if touch.on_plate else 3 for touch in touches])
     return Calibration(calibrated, mark, tuple(np.sqrt(np.bincount(owner, weights=off**2)).tolist()), sigma)
 
@@ -106,97 +183,6 @@ def _check_count(touches: Sequence[Touch]) -> None:
     tilts = {round(touch.pose.tilt_deg, 1) for touch in touches}
     if len(tilts) < 2:
         raise ProfileError(f"all touches are at tilt {tilts.pop():g}: the tilt axis is found from two tilts or more")
-
-
-def _fit(
-    machine: Machine, signs: tuple[int, int], start_deg: float, touches: Sequence[Touch], height_mm: float
-) -> tuple[float, tuple[int, int], Floats]:
-    """Mean square, signs and numbers of the best fit with these signs that begins at a zero so far from the profile's."""
-    cost, numbers = _descend(machine, signs, _start(machine, signs, touches, start_deg), touches, height_mm)
-    if abs(numbers[5] - machine.tilt.zero_deg) > UPSIDE_DOWN_DEG:  # turning the other way fits a table seen from below
-        cost = np.inf
-    return cost, signs, numbers
-
-
-def _start(machine: Machine, signs: tuple[int, int], touches: Sequence[Touch], start_deg: float) -> Floats:
-    """The profile's own numbers, the mark where the first touches put it."""
-    across = _across(machine)
-    tilt_point = np.array(machine.tilt.point_mm)
-    numbers = np.array([*machine.turn.point_mm, *(across @ tilt_point), machine.tilt.zero_deg + start_deg, 0.0, 0.0])
-    marks = workpiece_path(_machine_with(machine, signs, numbers), _positions([t for t in touches if not t.on_plate] or touches))
-    numbers[6:8] = marks[:, :2].mean(axis=0)
-    return numbers
-
-
-def _descend(
-    machine: Machine, signs: tuple[int, int], numbers: Floats, touches: Sequence[Touch], height_mm: float
-) -> tuple[float, Floats]:
-    """Mean square and numbers at the bottom: Levenberg's damped least squares."""
-    damping, here = 1e-3, _residuals(machine, signs, numbers, touches, height_mm)
-    for _ in range(ROUNDS):
-        slope = _slope(machine, signs, numbers, touches, height_mm)
-        normal = slope.T @ slope
-        step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-9), -slope.T @ here, rcond=None)[0]
-        tried = _residuals(machine, signs, numbers + step, touches, height_mm)
-        if tried @ tried < here @ here:
-            numbers, here, damping = numbers + step, tried, damping * 0.2
-        else:
-            damping *= 8.0
-        if np.abs(step).max() < 1e-9 or damping > 1e7:
-            break
-    return float(here @ here) / len(here), numbers
-
-
-def _residuals(machine: Machine, signs: tuple[int, int], numbers: Floats, touches: Sequence[Touch], height_mm: float) -> Floats:
-    """Where the touches lie from the mark, x y z each; of a touch on the plate the height over the table alone."""
-    seen = workpiece_path(_machine_with(machine, signs, numbers), _positions(touches))
-    off = seen - np.array([numbers[6], numbers[7], height_mm])
-    off[[touch.on_plate for touch in touches], 2] += height_mm
-    measured = np.array([[not touch.on_plate, not touch.on_plate, True] for touch in touches])
-    residuals: Floats = off[measured]
-    return residuals
-
-
-def _slope(machine: Machine, signs: tuple[int, int], numbers: Floats, touches: Sequence[Touch], height_mm: float) -> Floats:
-    """Derivative of the residuals by each number, from both sides."""
-    columns = []
-    for k in range(len(numbers)):
-        step = np.zeros(len(numbers))
-        step[k] = STEP
-        ahead, behind = (_residuals(machine, signs, numbers + s * step, touches, height_mm) for s in (1.0, -1.0))
-        columns.append((ahead - behind) / (2.0 * STEP))
-    return np.column_stack(columns)
-
-
-def _sigma(
-    machine: Machine, signs: tuple[int, int], numbers: Floats, touches: Sequence[Touch], height_mm: float
-) -> dict[str, float]:
-    """How sure each number is; raises ProfileError for those that the touches do not tell."""
-    slope = _slope(machine, signs, numbers, touches, height_mm)
-    _, sizes, directions = np.linalg.svd(slope, full_matrices=False)
-    if len(sizes) < len(numbers) or sizes[-1] < LEAST_SHARE * sizes[0]:
-        lost = np.abs(directions[-1])
-        names = dict.fromkeys(name for name, share in zip(UNKNOWN, lost, strict=True) if share > 0.3 * lost.max())
-        raise ProfileError(f"the touches do not tell {' and '.join(names)}: touch the mark at four turns and at two more tilts")
-    off = _residuals(machine, signs, numbers, touches, height_mm)
-    variance = float(off @ off) / max(1, len(off) - len(numbers))
-    spread = np.sqrt(np.diag((directions.T / sizes**2) @ directions) * variance)
-    named = zip(UNKNOWN, spread.tolist(), strict=True)
-    sigma: dict[str, float] = {}
-    for name, value in named:
-        sigma[name] = max(value, sigma.get(name, 0.0))
-    return sigma
-
-
-def _machine_with(machine: Machine, signs: tuple[int, int], numbers: Floats) -> Machine:
-    """The machine with these numbers; along its own axis the tilt's point stays where the profile has it."""
-    along = unit(machine.tilt.axis)
-    point = along * (along @ np.array(machine.tilt.point_mm)) + numbers[3:5] @ _across(machine)
-    tilt = machine.tilt.model_copy(
-        update={"sign": signs[0], "zero_deg": float(numbers[5]), "point_mm": tuple(float(x) for x in point)}
-    )
-    turn = machine.turn.model_copy(update={"sign": signs[1], "point_mm": tuple(float(x) for x in numbers[:3])})
-    return machine.model_copy(update={"tilt": tilt, "turn": turn})
 
 
 def _across(machine: Machine) -> Floats:

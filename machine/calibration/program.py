@@ -31,7 +31,7 @@ HEATING = ("M104", "M109", "M140", "M190", "M141", "M191", "SET_HEATER_TEMPERATU
 
 
 @dataclass(frozen=True)
-class Course:
+class TouchPlan:
     """The poses at which the mark is touched, where it is expected then, and how high the tip stands while the table turns."""
 
     poses: tuple[Pose, ...]
@@ -40,7 +40,7 @@ class Course:
     mark_mm: tuple[float, float, float]
 
 
-def course(machine: Machine, mark_height_mm: float, mark_radius_mm: float | None = None) -> Course:
+def plan_touches(machine: Machine, mark_height_mm: float, mark_radius_mm: float | None = None) -> TouchPlan:
     """Four turns at the level table and at two tilts, as steep as head, limits and the mark's height allow.
 
     Raises MoveError when no tilt of 10 degrees or more does.
@@ -56,10 +56,10 @@ def course(machine: Machine, mark_height_mm: float, mark_radius_mm: float | None
     turns = _turns(machine)
     poses = tuple(Pose(tilt, value) for tilt in (machine.tilt.zero_deg, *tilts) for value in turns)
     expected = tuple(_expected_mm(machine, pose, mark) for pose in poses)
-    return Course(poses, expected, _safe_z_mm(machine, mark, max(abs(t - machine.tilt.zero_deg) for t in tilts)), mark)
+    return TouchPlan(poses, expected, _safe_z_mm(machine, mark, max(abs(t - machine.tilt.zero_deg) for t in tilts)), mark)
 
 
-def calibration_lines(profile: Profile, touches: Course) -> Iterator[str]:
+def calibration_lines(profile: Profile, touches: TouchPlan) -> Iterator[str]:
     """The lines of the program: homing as the start block does it but without heat, then every touch, then level again.
 
     Raises ProfileError, before the first line, for a block of the profile that the firmware refuses.
@@ -123,13 +123,13 @@ def _tilts(machine: Machine, mark: tuple[float, float, float]) -> tuple[float, f
     ahead, behind = able[1.0], able[-1.0]
     if ahead is not None and behind is not None:
         return ahead, behind
-    one = ahead if ahead is not None else behind
-    if one is None:
+    tilt = ahead if ahead is not None else behind
+    if tilt is None:
         raise MoveError(
             f"no tilt of {TILTS_DEG[-1]:g} deg or more can be measured on {machine.name} with a mark {mark[2]:g} mm high: "
             "its head or its limits stand in the way; take a higher mark, nearer to the middle"
         )
-    return one, 0.5 * (one + zero)
+    return tilt, 0.5 * (tilt + zero)
 
 
 def _reachable(machine: Machine, mark: tuple[float, float, float], tilt_deg: float) -> bool:

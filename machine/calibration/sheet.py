@@ -10,7 +10,7 @@ from typing import Any
 import tomlkit
 
 from machine.calibration.fit import Touch
-from machine.calibration.program import Course
+from machine.calibration.program import TouchPlan
 from mdp.pose import Pose
 from profiles.errors import ProfileError
 from profiles.machine import Machine
@@ -31,7 +31,7 @@ class Sheet:
     machine: str | None = None
 
 
-def sheet_text(name: str, machine: Machine, touches: Course) -> str:
+def sheet_text(name: str, machine: Machine, touches: TouchPlan) -> str:
     """An empty sheet for the touches of a calibration program; name: of the machine's profile."""
     quoted = tomlkit.string(name, literal=name.isprintable() and "'" not in name)
     lines = [

@@ -5,10 +5,10 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.findings import MOST, Finding, cut_short
+from machine.dryrun.findings import MOST, Finding, at_row, cut_short
 from machine.kinematics.collision import Printed, Reach, gaps_of, hull, refined_gap, solids, sweep_gaps, swept, swing_mm
 from machine.planning.limits import axis_limits
-from machine.reader.parsed import MoveKind, ParsedProgram, pose_runs
+from machine.reader.parsed import MoveKind, ParsedProgram, PoseRun, pose_runs
 from mdp.head import Body, bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
@@ -44,14 +44,13 @@ def _straight(program: ParsedProgram, machine: Machine) -> list[Finding]:
             for body in bodies(machine):
                 close = gaps_of(body, least, tried, reach) < body.need_mm - ROUNDING_MM
                 if close.any():
-                    problems += _body(program, pose_run.rows[close], body, machine, pose_run.pose, solid)
+                    problems += _body(program, PoseRun(pose_run.rows[close], pose_run.pose), body, solid, machine)
     return problems
 
 
-def _body(
-    program: ParsedProgram, rows: NDArray[np.int64], body: Body, machine: Machine, pose: Pose, solid: tuple[str, Reach]
-) -> list[Finding]:
+def _body(program: ParsedProgram, run: PoseRun, body: Body, solid: tuple[str, Reach], machine: Machine) -> list[Finding]:
     """One body and one solid in one pose: the moves that two directions left open, by all directions and a search."""
+    rows, pose = run.rows, run.pose
     start, end = program.start[rows, :3], program.end[rows, :3]
     need = body.need_mm - ROUNDING_MM
     normal = rotation(machine, pose) @ UP
@@ -74,7 +73,7 @@ def _body(
         if worst > 0
         else f"{body.name} runs into {solid[0]} at {where} (moves: {len(close)})"
     )
-    return [Finding("error", "collision", int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)]
+    return [at_row(program, row, "error", "collision", message)]
 
 
 def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.int64], machine: Machine) -> list[Finding]:
@@ -142,16 +141,15 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
         middle = 0.5 * (low + high)
         between = room(middle, 0.5 * distance)
         open_intervals += [(low, middle, left, between), (middle, high, between, right)]
-    place = int(program.line[row]), int(program.part[row]), int(program.layer[row])
-    cut = [Finding("warning", "not-tested", *place, "the table turns so far that not all of the turn was tested for collisions")]
-    return (cut if open_intervals else []) + [
-        Finding(
-            "error", "collision", *place,
-            f"{body} {'comes to ' + format(gap, '.2f') + ' mm from' if gap > 0 else 'runs into'} {name} while the table turns, "
-            f"at {machine.tilt.letter}{pose.tilt_deg:.1f} {machine.turn.letter}{pose.turn_deg:.1f}",
-        )
-        for (body, name), (gap, pose) in least.items()
-    ]  # fmt: skip
+    problems = []
+    if open_intervals:
+        message = "the table turns so far that not all of the turn was tested for collisions"
+        problems.append(at_row(program, row, "warning", "not-tested", message))
+    for (body, solid), (gap, pose) in least.items():
+        meets = f"comes to {gap:.2f} mm from" if gap > 0 else "runs into"
+        where = f"{machine.tilt.letter}{pose.tilt_deg:.1f} {machine.turn.letter}{pose.turn_deg:.1f}"
+        problems.append(at_row(program, row, "error", "collision", f"{body} {meets} {solid} while the table turns, at {where}"))
+    return problems
 
 
 def _limit_turn(start: Floats, end: Floats, machine: Machine) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun import clearance, contents, extrusion, heat, layering, motion, placement, provenance, sequence
+from machine.dryrun import clearance, extrusion, heat, layering, motion, own_comments, placement, sequence
 from machine.dryrun.findings import Finding
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
@@ -23,7 +23,6 @@ from profiles.profile import Profile
 from slicer.paths import Kind
 
 MOST_MM = 10_000.0  # five times what the largest printers reach
-STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1", "M226", "M600")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +73,7 @@ def dry_run(lines: Iterable[str], profile: Profile, found: Sequence[Finding] | N
     ends = [workpiece_path(machine, side[rows]) for side in (program.start, program.end)]
     segments = np.stack(ends, axis=1)
     area = pi * profile.material.diameter_mm**2 / 4.0
-    stop = np.zeros(len(program.line), dtype=np.bool_)
-    stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
+    stop = motion.standstills(program)
     contacts = None
     if found is None:
         deposited = beads_of(program, segments, rows, profile)
@@ -105,12 +103,11 @@ def _findings(
         *placement.findings(program, deposited, contacts),
         *layering.findings(program, deposited, contacts),
         *extrusion.findings(program, deposited, profile),
-        *contents.findings(program),
         *sequence.findings(program, profile),
-        *provenance.findings(text, program, profile),
+        *own_comments.findings(text, program, profile),
         *placement.off_plate(program, segments, rows, profile),
         *placement.purged_into(program, deposited),
-        *heat.findings(program, profile, provenance.has_material(text, profile)),
+        *heat.findings(program, profile, own_comments.has_material(text, profile)),
     ]
     return sorted(dict.fromkeys(findings), key=lambda finding: (finding.severity, finding.line))
 

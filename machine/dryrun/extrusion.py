@@ -9,7 +9,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.findings import Finding, Severity, at_row
+from machine.dryrun.findings import Finding, Severity, at_row, by_part
 from machine.dryrun.strokes import Beads
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
@@ -33,13 +33,13 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> list
     """Errors of code extrusion and extruding-travel; a warning of code extrusion where the file tells no widths."""
     if not len(deposited.rows):
         return []
-    told = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
+    sized = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
     counted = ~program.rows_of_types(*UNEVEN)[deposited.rows] & ~_climbs(program, deposited)
     length = deposited.length_mm
     problems = _fast(program, deposited.rows, length)
     spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
     for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
-        mine = np.flatnonzero(counted & (told == known) & (length > 0))
+        mine = np.flatnonzero(counted & (sized == known) & (length > 0))
         rows = deposited.rows[mine]
         if not len(rows):
             continue
@@ -56,7 +56,7 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> list
 def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
     """(m,) which beads are of a layer that climbs, as a vase does: its first and last turns get less and less plastic."""
     rows = deposited.rows
-    _, group = np.unique(program.part[rows] * (int(program.layer.max(initial=0)) + 1) + program.layer[rows], return_inverse=True)
+    _, group = np.unique(program.layer_keys(rows), return_inverse=True)
     low, high = np.full(len(rows), np.inf), np.full(len(rows), -np.inf)
     np.minimum.at(low, group, program.end[rows, 2])
     np.maximum.at(high, group, program.end[rows, 2])
@@ -95,8 +95,7 @@ def _odd(program: ParsedProgram, rows: NDArray[np.int64], length: Floats, share:
     """Single moves far from the cross-section told, in every part that has a good length of them."""
     odd = (length > ROW_MM) & ((share < ROW_LEAST) | (share > ROW_MOST))
     problems = []
-    for part in np.unique(program.part[rows[odd]]):
-        mine = np.flatnonzero(odd & (program.part[rows] == part))
+    for mine in by_part(program, np.flatnonzero(odd), rows):
         if length[mine].sum() < ODD_MM:
             continue
         worst = float(share[mine][np.abs(np.log(np.maximum(share[mine], 1e-6))).argmax()])
@@ -122,15 +121,14 @@ def _layers(
     for kind in np.unique(program.type[rows]):
         mine = program.type[rows] == kind
         usual[mine] = _weighted_median(pushed[mine] / needed[mine], needed[mine])
-    group = program.part[rows] * (int(program.layer.max(initial=0)) + 1) + program.layer[rows]
+    group = program.layer_keys(rows)
     got, due, long = (np.bincount(group, weights=values) for values in (pushed, needed * usual, length))
     share = got / np.maximum(due, 1e-12)
     bad = np.flatnonzero((long > LAYER_MM) & (np.abs(got - due) > spare) & ((share > most) | (share < 1.0 / most)))
     problems = []
-    parts = np.array([program.part[rows[np.argmax(group == each)]] for each in bad])
-    for part in np.unique(parts):
-        layers = bad[parts == part]
-        row = int(rows[np.argmax(group == layers[0])])
+    for mine in by_part(program, np.flatnonzero(np.isin(group, bad)), rows):
+        layers = np.unique(group[mine])
+        row = int(rows[mine[np.argmax(group[mine] == layers[0])]])
         message = (
             f"layer {program.layer[row]} gets {share[layers[0]]:.2f} of the plastic that such beads get in the rest of the file, "
             f"{1 / most:.2f} to {most:.2f} are allowed (layers: {len(layers)})"
@@ -157,8 +155,7 @@ def _fast(program: ParsedProgram, rows: NDArray[np.int64], length: Floats) -> li
     if not fast.any() or fast.mean() > FEW or usual * FAST < FASTER * np.quantile(feed[~fast], 1.0 - FEW):
         return []
     problems = []
-    for part in np.unique(program.part[rows[fast]]):
-        mine = rows[fast & (program.part[rows] == part)]
+    for mine in by_part(program, rows[fast]):
         message = (
             f"a move pushes filament at {program.feed[mine[0]] / 60:.0f} mm/s, the speed of the travels (moves: {len(mine)}): "
             "filament flows during a travel"

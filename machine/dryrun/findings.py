@@ -1,6 +1,6 @@
 """Findings: what a person must know before a print is started."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Literal
@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.reader.parsed import OWN, ParsedProgram
+from machine.reader.parsed import OWN, Event, ParsedProgram
 from profiles.profile import Profile
 
 Severity = Literal["error", "warning"]
@@ -50,27 +50,49 @@ def _digest(lines: Sequence[str]) -> str:
     return sha256("\n".join((str(len(lines)), *lines)).encode("utf-8", "surrogatepass")).hexdigest()
 
 
+def at_row(program: ParsedProgram, row: int, severity: Severity, code: str, message: str) -> Finding:
+    """A finding about row `row`."""
+    return Finding(severity, code, int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
+
+
+def at_event(program: ParsedProgram, event: Event, severity: Severity, code: str, message: str) -> Finding:
+    """A finding about an event, which belongs to the layer of the row before it."""
+    last = min(max(event.row - 1, 0), len(program.line) - 1)
+    part, layer = (int(program.part[last]), int(program.layer[last])) if len(program.line) and event.row > 0 else (0, 0)
+    return Finding(severity, code, event.line, part, layer, message)
+
+
+def by_part(
+    program: ParsedProgram, places: NDArray[np.int64], rows: NDArray[np.int64] | None = None
+) -> Iterator[NDArray[np.int64]]:
+    """For every part its own of (m,) places, which are rows themselves or places in rows."""
+    part = program.part[places if rows is None else rows[places]]
+    for index in np.unique(part):
+        yield places[part == index]
+
+
 def per_part(
-    program: ParsedProgram, rows: NDArray[np.bool_], badness: NDArray[np.float64], severity: Severity, code: str, message: str
+    program: ParsedProgram,
+    marked: NDArray[np.bool_],
+    badness: NDArray[np.float64],
+    severity: Severity,
+    code: str,
+    message: str,
 ) -> list[Finding]:
     """One finding for every part that has rows marked: the first marked row's place.
 
     message takes {value} (the badness of the worst row of that part, as %.3f) and {count}.
     """
-    marked = np.flatnonzero(rows)
     problems = []
-    for part in np.unique(program.part[marked]):
-        mine = marked[program.part[marked] == part]
-        worst = float(badness[mine].max())
-        text = message.format(value=f"{worst:.3f}".rstrip("0").rstrip("."), count=len(mine))
-        problems.append(Finding(severity, code, int(program.line[mine[0]]), int(part), int(program.layer[mine[0]]), text))
+    for mine in by_part(program, np.flatnonzero(marked)):
+        worst = f"{float(badness[mine].max()):.3f}".rstrip("0").rstrip(".")
+        problems.append(at_row(program, int(mine[0]), severity, code, message.format(value=worst, count=len(mine))))
     return problems
 
 
 def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:
     """Said when a test stops at row `row`, because MOST findings of its kind are enough to refuse a program."""
-    message = f"after {MOST} findings the other {what} were not tested"
-    return Finding("warning", "not-tested", int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
+    return at_row(program, row, "warning", "not-tested", f"after {MOST} findings the other {what} were not tested")
 
 
 def unless_own(program: ParsedProgram, first: int, last: int) -> tuple[Severity, str]:
@@ -79,15 +101,3 @@ def unless_own(program: ParsedProgram, first: int, last: int) -> tuple[Severity,
     """
     names = [event.letters for event in program.events if event.code == OWN and first <= event.row <= last]
     return ("warning", f", unless {names[0]} does that") if names else ("error", "")
-
-
-def at_row(program: ParsedProgram, row: int, severity: Severity, code: str, message: str) -> Finding:
-    """A finding about row `row`."""
-    return Finding(severity, code, int(program.line[row]), int(program.part[row]), int(program.layer[row]), message)
-
-
-def at_line(program: ParsedProgram, row: int, line: int, severity: Severity, code: str, message: str) -> Finding:
-    """A finding about an event before row `row`."""
-    last = min(max(row - 1, 0), len(program.line) - 1)
-    part, layer = (int(program.part[last]), int(program.layer[last])) if len(program.line) and row > 0 else (0, 0)
-    return Finding(severity, code, line, part, layer, message)

@@ -4,9 +4,9 @@ from math import pi
 
 import numpy as np
 
-from machine.dryrun.findings import Finding, at_line, at_row, per_part, unless_own
+from machine.dryrun.findings import Finding, at_event, at_row, by_part, per_part, unless_own
+from machine.reader.levels import fan_shares, temperatures
 from machine.reader.parsed import MoveKind, ParsedProgram
-from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -59,23 +59,23 @@ def _left_on(program: ParsedProgram) -> list[Finding]:
         if events and events[-1].value > 0:
             severity, unless = unless_own(program, max(events[-1].row, last + 1), len(program.line))
             message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing{unless}"
-            problems.append(at_line(program, events[-1].row, events[-1].line, severity, "heater-on", message))
+            problems.append(at_event(program, events[-1], severity, "heater-on", message))
     return problems
 
 
 def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     """In every part the first bead at another temperature than the material's, or far from the rest of the file's."""
     material, machine = profile.material, profile.machine
-    wanted = _levels(program, ("M104", "M109"))
+    wanted = temperatures(program, "M104", "M109")
     beads = (program.kind == MoveKind.EXTRUDE) & (wanted >= MELTING_C)
     if not beads.any():
         return []
     usual = float(np.median(wanted[beads]))
     least, most = usual - FAR_C, min(usual + FAR_C, machine.nozzle_limit_c)
     if own:
-        told = (material.first_layer_nozzle_c, material.nozzle_c)
+        own_c = (material.first_layer_nozzle_c, material.nozzle_c)
         hotter = max(profile.of_part(part).process.interface_temperature_add_c for part in (0, *program.parts))
-        least, most = min(told) - 0.5, min(max(told) + hotter, machine.nozzle_limit_c) + 0.5
+        least, most = min(own_c) - 0.5, min(max(own_c) + hotter, machine.nozzle_limit_c) + 0.5
     message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
     cool, hot = beads & (wanted < least), beads & (wanted > most)
     return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted, "error", "temperature", message)]
@@ -83,21 +83,13 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
 
 def _bed_off(program: ParsedProgram) -> list[Finding]:
     """The bed switched off while beads are still to come: what is printed lets go of the plate."""
-    bed = _levels(program, ("M140", "M190"))
+    bed = temperatures(program, "M140", "M190")
     beads = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0))
     if not len(beads) or bed[beads[0]] <= 0.0:
         return []
     off = beads[bed[beads] <= 0.0]
     message = f"the bed is switched off while {len(off)} moves of the print are still to come"
     return [at_row(program, int(off[0]), "warning", "bed-off", message)] if len(off) else []
-
-
-def _levels(program: ParsedProgram, codes: tuple[str, ...]) -> Floats:
-    """(n,) what events of these codes have set before each row, 0 before the first."""
-    events = [event for event in program.events if event.code in codes]
-    values = np.array([0.0, *(1.0 if event.code == "M106" and not event.letters else event.value for event in events)])
-    order = np.searchsorted([event.row for event in events], np.arange(len(program.line)), side="right")
-    return np.asarray(values[order])
 
 
 def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
@@ -109,32 +101,31 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     beads = (program.kind == MoveKind.EXTRUDE) & ~program.rows_of_types(Kind.PURGE.value)
     if not beads.any():
         return []
-    fan = _levels(program, ("M106", "M107"))
-    layer = program.part * (int(program.layer.max()) + 1) + program.layer
+    fan = fan_shares(program, profile.machine)
+    layer = program.layer_keys()
     length = np.linalg.norm((program.end - program.start)[:, :3], axis=1)
     seconds = np.bincount(layer[beads], weights=(length / np.maximum(program.feed, 1e-9))[beads] * 60.0)
     blown = np.bincount(layer[beads], weights=(length * (fan > 0.0))[beads])
     at, first = np.unique(layer[beads], return_index=True)
     rows = np.flatnonzero(beads)[first]
     part = program.part[rows]
-    begun = np.array([np.searchsorted(at, at[part == each][0]) for each in part])
+    begun = np.array([np.searchsorted(at, at[part == index][0]) for index in part])
     settled = np.arange(len(at)) - begun >= SETTLED
     still = (blown[at] == 0.0) & settled
     if own:
         expected = min(profile.material.fan_least, profile.material.fan) > 0.0
-        quiet = {each: _without_fan(each, profile) for each in set(part.tolist())}
-        still &= expected & (np.arange(len(at)) - begun >= np.array([quiet[each] for each in part.tolist()]))
+        quiet = {index: _without_fan(index, profile) for index in set(part.tolist())}
+        still &= expected & (np.arange(len(at)) - begun >= np.array([quiet[index] for index in part.tolist()]))
     else:
         quick = seconds[at] < QUICKER * float(np.median(seconds[at][blown[at] > 0.0])) if (blown > 0.0).any() else ~still
         once = np.count_nonzero(np.diff(still.astype(np.int8), prepend=0) > 0) == 1
         if not once or not quick[still].all():
             return []
     problems = []
-    for each in np.unique(part[still]):
-        mine = np.flatnonzero(still & (part == each))
+    for mine in by_part(program, rows[still]):
         if len(mine) < FEWEST_STILL:
             continue
-        row = int(rows[mine[0]])
+        row = int(mine[0])
         message = f"no fan blows in layer {program.layer[row]}, where the file's other layers have one (layers: {len(mine)})"
         problems.append(at_row(program, row, "error", "fan", message))
     return problems

@@ -68,20 +68,20 @@ def lay_bead(a: Floats, b: Floats, half: float, row: int, field: Field) -> None:
     along = 0 if abs(b[0] - a[0]) >= abs(b[1] - a[1]) else 1
     if a[along] > b[along]:
         a, b = b, a
-    other = 1 - along
+    across_axis = 1 - along
     length = b[along] - a[along]
-    slope = (b[other] - a[other]) / length if length > 1e-9 else 0.0
+    slope = (b[across_axis] - a[across_axis]) / length if length > 1e-9 else 0.0
     rise = (b[2] - a[2]) / length if length > 1e-9 else 0.0
     across, cell = half * np.sqrt(1.0 + slope * slope), field.cell
     first = max(int(np.floor((a[along] - field.origin[along]) / cell)), 0)
     last = min(int(np.floor((b[along] - field.origin[along]) / cell)), field.shape[along] - 1)
     for p in range(first, last + 1):
         u = min(max(field.origin[along] + (p + 0.5) * cell, a[along]), b[along]) - a[along]
-        v, z = a[other] + slope * u - field.origin[other], a[2] + rise * u
+        v, z = a[across_axis] + slope * u - field.origin[across_axis], a[2] + rise * u
         low = max(int(np.floor((v - across) / cell + 0.5)), 0)
-        high = min(int(np.floor((v + across) / cell - 0.5)), field.shape[other] - 1)
+        high = min(int(np.floor((v + across) / cell - 0.5)), field.shape[across_axis] - 1)
         if high < low:
-            low = high = min(max(int(np.floor(v / cell)), 0), field.shape[other] - 1)
+            low = high = min(max(int(np.floor(v / cell)), 0), field.shape[across_axis] - 1)
         for q in range(low, high + 1):
             if along == 0:
                 _raise_cell(p, q, z, row, field)
@@ -108,8 +108,9 @@ def _distance_across(px: float, py: float, a: Point, b: Point) -> float:
 
 
 @part
-def _comes_over(px: float, py: float, half: float, a: Point, b: Point, box: Floats) -> bool:
-    """True when a box that goes with the tip from a to b comes over a square of half a side `half` about a point."""
+def _comes_over(square: Point, a: Point, b: Point, box: Floats) -> bool:
+    """True when a box that goes with the tip from a to b comes over a square; square: its middle and half of its side."""
+    px, py, half = square
     low, high = 0.0, 1.0
     for k in range(2):
         delta, p = b[k] - a[k], (px if k == 0 else py) - a[k]
@@ -135,7 +136,7 @@ def _depth_at(column: tuple[float, float, float, float], slack: float, a: Point,
     if depth > slack:
         deepest = depth
     for k in range(len(head.boxes)):
-        if rise - head.boxes[k, 2] > max(deepest, slack) and _comes_over(px, py, half, a, b, head.boxes[k]):
+        if rise - head.boxes[k, 2] > max(deepest, slack) and _comes_over((px, py, half), a, b, head.boxes[k]):
             deepest = rise - head.boxes[k, 2]
     return deepest
 

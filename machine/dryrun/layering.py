@@ -7,7 +7,7 @@ whose beads have nothing under them, by the plastic that lies there.
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.findings import Finding, at_row
+from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import Beads
 from machine.reader.parsed import ParsedProgram
@@ -27,10 +27,11 @@ CRUMB_MM = 1.0  # so little laid in a layer is the tip of something too fine to 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
     """Errors of code gap, in every part the first sign."""
-    found = sorted(
-        [*_too_high(program, deposited, contacts), *_floating(program, deposited, contacts)], key=lambda each: each.line
-    )
-    return list({each.part: each for each in reversed(found)}.values())
+    signs = [*_too_high(program, deposited, contacts), *_floating(program, deposited, contacts)]
+    first: dict[int, Finding] = {}
+    for sign in sorted(signs, key=lambda finding: finding.line):
+        first.setdefault(sign.part, sign)
+    return list(first.values())
 
 
 def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
@@ -38,8 +39,8 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
 
     What stands off by most of a layer may stand on support that ends as high as the part does there: the replay knows.
     """
-    told = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
-    rows = deposited.rows[told]
+    sized = (program.height_mm[deposited.rows] > 0) & ~program.rows_of_types(Kind.PURGE.value)[deposited.rows]
+    rows = deposited.rows[sized]
     turned = np.any(program.end[rows[1:], 3:] != program.end[rows[:-1], 3:], axis=1)
     groups = np.split(np.arange(len(rows)), np.flatnonzero((np.diff(program.part[rows]) != 0) | turned) + 1)
     problems, seen = [], set()
@@ -49,7 +50,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             continue
         mine = rows[group]
         gap = _gaps(program, mine)
-        laid_mm = np.bincount(program.layer[mine], weights=deposited.length_mm[told][group])[program.layer[mine]]
+        laid_mm = np.bincount(program.layer[mine], weights=deposited.length_mm[sized][group])[program.layer[mine]]
         height_mm = program.height_mm[mine]
         in_air = (contacts.air_mm + contacts.beside_mm > 0.0) & ~program.rows_of_types(*LOOSE)
         hangs = (gap < SEEN_SHARE * height_mm) | in_air[mine]
@@ -75,8 +76,8 @@ def _gaps(program: ParsedProgram, rows: NDArray[np.int64]) -> Floats:
     objects = np.cumsum(np.diff(top, prepend=top[0]) < -NEW_OBJECT_MM)
     support = program.rows_of_types(*SUPPORT)[rows]
     gaps = np.zeros(len(rows))
-    for each in np.unique(objects):
-        own = np.flatnonzero(objects == each)
+    for number in np.unique(objects):
+        own = np.flatnonzero(objects == number)
         highest = np.maximum.accumulate(top[own])
         of_part = np.maximum.accumulate(np.where(support[own], -np.inf, top[own]))
         begins = np.diff(program.layer[rows[own]], prepend=-1) != 0
@@ -106,20 +107,18 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
     low = np.minimum(deposited.segments_mm[:, 0, 2], deposited.segments_mm[:, 1, 2]) - deposited.height_mm < ON_PLATE_MM
     counted = ~program.rows_of_types(*LOOSE)[rows] & ~low & ~_begins(program, rows)
     rows, length = rows[counted], deposited.length_mm[counted]
-    group = program.part[rows] * (int(program.layer.max(initial=0)) + 1) + program.layer[rows]
+    group = program.layer_keys(rows)
     loose = np.bincount(group, weights=(contacts.air_mm + contacts.beside_mm)[rows])
     air = np.bincount(group, weights=contacts.air_mm[rows])
     whole = np.bincount(group, weights=length)
     bad = np.flatnonzero((loose > FLOATING_SHARE * whole) & (whole > LEAST_MM) & (air > 0.0))
-    problems, seen = [], set()
-    for each in bad:
-        row = int(rows[np.argmax(group == each)])
-        part = int(program.part[row])
-        if part not in seen:
-            seen.add(part)
-            message = (
-                f"{loose[each]:.1f} mm of the {whole[each]:.1f} mm of layer {program.layer[row]} have nothing under them, in "
-                f"stretches longer than sparse infill's cells are wide: a layer below it is missing"
-            )
-            problems.append(at_row(program, row, "error", "gap", message))
+    problems = []
+    for mine in by_part(program, rows[np.isin(group, bad)]):
+        layer = program.layer_keys(mine).min()
+        row = int(mine[np.argmax(program.layer_keys(mine) == layer)])
+        message = (
+            f"{loose[layer]:.1f} mm of the {whole[layer]:.1f} mm of layer {program.layer[row]} have nothing under them, in "
+            f"stretches longer than sparse infill's cells are wide: a layer below it is missing"
+        )
+        problems.append(at_row(program, row, "error", "gap", message))
     return problems

@@ -1,8 +1,9 @@
 """Motion: findings about axes: limits, speeds, homing, turning while plastic flows or while the firmware begins to follow."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from machine.dryrun.findings import Finding, at_line, per_part, unless_own
+from machine.dryrun.findings import Finding, at_event, at_row, per_part, unless_own
 from machine.firmware import dialect_of
 from machine.planning.limits import ROUNDING, axis_limits
 from machine.planning.timing import axis_speeds, lengths
@@ -10,6 +11,7 @@ from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.mesh import Floats
 from profiles.machine import Machine
 
+STANDSTILLS = ("G4", "G28", "M109", "M190", "M400", "M0", "M1", "M226", "M600")
 SLACK = 1.001
 WRITTEN = np.array([1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-5])  # how much a step may differ by its ends' rounding
 LEVEL_DEG = 0.01
@@ -45,6 +47,13 @@ def deltas(program: ParsedProgram) -> Floats:
     return np.column_stack([program.end - program.start, program.e_mm])
 
 
+def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
+    """(n,) before which rows the machine stands still, whatever comes after."""
+    stop = np.zeros(len(program.line), dtype=np.bool_)
+    stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
+    return stop
+
+
 def _too_fast(program: ParsedProgram, machine: Machine) -> list[Finding]:
     change = deltas(program)
     length, _ = lengths(change)
@@ -69,17 +78,16 @@ def _homing(program: ParsedProgram, machine: Machine) -> list[Finding]:
         later = [e for e in program.events if e.code == "G92" and machine.tilt.letter in e.letters and e.row == event.row]
         if abs(tilt - machine.tilt.zero_deg) > LEVEL_DEG and not any(e.line < event.line for e in later):
             message = f"homing while the table stands at {machine.tilt.letter}{tilt:.3f}: it must be level"
-            problems.append(at_line(program, event.row, event.line, "error", "homing-tilted", message))
+            problems.append(at_event(program, event, "error", "homing-tilted", message))
         printed = program.kind[: event.row] == MoveKind.EXTRUDE
         if printed.any() and (not set(event.letters) & set("XYZ") or "Z" in event.letters):
             message = "Z is homed after plastic was laid: the tip may run into the print unless the machine homes upwards"
-            problems.append(at_line(program, event.row, event.line, "warning", "homing-over-print", message))
+            problems.append(at_event(program, event, "warning", "homing-over-print", message))
     return problems
 
 
 def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
     """The first move of a linear axis that has been neither homed nor given a position."""
-    known: set[str] = set()
     events = sorted((e for e in program.events if e.code in ("G28", "G92")), key=lambda e: e.row)
     change = np.abs(program.end - program.start) > 1e-9
     for axis, letter in enumerate("XYZ"):
@@ -89,11 +97,8 @@ def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
             e for e in events if e.row <= first and (letter in e.letters or (e.code == "G28" and not set(e.letters) & set("XYZ")))
         ]
         if len(moved) and not homed:
-            known.add(letter)
-            row = first
-            severity, unless = unless_own(program, 0, row)
-            place = int(program.line[row]), int(program.part[row]), int(program.layer[row])
-            return [Finding(severity, "not-homed", *place, f"{letter} moves before it is homed{unless}")]
+            severity, unless = unless_own(program, 0, first)
+            return [at_row(program, first, severity, "not-homed", f"{letter} moves before it is homed{unless}")]
     return []
 
 
@@ -119,5 +124,5 @@ def _following_switches(program: ParsedProgram, machine: Machine) -> list[Findin
             stands_at = f"{machine.tilt.letter}{stands[0]:g} {machine.turn.letter}{stands[1]:g}"
             home = f"{machine.tilt.letter}{level[0]:g} {machine.turn.letter}{level[1]:g}"
             message = f"{event.code} while the table stands at {stands_at}: Marlin loses the position; turn it to {home} first"
-            problems.append(at_line(program, event.row, event.line, "error", "following-switched", message))
+            problems.append(at_event(program, event, "error", "following-switched", message))
     return problems

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.findings import Finding, Severity, at_row, per_part
+from machine.dryrun.findings import Finding, Severity, at_row, by_part, per_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import CROSSING_MM, Beads
 from machine.planning.fit import over_edge_mm
@@ -36,19 +36,15 @@ def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> li
     problems += _too_low(program, contacts)
     problems += [*_in_air(program, length, contacts), *_in_plastic(program, length, contacts)]
     if contacts.untested_row >= 0:
-        row = contacts.untested_row
         message = "the table turns too often: from here on no move was tried against earlier plastic"
-        place = (int(program.line[row]), int(program.part[row]), int(program.layer[row]))
-        problems.append(Finding("warning", "not-tested", *place, message))
+        problems.append(at_row(program, contacts.untested_row, "warning", "not-tested", message))
     return problems
 
 
 def _too_low(program: ParsedProgram, contacts: Contacts) -> list[Finding]:
     """In every part the first way to or from a turn of the table that does not lead above the print."""
-    close = contacts.close_mm > 0.0
     problems = []
-    for part in np.unique(program.part[close]):
-        rows = np.flatnonzero(close & (program.part == part))
+    for rows in by_part(program, np.flatnonzero(contacts.close_mm > 0.0)):
         left = max(CROSSING_MM - float(contacts.close_mm[rows].max()), 0.0)
         message = (
             f"the tip crosses the print {left:.2f} mm above it on the way to or from a turn of the table, {CROSSING_MM:g} mm are "
@@ -99,17 +95,15 @@ def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> tup
 def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[Finding]:
     """The first layer of every part in which a great share of the beads finds its room taken."""
     counted = ~program.rows_of_types(PURGE, IRONING) & (length > 0)
-    group = program.part * (int(program.layer.max(initial=0)) + 1) + program.layer
+    group = program.layer_keys()
     overlapping = np.bincount(group[counted], weights=contacts.overlapping_mm[counted])
     whole = np.bincount(group[counted], weights=length[counted])
     bad = np.flatnonzero((overlapping > LEAST_MM) & (overlapping > OVERLAPPING_SHARE * whole))
     problems = []
-    for first in dict.fromkeys(int(program.part[np.flatnonzero(group == g)[0]]) for g in bad):
-        groups = [g for g in bad if program.part[np.flatnonzero(group == g)[0]] == first]
-        amount = float(overlapping[groups].sum())
-        message = f"{amount:.1f} mm are extruded where plastic already is (layers: {len(groups)})"
-        rows = counted & np.isin(group, groups) & (contacts.overlapping_mm > 0)
-        problems.append(at_row(program, int(np.flatnonzero(rows)[0]), "error", "filled", message))
+    for rows in by_part(program, np.flatnonzero(counted & np.isin(group, bad) & (contacts.overlapping_mm > 0))):
+        groups = np.unique(group[rows])
+        message = f"{overlapping[groups].sum():.1f} mm are extruded where plastic already is (layers: {len(groups)})"
+        problems.append(at_row(program, int(rows[0]), "error", "filled", message))
     return problems
 
 
@@ -149,7 +143,7 @@ def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:
     places = [
         np.linspace(a, b, max(int(np.linalg.norm(b - a) / PURGE_STEP_MM), 1) + 1) for a, b in deposited.segments_mm[lines, :, :2]
     ]
-    points, which = np.concatenate(places), np.repeat(lines, [len(each) for each in places])
+    points, which = np.concatenate(places), np.repeat(lines, [len(points) for points in places])
     ends = deposited.segments_mm[beads, :, :2].reshape(-1, 2)
     own = (ends.min(axis=0) - 1.0, ends.max(axis=0) + 1.0)
     near = np.all((points > own[0]) & (points < own[1]), axis=1)

@@ -5,7 +5,6 @@ the run's own moves follow one by one. A bead is carried by what lies under it o
 moment; it overlaps when plastic already reaches its top along its middle and to one side at least.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +30,7 @@ MOST_TURNED = 100_000_000  # segments turned into the frames of all runs togethe
 FREE_END = 0.5  # of a span: so far a bead that is held at one end only may reach
 
 
-@dataclass(frozen=True, eq=False)
-class Contacts:
+class Contacts(NamedTuple):
     """(n,) for the rows of a program: depth of the head in earlier plastic, lengths in air and of overlapping extrusion, mm.
 
     beside_mm: lengths that only what lies beside them carries. Neither counts what spans from line to line of the sparse infill
@@ -48,7 +46,7 @@ class Contacts:
     overlapping_mm: Floats
     beside_mm: Floats
     close_mm: Floats
-    untested_row: int
+    untested_row: int = -1
 
 
 class Surroundings(NamedTuple):
@@ -60,22 +58,12 @@ class Surroundings(NamedTuple):
     plate: Floats
 
 
-class Measured(NamedTuple):
-    """(n,) what is filled in for each row, see Contacts."""
-
-    depth: Floats
-    air: Floats
-    overlapping: Floats
-    beside: Floats
-    close: Floats
-
-
 def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contacts:
     """Go through all moves of a program in order."""
     machine, count = profile.machine, len(program.line)
-    measured = Measured(*(np.zeros(count) for _ in Measured._fields))
+    contacts = Contacts(*np.zeros((5, count)))
     if not len(deposited.rows):
-        return Contacts(*measured, untested_row=-1)
+        return contacts
     extruded = program.kind == MoveKind.EXTRUDE
     strokes, head = strokes_of(program, deposited, extruded), head_of(machine)
     moves = moves_of(program, extruded, strokes.half, profile)
@@ -87,12 +75,12 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
         ups[before:after] = rotation(machine, run.pose)[2]
         turned += before
         if turned > MOST_TURNED:
-            return Contacts(*measured, untested_row=int(run.rows[0]))
+            return contacts._replace(untested_row=int(run.rows[0]))
         field = _field(deposited, int(before), int(after), run, ups, machine)
         if field is not None:
             about = Surroundings(field, int(run.rows[0]), gap, _plate(machine, run.pose))
-            _replay_run(run.rows, moves, strokes, about, head, measured)
-    return Contacts(*measured, untested_row=-1)
+            _replay_run(run.rows, moves, strokes, about, head, contacts)
+    return contacts
 
 
 def head_of(machine: Machine) -> Head:
@@ -176,15 +164,15 @@ def _classify_support(
     """0: a bead hangs in air, 1: lies on something, 2: overlaps others, 3: only has a neighbour; side: unit vector across."""
     x, y, z, at = place
     half, height, plate = strokes.half[row], strokes.height[row], about.plate
-    overlapping, carried = 0, 0
+    overlapping, bearing = 0, 0
     for k in range(-1, 2):
         off = 2.0 * INNER * half * k
         under = _under((x + off * side[0], y + off * side[1], z, at), row, False, strokes, about)
         overlapping += (2 if k == 0 else 1) if under == 2 else 0
-        carried += 1 if under == 1 else 0
+        bearing += 1 if under == 1 else 0
     if overlapping > 2:
         return 2
-    if carried > 0 or abs(z - height - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height:
+    if bearing > 0 or abs(z - height - plate[0] * x - plate[1] * y - plate[2]) < 0.6 * height:
         return 1
     if overlapping > 0:
         return 3
@@ -202,15 +190,15 @@ def _free_mm(most: float, held: float) -> float:
 
 
 @part
-def _settle(stretch: tuple[int, int, float], rows: NDArray[np.int64], pending: Floats, measured: Measured) -> None:
+def _settle(stretch: tuple[int, int, float], rows: NDArray[np.int64], pending: Floats, contacts: Contacts) -> None:
     """Ends a stretch of beads with nothing under them; stretch: the places in rows of its first and last row, and how much longer
     it is than it may span. pending: (n, 2) of each place what hangs in air there, and what only has a neighbour.
     """
     first, last, over_mm = stretch
     for at in range(first, last + 1):
         if over_mm > 0.0:
-            measured.air[rows[at]] += pending[at, 0]
-            measured.beside[rows[at]] += pending[at, 1]
+            contacts.air_mm[rows[at]] += pending[at, 0]
+            contacts.beside_mm[rows[at]] += pending[at, 1]
         pending[at, 0] = pending[at, 1] = 0.0
 
 
@@ -221,7 +209,7 @@ def _replay_run(
     strokes: Strokes,
     about: Surroundings,
     head: Head,
-    measured: Measured,
+    contacts: Contacts,
 ) -> None:
     """Try each row of a run against the field, then lay it."""
     pending, first, open_mm, most, held = table(len(rows), 2), 0, 0.0, 0.0, FREE_END
@@ -229,14 +217,14 @@ def _replay_run(
         row = rows[at]
         a, b = moves.start[row], moves.end[row]
         extruded = strokes.height[row] > 0.0
-        measured.depth[row] = depth_of(a, b, moves.slack[row], about.field, head)
+        contacts.depth_mm[row] = depth_of(a, b, moves.slack[row], about.field, head)
         if moves.lower[row] > 0.0:
             down = np.array([0.0, 0.0, moves.lower[row]])
-            measured.close[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, head)
+            contacts.close_mm[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, head)
         if not extruded:
             continue
         if at and strokes.path[row] != strokes.path[rows[at - 1]]:
-            _settle((first, at, open_mm - _free_mm(most, held)), rows, pending, measured)
+            _settle((first, at, open_mm - _free_mm(most, held)), rows, pending, contacts)
             first, open_mm, held = at, 0.0, FREE_END
         dx, dy = b[0] - a[0], b[1] - a[1]
         across = np.sqrt(dx * dx + dy * dy)
@@ -247,16 +235,16 @@ def _replay_run(
             for k in range(count):
                 t = (k + 0.5) / count
                 way = strokes.way[row] - (1.0 - t) * length
-                carried = _classify_support(
+                support = _classify_support(
                     (a[0] + t * dx, a[1] + t * dy, a[2] + t * (b[2] - a[2]), way), side, row, strokes, about
                 )
-                if carried in (0, 3):
+                if support in (0, 3):
                     most = moves.span[row] if open_mm == 0.0 else min(most, moves.span[row])
-                    pending[at, carried // 3] += length / count
+                    pending[at, support // 3] += length / count
                     open_mm += length / count
                 else:
-                    _settle((first, at, open_mm - held * most), rows, pending, measured)
+                    _settle((first, at, open_mm - held * most), rows, pending, contacts)
                     first, open_mm, held = at, 0.0, 1.0
-                    measured.overlapping[row] += length / count if carried == 2 else 0.0
+                    contacts.overlapping_mm[row] += length / count if support == 2 else 0.0
         lay_bead(a, b, strokes.half[row], row, about.field)
-    _settle((first, len(rows) - 1, open_mm - _free_mm(most, held)), rows, pending, measured)
+    _settle((first, len(rows) - 1, open_mm - _free_mm(most, held)), rows, pending, contacts)

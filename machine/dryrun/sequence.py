@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from machine.dryrun.findings import Finding
+from machine.dryrun.findings import Finding, at_row, by_part
 from machine.reader.parsed import MoveKind, ParsedProgram
 from profiles.profile import Profile
 from slicer.paths import Kind
@@ -22,10 +22,6 @@ def findings(program: ParsedProgram, profile: Profile) -> list[Finding]:
     ]
 
 
-def _place(program: ParsedProgram, row: int) -> tuple[int, int, int]:
-    return int(program.line[row]), int(program.part[row]), int(program.layer[row])
-
-
 def _parts(program: ParsedProgram) -> list[Finding]:
     """The first part that comes after a part with a greater number."""
     extruding = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
@@ -34,7 +30,7 @@ def _parts(program: ParsedProgram) -> list[Finding]:
         return []
     row, before = int(extruding[falling[0] + 1]), int(program.part[extruding[falling[0]]])
     message = f"part {program.part[row]} is printed after part {before}: parts are printed in the order of their numbers"
-    return [Finding("error", "order", *_place(program, row), message)]
+    return [at_row(program, row, "error", "order", message)]
 
 
 def _layers(program: ParsedProgram) -> list[Finding]:
@@ -44,10 +40,10 @@ def _layers(program: ParsedProgram) -> list[Finding]:
     same = (np.diff(program.part[rows]) == 0) & np.all(program.end[rows[1:], 3:] == program.end[rows[:-1], 3:], axis=1)
     lower = np.flatnonzero(same & (np.diff(program.layer[rows]) != 0) & (np.diff(z) < -0.25 * height[1:] - SLACK_MM))
     problems = []
-    for part in np.unique(program.part[rows[lower + 1]]):
-        k = int(lower[program.part[rows[lower + 1]] == part][0])
+    for mine in by_part(program, lower + 1, rows):
+        k = int(mine[0]) - 1
         message = f"layer {program.layer[rows[k + 1]]} lies {z[k] - z[k + 1]:.2f} mm lower than the layer before it"
-        problems.append(Finding("error", "order", *_place(program, int(rows[k + 1])), message))
+        problems.append(at_row(program, int(rows[k + 1]), "error", "order", message))
     return problems
 
 
@@ -82,11 +78,10 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> list[Fi
     ):
         runs = np.flatnonzero(wrong)
         places = rows[np.searchsorted(run, runs, side="right") - 1 + next_bead]
-        for part in np.unique(program.part[places]):
-            mine = program.part[places] == part
+        for mine in by_part(program, np.arange(len(places)), places):
             worst = float(np.abs(balance[runs[mine]]).max())
-            message = f"{sentence.format(worst)} before the next bead (places: {mine.sum()})"
-            problems.append(Finding("error", "retraction", *_place(program, int(places[mine][0])), message))
+            message = f"{sentence.format(worst)} before the next bead (places: {len(mine)})"
+            problems.append(at_row(program, int(places[mine[0]]), "error", "retraction", message))
     return problems
 
 
@@ -100,11 +95,11 @@ def _far_pulled(program: ParsedProgram) -> list[Finding]:
     pulled = program.filament_mm[last] - program.filament_mm[rows]
     far = rows[pulled > MOST_PULLED_MM]
     problems = []
-    for part in np.unique(program.part[far]):
-        row = int(far[program.part[far] == part][0])
+    for mine in by_part(program, far):
+        row = int(mine[0])
         amount = float(pulled[row - rows[0]])
         message = f"{amount:.1f} mm of filament are pulled back, {MOST_PULLED_MM:g} mm are allowed: more leaves the hot end"
-        problems.append(Finding("error", "retraction", *_place(program, row), message))
+        problems.append(at_row(program, row, "error", "retraction", message))
     return problems
 
 
@@ -118,4 +113,4 @@ def _oozing(program: ParsedProgram) -> list[Finding]:
     loose = (program.kind == MoveKind.ROTATE) & (program.part > 0) & (last >= 0) & (pulled - pulled[last] < SLACK_MM)
     row = int(np.flatnonzero(loose)[0]) if loose.any() else -1
     message = "the table turns while the filament is not pulled back"
-    return [Finding("error", "retraction", *_place(program, row), message)] if row >= 0 else []
+    return [at_row(program, row, "error", "retraction", message)] if row >= 0 else []

@@ -12,27 +12,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.dryrun.dryrun import STANDSTILLS, DryRun
-from machine.dryrun.findings import Finding
-from machine.dryrun.motion import deltas
-from machine.planning.timing import TINY, Blocks, axis_accelerations, axis_speeds, block_time, corner_speed, lengths
+from machine.dryrun.dryrun import DryRun
+from machine.dryrun.findings import Finding, at_row, by_part
+from machine.dryrun.motion import deltas, standstills
+from machine.firmware.line import BYTE_BITS, FRAME_BYTES, NUMBER_DIGITS
+from machine.firmware.marlin import BUFSIZE, FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S, MIN_SEGMENT_S, PLANNED_BLOCKS
+from machine.planning.timing import TINY, Blocks, block_time, blocks_of, corner_speed
 from machine.reader.parsed import ParsedProgram
 from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
-from profiles.errors import PrinterError
 from profiles.machine import Machine
 
-BITS = 10.0  # of a byte on the line: start, eight, stop
-FRAME_BYTES = 6  # N, blank, *, two digits of the checksum, newline; the line's number comes on top
-GREETING, DIGITS = 3, 5  # lines sent before the program; digits after which the numbers begin anew
-BAUDS = (1200, 4_000_000)
+USUAL_FRAME_BYTES = FRAME_BYTES - 1  # of the checksums of ASCII, 0 to 127, most have two digits; the line's number comes on top
+GREETING = 3  # lines sent before the program
 FREE_BAUD = 1e12  # a line that takes no time
-LINES = 4  # Marlin's BUFSIZE: more lines are never in flight
-OK_BYTES = 17.0  # of `ok N12345 P15 B3`, during which the printer reads nothing
-BLOCKS = 15  # of Marlin's BLOCK_BUFFER_SIZE 16 one place stays empty
-SEGMENT_S = 0.02  # DEFAULT_MINSEGMENTTIME
-DELIVER_S, DELIVER_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE
+OK_BYTES = float(len("ok N12345 P15 B3\n"))  # during which the printer reads nothing
 NONE = -1
 
 
@@ -47,7 +42,7 @@ class Feeding:
     time_s: float
 
 
-class Line(NamedTuple):
+class SerialLine(NamedTuple):
     """How blocks come: (m,) bytes of the line of each, (m,) of other lines before it, bytes in flight at most, seconds a byte."""
 
     own: Floats
@@ -66,12 +61,6 @@ class Planned(NamedTuple):
     entry2: Floats
 
 
-def check_baud(baud: int) -> None:
-    """Raises PrinterError for a rate that no line has."""
-    if not BAUDS[0] <= baud <= BAUDS[1]:
-        raise PrinterError(f"--baud is {baud}: {BAUDS[0]} to {BAUDS[1]} is allowed, printers use 115200 or 250000")
-
-
 def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: int) -> DryRun:
     """The dry run with a finding for every part that a line of so many bits a second starves."""
     slow, free = (feeding(run.program, lines, machine, rate) for rate in (baud, FREE_BAUD))
@@ -83,41 +72,27 @@ def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: i
 def _findings(
     program: ParsedProgram, rows: NDArray[np.bool_], stopped: NDArray[np.bool_], times_s: Floats, baud: int
 ) -> list[Finding]:
-    problems, marked = [], np.flatnonzero(rows)
-    for index in np.unique(program.part[marked]):
-        mine = marked[program.part[marked] == index]
+    problems = []
+    for mine in by_part(program, np.flatnonzero(rows)):
         needed = 1.0 / max(float(np.median(times_s[mine])), TINY)
         stops = int(stopped[mine].sum())
         message = (
             f"{baud} baud bring {len(mine)} moves too late, {needed:.0f} lines/s are needed there: the printer slows down"
             f"{f' and stops {stops} times' if stops else ''}; a faster line or longer segments help"
         )
-        row = int(mine[0])
-        problems.append(Finding("warning", "starvation", int(program.line[row]), int(index), int(program.layer[row]), message))
+        problems.append(at_row(program, int(mine[0]), "warning", "starvation", message))
     return problems
 
 
 def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> Feeding:
     """Play a program's lines over a line and its blocks in the printer's planner."""
-    moved = deltas(program)
-    length, measure = lengths(moved)
-    blocks = np.flatnonzero(measure < 3)
-    moved, length, measure = moved[blocks], length[blocks], measure[blocks]
-    share = np.abs(moved) / length[:, None]
-    with np.errstate(divide="ignore"):
-        speed = np.minimum(program.feed[blocks] / 60.0, (axis_speeds(machine) / share).min(axis=1))
-        acceleration = (axis_accelerations(machine) / share).min(axis=1)
-    acceleration = np.where(measure == 0, np.minimum(acceleration, program.acceleration[blocks]), acceleration)
-    stop = np.zeros(len(program.line), dtype=np.bool_)
-    stop[[event.row for event in program.events if event.code in STANDSTILLS and event.row < len(stop)]] = True
-    halts = np.diff(np.cumsum(stop)[blocks], prepend=0) > 0
-    own, ahead = _bytes(lines, program.line[blocks])
-    flags = np.zeros((2, len(blocks)), dtype=np.bool_)
-    planned = Blocks(moved / length[:, None], length, speed, acceleration, measure, halts)
-    line = Line(own, ahead, machine.receive_bytes - 1.0, BITS / baud)
-    time_s = _play(planned, line, machine.junction_speed_mm_s, flags[0], flags[1])
+    blocks, moving = blocks_of(deltas(program), program.feed / 60.0, standstills(program), machine, program.acceleration)
+    own, ahead = _bytes(lines, program.line[moving])
+    flags = np.zeros((2, len(own)), dtype=np.bool_)
+    line = SerialLine(own, ahead, machine.receive_bytes - 1.0, BYTE_BITS / baud)
+    time_s = _play(blocks, line, machine.junction_speed_mm_s, flags[0], flags[1])
     whole = np.zeros((2, len(program.line)), dtype=np.bool_)
-    whole[:, blocks] = flags
+    whole[:, moving] = flags
     return Feeding(whole[0], whole[1], float(time_s))
 
 
@@ -128,8 +103,8 @@ def _bytes(lines: Sequence[str], at: NDArray[np.int64]) -> tuple[Floats, Floats]
     """
     texts = (line.partition(";")[0].strip() for line in lines)
     letters = np.array([0, *(len(text) for text in texts)], dtype=np.float64)
-    digits = np.minimum(np.floor(np.log10(np.cumsum(letters > 0) + GREETING)) + 1, DIGITS)
-    sizes = np.where(letters > 0, letters + FRAME_BYTES + digits, 0.0)
+    digits = np.minimum(np.floor(np.log10(np.cumsum(letters > 0) + GREETING)) + 1, NUMBER_DIGITS)
+    sizes = np.where(letters > 0, letters + USUAL_FRAME_BYTES + digits, 0.0)
     sums = np.cumsum(sizes)
     before = np.concatenate([[0], at[:-1]])
     first = at != before
@@ -171,7 +146,7 @@ def _wait_for_room(now: float, places: int, planned: Planned, blocks: Blocks) ->
 
 
 @kernel
-def _play(blocks: Blocks, line: Line, jerk: float, slowed: NDArray[np.bool_], stopped: NDArray[np.bool_]) -> float:
+def _play(blocks: Blocks, line: SerialLine, jerk: float, slowed: NDArray[np.bool_], stopped: NDArray[np.bool_]) -> float:
     """Seconds until the last block is over; slowed and stopped (m,) are filled in, some cruise speeds lowered."""
     n = len(blocks.length)
     corner2, taken = floats(n, 0.0), floats(n, 0.0)
@@ -181,7 +156,7 @@ def _play(blocks: Blocks, line: Line, jerk: float, slowed: NDArray[np.bool_], st
     sent, flight, oldest, now = 0.0, 0.0, 0, 0.0
     for i in range(n):
         flight += line.own[i]
-        while oldest < i and (flight > line.ring or i - oldest >= LINES):
+        while oldest < i and (flight > line.ring or i - oldest >= BUFSIZE):
             flight -= line.own[oldest]
             oldest += 1
         begin = max(sent, taken[oldest - 1] + OK_BYTES * line.byte_s) if oldest > 0 else sent
@@ -190,20 +165,20 @@ def _play(blocks: Blocks, line: Line, jerk: float, slowed: NDArray[np.bool_], st
         if blocks.halts[i]:
             now = _wait_for_room(now, 1, planned, blocks)
             span[1] = NONE
-        now = _wait_for_room(now, BLOCKS, planned, blocks)
+        now = _wait_for_room(now, PLANNED_BLOCKS, planned, blocks)
         taken[i] = now
         queued = span[3] - span[2] + (1 if span[0] != NONE else 0)
-        if 2 <= queued < BLOCKS // 2 + 1 and length[i] / cruise[i] < SEGMENT_S:
+        if 2 <= queued < PLANNED_BLOCKS // 2 + 1 and length[i] / cruise[i] < MIN_SEGMENT_S:
             seconds = length[i] / cruise[i]
-            cruise[i] = length[i] / (seconds + 2.0 * (SEGMENT_S - seconds) / queued)
+            cruise[i] = length[i] / (seconds + 2.0 * (MIN_SEGMENT_S - seconds) / queued)
             slowed[i] = True
         if span[3] > span[2]:
             corner2[i] = corner_speed(blocks, i - 1, i, jerk) ** 2
         elif span[0] == NONE:
             stopped[i] = span[1] != NONE and corner_speed(blocks, span[1], i, jerk) > 0.0
-            state[3] = now + DELIVER_S
+            state[3] = now + FIRST_MOVE_DELAY_S
         span[3] = i + 1
-        if span[3] - span[2] >= DELIVER_BLOCKS:
+        if span[3] - span[2] >= FIRST_MOVE_BLOCKS:
             state[3] = min(state[3], now)
         after2 = 0.0
         for k in range(i, span[2] - 1, -1):

@@ -64,10 +64,10 @@ class Moves(NamedTuple):
 
 def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Beads:
     """Widths and heights as the program's comments tell, else by its layers or the profile's, and the filament pushed."""
-    told = program.height_mm[rows]
-    first_mm, layer_mm = _layers_mm(segments[:, :, 2], bool((told > 0).any()), profile)
+    height_mm = program.height_mm[rows]
+    first_mm, layer_mm = _layers_mm(segments[:, :, 2], bool((height_mm > 0).any()), profile)
     usual = np.where(np.maximum(segments[:, 0, 2], segments[:, 1, 2]) <= first_mm + 1e-3, first_mm, layer_mm)
-    height = np.where(told > 0, told, usual)
+    height = np.where(height_mm > 0, height_mm, usual)
     length = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     area = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0 / np.maximum(length, 1e-9)
     by_flow = np.clip(area / height + height * (1.0 - pi / 4.0), profile.machine.head.nozzle_mm, 4.0 * height + 2.0)
@@ -75,14 +75,14 @@ def beads_of(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], 
     return Beads(segments, rows, width, height, length)
 
 
-def _layers_mm(z_mm: Floats, told: bool, profile: Profile) -> tuple[float, float]:
+def _layers_mm(z_mm: Floats, has_heights: bool, profile: Profile) -> tuple[float, float]:
     """Heights of the first layer and of others for beads that tell none: the profile's, and in a file that tells none at all
     those of its own level beads; z_mm: (m, 2) of the beads' ends.
     """
     process, most = profile.process, profile.machine.head.nozzle_mm  # a higher step is no layer's
     first, usual = process.first_layer_height_mm, process.layer_height_mm
     levels = np.unique(np.round(z_mm[z_mm[:, 0] == z_mm[:, 1], 1], 3))
-    if told or len(levels) < FEWEST_LEVELS:
+    if has_heights or len(levels) < FEWEST_LEVELS:
         return first, usual
     step = float(np.median(np.diff(levels)))
     return (float(levels[0]) if 0.0 < levels[0] <= most else first), (step if step <= most else usual)

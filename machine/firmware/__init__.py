@@ -1,4 +1,8 @@
-"""Firmwares: what each one is told, how it answers and how it is simulated; one file a firmware, one line of the table."""
+"""Firmwares: what each one is told, how it answers and how it is simulated; one file a firmware, one line of the table.
+
+`dialect_of(machine)` is what is written for a machine, `simulation_of(machine)` how its firmware is simulated, `identify(text)`
+the firmware of an answer to M115. `line` has what a byte and a numbered line cost on the serial line, and its rates.
+"""
 
 from machine.firmware.dialect import Dialect
 from machine.firmware.firmware import Firmware

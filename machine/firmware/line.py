@@ -1,6 +1,25 @@
-"""LineRules: how a firmware behaves at the other end of the serial line."""
+"""The serial line: what a byte and a numbered line cost on it, its rates, and how a firmware behaves at its other end."""
 
 from dataclasses import dataclass
+
+from profiles.errors import PortError
+
+BYTE_BITS = 10  # start, eight, stop
+BAUDS = (115200, 250000, 230400, 500000, 1000000, 57600)  # what firmwares are built with, the usual ones first
+SLOWEST_BAUD, FASTEST_BAUD = 1200, 4_000_000  # that an adapter is known to take
+# Five digits, the questions of a trouble included: a line that fits its firmware when a program is checked fits when it is sent,
+# and short numbers leave the line to the program. All are far below 2^31, where a firmware's counter turns.
+LAST_NUMBER = 99_900
+NUMBER_DIGITS = len(str(LAST_NUMBER))
+FRAME_BYTES = len("N *123\n")  # what the sender adds to a command at most, its number's digits aside
+FRAME_CHARACTERS = FRAME_BYTES - len("\n") + NUMBER_DIGITS  # of those that a firmware keeps
+
+
+def check_baud(baud: int) -> None:
+    """Refuse a rate that no adapter takes; raises PortError."""
+    if not SLOWEST_BAUD <= baud <= FASTEST_BAUD:
+        allowed = f"{SLOWEST_BAUD} to {FASTEST_BAUD} is allowed, printers use {BAUDS[0]} or {BAUDS[1]}"
+        raise PortError(f"baud rate {baud} is not possible: {allowed}")
 
 
 @dataclass(frozen=True)
@@ -23,9 +42,7 @@ class LineRules:
     places_plain: int = 1
     rx_bytes: int = 127  # an AVR's 128-byte receive ring holds one byte less; a fuller one loses bytes without a word
     silence_s: float | None = None
-    # Five digits, the questions of a trouble included: a line that fits its firmware when a program is checked fits when it
-    # is sent, and short numbers leave the line to the program. All are far below 2^31, where a firmware's counter turns.
-    last_number: int = 99_900
+    last_number: int = LAST_NUMBER
     reports_rotary_axes: bool = False
     waiting_moves: int | None = None
     keep_awake: str = ""

@@ -30,7 +30,11 @@ DIALECT = Dialect(
     wait_for_person=("M0 {text}",),
 )
 
-BLOCK_BUFFER_SIZE, BUFSIZE = 16, 4  # Configuration_adv.h: planned moves, and commands read ahead of them
+# Configuration_adv.h and module/planner.h, bugfix-2.1.x of 2024-09, which the dry run's planner and the simulated one share.
+BLOCK_BUFFER_SIZE, BUFSIZE = 16, 4  # planned moves, and commands read ahead of them
+PLANNED_BLOCKS = BLOCK_BUFFER_SIZE - 1  # one place of its ring stays empty
+MIN_SEGMENT_S = 0.02  # DEFAULT_MINSEGMENTTIME: a shorter move is stretched while few wait
+FIRST_MOVE_DELAY_S, FIRST_MOVE_BLOCKS = 0.1, 3  # BLOCK_DELAY_FOR_1ST_MOVE: an idle machine waits so long for so many
 
 # gcode/control/M17_M18_M84.cpp: the idle time after which manage_inactivity (MarlinCore.cpp) lets the motors go; 0: never.
 MOTORS_STAY_ON = "M84 S0"
@@ -41,8 +45,8 @@ SIMULATED = SimulationRules(
     banner=("start", "Marlin bugfix-2.1.x (simulated)", "echo: Last Updated: 2024-09-29 | Author: (none, default config)"),
     numbers="resend",
     queue_lines=BUFSIZE,
-    blocks=BLOCK_BUFFER_SIZE - 1,  # one place of its ring stays empty
-    min_segment_s=0.02,  # DEFAULT_MINSEGMENTTIME
+    blocks=PLANNED_BLOCKS,
+    min_segment_s=MIN_SEGMENT_S,
     urgent="bytes",
     unknown='echo:Unknown command: "{}"',
     cold=("echo: cold extrusion prevented",),

@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from machine.firmware import dialect_of
-from machine.gcode.block_words import refused_lines
+from machine.firmware.dialect import Dialect
 from machine.gcode.placeholders import fill_block, placeholders, resume_placeholders
+from machine.gcode.words import FLAG, MACRO, PAREN
 from mdp.pose import level
 from profiles.errors import ProfileError
 from profiles.machine import Blocks, Machine
@@ -13,6 +14,10 @@ from profiles.profile import Profile
 
 RESUME = "resume"
 MOST_QUOTED = 3
+HEATING = ("M104", "M109", "M140", "M190")
+OTHER_WORD = {"S": "P", "P": "S"}  # what a temperature stands behind in the other kind of firmware
+WITH_E = {"G76", "M66", "M67", "M68"}  # the commands of CNC programs that use an E
+EXPRESSION = frozenset("#[<%")  # of CNC programs, which are not read here
 
 
 def placeholder_names(profile: Profile, block: str) -> list[str]:
@@ -61,3 +66,24 @@ def _values(profile: Profile, block: str) -> dict[str, object]:
     if block == RESUME:
         return resume_placeholders(profile.machine, (0.0, 0.0, 0.0), level(profile.machine), 0.0)
     return placeholders("check", profile, [], 0.0, 0.0)
+
+
+def refused_lines(lines: Sequence[str], dialect: Dialect) -> Iterator[str]:
+    """The filled-in lines of a block that are not in the firmware's words."""
+    for line in lines:
+        text = PAREN.sub(" ", line.partition(";")[0]).strip().upper()
+        if text and text.split()[0] not in dialect.statements and not _is_known(text, dialect):
+            yield line
+
+
+def _is_known(text: str, dialect: Dialect) -> bool:
+    if MACRO.fullmatch(text):
+        return dialect.macros
+    if not dialect.bare_words and (text[0] in "/O" or EXPRESSION & set(text)):
+        return True
+    words = FLAG.findall(text)
+    named = [f"{letter}{float(number):g}" for letter, number in words if letter in "GM" and number]
+    letters = {letter for letter, _ in words}
+    if dialect.lacks & {*named} or (named and named[0] in HEATING and letters == {"M", OTHER_WORD[dialect.value_word]}):
+        return False
+    return dialect.bare_words or (all(number for _, number in words) and ("E" not in letters or bool(WITH_E & {*named})))

@@ -13,5 +13,5 @@ def begins_layer(comment: str) -> bool:
 
 def begun_part(comment: str) -> tuple[int, int] | None:
     """The part that such a comment begins, from 1, and of how many, 0 where it does not tell; None for another comment."""
-    found = PART.fullmatch(comment)
-    return (int(found[1]), int(found[2] or 0)) if found else None
+    match = PART.fullmatch(comment)
+    return (int(match[1]), int(match[2] or 0)) if match else None

@@ -106,8 +106,8 @@ class ModalState:
 
     def _unsummed(self, words: list[Word]) -> float:
         """Filament that a move pushes where it is not known where the filament has stood."""
-        told = [value * self.modes.unit_mm for letter, value in words if self.axes.words.get(letter) == E_AXIS]
-        return sum(told) if self.modes.steps[E_AXIS] or not told else inf
+        pushed = [value * self.modes.unit_mm for letter, value in words if self.axes.words.get(letter) == E_AXIS]
+        return sum(pushed) if self.modes.steps[E_AXIS] or not pushed else inf
 
     def _forget(self, letter: str) -> None:
         if letter in self.axes.letters[:E_AXIS]:

@@ -88,8 +88,8 @@ class Modes:
                 self.filament_relative = self.relative
         else:
             self.filament_relative = name == "M83"
-        carried = self.relative and self.axes.filament_mode == "carried"
-        self.steps[:] = [*[self.relative] * E_AXIS, self.filament_relative or carried]
+        follows = self.relative and self.axes.filament_mode == "carried"
+        self.steps[:] = [*[self.relative] * E_AXIS, self.filament_relative or follows]
 
     @property
     def unit_mm(self) -> float:

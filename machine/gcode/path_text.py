@@ -15,7 +15,7 @@ SPACE, MINUS, POINT, ZERO, LINE_END = 32, 45, 46, 48, 10
 COORDINATE_DIGITS, FILAMENT_DIGITS = 3, 5  # behind the point
 
 
-class Words(NamedTuple):
+class PathWords(NamedTuple):
     """What all lines of a path share: the command, the letter of filament, whether its word is a step, the first line's F."""
 
     stroke: Bytes
@@ -29,7 +29,7 @@ def as_bytes(text: str) -> Bytes:
     return np.frombuffer(text.encode("ascii"), dtype=np.uint8)
 
 
-def path_lines(points: Whole, pushed: Whole, words: Words, known: Whole) -> list[str]:
+def path_lines(points: Whole, pushed: Whole, words: PathWords, known: Whole) -> list[str]:
     """A line for each of (n, 3) points in thousandths of a mm, with the words of the coordinates that change and of filament.
 
     pushed: (n,) filament up to each, 1e-5 mm. known: X Y Z, filament where the tip is, which become those of the last line. A
@@ -41,7 +41,7 @@ def path_lines(points: Whole, pushed: Whole, words: Words, known: Whole) -> list
 
 
 @kernel
-def _write(points: Whole, pushed: Whole, words: Words, known: Whole, text: Bytes) -> int:
+def _write(points: Whole, pushed: Whole, words: PathWords, known: Whole, text: Bytes) -> int:
     """Fills in the text and returns its length."""
     at, first = 0, True
     for k in range(len(points)):

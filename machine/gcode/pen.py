@@ -6,7 +6,7 @@ from math import ceil
 import numpy as np
 
 from machine.firmware import Dialect
-from machine.gcode.path_text import Words, as_bytes, path_lines
+from machine.gcode.path_text import PathWords, as_bytes, path_lines
 from machine.kinematics.coordinates import followed_places
 from mdp.mesh import Floats
 from mdp.pose import Pose
@@ -85,7 +85,7 @@ def write_path(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: P
     filament = pen.filament_mm + np.cumsum(steps_mm)
     pen.filament_mm = float(filament[-1])
     ending = pen.speed(speed_mm_s / slower)
-    words = Words(as_bytes(pen.dialect.stroke), ord(pen.filament_letter), pen.dialect.filament_relative, as_bytes(ending))
+    words = PathWords(as_bytes(pen.dialect.stroke), ord(pen.filament_letter), pen.dialect.filament_relative, as_bytes(ending))
     known = np.array([pen.x, pen.y, pen.z, pen.pushed])
     lines = path_lines(rounded[1:].astype(np.int64), np.rint(filament * 1e5).astype(np.int64), words, known)
     pen.x, pen.y, pen.z, pen.pushed = known.tolist()

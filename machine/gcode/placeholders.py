@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from math import pi
 
 from machine.firmware.klipper import stepper_name
-from machine.gcode.settings import clock
+from machine.firmware.line import FRAME_CHARACTERS
 from machine.planning.moves import BeginPart
+from machine.quantities import duration, filament_g
 from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.errors import ProfileError
@@ -14,7 +14,6 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
-FRAME = 12  # "N1234567 " and "*123": what the stream adds to a command
 
 
 def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: float, filament_mm: float) -> dict[str, object]:
@@ -37,10 +36,10 @@ def placeholders(name: str, profile: Profile, parts: list[BeginPart], seconds: f
         "tilt_deg": pose.tilt_deg,
         "turn_deg": pose.turn_deg,
         "z_mm": 0.0,
-        "time": clock(seconds),
+        "time": duration(seconds),
         "time_s": round(seconds),
         "filament_mm": round(filament_mm, 2),
-        "filament_g": round(filament_mm * pi * material.diameter_mm**2 / 4000.0 * material.density_g_cm3, 2),
+        "filament_g": round(filament_g(filament_mm, material), 2),
         "model": "".join(c if "!" <= c <= "~" and c not in "(){};*" else "_" for c in name),
         "material": material.name,
         "process": process.name,
@@ -77,12 +76,12 @@ def fill_block(block: str, name: str, values: Mapping[str, object], longest: int
     """
     lines = []
     for line in block.splitlines():
-        text = PLACEHOLDER.sub(lambda found: _value(found[1], name, values), line).strip()
+        text = PLACEHOLDER.sub(lambda match: _value(match[1], name, values), line).strip()
         command = text.partition(";")[0].strip()
-        if len(command) + FRAME > longest:
+        if len(command) + FRAME_CHARACTERS > longest:
             raise ProfileError(
                 f"{name}: the line {command[:40]!r}... has {len(command)} characters, "
-                f"at most {longest - FRAME} are allowed (the firmware's {longest} less line number and checksum)"
+                f"at most {longest - FRAME_CHARACTERS} are allowed (the firmware's {longest} less line number and checksum)"
             )
         if text:
             lines.append(text)

@@ -1,12 +1,13 @@
 """Settings: the comments at a G-code file's head and foot from which a reader sees how it was made."""
 
 from collections.abc import Iterator
-from math import pi
 from typing import Any
 
+from machine.quantities import duration, filament_cm3, filament_g
 from profiles.profile import Profile
 
 LONGEST_COMMENT = 190
+CONFIG_BEGIN, CONFIG_END = "; tiltprint_config = begin", "; tiltprint_config = end"
 
 
 def head(name: str, profile: Profile) -> Iterator[str]:
@@ -21,26 +22,14 @@ def head(name: str, profile: Profile) -> Iterator[str]:
 def foot(profile: Profile, filament_mm: float, seconds: float) -> Iterator[str]:
     """Filament and time in PrusaSlicer's words, which print hosts look for, then every setting."""
     material = profile.material
-    volume_cm3 = filament_mm * pi * material.diameter_mm**2 / 4.0 / 1000.0
     yield f"; filament used [mm] = {filament_mm:.2f}"
-    yield f"; filament used [cm3] = {volume_cm3:.2f}"
-    yield f"; filament used [g] = {volume_cm3 * material.density_g_cm3:.2f}"
-    yield f"; estimated printing time (normal mode) = {clock(seconds)}"
-    yield "; tiltprint_config = begin"
+    yield f"; filament used [cm3] = {filament_cm3(filament_mm, material):.2f}"
+    yield f"; filament used [g] = {filament_g(filament_mm, material):.2f}"
+    yield f"; estimated printing time (normal mode) = {duration(seconds)}"
+    yield CONFIG_BEGIN
     for key, value in flat(profile.model_dump(), ""):
         yield comment(f"{key} = {value}")
-    yield "; tiltprint_config = end"
-
-
-def clock(seconds: float) -> str:
-    """Days, hours, minutes and seconds as "1h 6m 15s"."""
-    left = round(seconds)
-    words: list[str] = []
-    for letter, size in (("d", 86400), ("h", 3600), ("m", 60)):
-        count, left = divmod(left, size)
-        if count or words:
-            words.append(f"{count}{letter}")
-    return " ".join([*words, f"{left}s"])
+    yield CONFIG_END
 
 
 def comment(text: str) -> str:

@@ -45,7 +45,7 @@ def _stepped(to: Pose, tilt_deg: float, turn_deg: float, speed_deg_s: float, pen
     ]
     along = hypot(tilt_deg, turn_deg)
     acceleration = min((axis.acceleration_deg_s2 * along / far for far, _, _, axis in axes if far > 0), default=0.0)
-    for wait, (far, stepper, value, axis) in enumerate(sorted(axes, key=lambda each: each[0])):
+    for wait, (far, stepper, value, axis) in enumerate(sorted(axes, key=lambda turned: turned[0])):
         share = far / along if along > 0 else 0.0
         how = f"SPEED={number(max(speed_deg_s * share, 1e-4))} ACCEL={number(max(acceleration * share, 1e-4))}"
         if share == 0.0:

@@ -11,7 +11,7 @@ from machine.firmware import dialect_of
 from machine.gcode import settings
 from machine.gcode.arcs import FEWEST_CHORDS, fit_arcs
 from machine.gcode.blocks import check_blocks
-from machine.gcode.contents import contents_comment
+from machine.gcode.part_totals import totals_comment
 from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_path
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
@@ -36,24 +36,24 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
     check_blocks(profile)
     machine = profile.machine
     dialect = dialect_of(machine)
-    letter = next(each for each in dialect.filament if each not in (machine.tilt.letter, machine.turn.letter))
+    letter = next(word for word in dialect.filament if word not in (machine.tilt.letter, machine.turn.letter))
     pen = Pen(dialect, machine, letter, level(machine))
     parts = [move for move in program.moves if isinstance(move, BeginPart)]
-    elapsed, filament_mm = clock(program, profile)
+    elapsed, filament_mm = elapsed_s(program, profile)
     pen.values = placeholders(program.name, profile, parts, float(elapsed[-1]), filament_mm)
     for name in BLOCKS:
         _block(name, pen)
     return _lines(program, profile, parts, elapsed, filament_mm, pen)
 
 
-def clock(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
+def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
     """(number of moves + 1,) seconds from the first move to the beginning of each, and to the end; filament in mm."""
     machine = profile.machine
     straight = rows(program, machine.tilt.zero_deg, machine.turn.zero_deg)
     stop = np.zeros(len(straight.speed), dtype=np.bool_)
     times = move_times(straight.end - straight.start, straight.speed, stop, machine, straight.acceleration)
-    each = np.bincount(straight.move, weights=times, minlength=len(program.moves))
-    elapsed: Floats = np.concatenate([[0.0], np.cumsum(each)])
+    seconds = np.bincount(straight.move, weights=times, minlength=len(program.moves))
+    elapsed: Floats = np.concatenate([[0.0], np.cumsum(seconds)])
     return elapsed, float(straight.end[:, 5].max(initial=0.0))
 
 
@@ -62,7 +62,7 @@ def _lines(
 ) -> Iterator[str]:
     total = float(elapsed[-1])
     coming = iter(parts)
-    following = next(coming, None)
+    next_part = next(coming, None)
     last_strokes = _last_strokes(program)
     yield from settings.head(program.name, profile)
     yield from _start(profile, parts, pen)
@@ -82,11 +82,11 @@ def _lines(
             yield f"{pen.dialect.stroke}{pen.filament()}{pen.speed(move.speed_mm_s)}"
         elif isinstance(move, Reorient):
             yield from _heat_ahead(program, place, profile, pen)
-            yield from _reorient(move, following, pen)
+            yield from _reorient(move, next_part, pen)
         elif isinstance(move, Pause):
             yield from _pause(move, pen)
         elif isinstance(move, BeginPart):
-            following = next(coming, None)
+            next_part = next(coming, None)
             yield from _begin_part(move, len(parts), pen)
             yield from _contents(program, place)
         else:
@@ -177,7 +177,7 @@ def _contents(program: MachineProgram, place: int) -> Iterator[str]:
         elif isinstance(move, Stroke):
             strokes.append(move)
             layers.add(layer)
-    comment = contents_comment(strokes, len(layers))
+    comment = totals_comment(strokes, len(layers))
     if comment:
         yield comment
 
@@ -296,15 +296,15 @@ def _travel(move: Travel, pen: Pen) -> Iterator[str]:
             yield f"{pen.dialect.travel}{place}{pen.speed(move.speed_mm_s)}"
 
 
-def _reorient(move: Reorient, following: BeginPart | None, pen: Pen) -> Iterator[str]:
+def _reorient(move: Reorient, next_part: BeginPart | None, pen: Pen) -> Iterator[str]:
     """The blocks around a turn of the table, and the turn."""
     yield ";TYPE:Custom"
     pen.kind = None
-    if pen.turned and following is not None:
+    if pen.turned and next_part is not None:
         yield from _block("after_part", pen)
     values: dict[str, object] = {"tilt_deg": move.pose.tilt_deg, "turn_deg": move.pose.turn_deg, "z_mm": pen.z / 1000}
-    if following is not None:
-        values |= {"part": following.index, "part_layers": following.layers}
+    if next_part is not None:
+        values |= {"part": next_part.index, "part_layers": next_part.layers}
     yield from _block("before_part", pen, **values)
     pen.turned = True
     yield from turn(move.pose, move.speed_deg_s, pen)

@@ -33,8 +33,8 @@ def workpiece_path(machine: Machine, axes: Floats) -> Floats:
     """(n, 3) workpiece points under the tip for (n, 5) rows X Y Z tilt turn, the angles in degrees."""
     tilt_point, turn_point = np.array(machine.tilt.point_mm), np.array(machine.turn.point_mm)
     tip = axes[:, :3] - np.array(machine.tool_mm)
-    carried = _turned(machine.tilt, axes[:, 3], tip - tilt_point) + tilt_point
-    points: Floats = _turned(machine.turn, axes[:, 4], carried - turn_point)
+    tilted_back = _turned(machine.tilt, axes[:, 3], tip - tilt_point) + tilt_point
+    points: Floats = _turned(machine.turn, axes[:, 4], tilted_back - turn_point)
     return points
 
 

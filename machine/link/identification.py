@@ -7,6 +7,7 @@ from enum import Enum
 from threading import Event as Flag
 from time import monotonic
 
+from machine.firmware.line import BAUDS
 from machine.link.port import Port
 from machine.link.protocol.decoder import LineDecoder
 from machine.link.protocol.events import NAME, Area, Busy, Event, FirmwareFault, Identity, Ok, Position, Resend, lacks_checksum
@@ -16,7 +17,6 @@ TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in i
 QUICK_S = 1.5  # at another rate: it has started by then
 ASK_S = 1.0  # between questions; those asked during the start are lost
 POSITION_S = 1.0  # a printer that names itself but not its place
-RATES = (115200, 250000, 1000000, 230400)  # what firmwares are built with, the likeliest first
 KEY = re.compile(r"\s+[A-Z_]+:")  # Marlin writes SOURCE_CODE_URL, RepRapFirmware ELECTRONICS behind the name
 VERSION = re.compile(r" FIRMWARE_VERSION: ?(\S+)")
 GRBL_SAYS = re.compile(r"error:\s*\d+")  # its answer to M115; the errors of printers have words
@@ -71,7 +71,7 @@ def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: F
     first = ask(port, timeout_s, stop)
     if first.kind not in (Kind.RUBBISH, Kind.SILENT) or port.name.startswith("socket://"):
         return first, baud
-    for rate in RATES:
+    for rate in BAUDS:
         if rate != baud:
             port.set_baud(rate)
             answer = ask(port, QUICK_S, stop)

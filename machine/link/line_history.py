@@ -4,10 +4,10 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from machine.firmware.marlin import BLOCK_BUFFER_SIZE
 from machine.gcode.words import read_words, split_command
 
 MOST_WAITING = 4096  # moves whose end is awaited; of further ones, without any word from the planner, nothing can be known
-PLANNER_BLOCKS = 16  # Marlin's BLOCK_BUFFER_SIZE; a printer that reports more free places has more
 
 
 CHECK_S = 30.0  # between looks at the position where a layer ends
@@ -37,7 +37,8 @@ class LineHistory:
         self.pose: tuple[float | None, ...] = ()  # after the newest acknowledged command
         self._flight: deque[SentLine] = deque()
         self._planned: deque[SentLine] = deque()
-        self._blocks, self._free, self._waiting = PLANNER_BLOCKS, 0, waiting
+        self._blocks = BLOCK_BUFFER_SIZE  # a printer that reports more free places has more
+        self._free, self._waiting = 0, waiting
         self.tracked = False  # the printer tells what it has executed
 
     @property

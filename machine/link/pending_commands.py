@@ -182,9 +182,9 @@ def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
     During a pause filament may be pushed and pulled, so that it can be changed; nothing else moves under the sender's hands.
     """
     try:
-        command = command_of(text, 0, limit)
+        command = command_of(text, "the command", limit)
     except LocalProtocolError as error:
-        return str(error).replace("line 0", "the command")
+        return str(error)
     if not command:
         return "there is no command in it"
     name = name_of(command.upper())

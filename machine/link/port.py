@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any, Self
 from urllib.parse import urlsplit
 
+from machine.firmware.line import check_baud
 from profiles.errors import PortError
 
 try:
@@ -24,7 +25,6 @@ READ_S = 0.02  # read() gives up after this: an emergency stop is to be on the w
 READ_BYTES = 4096
 WRITE_S = 10.0  # a printer whose buffers stay full for longer has stopped reading
 CONNECT_S = 5.0
-BAUDS = (1200, 4_000_000)  # slowest and fastest rate that an adapter is known to take
 
 # termios.error is no OSError; pyserial lets it through when a setting is refused. An rfc2217:// port that is closed or
 # refuses a setting may show it as AttributeError or NotImplementedError.
@@ -48,6 +48,14 @@ class SerialDevice:
     serial_number: str
 
 
+class RefusedPortError(PortError):
+    """A port that cannot be opened. reason: why, as said behind its name."""
+
+    def __init__(self, name: str, reason: str) -> None:
+        super().__init__(f"port {name} {reason}")
+        self.reason = reason
+
+
 class Port:
     """An open port: write all, read what is there.
 
@@ -65,7 +73,7 @@ class Port:
         try:
             self._device.baudrate = baud
         except _TROUBLE as error:
-            raise PortError(refusal(self.name, baud, error)) from None
+            raise RefusedPortError(self.name, refusal(self.name, baud, error)) from None
 
     def write(self, data: bytes) -> None:
         """Send all bytes. PortError when the printer does not take them or the port is gone."""
@@ -150,14 +158,16 @@ def open_port(name: str, baud: int) -> Port:
     try:
         return Port(_open_device(name, baud), name)
     except _TROUBLE as error:
-        raise PortError(refusal(name, baud, error)) from None
+        raise RefusedPortError(name, refusal(name, baud, error)) from None
 
 
 def _open_device(name: str, baud: int) -> Any:
     if name.startswith("socket://"):
         return _Socket(name)
     if serial is None:
-        raise PortError(f"port {name}: this system's serial ports are not known to pyserial, socket://HOST:PORT is left")
+        raise RefusedPortError(
+            name, "cannot be opened: serial ports of this system are not known to pyserial, socket://HOST:PORT is left"
+        )
     # pyserial's rfc2217:// knows no time limit for writing.
     write_s = None if name.startswith("rfc2217://") else WRITE_S
     return serial.serial_for_url(name, baudrate=baud, timeout=READ_S, write_timeout=write_s, exclusive=True)
@@ -198,12 +208,6 @@ class _Socket:
     def close(self) -> None:
         """Hang up."""
         self._socket.close()
-
-
-def check_baud(baud: int) -> None:
-    """Refuse a rate that no adapter takes; raises PortError."""
-    if not BAUDS[0] <= baud <= BAUDS[1]:
-        raise PortError(f"baud rate {baud} is not possible: {BAUDS[0]} to {BAUDS[1]} is allowed, printers use 115200 or 250000")
 
 
 def _descriptor(device: Any) -> int | None:
@@ -252,26 +256,26 @@ def port_names() -> list[str]:
 
 
 def refusal(name: str, baud: int, error: Exception) -> str:
-    """One sentence for a port that cannot be opened."""
+    """Why a port cannot be opened, as said behind its name."""
     number = _number(error)
     text = str(error).lower()
     if "exclusively lock" in text or number in (errno.EBUSY, errno.EAGAIN):
-        return f"port {name} is busy: another program holds it open"
+        return "is busy: another program holds it open"
     if "://" in name:
-        return f"port {name} cannot be opened: {_reason(error)}"
+        return f"cannot be opened: {_reason(error)}"
     if number in (errno.EACCES, errno.EPERM):
-        return f"port {name} may not be used by this user: {_owners(name)}"
+        return f"may not be used by this user: {_owners(name)}"
     if number == errno.ENOENT:
-        return no_such_port(name)
+        return _absence()
     if number in (errno.ENOTTY, errno.EINVAL, errno.ENODEV, errno.ENXIO, errno.EIO):
-        return f"port {name} is not a working serial device at {baud} baud ({_reason(error)})"
-    return f"port {name} cannot be opened: {_reason(error)}"
+        return f"is not a working serial device at {baud} baud ({_reason(error)})"
+    return f"cannot be opened: {_reason(error)}"
 
 
-def no_such_port(name: str) -> str:
-    """One sentence for a port that does not exist, with those that do."""
+def _absence() -> str:
+    """The same for a port that does not exist, with those that do."""
     names = port_names()
-    return f"port {name} does not exist: {'there are ' + ', '.join(names) if names else 'no serial port was found'}"
+    return f"does not exist: {'there are ' + ', '.join(names) if names else 'no serial port was found'}"
 
 
 def _check_address(name: str) -> None:
@@ -285,7 +289,7 @@ def _check_address(name: str) -> None:
     except ValueError:  # a port that is no number, or too great
         whole = False
     if not whole:
-        raise PortError(f"port {name} is not complete: {scheme}://HOST:PORT is expected, PORT from 1 to 65535")
+        raise RefusedPortError(name, f"is not complete: {scheme}://HOST:PORT is expected, PORT from 1 to 65535")
 
 
 def _check_path(name: str) -> None:
@@ -294,10 +298,10 @@ def _check_path(name: str) -> None:
     try:
         mode = os.stat(name).st_mode
     except OSError as error:
-        raise PortError(no_such_port(name) if error.errno == errno.ENOENT else refusal(name, 0, error)) from None
+        raise RefusedPortError(name, refusal(name, 0, error)) from None
     if not stat.S_ISCHR(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "a file"
-        raise PortError(f"port {name} is {kind}, not a serial device")
+        raise RefusedPortError(name, f"is {kind}, not a serial device")
 
 
 def _owners(name: str) -> str:

@@ -1,1 +1,5 @@
-"""Network: print servers (OctoPrint, Moonraker, Duet): files handed over, printed from there, followed and stopped over HTTP."""
+"""Network: print servers (OctoPrint, Moonraker, Duet): files handed over, printed from there, followed and stopped over HTTP.
+
+`servers.open_server` is a session with a `server.PrintServer`, `follow.follow_print` has a file printed and follows it to its
+end.
+"""

@@ -15,7 +15,7 @@ from machine.network.answers import entry, number, table, whole
 from machine.network.credentials import how_to_give_a_key
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals, Reply, plain
-from machine.network.server import ACTIVE, Greeting, JobStatus, Phase
+from machine.network.server import ACTIVE, JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 FOLDER = "0:/gcodes/"
@@ -40,18 +40,17 @@ STATES = {
 }
 
 
-class Duet:
+class Duet(PrintServer):
     """PrintServer of a Duet."""
 
     def __init__(self, http: HttpSession) -> None:
-        self._http = http
-        self.name = http.name
+        super().__init__(http)
         self._nozzle, self._bed = 1, 0  # heaters
         self._connected = False
         self._last: Phase | None = None  # of the print, for idle says nothing of how it ended
         self._up_s = 0.0  # since the board was reset
 
-    def greet(self) -> Greeting:
+    def greet(self) -> ServerIdentity:
         """Log in, and learn firmware, axes with their limits and which heaters are nozzle and bed."""
         self._connect()
         board = table(self._model("boards[0]"))
@@ -62,7 +61,7 @@ class Duet:
         nozzle = whole(entry(table(entry(self._array("tools"), 0)).get("heaters"), 0))
         bed = whole(entry(table(self._model("heat")).get("bedHeaters"), 0))
         self._nozzle, self._bed = self._nozzle if nozzle is None else nozzle, -1 if bed is None else bed
-        return Greeting(f"{name} {version}".strip(), f"{name} {version}".strip(), "".join(limits), known)
+        return ServerIdentity(f"{name} {version}".strip(), f"{name} {version}".strip(), "".join(limits), known)
 
     def _connect(self) -> None:
         password = self._http.credentials.key or DEFAULT_PASSWORD
@@ -85,8 +84,8 @@ class Duet:
         """From what the object model calls frequently changing, and what the firmware has said since."""
         before = self._last  # an answer that was on its way when the print began is none of its end
         model = table(table(self._value("/rr_model", {"flags": "d99fn"})).get("result"))
-        job, told = table(model.get("job")), table(model.get("state"))
-        state, up_s = str(told.get("status") or ""), number(told.get("upTime"))
+        job, machine_state = table(model.get("job")), table(model.get("state"))
+        state, up_s = str(machine_state.get("status") or ""), number(machine_state.get("upTime"))
         if up_s is not None:
             if up_s < self._up_s:  # reset since (Platform/RepRap.cpp): idle is not the end of the print
                 before = self._last = None
@@ -114,27 +113,22 @@ class Duet:
         return Phase.CANCELLED if self._last in STOPPED else Phase.DONE
 
     def _temperature(self, heaters: Any) -> Temperature:
-        found = (table(entry(heaters, index)) for index in (self._nozzle, self._bed))
-        return Temperature(*(number(each.get(key)) for each in found for key in ("current", "active")))
+        reported = (table(entry(heaters, index)) for index in (self._nozzle, self._bed))
+        return Temperature(*(number(heater.get(key)) for heater in reported for key in ("current", "active")))
 
     def has(self, file: str) -> bool:
-        """Whether it holds a file of this name."""
         return table(self._value("/rr_fileinfo", {"name": FOLDER + file})).get("err") == 0
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
-        """Hand over a file with its CRC."""
         self._connect()  # the one before may have ended while the program was made
         params = {"name": FOLDER + upload.name, "crc32": upload.crc32}
-        headers = {"Content-Type": "application/octet-stream"}
-        pieces = upload.pieces(sent)
-        reply = self._http.upload("/rr_upload", pieces, len(upload.content), headers, params, answer_s=WRITTEN_S)
+        reply = self._http.upload("/rr_upload", params, upload.read_by(sent), answer_s=WRITTEN_S)
         if table(self._http.check(reply, "the file")).get("err") != 0:
             said = plain(self._get("/rr_reply").body.decode("utf-8", "replace"))
             raise ServerError(f"{self.name} has not kept the file ({said or 'no reason given'}): is the card full or damaged?")
         return upload.name
 
     def start(self, file: str) -> None:
-        """Begin to print a file that it holds."""
         self._last = None
         self.command(f'M32 "{FOLDER}{file}"')
         deadline_s = time.monotonic() + START_S
@@ -154,7 +148,6 @@ class Duet:
         self.command("M25")
 
     def resume(self) -> None:
-        """Go on with it."""
         self.command("M24")
 
     def cancel(self) -> None:
@@ -169,7 +162,6 @@ class Duet:
             self.command("M0")
 
     def command(self, line: str) -> None:
-        """Have a line of G-code executed."""
         value = table(self._value("/rr_gcode", {"gcode": line}))
         if value.get("err", 0) != 0:
             raise ServerError(f"{self.name} has not taken {line}: it is busy")
@@ -186,7 +178,7 @@ class Duet:
         except ServerError:
             pass
         finally:
-            self._http.close()
+            super().close()
 
     def _model(self, key: str) -> Any:
         return table(self._value("/rr_model", {"key": key, "flags": "d99vn"})).get("result")
@@ -198,10 +190,10 @@ class Duet:
         for _ in range(MOST_PAGES):
             page = table(self._value("/rr_model", {"key": key, "flags": flags}))
             entries += page["result"] if isinstance(page.get("result"), list) else []
-            following = whole(page.get("next"))
-            if not following:
+            next_page = whole(page.get("next"))
+            if not next_page:
                 break
-            flags = f"d99vna{following}"
+            flags = f"d99vna{next_page}"
         return entries
 
     def _value(self, path: str, params: Mapping[str, str]) -> Any:

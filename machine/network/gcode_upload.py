@@ -1,15 +1,15 @@
-"""G-code upload: a program as a server takes it: bytes, a name that every server can keep, checksums, a multipart form."""
+"""G-code upload: a program as a server takes it: bytes, a name that every server can keep, checksums."""
 
 import hashlib
 import re
 import unicodedata
 import zlib
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import cached_property
+from collections.abc import Callable, Iterable
+from io import BytesIO
 from itertools import accumulate
+from typing import BinaryIO
 
-PIECE = 65536
 LONGEST_NAME = 80  # RepRapFirmware keeps 120 characters of a whole path
 SUFFIX = ".gcode"
 TAKEN = (".gcode", ".gco", ".g")  # OctoPrint takes no others for programs
@@ -30,7 +30,7 @@ class GcodeUpload:
         """How many whole lines of the file lie before a byte position."""
         return bisect_right(self._ends, position)
 
-    @cached_property
+    @property
     def sha256(self) -> str:
         """Of the content, hexadecimal."""
         return hashlib.sha256(self.content).hexdigest()
@@ -40,28 +40,19 @@ class GcodeUpload:
         """Of the content, eight hexadecimal digits: DuetSoftwareFramework compares them as text."""
         return f"{zlib.crc32(self.content):08x}"
 
-    def pieces(self, sent: Sent, head: bytes = b"", tail: bytes = b"") -> Iterator[bytes]:
-        """The content between head and tail piece by piece; sent() is told how much of it has gone before each."""
-        yield head
-        for start in range(0, len(self.content), PIECE):
-            sent(start)
-            yield self.content[start : start + PIECE]
-        sent(len(self.content))
-        yield tail
+    def read_by(self, sent: Sent) -> BinaryIO:
+        """The content as a file; sent() is told how much of it has been read before each piece, and at its end."""
+        return _ReportedBytes(self.content, sent)
 
-    def form(self, fields: Mapping[str, str], sent: Sent) -> tuple[Iterator[bytes], int, dict[str, str]]:
-        """The file as `file` in a multipart form after the fields: pieces, length in bytes, headers (RFC 7578).
 
-        The boundary is the content's own hash, which cannot stand in it.
-        """
-        boundary = f"tiltprint-{self.sha256}"
-        begin = f"--{boundary}\r\nContent-Disposition: form-data; name="
-        texts = [f'{begin}"{key}"\r\n\r\n{value}\r\n' for key, value in fields.items()]
-        file = f'{begin}"file"; filename="{self.name}"\r\n'
-        head = ("".join(texts) + file + "Content-Type: application/octet-stream\r\n\r\n").encode()
-        tail = f"\r\n--{boundary}--\r\n".encode()
-        length = len(head) + len(self.content) + len(tail)
-        return self.pieces(sent, head, tail), length, {"Content-Type": f"multipart/form-data; boundary={boundary}"}
+class _ReportedBytes(BytesIO):
+    def __init__(self, content: bytes, sent: Sent) -> None:
+        super().__init__(content)
+        self._sent = sent
+
+    def read(self, size: int | None = -1) -> bytes:
+        self._sent(self.tell())
+        return super().read(size)
 
 
 def server_name(name: str) -> str:
@@ -70,9 +61,9 @@ def server_name(name: str) -> str:
     Klipper reads it from between quotes, RepRapFirmware from a card with FAT names, OctoPrint replaces what it does not like.
     """
     stem, suffix = name.removeprefix("demo:"), ""
-    for each in (*TAKEN, ".nc", ".ngc"):
-        if stem.lower().endswith(each):
-            stem, suffix = stem[: -len(each)], stem[-len(each) :].lower()
+    for ending in (*TAKEN, ".nc", ".ngc"):
+        if stem.lower().endswith(ending):
+            stem, suffix = stem[: -len(ending)], stem[-len(ending) :].lower()
             break
     plain = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode()
     plain = STRANGE.sub("_", plain).strip("._-")[:LONGEST_NAME]

@@ -13,9 +13,9 @@ import socket
 import ssl
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from machine.network.address import NAMES, ServerAddress
 from machine.network.credentials import Credentials, how_to_give_a_key, servers_file
@@ -24,10 +24,11 @@ from profiles.errors import NoAnswerError, ServerError
 if TYPE_CHECKING:
     import httpx
 
-CONNECT_S, ANSWER_S = 5.0, 10.0
+CONNECT_S, ANSWER_S, WRITE_S = 5.0, 10.0, 30.0
 WHOLE_S = 30.0  # from the first byte of an answer to its last: ANSWER_S is between any two of them
 ERRNO = re.compile(r"^\[errno -?\d+\] ")
 MOST_BYTES = 16_000_000  # of an answer
+FILE_TYPE = "application/octet-stream"
 WORDS = 160  # characters of a server's own words in a message
 Tell = Callable[[str, bytes], None]  # direction and what went over the line, as a log takes it
 
@@ -106,20 +107,19 @@ class HttpSession:
         timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S)
         return self._request("POST", path, json=value, timeout=timeout, note=note)
 
-    def upload(
-        self,
-        path: str,
-        pieces: Iterable[bytes],
-        length: int,
-        headers: Mapping[str, str],
-        params: Mapping[str, str] | None = None,
-        answer_s: float = ANSWER_S,
-    ) -> Reply:
-        """POST a body of so many bytes; the answer may take so many seconds after its last one."""
-        timeout = self._httpx.Timeout(answer_s, connect=CONNECT_S, write=30.0)
-        sent = {**headers, "Content-Length": str(length)}
-        note = f"{_shown(path, params)} ({length} bytes)"
-        return self._request("POST", path, params=params, content=pieces, headers=sent, timeout=timeout, note=note)
+    def upload_form(self, path: str, fields: Mapping[str, str], name: str, file: BinaryIO, *, answer_s: float) -> Reply:
+        """POST a file as `file` in a multipart form after the fields; the answer may take so many seconds after its last byte."""
+        files = {"file": (name, file, FILE_TYPE)}
+        return self._request("POST", path, data=fields, files=files, timeout=self._of_upload(answer_s), note=f"{path} ({name})")
+
+    def upload(self, path: str, params: Mapping[str, str], file: BinaryIO, *, answer_s: float) -> Reply:
+        """The same as the body itself of a request."""
+        headers, note = {"Content-Type": FILE_TYPE}, _shown(path, params)
+        timeout = self._of_upload(answer_s)
+        return self._request("POST", path, params=params, content=file, headers=headers, timeout=timeout, note=note)
+
+    def _of_upload(self, answer_s: float) -> httpx.Timeout:
+        return self._httpx.Timeout(answer_s, connect=CONNECT_S, write=WRITE_S)
 
     def _request(self, method: str, path: str, note: str, **request: Any) -> Reply:
         self._log(">", f"{method} {note}")
@@ -227,20 +227,20 @@ def _certificates(address: ServerAddress, credentials: Credentials) -> ssl.SSLCo
 def _transport_sentence(error: httpx.TransportError, address: ServerAddress, httpx_: Any) -> str:
     """What went wrong below HTTP, and what to look at."""
     where, chain = f"{address.host} at port {address.port}", _causes(error)
-    if any(isinstance(each, socket.gaierror) for each in chain):
+    if any(isinstance(cause, socket.gaierror) for cause in chain):
         return f"{address.text}: no computer of the name {address.host} is known here: an IP address will do, too"
-    if trust := next((each for each in chain if isinstance(each, ssl.SSLCertVerificationError)), None):
+    if trust := next((cause for cause in chain if isinstance(cause, ssl.SSLCertVerificationError)), None):
         return (
             f"{address.text}: its certificate cannot be trusted ({plain(trust.verify_message)}): for one of your own name "
             f'its authority as ca_file below [servers."{address.host}"] in {servers_file()}'
         )
-    if any(isinstance(each, ssl.SSLError) for each in chain):
+    if any(isinstance(cause, ssl.SSLError) for cause in chain):
         return f"{address.text}: {where} speaks no TLS: is it http:// instead of https://?"
-    if any(isinstance(each, ConnectionRefusedError) for each in chain):
+    if any(isinstance(cause, ConnectionRefusedError) for cause in chain):
         return f"{address.text}: nothing listens on {where}: is {NAMES[address.kind]} switched on and the port right?"
     if isinstance(error, httpx_.ConnectTimeout):
-        other = ", and does it speak TLS" if address.scheme == "https" else ""
-        return f"{address.text}: {where} does not answer within {CONNECT_S:g} s: is it switched on, in this network{other}?"
+        doubt = ", and does it speak TLS" if address.scheme == "https" else ""
+        return f"{address.text}: {where} does not answer within {CONNECT_S:g} s: is it switched on, in this network{doubt}?"
     if isinstance(error, httpx_.ConnectError):
         return f"{address.text}: {where} cannot be reached: {_reason(error)}"
     if isinstance(error, httpx_.TimeoutException):

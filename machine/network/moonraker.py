@@ -12,7 +12,7 @@ from machine.link.protocol.events import Temperature
 from machine.network.answers import entry, number, table, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals
-from machine.network.server import Greeting, JobStatus, Phase
+from machine.network.server import JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers
@@ -30,56 +30,60 @@ STATES = {
 REPORTED = ("webhooks", "print_stats", "virtual_sdcard", "extruder", "heater_bed", "gcode_move")
 
 
-class Moonraker:
+class Moonraker(PrintServer):
     """PrintServer of a Moonraker."""
 
     def __init__(self, http: HttpSession) -> None:
-        self._http = http
-        self.name = http.name
+        super().__init__(http)
         if http.credentials.key:
             http.set_header("X-Api-Key", http.credentials.key)
 
-    def greet(self) -> Greeting:
+    def greet(self) -> ServerIdentity:
         """Its version; axes, limits, steppers and commands of its Klipper where that is ready."""
         server = table(self._get("/server/info"))
         if "klippy_state" not in server:
             raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
         text = f"Moonraker {server.get('moonraker_version') or ''}".strip()
         if server["klippy_state"] != "ready":
-            return Greeting(text, "Klipper")
+            return ServerIdentity(text, "Klipper")
         version = str(table(self._get("/printer/info")).get("software_version") or "")
         objects = table(self._get("/printer/objects/list")).get("objects")
         names = frozenset(name for name in objects if isinstance(name, str)) if isinstance(objects, list) else frozenset()
         steppers = frozenset(name.removeprefix(STEPPER) for name in names if name.startswith(STEPPER))
         limits = self._limits() if "toolhead" in names else {}
         commands = self._commands() if "gcode" in names else None
-        return Greeting(f"{text}, Klipper {version}".strip(), f"Klipper {version}".strip(), "XYZ", limits, steppers, commands)
+        klipper = f"Klipper {version}".strip()
+        return ServerIdentity(f"{text}, {klipper}", klipper, "XYZ", limits, steppers, commands)
 
     def _commands(self) -> frozenset[str] | None:
         """All that it knows, macros included (klippy/gcode.py, get_status); None where it is too old to tell."""
-        told = table(self._query(("gcode",)).get("gcode")).get("commands")
-        return frozenset(name.upper() for name in told) if isinstance(told, dict) else None
+        commands = table(self._query(("gcode",)).get("gcode")).get("commands")
+        return frozenset(name.upper() for name in commands) if isinstance(commands, dict) else None
 
     def _limits(self) -> dict[str, tuple[float, float]]:
         toolhead = table(self._query(("toolhead",)).get("toolhead"))
         pairs = ((number(entry(toolhead.get(f"axis_{end}"), k)) for end in ("minimum", "maximum")) for k in range(3))
-        found = zip("XYZ", (tuple(pair) for pair in pairs), strict=True)
-        return {letter: (low, high) for letter, (low, high) in found if low is not None and high is not None}
+        limits = zip("XYZ", (tuple(pair) for pair in pairs), strict=True)
+        return {letter: (low, high) for letter, (low, high) in limits if low is not None and high is not None}
 
     def status(self) -> JobStatus:
         """From the objects that Klipper reports; where it does not run, from what Moonraker says of it."""
         server = table(self._get("/server/info"))
         if server.get("klippy_state") != "ready":
             return JobStatus(Phase.OFFLINE, message=self._trouble(server))
-        found = self._query(REPORTED)
-        job, card, moves = table(found.get("print_stats")), table(found.get("virtual_sdcard")), table(found.get("gcode_move"))
+        objects = self._query(REPORTED)
+        job, card, moves = (
+            table(objects.get("print_stats")),
+            table(objects.get("virtual_sdcard")),
+            table(objects.get("gcode_move")),
+        )
         feed, flow = number(moves.get("speed_factor")), number(moves.get("extrude_factor"))
         return JobStatus(
             STATES.get(str(job.get("state")), Phase.READY),
             str(job.get("filename") or ""),
             whole(card.get("file_position")),
             number(job.get("total_duration")),
-            _temperature(found),
+            _temperature(objects),
             None if feed is None else 100.0 * feed,
             None if flow is None else 100.0 * flow,
             str(job.get("message") or ""),
@@ -100,12 +104,12 @@ class Moonraker:
         """
         reply = self._http.get("/server/files/directory", {"path": "gcodes"})
         files = table(table(self._value(reply, "to tell of its files")).get("result")).get("files")
-        return any(table(each).get("filename") == file for each in files) if isinstance(files, list) else False
+        return any(table(item).get("filename") == file for item in files) if isinstance(files, list) else False
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file with its checksum, without which half a file would be taken for a whole one."""
-        pieces, length, headers = upload.form({"root": "gcodes", "checksum": upload.sha256}, sent)
-        reply = self._http.upload("/server/files/upload", pieces, length, headers, answer_s=READ_S)
+        fields, file = {"root": "gcodes", "checksum": upload.sha256}, upload.read_by(sent)
+        reply = self._http.upload_form("/server/files/upload", fields, upload.name, file, answer_s=READ_S)
         sentences = {
             400: f"{self.name} does not take the file: {{words}}; it takes files up to max_upload_size of its [server]",
             403: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})",
@@ -118,16 +122,13 @@ class Moonraker:
         return path
 
     def start(self, file: str) -> None:
-        """Begin to print a file that it holds."""
         sentence = {400: f"{self.name} cannot start it now: {{words}}"}
         self._order("/printer/print/start", {"filename": file}, sentence)
 
     def pause(self) -> None:
-        """Pause the print."""
         self._order("/printer/print/pause")
 
     def resume(self) -> None:
-        """Go on with it."""
         self._order("/printer/print/resume")
 
     def cancel(self) -> None:
@@ -141,10 +142,6 @@ class Moonraker:
     def emergency_stop(self) -> None:
         """Klipper shuts down at once."""
         self._value(self._http.post("/printer/emergency_stop"), "the emergency stop")
-
-    def close(self) -> None:
-        """Leave."""
-        self._http.close()
 
     def _query(self, names: tuple[str, ...]) -> Mapping[str, Any]:
         value = self._value(
@@ -164,6 +161,6 @@ class Moonraker:
         return self._http.check(reply, purpose, Refusals(sentence, KEY))
 
 
-def _temperature(found: Mapping[str, Any]) -> Temperature:
-    nozzle, bed = table(found.get("extruder")), table(found.get("heater_bed"))
-    return Temperature(*(number(each.get(key)) for each in (nozzle, bed) for key in ("temperature", "target")))
+def _temperature(objects: Mapping[str, Any]) -> Temperature:
+    nozzle, bed = table(objects.get("extruder")), table(objects.get("heater_bed"))
+    return Temperature(*(number(heater.get(key)) for heater in (nozzle, bed) for key in ("temperature", "target")))

@@ -11,7 +11,7 @@ from machine.link.protocol.events import Temperature
 from machine.network.answers import number, table, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
 from machine.network.http import HttpSession, Refusals
-from machine.network.server import Greeting, JobStatus, Phase
+from machine.network.server import JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 STORED_S = 120.0  # the server copies and reads a file before it answers
@@ -25,16 +25,15 @@ FLAGS = (
 )
 
 
-class OctoPrint:
+class OctoPrint(PrintServer):
     """PrintServer of an OctoPrint."""
 
     def __init__(self, http: HttpSession) -> None:
-        self._http = http
-        self.name = http.name
+        super().__init__(http)
         if http.credentials.key:
             http.set_header("X-Api-Key", http.credentials.key)
 
-    def greet(self) -> Greeting:
+    def greet(self) -> ServerIdentity:
         """Its version; what it drives is not told by the API."""
         value = self._get("/api/version", "to say who it is")
         text = value.get("text") if isinstance(value, dict) else None
@@ -42,7 +41,7 @@ class OctoPrint:
             raise ServerError(f"{self.name} is no OctoPrint: it does not answer /api/version as one")
         if "moonraker" in text.lower():
             raise ServerError(f"{self.name} is a Moonraker that speaks as OctoPrint: use moonraker:HOST")
-        return Greeting(text)
+        return ServerIdentity(text)
 
     def status(self) -> JobStatus:
         """From /api/job, and from /api/printer where its printer is connected."""
@@ -62,14 +61,12 @@ class OctoPrint:
         )
 
     def has(self, file: str) -> bool:
-        """Whether it holds a file of this name."""
         reply = self._http.get(f"/api/files/local/{file}")
         return reply.status != 404 and self._http.check(reply, "to tell of its files") is not None
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Hand over a file; the name is the one that the server has made of it."""
-        pieces, length, headers = upload.form({}, sent)
-        reply = self._http.upload("/api/files/local", pieces, length, headers, answer_s=STORED_S)
+        reply = self._http.upload_form("/api/files/local", {}, upload.name, upload.read_by(sent), answer_s=STORED_S)
         sentence = {409: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})"}
         value = table(self._http.check(reply, "the file", Refusals(sentence)))
         local = table(table(value.get("files")).get("local"))
@@ -78,16 +75,13 @@ class OctoPrint:
         return str(local["path"])
 
     def start(self, file: str) -> None:
-        """Begin to print a file that it holds."""
         sentence = {409: f"{self.name} cannot start it now: {{words}}"}
         self._order(f"/api/files/local/{file}", {"command": "select", "print": True}, "to start it", sentence)
 
     def pause(self) -> None:
-        """Pause the print."""
         self._order("/api/job", {"command": "pause", "action": "pause"}, "to pause")
 
     def resume(self) -> None:
-        """Go on with it."""
         self._order("/api/job", {"command": "pause", "action": "resume"}, "to resume")
 
     def cancel(self) -> None:
@@ -95,16 +89,11 @@ class OctoPrint:
         self._order("/api/job", {"command": "cancel"}, "to cancel")
 
     def command(self, line: str) -> None:
-        """Have a line of G-code sent."""
         self._order("/api/printer/command", {"command": line}, f"{line}")
 
     def emergency_stop(self) -> None:
         """M112, which OctoPrint sends ahead of its queue."""
         self.command("M112")
-
-    def close(self) -> None:
-        """Leave."""
-        self._http.close()
 
     def _get(self, path: str, purpose: str) -> Any:
         return self._http.check(self._http.get(path), purpose)
@@ -126,4 +115,4 @@ def _phase(flags: Mapping[str, Any], progress: Mapping[str, Any]) -> Phase:
 
 def _temperature(reported: Mapping[str, Any]) -> Temperature:
     nozzle, bed = table(reported.get("tool0")), table(reported.get("bed"))
-    return Temperature(*(number(each.get(key)) for each in (nozzle, bed) for key in ("actual", "target")))
+    return Temperature(*(number(heater.get(key)) for heater in (nozzle, bed) for key in ("actual", "target")))

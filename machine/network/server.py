@@ -1,11 +1,12 @@
 """Server: what every kind of print server can be asked for, and where a print on one stands."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
 
 from machine.link.protocol.events import Temperature
 from machine.network.gcode_upload import GcodeUpload, Sent
+from machine.network.http import HttpSession
 
 
 class Phase(Enum):
@@ -46,7 +47,7 @@ class JobStatus:
 
 
 @dataclass(frozen=True)
-class Greeting:
+class ServerIdentity:
     """Who answers. text: server, version and what it drives; firmware: as M115 names it, "" when it does not tell.
 
     letters: axes of the printer; limits: letter -> least and greatest place, mm or deg; steppers: names of the [manual_stepper]
@@ -61,42 +62,52 @@ class Greeting:
     commands: frozenset[str] | None = None
 
 
-class PrintServer(Protocol):
-    """One print server. All raise ServerError; status() and orders may come from different threads."""
+class PrintServer(ABC):
+    """One print server. name: as the user names it. All raise ServerError; status() and orders may come from any thread."""
 
-    @property
-    def name(self) -> str:
-        """As the user names it."""
-
-    def greet(self) -> Greeting:
-        """Make sure that it is such a server, that the key is good, and learn what it drives."""
-
-    def status(self) -> JobStatus:
-        """Where it stands."""
-
-    def has(self, file: str) -> bool:
-        """Whether it holds a file of this name."""
-
-    def upload(self, upload: GcodeUpload, sent: Sent) -> str:
-        """Hand over a file and return the name by which it is printed; half a file is never kept."""
-
-    def start(self, file: str) -> None:
-        """Begin to print a file that it holds."""
-
-    def pause(self) -> None:
-        """Pause the print."""
-
-    def resume(self) -> None:
-        """Go on with it."""
-
-    def cancel(self) -> None:
-        """End it."""
-
-    def command(self, line: str) -> None:
-        """Have a line of G-code executed."""
-
-    def emergency_stop(self) -> None:
-        """Halt at once."""
+    def __init__(self, http: HttpSession) -> None:
+        self._http, self.name = http, http.name
 
     def close(self) -> None:
         """Leave."""
+        self._http.close()
+
+    @abstractmethod
+    def greet(self) -> ServerIdentity:
+        """Make sure that it is such a server, that the key is good, and learn what it drives."""
+
+    @abstractmethod
+    def status(self) -> JobStatus:
+        """Where it stands."""
+
+    @abstractmethod
+    def has(self, file: str) -> bool:
+        """Whether it holds a file of this name."""
+
+    @abstractmethod
+    def upload(self, upload: GcodeUpload, sent: Sent) -> str:
+        """Hand over a file and return the name by which it is printed; half a file is never kept."""
+
+    @abstractmethod
+    def start(self, file: str) -> None:
+        """Begin to print a file that it holds."""
+
+    @abstractmethod
+    def pause(self) -> None:
+        """Pause the print."""
+
+    @abstractmethod
+    def resume(self) -> None:
+        """Go on with it."""
+
+    @abstractmethod
+    def cancel(self) -> None:
+        """End it."""
+
+    @abstractmethod
+    def command(self, line: str) -> None:
+        """Have a line of G-code executed."""
+
+    @abstractmethod
+    def emergency_stop(self) -> None:
+        """Halt at once."""

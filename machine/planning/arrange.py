@@ -17,9 +17,9 @@ def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine)
     """
     best: list[Place] = []
     for shift in product((0.0, 0.5), (0.0, 0.5)):
-        found = _lattice(size_mm, gap_mm, shift, machine)[:count]
-        if (len(found), -_reach(found)) > (len(best), -_reach(best)):
-            best = found
+        lattice = _lattice(size_mm, gap_mm, shift, machine)[:count]
+        if (len(lattice), -_reach(lattice)) > (len(best), -_reach(best)):
+            best = lattice
     return best
 
 

@@ -12,7 +12,7 @@ from machine.planning.acceleration import stroke_accelerations
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Pause, Reorient, Stroke, Travel, rows
 from machine.planning.priming import run_in
 from machine.planning.purge import purge_lanes, purge_width_mm
-from machine.planning.reorient import Route, Speeds, route, top_z
+from machine.planning.reorient import Route, Speeds, Turn, route, top_z
 from machine.planning.stops import Stop, stops_by_layer
 from machine.planning.travel import Tip, go, lift_speed, prime, retract, to_path, trail_after, travel_speed, wipe_trail
 from mdp.decomposition import Decomposition, Part
@@ -54,7 +54,8 @@ def plan(
             if (part.index, number) in stopped:
                 moves += _stop(tip, Pause(part.index, number, stopped[part.index, number]), profile)
             if layer.paths:
-                moves += _layer(tip, part.index, number, layer, shift, profile)
+                begin_layer = BeginLayer(part.index, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c)
+                moves += [begin_layer, *_layer(tip, layer, shift, profile, on_plate=part.index == number == 1)]
         printed.append(_printed(piece, part, shift, profile))
     if pieces:
         moves += _finish(tip, pieces[-1].index, join_hulls(printed), profile)
@@ -70,7 +71,7 @@ def _begin(tip: Tip, part: BeginPart, target: Floats, lanes: Floats | None, prof
     """
     machine, near = profile.machine, target if lanes is None else lanes[0]
     tip.at_mm = np.array([*near[:2], min(top_z(machine, tip.pose), machine.z.limits_mm[1])])
-    way = route(machine, join_hulls([]), tip.at_mm, near, tip.pose, part.pose, _speeds(profile), part.index)
+    way = _route(Turn(tip.pose, part.pose, tip.at_mm, near), part.index, join_hulls([]), profile)
     tip.at_mm = np.array([*way.over_mm, way.z_mm])
     for speed in (lift_speed(profile), travel_speed(profile)):
         yield Travel(np.array([tip.at_mm, tip.at_mm]), speed)
@@ -90,14 +91,14 @@ def _purge(tip: Tip, lanes: Floats, profile: Profile) -> Iterator[Move]:
     path = Path(
         Kind.PURGE, lanes[:, :2], width_mm, process.first_layer_speed_mm_s, profile.material.flow, np.zeros((0, 2)), False
     )
-    yield _stroke(path, process.first_layer_height_mm, lanes, profile, stroke_accelerations(profile, True), 0.0)
+    yield _stroke(path, process.first_layer_height_mm, lanes, profile, stroke_accelerations(profile, True))
     tip.at_mm, tip.trail = lanes[-1], wipe_trail(lanes, width_mm)
 
 
 def _reach(tip: Tip, part: BeginPart, target: Floats, printed: Printed, profile: Profile) -> Iterator[Move]:
     """Retract, lift, turn the table, cross over to above the target, go down."""
     yield from retract(tip, profile)
-    way = route(profile.machine, printed, tip.at_mm, target, tip.pose, part.pose, _speeds(profile), part.index)
+    way = _route(Turn(tip.pose, part.pose, tip.at_mm, target), part.index, printed, profile)
     yield from _to_stand(tip, way, profile)
     if tip.pose != part.pose:
         yield _reorient(tip, part.pose, profile)
@@ -119,8 +120,8 @@ def _to_stand(tip: Tip, way: Route, profile: Profile) -> Iterator[Move]:
     yield from go(tip, [*way.over_mm, way.z_mm], profile)
 
 
-def _speeds(profile: Profile) -> Speeds:
-    return Speeds(lift_speed(profile), travel_speed(profile))
+def _route(turn: Turn, part: int, printed: Printed, profile: Profile) -> Route:
+    return route(turn, part, printed, profile.machine, Speeds(lift_speed(profile), travel_speed(profile)))
 
 
 def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
@@ -129,17 +130,17 @@ def _reorient(tip: Tip, pose: Pose, profile: Profile) -> Reorient:
     return Reorient(pose, speed)
 
 
-def _layer(tip: Tip, part: int, number: int, layer: Layer, shift: Floats, profile: Profile) -> Iterator[Move]:
-    accelerations = stroke_accelerations(profile, part == 1 and number == 1)
-    yield BeginLayer(part, number, layer.z_mm, layer.height_mm, layer.fan, layer.nozzle_add_c)
+def _layer(tip: Tip, layer: Layer, shift: Floats, profile: Profile, *, on_plate: bool) -> Iterator[Move]:
+    accelerations = stroke_accelerations(profile, on_plate)
     z = layer.z_mm + float(shift[2])
-    for path, following in zip(layer.paths, [*layer.paths[1:], None], strict=True):
+    for path, next_path in zip(layer.paths, [*layer.paths[1:], None], strict=True):
         points = np.column_stack([path.points + shift[:2], z + path.z_mm])
         before = tip.trail
         yield from to_path(tip, path, points[0], shift, profile)
         yield from prime(tip, profile)
-        coast = profile.material.coast_mm if following is not None and following.retract else 0.0
-        yield run_in(_stroke(path, layer.height_mm, points, profile, accelerations, coast), layer, tip, profile)
+        coast = profile.material.coast_mm if next_path is not None and next_path.retract else 0.0
+        stroke = _stroke(path, layer.height_mm, points, profile, accelerations, coast_mm=coast)
+        yield run_in(stroke, layer, tip, profile)
         tip.trail = trail_after(points, path, before if tip.trail is before else before[:0], shift, profile.material.wipe_mm)
         tip.at_mm = points[-1]
 
@@ -154,7 +155,13 @@ def _stop(tip: Tip, pause: Pause, profile: Profile) -> Iterator[Move]:
 
 
 def _stroke(
-    path: Path, height_mm: float, points: Floats, profile: Profile, accelerations: dict[Kind, float] | None, coast_mm: float
+    path: Path,
+    height_mm: float,
+    points: Floats,
+    profile: Profile,
+    accelerations: dict[Kind, float] | None,
+    *,
+    coast_mm: float = 0.0,
 ) -> Stroke:
     """Filament by volume (the path's flow holds the material's); the speed lowered to what axes, extruder and hot end can do."""
     machine, material = profile.machine, profile.material
@@ -190,7 +197,7 @@ def _finish(tip: Tip, part: int, printed: Printed, profile: Profile) -> Iterator
         z = min(float(tip.at_mm[2]) + profile.machine.lift_mm, profile.machine.z.limits_mm[1])
         yield from go(tip, [*tip.at_mm[:2], z], profile)
         return
-    way = route(profile.machine, printed, tip.at_mm, None, tip.pose, home, _speeds(profile), part)
+    way = _route(Turn(tip.pose, home, tip.at_mm, None), part, printed, profile)
     yield from _to_stand(tip, way, profile)
     yield _reorient(tip, home, profile)
 

@@ -36,6 +36,16 @@ class Speeds:
     travel_mm_s: float
 
 
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """A turn of the table on the way of the tip from one place to another, machine X Y Z; target_mm None: the turn is its end."""
+
+    start: Pose
+    end: Pose
+    at_mm: Floats
+    target_mm: Floats | None
+
+
 @dataclass(frozen=True)
 class Route:
     """The tip stands at X, Y of over_mm and at z_mm while the table turns, and crosses to the next part at across_z_mm.
@@ -99,50 +109,50 @@ def _upward(machine: Machine, turning: list[Pose]) -> Floats:
     tried = np.vstack([UP[None], *fans, spread(2 * FIELD)])
     around = np.radians(np.arange(0.0, 360.0, 15.0))
     tried = np.vstack([tried, np.column_stack([np.cos(around), np.sin(around), np.zeros(len(around))])])
-    kept: Floats = tried[tried[:, 2] >= -1e-12]
-    return np.unique(np.round(kept, 12), axis=0)
+    upward: Floats = tried[tried[:, 2] >= -1e-12]
+    return np.unique(np.round(upward, 12), axis=0)
 
 
-def route(
-    machine: Machine, printed: Printed, at_mm: Floats, target_mm: Floats | None, start: Pose, end: Pose, speeds: Speeds, part: int
-) -> Route:
-    """The quickest safe route from at_mm (machine X Y Z) at one pose to target_mm at another; None: the turn is the end of it.
+def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Speeds) -> Route:
+    """The quickest safe route of a turn; part: that comes after it.
 
     Raises MoveError when no stand is safe inside the axis limits.
     """
-    swept = sweep(machine, printed, start, end)
+    swept = sweep(machine, printed, turn.start, turn.end)
     best: Route | None = None
     lowest = inf
-    for x, y in stands(machine, at_mm, target_mm):
+    for x, y in stands(machine, turn):
         for every in (COARSE, 1):
             least = swept.least_z(x, y, every)
-            candidate = _at(machine, (x, y), least, at_mm, target_mm, speeds)
+            candidate = _at((x, y), least, turn, machine, speeds)
             if candidate.across_z_mm > machine.z.limits_mm[1] or (best is not None and candidate.seconds >= best.seconds):
                 break
         else:
-            best = candidate if _ways_clear(machine, at_mm, candidate, target_mm, start, end) else best
+            best = candidate if _ways_clear(candidate, turn, machine) else best
         lowest = min(lowest, least)
     if best is not None:
         return best
-    where = f"{machine.tilt.letter}{end.tilt_deg:.3f} {machine.turn.letter}{end.turn_deg:.3f}"
+    where = f"{machine.tilt.letter}{turn.end.tilt_deg:.3f} {machine.turn.letter}{turn.end.turn_deg:.3f}"
     raise MoveError(
         f"part {part}: turning the table to {where} needs the tip at Z {lowest:.1f} mm, "
         f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm, and no way aside is clear"
     )
 
 
-def _at(machine: Machine, over: tuple[float, float], least_z: float, at: Floats, target: Floats | None, speeds: Speeds) -> Route:
+def _at(over: tuple[float, float], least_z: float, turn: Turn, machine: Machine, speeds: Speeds) -> Route:
     """The route that stands at a place as low as it may; the print just left and the one to come are crossed with clearance."""
-    z = max(least_z, min(float(at[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
-    across = z if target is None else max(z, min(float(target[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
-    seconds = way_s(machine, at, over, (z, across), target, speeds) if across < inf else inf
+    z = max(least_z, min(float(turn.at_mm[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
+    across = z
+    if turn.target_mm is not None:
+        across = max(z, min(float(turn.target_mm[2]) + machine.clearance_mm, machine.z.limits_mm[1]))
+    seconds = way_s(turn, over, (z, across), machine, speeds) if across < inf else inf
     return Route(over, z, across, seconds)
 
 
-def stands(machine: Machine, at_mm: Floats, target_mm: Floats | None) -> Iterator[tuple[float, float]]:
+def stands(machine: Machine, turn: Turn) -> Iterator[tuple[float, float]]:
     """Places to stand: where the tip is, above the next first point, half way, then a lattice over X and Y."""
-    here = at_mm[:2]
-    there = here if target_mm is None else target_mm[:2]
+    here = turn.at_mm[:2]
+    there = here if turn.target_mm is None else turn.target_mm[:2]
     for place in (here, there, 0.5 * (here + there)):
         yield float(place[0]), float(place[1])
     xs, ys = (np.linspace(*axis.limits_mm, STANDS) for axis in (machine.x, machine.y))
@@ -151,11 +161,9 @@ def stands(machine: Machine, at_mm: Floats, target_mm: Floats | None) -> Iterato
             yield float(x), float(y)
 
 
-def way_s(
-    machine: Machine, at: Floats, over: tuple[float, float], z_mm: tuple[float, float], target: Floats | None, speeds: Speeds
-) -> float:
+def way_s(turn: Turn, over: tuple[float, float], z_mm: tuple[float, float], machine: Machine, speeds: Speeds) -> float:
     """Seconds of a route: up to the first of z_mm, to `over`, (turn,) at the second across, down; it stops between its moves."""
-    turning, across = z_mm
+    (turning, across), at, target = z_mm, turn.at_mm, turn.target_mm
     places = [at, [*at[:2], turning], [*over, turning]]
     if target is not None:
         places += [[*over, across], [*target[:2], across], target]
@@ -166,11 +174,12 @@ def way_s(
     return float(move_times(steps, speed, np.ones(len(steps), dtype=np.bool_), machine).sum())
 
 
-def _ways_clear(machine: Machine, at: Floats, candidate: Route, target: Floats | None, start: Pose, end: Pose) -> bool:
+def _ways_clear(candidate: Route, turn: Turn, machine: Machine) -> bool:
     """True when the ways to the stand, at the first pose, and from it, at the second, keep off table and cradle.
 
     Of what is printed nothing stands higher than the tip in either pose, so the ways need not be tried against it.
     """
+    start, end, at, target = turn.start, turn.end, turn.at_mm, turn.target_mm
     stand = np.array([*candidate.over_mm, candidate.z_mm])
     ways = [(start, at, np.array([*at[:2], candidate.z_mm])), (start, np.array([*at[:2], candidate.z_mm]), stand)]
     if target is not None:

@@ -64,6 +64,17 @@ def move_times(
     stop: (n,) True where the machine stands still before the move. most_mm_s2: (n,) acceleration told for X Y Z. Axes that
     would be too fast slow the move down.
     """
+    blocks, moving = blocks_of(deltas, speed, stop, machine, most_mm_s2)
+    times = np.zeros(len(deltas))
+    if moving.any():
+        times[moving] = _block_times(blocks, machine.junction_speed_mm_s)
+    return times
+
+
+def blocks_of(
+    deltas: Floats, speed: Floats, stop: NDArray[np.bool_], machine: Machine, most_mm_s2: Floats | None = None
+) -> tuple[Blocks, NDArray[np.bool_]]:
+    """The blocks of the moves that move anything, and (n,) which they are."""
     length, measure = lengths(deltas)
     share = np.abs(deltas) / np.maximum(length, TINY)[:, None]
     with np.errstate(divide="ignore"):
@@ -72,13 +83,9 @@ def move_times(
     if most_mm_s2 is not None:
         acceleration = np.where(measure == 0, np.minimum(acceleration, most_mm_s2), acceleration)
     moving = measure < 3
-    times = np.zeros(len(deltas))
-    if moving.any():
-        halts = np.diff(np.cumsum(stop)[moving], prepend=0) > 0
-        direction = deltas[moving] / length[moving][:, None]
-        blocks = Blocks(direction, length[moving], cruise[moving], acceleration[moving], measure[moving], halts)
-        times[moving] = _block_times(blocks, machine.junction_speed_mm_s)
-    return times
+    halts = np.diff(np.cumsum(stop)[moving], prepend=0) > 0
+    direction = deltas[moving] / length[moving][:, None]
+    return Blocks(direction, length[moving], cruise[moving], acceleration[moving], measure[moving], halts), moving
 
 
 @part

@@ -1,12 +1,11 @@
-"""Program: a G-code file that is read line by line, as often as wanted, and never held whole."""
+"""G-code file: a program that is read line by line, as often as wanted, and never held whole."""
 
 from collections.abc import Iterator
-from hashlib import sha256
+from contextlib import contextmanager
+from hashlib import file_digest
 from pathlib import Path
 
 from profiles.errors import GcodeError
-
-CHUNK_BYTES = 1 << 20
 
 
 class GcodeFile:
@@ -16,22 +15,21 @@ class GcodeFile:
         self.path = path
 
     def __iter__(self) -> Iterator[str]:
-        try:
-            with self.path.open(encoding="utf-8-sig") as file:
-                for line in file:
-                    yield line.rstrip("\n")
-        except OSError as error:
-            raise GcodeError(f"G-code file {self.path} cannot be read: {(error.strerror or str(error)).lower()}") from None
-        except UnicodeDecodeError:
-            raise GcodeError(f"G-code file {self.path} is not text") from None
+        with self._refusing(), self.path.open(encoding="utf-8-sig") as file:
+            for line in file:
+                yield line.rstrip("\n")
 
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the file's bytes; raises GcodeError."""
-        found = sha256()
+        with self._refusing(), self.path.open("rb") as file:
+            return file_digest(file, "sha256").hexdigest()
+
+    @contextmanager
+    def _refusing(self) -> Iterator[None]:
         try:
-            with self.path.open("rb") as file:
-                while chunk := file.read(CHUNK_BYTES):
-                    found.update(chunk)
+            yield
         except OSError as error:
             raise GcodeError(f"G-code file {self.path} cannot be read: {(error.strerror or str(error)).lower()}") from None
-        return found.hexdigest()
+        except UnicodeDecodeError as error:
+            byte = f"{error.object[error.start]:#04x}"
+            raise GcodeError(f"G-code file {self.path} is not text: it holds the byte {byte}") from None

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 from math import inf
 
+from machine.firmware.klipper import OPTIONAL
 from machine.gcode.words import read_number, read_values
 from machine.reader.motion import flush
 from machine.reader.state import Reader
@@ -68,7 +69,7 @@ def _turn(reader: Reader, values: Values) -> None:
         reader.note("G28", 0.0, axis.letter)
         reader.at[index] = reader.home[index]
         return
-    if any(index == other for other, _, _ in reader.turning):
+    if any(index == turned for turned, _, _ in reader.turning):
         flush(reader)
     reader.turning.append((index, value, speed))
     if values.get("SYNC", "1") != "0":
@@ -109,22 +110,12 @@ def _pause(reader: Reader, values: Values) -> None:
     reader.note("M0", 0.0, "")
 
 
-def _nothing(reader: Reader, values: Values) -> None:
-    """Commands without a bearing on motion or heat."""
-
-
 MACROS: dict[str, Callable[[Reader, Values], None]] = {
     "MANUAL_STEPPER": _turn,
     "SET_HEATER_TEMPERATURE": _heat,
     "TEMPERATURE_WAIT": _wait,
     "TURN_OFF_HEATERS": _off,
     "SET_VELOCITY_LIMIT": _limit,
-    "SET_PRINT_STATS_INFO": _nothing,
-    "EXCLUDE_OBJECT": _nothing,
-    "EXCLUDE_OBJECT_DEFINE": _nothing,
-    "EXCLUDE_OBJECT_START": _nothing,
-    "EXCLUDE_OBJECT_END": _nothing,
-    "SET_DISPLAY_TEXT": _nothing,
-    "SET_PRESSURE_ADVANCE": _nothing,
     "PAUSE": _pause,
+    **dict.fromkeys(("SET_PRESSURE_ADVANCE", "EXCLUDE_OBJECT", *OPTIONAL), lambda reader, values: None),
 }

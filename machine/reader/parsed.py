@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.gcode.contents import Contents
+from machine.gcode.part_totals import PartTotals
 from mdp.mesh import Floats
 from mdp.pose import Pose
 
@@ -54,7 +54,7 @@ class ParsedProgram:
     type: index into types, the ;TYPE: names. width_mm, height_mm: from ;WIDTH: and ;HEIGHT:, 0 when not told.
     acceleration: mm/s2 told by M204, inf where the axes decide. layers: number of layer changes. parts: numbers of the parts
     in order. unsupported: the places that no support could be given. announced: how many parts `;PART:1 of 3` tells, 0 where none
-    does; contents: what comments tell of the parts' beads.
+    does; part_totals: what comments tell of the parts' beads.
     """
 
     line: NDArray[np.int64]
@@ -77,7 +77,12 @@ class ParsedProgram:
     parts: tuple[int, ...]
     unsupported: tuple[Unheld, ...]
     announced: int
-    contents: tuple[Contents, ...]
+    part_totals: tuple[PartTotals, ...]
+
+    def layer_keys(self, rows: NDArray[np.int64] | slice = slice(None)) -> NDArray[np.int64]:
+        """(m,) a number for the layer of each row, another in each part."""
+        keys: NDArray[np.int64] = self.part[rows] * (int(self.layer.max(initial=0)) + 1) + self.layer[rows]
+        return keys
 
     def rows_of_types(self, *names: str) -> NDArray[np.bool_]:
         """(n,) which rows belong to these ;TYPE: names."""

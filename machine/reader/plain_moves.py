@@ -95,15 +95,15 @@ def _read_run(text: Text, meaning: Meaning, first: int, place: Floats, rows: Flo
     count, line = 0, first
     while line < len(text.start) - 1 and line - first < len(rows):
         begin, end = text.start[line], text.start[line + 1]
-        found = _read_words(text.text, begin, end, meaning.letters, words)
-        if found < 0:
+        word_count = _read_words(text.text, begin, end, meaning.letters, words)
+        if word_count < 0:
             break
         for k in range(ROW):
             rows[count, k] = meaning.row[k]
         for k in range(6):
             rows[count, 1 + k] = place[k]
         moved = False
-        for k in range(found):
+        for k in range(word_count):
             axis, value = int(words[k, 0]), words[k, 1]
             if axis == FEED:
                 place[FEED] = value * meaning.units[0]
@@ -131,9 +131,9 @@ def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], wo
         end -= 1
     if end - begin < 5 or end - begin >= LONGEST or text[begin] != 71 or (text[begin + 1] != 48 and text[begin + 1] != 49):
         return -1
-    at, found = begin + 2, 0
+    at, count = begin + 2, 0
     while at < end:
-        if found == len(words) or at + 2 >= end or text[at] != 32:
+        if count == len(words) or at + 2 >= end or text[at] != 32:
             return -1
         axis = letters[text[at + 1]]
         at += 2
@@ -161,6 +161,6 @@ def _read_words(text: Bytes, begin: int, end: int, letters: NDArray[np.int8], wo
         value = whole / divisor
         if axis == FEED and (negative or value <= 0.0):
             return -1
-        words[found, 0], words[found, 1] = axis, -value if negative else value
-        found += 1
-    return found
+        words[count, 0], words[count, 1] = axis, -value if negative else value
+        count += 1
+    return count

@@ -2,8 +2,8 @@
 
 import re
 
-from machine.gcode.contents import KEY, read_contents
 from machine.gcode.landmarks import begins_layer, begun_part
+from machine.gcode.part_totals import KEY, read_totals
 from machine.reader.parsed import Unheld
 from machine.reader.state import Reader
 
@@ -30,9 +30,9 @@ def remark(reader: Reader, text: str) -> None:
     elif key == "HEIGHT":
         reader.height = _positive(value)
     elif key == KEY:
-        contents = read_contents(value, reader.number, reader.part)
-        if contents is not None:
-            reader.contents.append(contents)
+        totals = read_totals(value, reader.number, reader.part)
+        if totals is not None:
+            reader.part_totals.append(totals)
     elif key == "UNSUPPORTED":
         area, _, place = value.partition("@")
         layer, _, reason = place.partition(" ")

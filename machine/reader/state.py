@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.firmware import Dialect, dialect_of
-from machine.gcode.contents import Contents
 from machine.gcode.modes import Modes, axes_of
+from machine.gcode.part_totals import PartTotals
 from machine.gcode.words import Word
 from machine.reader.parsed import OWN, Event, Unheld
 from profiles.machine import Machine
@@ -55,7 +55,7 @@ class Reader:
     types: dict[str, int] = field(default_factory=lambda: {"": 0})
     parts: list[int] = field(default_factory=list)
     announced: int = 0
-    contents: list[Contents] = field(default_factory=list)
+    part_totals: list[PartTotals] = field(default_factory=list)
     rows: "array[float]" = field(default_factory=lambda: array("d"))
     events: list[Event] = field(default_factory=list)
     ignored: dict[str, tuple[int, int]] = field(default_factory=dict)

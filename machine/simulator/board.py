@@ -1,17 +1,16 @@
 """The board of a simulated printer: its build options, clock, motion, heaters and fan, and the words its commands read."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
 
 from machine.firmware import simulation_of
-from machine.simulator.motion import Motion
+from machine.simulator.motion import Motion, WordValues
 from profiles.machine import Machine
 
-Words = Mapping[str, float]
 # None: done, answered with ok; a text: its own ok; else the virtual times at which a slow command wants to look again.
 Work = Iterator[float] | str | None
-Command = Callable[["Board", Words, str], Work]
+Command = Callable[["Board", WordValues, str], Work]
 
 NOZZLE_S, BED_S = 60.0, 240.0  # time constants of a 40 W hot end and a 300 W plate
 EVENTS = 10000  # kept where the moves are not all kept either
@@ -119,6 +118,7 @@ class Board:
         self.nozzle = Heater("nozzle", machine.nozzle_limit_c, NOZZLE_S)
         self.bed = Heater("bed", machine.bed_limit_c, BED_S)
         self.events: list[tuple[float, str]] = []
+        self.troubles: list[tuple[float, str]] = []
         self._most_events = None if kept is None else EVENTS
         self.unknown = 0
         self.turning: dict[int, tuple[float, float]] = {}
@@ -136,9 +136,11 @@ class Board:
         self.report_every_s = self.place_every_s = 0.0
         self.report_s = self.place_s = inf
 
-    def note(self, what: str) -> None:
-        """Put an event on record."""
+    def note(self, what: str, trouble: bool = False) -> None:
+        """Put an event on record; trouble: it is none that a program asks for."""
         self.events.append((self.now_s, what))
+        if trouble:
+            self.troubles.append((self.now_s, what))
         if self._most_events is not None and len(self.events) > 2 * self._most_events:
             del self.events[: self._most_events]
 

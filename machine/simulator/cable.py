@@ -33,11 +33,11 @@ class _FaultQueue:
         heap = self._heap
         while heap and heap[0][0] < end:
             place, index, places = heap[0]
-            following = next(places, None)
-            if following is None:
+            next_place = next(places, None)
+            if next_place is None:
                 heappop(heap)
             else:
-                heapreplace(heap, (following, index, places))
+                heapreplace(heap, (next_place, index, places))
             yield place, self._script.faults[index]
 
 

@@ -5,7 +5,8 @@ from math import inf
 
 from machine.firmware import dialect_of
 from machine.firmware.simulation import SimulationRules
-from machine.simulator.board import Board, Command, Words, Work
+from machine.simulator.board import Board, Command, Work
+from machine.simulator.motion import WordValues
 from machine.simulator.motion_commands import MOVING
 
 NEAR_C = 1.0  # Marlin's TEMP_WINDOW: a heater within it has arrived
@@ -33,9 +34,10 @@ CAPABILITIES = {
 }
 ENDSTOP_MM = 0.01
 TEXTS = ("M117", "M118")  # what follows them are no words
+WITHOUT_EFFECT = ("M17", "M73", "M117", "M486", "M572", "M665", "M876", "M900", "T0")
 
 
-def heat(board: Board, words: Words, text: str) -> Work:
+def heat(board: Board, words: WordValues, text: str) -> Work:
     """Give a heater its target: M104, M109, M568 the nozzle, others the bed."""
     heater = board.nozzle if text.startswith(("M104", "M109", "M568")) else board.bed
     wanted = words.get("S", words.get("R"))
@@ -45,7 +47,7 @@ def heat(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def heat_and_wait(board: Board, words: Words, text: str) -> Iterator[float]:
+def heat_and_wait(board: Board, words: WordValues, text: str) -> Iterator[float]:
     """The same, and wait until it is there; R: also for a hotter one to cool."""
     heat(board, words, text)
     heater = board.nozzle if text.startswith("M109") else board.bed
@@ -63,20 +65,20 @@ def heat_and_wait(board: Board, words: Words, text: str) -> Iterator[float]:
     board.waits_for_heat = False
 
 
-def _wait_for_all(board: Board, words: Words, text: str) -> Iterator[float]:
+def _wait_for_all(board: Board, words: WordValues, text: str) -> Iterator[float]:
     """M116 (RepRapFirmware)."""
     yield from heat_and_wait(board, {"S": board.bed.target_c}, "M190")
     yield from heat_and_wait(board, {"S": board.nozzle.target_c}, "M109")
 
 
-def _fan(board: Board, words: Words, text: str) -> Work:
+def _fan(board: Board, words: WordValues, text: str) -> Work:
     full = 1.0 if words.get("S", 255.0) <= dialect_of(board.machine).fan_full == 1 else 255.0
     board.fan = min(max(words.get("S", full), 0.0), full) / full if text.startswith("M106") else 0.0
     board.note(f"fan {board.fan:.2f}")
     return None
 
 
-def _allow_cold(board: Board, words: Words, text: str) -> Work:
+def _allow_cold(board: Board, words: WordValues, text: str) -> Work:
     """M302."""
     if "P" in words:
         board.cold_allowed = words["P"] != 0
@@ -85,12 +87,7 @@ def _allow_cold(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _stop_waiting(board: Board, words: Words, text: str) -> Work:
-    board.impatient = True
-    return None
-
-
-def _power(board: Board, words: Words, text: str) -> Work:
+def _power(board: Board, words: WordValues, text: str) -> Work:
     """M80, M81: without the power supply nothing heats; what moves is planned and does not matter."""
     if text.startswith("M81"):
         board.off()
@@ -99,7 +96,7 @@ def _power(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _identify_firmware(board: Board, words: Words, text: str) -> Work:
+def _identify_firmware(board: Board, words: WordValues, text: str) -> Work:
     """M115: name, capabilities, and the axes' reach, the fourth axis on named i, j whatever their words are."""
     rules, build = board.rules, board.build
     name = rules.identity.format(axes=5 if board.machine.tilts else 3)
@@ -127,28 +124,19 @@ def _area(board: Board) -> str:
     return f"area:{{full:{{{reach}}},work:{{{reach}}}}}"
 
 
-def _report_temperatures(board: Board, words: Words, text: str) -> Work:
-    return f"ok {board.temperatures()}"
-
-
-def _report_position(board: Board, words: Words, text: str) -> Work:
-    board.say(board.position())
-    return None
-
-
-def _autoreport_temperatures(board: Board, words: Words, text: str) -> Work:
+def _autoreport_temperatures(board: Board, words: WordValues, text: str) -> Work:
     board.report_every_s = max(0.0, words.get("S", 0.0))
     board.report_s = board.now_s + board.report_every_s if board.report_every_s else inf
     return None
 
 
-def _autoreport_position(board: Board, words: Words, text: str) -> Work:
+def _autoreport_position(board: Board, words: WordValues, text: str) -> Work:
     board.place_every_s = max(0.0, words.get("S", 0.0))
     board.place_s = board.now_s + board.place_every_s if board.place_every_s else inf
     return None
 
 
-def _keep_alive(board: Board, words: Words, text: str) -> Work:
+def _keep_alive(board: Board, words: WordValues, text: str) -> Work:
     """M113: seconds between `busy:`, 0 for none."""
     if "S" in words:
         board.busy_every_s = max(0.0, words["S"])
@@ -157,14 +145,14 @@ def _keep_alive(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _number_lines(board: Board, words: Words, text: str) -> Work:
+def _number_lines(board: Board, words: WordValues, text: str) -> Work:
     """A bare M110: its N is the number of the last line."""
     if "N" in words:
         board.number = int(words["N"])
     return None
 
 
-def _send_to_host(board: Board, words: Words, text: str) -> Work:
+def _send_to_host(board: Board, words: WordValues, text: str) -> Work:
     """M118: A1 makes it an action of the host, with the line end of another system; E1 an echo."""
     message, action, echo = text[4:].strip(), False, False
     while message[:2] in ("A0", "A1", "E0", "E1", "P0") and message[2:3] in ("", " "):
@@ -174,7 +162,7 @@ def _send_to_host(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _report_endstops(board: Board, words: Words, text: str) -> Work:
+def _report_endstops(board: Board, words: WordValues, text: str) -> Work:
     """M119: X and Y end at their least, Z at its greatest."""
     board.say("Reporting endstop status")
     real = board.motion.at(board.now_s)
@@ -185,45 +173,31 @@ def _report_endstops(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _nothing(board: Board, words: Words, text: str) -> Work:
+def _stop_waiting(board: Board, words: WordValues, text: str) -> Work:
+    board.impatient = True
     return None
 
 
-HEAT: dict[str, Command] = {
-    "M80": _power,
-    "M81": _power,
-    "M104": heat,
-    "M106": _fan,
-    "M107": _fan,
+COMMANDS: dict[str, Command] = {
+    **MOVING,
+    **dict.fromkeys(("M80", "M81"), _power),
+    **dict.fromkeys(("M104", "M140", "M568"), heat),
+    **dict.fromkeys(("M109", "M190"), heat_and_wait),
+    **dict.fromkeys(("M106", "M107"), _fan),
+    "M105": lambda board, words, text: f"ok {board.temperatures()}",
     "M108": _stop_waiting,
-    "M109": heat_and_wait,
-    "M116": _wait_for_all,
-    "M140": heat,
-    "M190": heat_and_wait,
-    "M302": _allow_cold,
-    "M568": heat,
-}
-REPORTS: dict[str, Command] = {
-    "M17": _nothing,
-    "M73": _nothing,
-    "M105": _report_temperatures,
     "M110": _number_lines,
     "M113": _keep_alive,
+    "M114": lambda board, words, text: board.say(board.position()),
     "M115": _identify_firmware,
-    "M114": _report_position,
-    "M117": _nothing,
+    "M116": _wait_for_all,
     "M118": _send_to_host,
     "M119": _report_endstops,
     "M154": _autoreport_position,
     "M155": _autoreport_temperatures,
-    "M486": _nothing,
-    "M572": _nothing,
-    "M665": _nothing,
-    "M876": _nothing,
-    "M900": _nothing,
-    "T0": _nothing,
+    "M302": _allow_cold,
+    **dict.fromkeys(WITHOUT_EFFECT, lambda board, words, text: None),
 }
-COMMANDS: dict[str, Command] = {**MOVING, **HEAT, **REPORTS}
 
 
 def commands_of(rules: SimulationRules) -> dict[str, Command]:

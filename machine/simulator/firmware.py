@@ -151,15 +151,16 @@ class SimulatedFirmware:
     def kill(self, error: str) -> None:
         """The firmware stops for ever with its own words, heaters off."""
         own = self._rules.heater_fault
-        self._shut_down(error, () if own else (f"Error:{error}",), own)
+        self.board.note(error, trouble=True)
+        self._shut_down(() if own else (f"Error:{error}",), own)
 
     def _stop_at_once(self) -> None:
         """M112."""
         report = ("echo:M112 Shutdown",) if self._rules.urgent == "bytes" else ()
-        self._shut_down("M112", report, "Shutdown due to M112 command")
+        self.board.note("M112")
+        self._shut_down(report, "Shutdown due to M112 command")
 
-    def _shut_down(self, event: str, report: tuple[str, ...], reason: str) -> None:
-        self.board.note(event)
+    def _shut_down(self, report: tuple[str, ...], reason: str) -> None:
         self.board.off()
         self._said += [*report, *self._rules.kill]
         self._reason, self.dead = reason, True
@@ -213,7 +214,8 @@ class SimulatedFirmware:
             if board.waits_for_heat or board.waits_for_person:
                 self._wake_s = board.now_s
         elif order == "M410" and board.homes:  # Endstops::validate_homing_move: the end stop was not met
-            self._shut_down("Homing Failed", ("echo:Homing Failed",), "")
+            board.note("Homing Failed", trouble=True)
+            self._shut_down(("echo:Homing Failed",), "")
         elif order == "M410":
             board.motion.halt(board.now_s)
             board.note("M410")

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Iterator
 from math import hypot
 
-from machine.firmware.klipper import stepper_name
+from machine.firmware.klipper import OPTIONAL, stepper_name
 from machine.gcode.words import read_number
 from machine.simulator.board import Board, Work, wait_for_moves
 from machine.simulator.commands import heat, heat_and_wait
@@ -70,10 +70,6 @@ def _off(board: Board, values: Values) -> Work:
     return heat(board, {"S": 0.0}, "M140")
 
 
-def _nothing(board: Board, values: Values) -> Work:
-    return None
-
-
 def _number(values: Values, key: str, default: float = 0.0) -> float:
     number = read_number(values.get(key, ""))
     return default if number is None else number
@@ -84,12 +80,5 @@ MACROS: dict[str, Callable[[Board, Values], Work]] = {
     "SET_HEATER_TEMPERATURE": _heat,
     "TEMPERATURE_WAIT": _wait,
     "TURN_OFF_HEATERS": _off,
-    "SET_VELOCITY_LIMIT": _nothing,
-    "SET_PRINT_STATS_INFO": _nothing,
-    "SET_DISPLAY_TEXT": _nothing,
-    "SET_PRESSURE_ADVANCE": _nothing,
-    "EXCLUDE_OBJECT": _nothing,
-    "EXCLUDE_OBJECT_DEFINE": _nothing,
-    "EXCLUDE_OBJECT_START": _nothing,
-    "EXCLUDE_OBJECT_END": _nothing,
+    **dict.fromkeys(("SET_VELOCITY_LIMIT", "SET_PRESSURE_ADVANCE", "EXCLUDE_OBJECT", *OPTIONAL), lambda board, values: None),
 }

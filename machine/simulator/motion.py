@@ -4,10 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from math import ceil, hypot, inf, pi, sqrt
 
 from machine.firmware import simulation_of
-from machine.gcode.arcs import centre_of, chords, sweep_rad
+from machine.gcode.arcs import chords, sweep_rad, told_centre
 from machine.gcode.modes import Modes, axes_of
 from machine.kinematics.coordinates import origin_mm
-from machine.simulator.planner import ExecutedMoves, Planner, block_of
+from machine.planning.timing import axis_accelerations, axis_speeds
+from machine.simulator.planner import ExecutedMoves, Place, Planner, block_of
 from mdp.pose import Pose, rotation, shift
 from profiles.machine import Machine
 
@@ -20,8 +21,7 @@ ARC_MM, CIRCLE_CHORDS = 1.0, 72  # Marlin's MAX_ARC_SEGMENT_MM and MIN_CIRCLE_SE
 SEGMENTS_PER_S = 200.0  # into which the firmware cuts a turn that it follows
 STEPS = (80.0, 80.0, 400.0, 80.0, 80.0)  # a mm or degree, for M114's Count
 
-Words = Mapping[str, float]
-Place = Sequence[float]
+WordValues = Mapping[str, float]  # by letter
 
 
 class TcpKinematics:
@@ -63,7 +63,7 @@ class Motion:
     def __init__(
         self,
         machine: Machine,
-        note: Callable[[str], None] = lambda what: None,
+        note: Callable[[str, bool], None] = lambda what, trouble: None,
         kept: int | None = None,
         home_start: bool = True,
     ) -> None:
@@ -96,16 +96,12 @@ class Motion:
         self.homed: set[int] = set()
         self.energised = False
         self.feed_share = self.flow_share = 1.0
-        axes = (machine.x, machine.y, machine.z)
-        self.speeds = [a.speed_mm_s for a in axes]
-        self.speeds += [machine.tilt.speed_deg_s, machine.turn.speed_deg_s, machine.extruder_speed_mm_s]
-        self.accelerations = [a.acceleration_mm_s2 for a in axes]
-        self.accelerations += [machine.tilt.acceleration_deg_s2, machine.turn.acceleration_deg_s2]
-        self.accelerations += [machine.extruder_acceleration_mm_s2]
+        self.speeds: list[float] = axis_speeds(machine).tolist()
+        self.accelerations: list[float] = axis_accelerations(machine).tolist()
         self.jerk_mm_s = machine.junction_speed_mm_s
         self._printing = self._travelling = inf  # mm/s2 set by M204 for X Y Z; inf: what the axes allow
 
-    def target(self, words: Words, extrude: bool = True) -> list[float]:
+    def target(self, words: WordValues, extrude: bool = True) -> list[float]:
         """Where a G0 or G1 leads, its F taken over; without `extrude` (cold nozzle) the filament stands still."""
         place = self._wanted(words)
         if self.soft_limits:
@@ -119,8 +115,8 @@ class Motion:
         """Marlin stops at soft limits without a word, on axes that were homed; on others what the program meant is counted."""
         for axis, (low, high) in enumerate(self.limits):
             limited = axis in self.homed or not self._starts_at_home
-            told = place[axis] + (0.0 if limited else self.modes.offset[axis])
-            if not low - SLACK <= told <= high + SLACK:
+            coordinate = place[axis] + (0.0 if limited else self.modes.offset[axis])
+            if not low - SLACK <= coordinate <= high + SLACK:
                 self.clamped += 1
                 place[axis] = min(max(place[axis], low), high) if limited else place[axis]
 
@@ -133,22 +129,22 @@ class Motion:
             self._clamp(place)
         return place
 
-    def pushes(self, words: Words) -> bool:
+    def pushes(self, words: WordValues) -> bool:
         """Whether a move turns the extruder."""
         return abs(self._wanted(words)[5] - self.place[5]) > TINY_MM
 
-    def unhomed(self, words: Words) -> list[float] | None:
+    def unhomed(self, words: WordValues) -> list[float] | None:
         """The program's coordinates of a target that moves X, Y or Z before they are homed; None for any other."""
         wanted = [axis for axis, letter in enumerate(self.letters[:3]) if letter in words and axis not in self.homed]
         return [p + s for p, s in zip(self._wanted(words), self.modes.offset, strict=True)] if wanted else None
 
-    def beyond(self, words: Words) -> list[float] | None:
+    def beyond(self, words: WordValues) -> list[float] | None:
         """The program's coordinates of a target outside the soft limits; None for one inside."""
         place = self._wanted(words)
         inside = all(low - SLACK <= p <= high + SLACK for p, (low, high) in zip(place, self.limits, strict=False))
         return None if inside else [p + s for p, s in zip(place, self.modes.offset, strict=True)]
 
-    def _wanted(self, words: Words) -> list[float]:
+    def _wanted(self, words: WordValues) -> list[float]:
         place = self.place[:]
         self.modes.move(place, words.items())
         return place
@@ -165,15 +161,12 @@ class Motion:
             return [list(target)]
         return _evenly(here, target, max(1, ceil(self._seconds(here, target) * SEGMENTS_PER_S)))
 
-    def arc(self, words: Words, clockwise: bool, extrude: bool) -> list[list[float]]:
+    def arc(self, words: WordValues, clockwise: bool, extrude: bool) -> list[list[float]]:
         """Where the chords of a G2 or G3 end; [] for what Marlin answers with "Bad arc parameters"."""
         scale = self.modes.unit_mm
         start, end = self.place, self.target(words, extrude)
         begin, finish = (start[0], start[1]), (end[0], end[1])
-        if "R" in words:
-            centre = centre_of(begin, finish, words["R"] * scale, clockwise)
-        else:
-            centre = (start[0] + words.get("I", 0.0) * scale, start[1] + words.get("J", 0.0) * scale)
+        centre = told_centre(begin, finish, {letter: scale * words[letter] for letter in "RIJ" if letter in words}, clockwise)
         if centre is None or centre == begin:
             return []
         sweep = sweep_rad(begin, finish, centre, clockwise)
@@ -212,7 +205,7 @@ class Motion:
                 stopped = min(max(end[axis], low - HARD_MM), high + HARD_MM)
                 self._offset[axis] += stopped - end[axis]
                 end[axis] = stopped
-                self._note(f"{self.letters[axis]} driven against its end")
+                self._note(f"{self.letters[axis]} driven against its end", True)
 
     def home(self, axes: Sequence[int]) -> float:
         """Put axes at their home positions (X Y least, Z greatest, table level); returns how long it takes, s."""
@@ -243,7 +236,7 @@ class Motion:
             positions = self._tcp.positions(self.place) if on else self.place[:5]
             self._offset = [r - p for r, p in zip(self._real, positions, strict=False)]
 
-    def accelerate(self, words: Words) -> None:
+    def accelerate(self, words: WordValues) -> None:
         """M204: P for moves that push filament, T for those that do not, S for both; what is not above 0 changes nothing."""
         scale = self.modes.unit_mm
         for letter, value in words.items():
@@ -252,13 +245,13 @@ class Motion:
             if value > 0 and letter in "TS":
                 self._travelling = value * scale
 
-    def bound(self, words: Words, bounds: list[float]) -> None:
+    def bound(self, words: WordValues, bounds: list[float]) -> None:
         """M201, M203: greatest accelerations or speeds of single axes."""
         for axis, most in self.modes.named(words.items()):
             if most > 0:
                 bounds[axis] = most
 
-    def rename(self, words: Words) -> None:
+    def rename(self, words: WordValues) -> None:
         """G92: the place where the axes stand gets these coordinates."""
         for axis, coordinate in self.modes.named(words.items()):
             self.set_coordinate(axis, coordinate)

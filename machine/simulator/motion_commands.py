@@ -4,12 +4,14 @@ from collections.abc import Iterator, Sequence
 from math import inf
 
 from machine.gcode.words import read_letters, split_command
-from machine.simulator.board import Board, Command, Words, Work, wait_for_moves
+from machine.simulator.board import Board, Command, Work, wait_for_moves
+from machine.simulator.motion import WordValues
 
+MODES = ("G20", "G21", "G90", "G91", "M82", "M83")
 COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP
 
 
-def move(board: Board, words: Words, text: str) -> Work:
+def move(board: Board, words: WordValues, text: str) -> Work:
     """G0, G1; the caller has made sure of a free block."""
     motion, pushes = board.motion, True
     if board.must_home and (unhomed := motion.unhomed(words)) is not None:
@@ -49,7 +51,7 @@ def _run(board: Board, pieces: Sequence[Sequence[float]]) -> Iterator[float]:
         motion.reach(piece, board.now_s)
 
 
-def _arc(board: Board, words: Words, text: str) -> Work:
+def _arc(board: Board, words: WordValues, text: str) -> Work:
     pushes = "E" not in words or board.cold_allowed or board.nozzle.at(board.now_s) >= COLD_C or not board.motion.pushes(words)
     if not pushes:
         for line in board.rules.cold:
@@ -60,7 +62,7 @@ def _arc(board: Board, words: Words, text: str) -> Work:
     return _run(board, pieces)
 
 
-def _dwell(board: Board, words: Words, text: str) -> Iterator[float]:
+def _dwell(board: Board, words: WordValues, text: str) -> Iterator[float]:
     yield from wait_for_moves(board)
     until_s = board.now_s + max(0.0, words.get("S", words.get("P", 0.0) / 1000.0))
     while board.now_s < until_s:
@@ -69,11 +71,7 @@ def _dwell(board: Board, words: Words, text: str) -> Iterator[float]:
         board.awake_s = board.now_s
 
 
-def _drain(board: Board, words: Words, text: str) -> Iterator[float]:
-    yield from wait_for_moves(board)
-
-
-def _home(board: Board, words: Words, text: str) -> Iterator[float]:
+def _home(board: Board, words: WordValues, text: str) -> Iterator[float]:
     letters = read_letters(split_command(text)[1])
     axes = [axis for axis, letter in enumerate(board.motion.letters[:5]) if letter in letters] or list(range(5))
     yield from seek_endstops(board, axes)
@@ -92,7 +90,7 @@ def seek_endstops(board: Board, axes: Sequence[int]) -> Iterator[float]:
     board.note("homed " + "".join(board.motion.letters[axis] for axis in axes))
 
 
-def _wait_for_person(board: Board, words: Words, text: str) -> Iterator[float]:
+def _wait_for_person(board: Board, words: WordValues, text: str) -> Iterator[float]:
     """M0, M1: until M108, or for P milliseconds or S seconds."""
     yield from wait_for_moves(board)
     seconds = words.get("S", words.get("P", 0.0) / 1000.0)
@@ -103,38 +101,18 @@ def _wait_for_person(board: Board, words: Words, text: str) -> Iterator[float]:
     board.waits_for_person = False
 
 
-def _mode(board: Board, words: Words, text: str) -> Work:
-    board.motion.modes.set(split_command(text)[0])
-    return None
-
-
-def _follow(board: Board, words: Words, text: str) -> Iterator[float]:
+def _follow(board: Board, words: WordValues, text: str) -> Iterator[float]:
     yield from wait_for_moves(board)
     board.motion.follow(text.startswith("G43"))
 
 
-def _accelerate(board: Board, words: Words, text: str) -> Work:
-    board.motion.accelerate(words)
-    return None
-
-
-def _bound_accelerations(board: Board, words: Words, text: str) -> Work:
-    board.motion.bound(words, board.motion.accelerations)
-    return None
-
-
-def _bound_speeds(board: Board, words: Words, text: str) -> Work:
-    board.motion.bound(words, board.motion.speeds)
-    return None
-
-
-def _corner(board: Board, words: Words, text: str) -> Work:
+def _corner(board: Board, words: WordValues, text: str) -> Work:
     if words.get("X", -1.0) >= 0:
         board.motion.jerk_mm_s = words["X"]
     return None
 
 
-def _override_feed(board: Board, words: Words, text: str) -> Work:
+def _override_feed(board: Board, words: WordValues, text: str) -> Work:
     if words.get("S", 0.0) > 0:
         board.motion.feed_share = words["S"] / 100.0
     elif "S" not in words:
@@ -142,7 +120,7 @@ def _override_feed(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _override_flow(board: Board, words: Words, text: str) -> Work:
+def _override_flow(board: Board, words: WordValues, text: str) -> Work:
     if words.get("S", -1.0) >= 0:
         board.motion.flow_share = words["S"] / 100.0
     elif "S" not in words:
@@ -150,7 +128,7 @@ def _override_flow(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _limit(board: Board, words: Words, text: str) -> Work:
+def _limit(board: Board, words: WordValues, text: str) -> Work:
     """M211: soft limits on, off, reported."""
     motion = board.motion
     if "S" in words:
@@ -161,14 +139,14 @@ def _limit(board: Board, words: Words, text: str) -> Work:
     return None
 
 
-def _rename(board: Board, words: Words, text: str) -> Work:
+def _rename(board: Board, words: WordValues, text: str) -> Work:
     board.motion.rename(words)
     if board.rules.reports_position:
         board.say(board.position())
     return None
 
 
-def _rest(board: Board, words: Words, text: str) -> Iterator[float]:
+def _rest(board: Board, words: WordValues, text: str) -> Iterator[float]:
     """M18, M84: motors off; with S only after so many idle seconds, 0: never."""
     idle = board.rules.idle
     if "S" in words and (idle is None or not idle.shuts_down):
@@ -180,35 +158,29 @@ def _rest(board: Board, words: Words, text: str) -> Iterator[float]:
     board.let_go(range(5))
 
 
-def _stop(board: Board, words: Words, text: str) -> Work:
+def _stop(board: Board, words: WordValues, text: str) -> Work:
     board.motion.halt(board.now_s)
     board.note("M410")
     return None
 
 
-MODES = ("G20", "G21", "G90", "G91", "M82", "M83")
 MOVING: dict[str, Command] = {
-    **dict.fromkeys(MODES, _mode),
-    "G0": move,
-    "G1": move,
-    "G2": _arc,
-    "G3": _arc,
+    **dict.fromkeys(MODES, lambda board, words, text: board.motion.modes.set(split_command(text)[0])),
+    **dict.fromkeys(("G0", "G1"), move),
+    **dict.fromkeys(("G2", "G3"), _arc),
     "G4": _dwell,
     "G28": _home,
-    "G43.4": _follow,
-    "G49": _follow,
+    **dict.fromkeys(("G43.4", "G49"), _follow),
     "G92": _rename,
-    "M0": _wait_for_person,
-    "M1": _wait_for_person,
-    "M18": _rest,
-    "M84": _rest,
-    "M201": _bound_accelerations,
-    "M203": _bound_speeds,
-    "M204": _accelerate,
+    **dict.fromkeys(("M0", "M1"), _wait_for_person),
+    **dict.fromkeys(("M18", "M84"), _rest),
+    "M201": lambda board, words, text: board.motion.bound(words, board.motion.accelerations),
+    "M203": lambda board, words, text: board.motion.bound(words, board.motion.speeds),
+    "M204": lambda board, words, text: board.motion.accelerate(words),
     "M205": _corner,
     "M211": _limit,
     "M220": _override_feed,
     "M221": _override_flow,
-    "M400": _drain,
+    "M400": lambda board, words, text: wait_for_moves(board),
     "M410": _stop,
 }

@@ -10,7 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
-DELIVER_S, DELIVER_BLOCKS = 0.1, 3  # the first block of an idle machine waits so long for others (BLOCK_DELAY_FOR_1ST_MOVE)
+from machine.firmware.marlin import FIRST_MOVE_BLOCKS, FIRST_MOVE_DELAY_S
+
 TINY = 1e-9
 
 Place = Sequence[float]
@@ -165,9 +166,9 @@ class Planner:
         elif self._current is None:
             if self._last is not None and corner2(self._last, block, jerk) > 0.0:
                 self.underruns += 1
-            self._gate_s = now_s + DELIVER_S
+            self._gate_s = now_s + FIRST_MOVE_DELAY_S
         waiting.append(block)
-        if len(waiting) >= DELIVER_BLOCKS:
+        if len(waiting) >= FIRST_MOVE_BLOCKS:
             self._gate_s = min(self._gate_s, now_s)
         self._look_back()
 

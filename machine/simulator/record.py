@@ -20,10 +20,10 @@ class Record:
 
     start, end: (n, 6) machine X Y Z mm, tilt turn deg, filament mm (running total); feed (n,) mm/s as programmed;
     begin_s, duration_s (n,) of the virtual clock; first: how many moves before these are not kept; moves, strokes,
-    pushed_mm, moving_s: count of all moves and strokes, filament of the strokes, time of all moves; events (virtual s, what);
-    targets and fan at the end; clamped: coordinates outside the soft limits; unknown: commands not understood; underruns: how
-    often the planner ran dry in mid-motion; slowed: moves slowed down since the host sent too few; lost_bytes: what a full
-    receive ring dropped.
+    pushed_mm, moving_s: count of all moves and strokes, filament of the strokes, time of all moves; events (virtual s, what) and
+    those of them that no program asks for; targets and fan at the end; clamped: coordinates outside the soft limits;
+    unknown: commands not understood; underruns: how often the planner ran dry in mid-motion; slowed: moves slowed down since
+    the host sent too few; lost_bytes: what a full receive ring dropped.
     """
 
     machine: Machine
@@ -38,6 +38,7 @@ class Record:
     pushed_mm: float
     moving_s: float
     events: tuple[tuple[float, str], ...]
+    troubles: tuple[tuple[float, str], ...]
     nozzle_target_c: float
     bed_target_c: float
     fan: float
@@ -87,6 +88,7 @@ def record_of(board: Board, lines: int, lost_bytes: int) -> Record:
         pushed_mm=executed.pushed_mm + float(pushed[strokes].sum()),
         moving_s=executed.moving_s + float(table[len(rows) :, 14].sum()),
         events=tuple(board.events),
+        troubles=tuple(board.troubles),
         nozzle_target_c=board.nozzle.target_c,
         bed_target_c=board.bed.target_c,
         fan=board.fan,

@@ -42,6 +42,7 @@ class SimulatedPrinter:
         self,
         machine: Machine,
         speed: float = inf,
+        *,
         build: BuildOptions | None = None,
         faults: FaultScript | Iterable[Fault] = (),
         link: Path | None = None,

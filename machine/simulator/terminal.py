@@ -159,16 +159,16 @@ class Server:
     def _turn_away(self) -> None:
         """Tell other hosts, as soon as they ask something, that the printer is taken."""
         with suppress(OSError):
-            other, _ = self._server.accept()
-            other.setblocking(False)
-            self._others.append(other)
-        for other in [*self._others]:
+            host, _ = self._server.accept()
+            host.setblocking(False)
+            self._others.append(host)
+        for host in [*self._others]:
             with suppress(OSError):
-                if other.recv(READ_BYTES):
-                    other.sendall(TAKEN)
+                if host.recv(READ_BYTES):
+                    host.sendall(TAKEN)
                     continue
-                self._others.remove(other)
-                other.close()
+                self._others.remove(host)
+                host.close()
         while len(self._others) > MOST_OTHERS:
             self._others.popleft().close()
 

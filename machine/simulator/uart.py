@@ -2,10 +2,10 @@
 
 from math import inf
 
+from machine.firmware.line import BYTE_BITS
 from machine.simulator.cable import Cable
 
 ADAPTER_BYTES = 512  # what a USB adapter keeps (CH340, FTDI: 128 to 512)
-BITS = 10  # of a byte on the line: start, eight, stop
 
 
 class _Wire:
@@ -64,7 +64,7 @@ class Uart:
         if baud <= 0:
             raise ValueError(f"baud is {baud}: it must be above 0")
         self._cable = cable
-        self._byte_s = BITS / baud
+        self._byte_s = BYTE_BITS / baud
         self._in, self._out = _Wire(self._byte_s), _Wire(self._byte_s)
         self._now_s = self._sends_until_s = 0.0
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.program import Alternative, Program
 from machine.reader.parsed import ParsedProgram
 from machine.view import findings, layers, paths, scene
-from machine.view.comparison import Alternative, front_records
 from machine.view.encoding import pack
+from machine.view.front import front_records
 from machine.view.parts import page_colours
-from machine.view.program import Program
 from machine.view.report import parts_report, print_report, with_alternatives
 from machine.view.text import line_patterns
 from mdp.decomposition import Decomposition
@@ -39,6 +39,7 @@ def of_print(
     name: str,
     program: Program,
     profile: Profile,
+    *,
     known: bool = True,
     alternatives: Sequence[Alternative] = (),
     live: bool = False,
@@ -50,21 +51,23 @@ def of_print(
     height = np.zeros(len(ends_s))
     height[shown] = rows["height"].values
     count = len(ends_s)
-    told, text = line_patterns(program.lines, rows)
+    patterns, text = line_patterns(program.lines, rows)
     source = _source(program)
     header = _head(name, source, profile, known) | {
         "live": live,
         "time_s": run.time_s,
         "filament_mm": float(np.max(run.program.filament_mm, initial=0.0)),
         "lines": len(program.lines),
-        "text": told,
+        "text": patterns,
         "types": list(run.program.types),
         "layers_by": by_layer.by,
         "thinned": {"rows": count, "kept": len(shown)} if len(shown) < count else None,
         "parts": _with_colours(_parts(program, profile, by_layer, ends_s, shown)),
         "front": [] if program.decomposition is None else front_records(program.decomposition),
         "findings": findings.finding_records(run, profile.machine, known, shown),
-        "report": print_report(program, profile, by_layer, ends_s, alternatives, known, source != "foreign"),
+        "report": print_report(
+            program, profile, by_layer, ends_s, alternatives=alternatives, known=known, ours=source != "foreign"
+        ),
     }
     table = layers.columns(run.program, by_layer, ends_s, height, shown)
     return pack(header, rows | text | table | scene.surfaces(program.decomposition, profile))

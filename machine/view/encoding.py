@@ -60,7 +60,7 @@ def _press(header: Mapping[str, Any], arrays: Iterable[bytes | memoryview]) -> b
     text = json.dumps(header, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode(errors="replace")
     text += b" " * (-(len(MAGIC) + LENGTH.size + len(text)) % ALIGNED)
     press = zlib.compressobj(LEVEL)
-    pressed = [press.compress(each) for each in (MAGIC + LENGTH.pack(len(text)) + text, *arrays)]
+    pressed = [press.compress(block) for block in (MAGIC + LENGTH.pack(len(text)) + text, *arrays)]
     return b"".join([*pressed, press.flush()])
 
 
@@ -81,8 +81,8 @@ def _delta(column: Column) -> bytes:
     """Every column's zigzag differences, as far as they fit into 32 bits, as four planes of bytes, the lowest first."""
     multiples = whole(column)
     blocks = []
-    for each in multiples.reshape(len(multiples), prod(multiples.shape[1:])).T:
-        steps = np.diff(each, prepend=0)
+    for multiple in multiples.reshape(len(multiples), prod(multiples.shape[1:])).T:
+        steps = np.diff(multiple, prepend=0)
         words = np.minimum((steps << 1) ^ (steps >> 63), MOST).astype("<u4")
         blocks.append(np.ascontiguousarray(words.view(np.uint8).reshape(-1, 4).T).tobytes())
     return b"".join(blocks)

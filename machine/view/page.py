@@ -7,10 +7,9 @@ from hashlib import sha256
 from html import escape
 from importlib import resources
 
-from machine.view.comparison import Alternative
+from machine.program import Alternative, Program
 from machine.view.contents import compared, of_parts, of_print
 from machine.view.encoding import with_header
-from machine.view.program import Program
 from mdp.decomposition import Decomposition
 from profiles.profile import Profile
 
@@ -27,12 +26,13 @@ def print_page(
     name: str,
     program: Program,
     profile: Profile,
+    *,
     known: bool = True,
     alternatives: Sequence[Alternative] = (),
     live: bool = False,
 ) -> bytes:
     """The page of a whole print; arguments as of_print takes them."""
-    return page(name, of_print(name, program, profile, known, alternatives, live), live)
+    return page(name, of_print(name, program, profile, known=known, alternatives=alternatives, live=live), live)
 
 
 def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> bytes:

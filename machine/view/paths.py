@@ -1,20 +1,17 @@
 """Paths: the rows of a dry run as the page's columns, one row a straight move; of a very long program so many that a browser
 stays quick."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun
 from machine.dryrun.strokes import beads_of
-from machine.firmware import dialect_of
 from machine.kinematics.table import workpiece_path
+from machine.reader.levels import fan_shares, temperatures
 from machine.reader.parsed import MoveKind, ParsedProgram
 from machine.view.encoding import Column
 from machine.view.layers import Layers
 from mdp.mesh import Floats
-from profiles.machine import Machine
 from profiles.profile import Profile
 
 WIPE, PRIME = 4, 5  # kinds of the page beside those of MoveKind
@@ -76,9 +73,9 @@ def columns(run: DryRun, profile: Profile, layers: Layers, ends_s: Floats, shown
         "type": Column(program.type, "u16"),
         "width": Column(width, "u16", 0.001),
         "height": Column(height, "u16", 0.001),
-        "fan": Column(_fan(program, profile.machine), "u8", 1 / 255),
-        "nozzle": Column(_following(program, ("M104", "M109")), "u16", 0.1),
-        "bed": Column(_following(program, ("M140", "M190")), "u16", 0.1),
+        "fan": Column(fan_shares(program, profile.machine), "u8", 1 / 255),
+        "nozzle": Column(temperatures(program, "M104", "M109"), "u16", 0.1),
+        "bed": Column(temperatures(program, "M140", "M190"), "u16", 0.1),
     }
     rows = {name: Column(column.values[shown], column.type, column.scale, column.delta) for name, column in table.items()}
     start = np.clip(program.start[shown[jumps]], -REACH, REACH)
@@ -101,27 +98,6 @@ def _bead_sizes(run: DryRun, profile: Profile) -> tuple[Floats, Floats]:
         beads = beads_of(program, segments, rows, profile)
         width[rows], height[rows] = beads.width_mm, beads.height_mm
     return width, height
-
-
-def _following(program: ParsedProgram, codes: tuple[str, ...]) -> Floats:
-    """(n,) the value that the last of the events before each row has set; 0 before the first."""
-    events = [event for event in program.events if event.code in codes]
-    place = np.searchsorted([event.row for event in events], np.arange(len(program.line)), side="right")
-    followed: Floats = np.array([0.0, *(event.value for event in events)])[place]
-    return followed
-
-
-def _fan(program: ParsedProgram, machine: Machine) -> Floats:
-    """(n,) 0..1; M106 without a value means full, and full is 255 also where the firmware knows 0 to 1 as well."""
-    dialect = dialect_of(machine)
-    shares = []
-    for event in program.events:
-        if event.code == "M106":
-            value = event.value if dialect.value_word in event.letters else dialect.fan_full
-            shares.append(replace(event, value=min(1.0, value / (dialect.fan_full if value <= dialect.fan_full else 255))))
-        elif event.code == "M107":
-            shares.append(replace(event, value=0.0))
-    return _following(replace(program, events=tuple(shares)), ("M106", "M107"))
 
 
 def shown_rows(program: ParsedProgram, most: int = MOST_ROWS) -> NDArray[np.int64]:

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun.dryrun import DryRun, summary
+from machine.program import Alternative, Program
+from machine.quantities import duration, filament_g
 from machine.reader.parsed import MoveKind
-from machine.view.comparison import Alternative
 from machine.view.layers import Layers
 from machine.view.parts import risky_before_mm2
 from machine.view.paths import PRIME, WIPE, page_kinds
-from machine.view.program import Program
-from machine.view.quantities import duration, filament_g
 from machine.view.settings import settings_tables
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
@@ -51,6 +50,7 @@ def print_report(
     profile: Profile,
     layers: Layers,
     ends_s: Floats,
+    *,
     alternatives: Sequence[Alternative] = (),
     known: bool = True,
     ours: bool = True,
@@ -99,7 +99,8 @@ def _parts(program: Program, profile: Profile, layers: Layers, ends_s: Floats) -
     for index in parsed.parts or (0,):
         mine = parsed.part == index
         count = int((parsed.part[layers.first] == index).sum())
-        figures = [str(count), duration(float(seconds[mine].sum())), f"{filament_g(parsed.e_mm[mine], profile.material):.1f}"]
+        mass_g = filament_g(float(parsed.e_mm[mine].sum()), profile.material)
+        figures = [str(count), duration(float(seconds[mine].sum())), f"{mass_g:.1f}"]
         stands_on = [f"{interfaces.get(index, 0.0) / 1000:.2f}"] if interfaces else []
         rows.append([*solids.get(index, [str(index) if index else "all"]), *figures, *stands_on])
     head = [*(SOLID if solids else SOLID[:1]), "layers", "time", "g", *([STANDS_ON] if interfaces else [])]
@@ -135,16 +136,10 @@ def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
     spent = [(name, float(run.times_s[rows].sum()), float(program.e_mm[rows].sum())) for name, rows in groups if rows.any()]
     if run.dwell_s > 0:
         spent.append(("waiting", run.dwell_s, 0.0))
-    rows = [
-        [
-            name,
-            duration(s),
-            _share(s, run.time_s),
-            _format_fixed(e_mm / 1000, 2),
-            _format_fixed(filament_g(e_mm, profile.material), 1),
-        ]
-        for name, s, e_mm in spent
-    ]
+    rows = []
+    for name, seconds, e_mm in spent:
+        filament = [_format_fixed(e_mm / 1000, 2), _format_fixed(filament_g(e_mm, profile.material), 1)]
+        rows.append([name, duration(seconds), _share(seconds, run.time_s), *filament])
     notes = ["heating and homing are not counted", *([f"times as on {guess}"] if guess else [])]
     return _table("Time and material", ["kind", "time", "share", "m", "g"], rows, notes)
 
@@ -169,25 +164,30 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
 def _alternatives(alternatives: Sequence[Alternative]) -> Table:
     """This print beside the model in one part, a row for each cost: a row for each way would be broader than a phone."""
     columns = []
-    for each in alternatives:
+    for way in alternatives:
         costs = ["-"] * 7
-        if each.time_s is not None:
-            filament_mm, mass_g, support_mm3 = each.filament_mm or 0.0, each.filament_g or 0.0, each.support_mm3 or 0.0
-            volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(each.interface_mm3.values()) / 1000:.2f}"]
-            scars = [f"{each.seam_mm:.0f}", str(each.findings)]
-            costs = [duration(each.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
-        columns.append([*costs, f"{max(each.risky_mm2, 0.0):.1f}"])
-    notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
+        if way.time_s is not None:
+            filament_mm, mass_g, support_mm3 = (
+                way.filament_mm or 0.0,
+                way.filament_g or 0.0,
+                way.support_mm3 or 0.0,
+            )
+            volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(way.interface_mm3.values()) / 1000:.2f}"]
+            scars = [f"{way.seam_mm:.0f}", str(way.findings)]
+            costs = [duration(way.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
+        columns.append([*costs, f"{max(way.risky_mm2, 0.0):.1f}"])
+    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
     rows = [[cost, *values] for cost, *values in zip(COSTS, *columns, strict=True)]
-    return _table(COMPARED, ["", *(each.name for each in alternatives)], rows, notes)
+    return _table(COMPARED, ["", *(way.name for way in alternatives)], rows, notes)
 
 
 def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
     values = summary(run)
     count = str(len(layers.first)) if layers.by == "comments" else f"{len(layers.first)}, by their heights"
+    mass_g = filament_g(float(run.program.e_mm.sum()), profile.material)
     return [
         ["time", duration(values["time_s"])],
-        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {filament_g(run.program.e_mm, profile.material):.1f} g"],
+        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {mass_g:.1f} g"],
         *([["parts", str(values["parts"])]] if values["parts"] else []),
         ["layers", count],
         *[[key, str(values[key])] for key in ("reorientations", "retractions")],

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from machine.dryrun.dryrun import dry_run
+from machine.program import Program
 from machine.view import text as text_of_page
 from machine.view.contents import of_print
 from machine.view.page import print_page
-from machine.view.program import Program
 from mdp.save import stl
 from profiles.profile import load
 from tests.machine import hand

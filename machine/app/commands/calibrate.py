@@ -7,7 +7,7 @@ from machine.app.output import check_writable, write_bytes, write_lines
 from machine.app.requests import CalibrationRequest
 from machine.app.terminal.plain import show
 from machine.calibration.fit import Calibration, calibrate
-from machine.calibration.program import calibration_lines, course
+from machine.calibration.program import calibration_lines, plan_touches
 from machine.calibration.saved import found_tables, own_profile
 from machine.calibration.sheet import Sheet, read_sheet, sheet_text
 from profiles.errors import OutputError, ProfileError
@@ -26,7 +26,7 @@ def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> i
         check_writable(file)
         _refuse_to_overwrite(file, request.replace)
     height = _mark_height_mm(request)
-    touches = course(profile.machine, height, request.mark_radius_mm)
+    touches = plan_touches(profile.machine, height, request.mark_radius_mm)
     write_lines(out, calibration_lines(profile, touches))
     write_bytes(sheet, sheet_text(request.machine, profile.machine, touches).encode())
     radius = touches.mark_mm[0]

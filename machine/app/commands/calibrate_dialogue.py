@@ -10,7 +10,7 @@ import numpy as np
 
 from machine.app.terminal.plain import plain_line
 from machine.calibration.fit import SIGNS, Touch
-from machine.calibration.program import Course, course
+from machine.calibration.program import TouchPlan, plan_touches
 from machine.calibration.sheet import Sheet
 from machine.kinematics.table import machine_points
 from mdp.pose import Pose
@@ -138,7 +138,7 @@ def _questions(machine: Machine, answers: Sequence[Answer], radius_mm: float | N
         if not LOWEST_MM <= height <= HIGHEST_MM:
             return f"a mark {height:g} mm high cannot be used: {LOWEST_MM:g} to {HIGHEST_MM:g} mm are"
         try:
-            course(machine, height, radius_mm)
+            plan_touches(machine, height, radius_mm)
         except MoveError as error:
             return str(error)
         return ""
@@ -149,13 +149,13 @@ def _questions(machine: Machine, answers: Sequence[Answer], radius_mm: float | N
     ]
     if not answers or answers[0] is None or too_low(answers[0]):
         return questions
-    touches = course(machine, answers[0], radius_mm)
+    touches = plan_touches(machine, answers[0], radius_mm)
     return questions + [
         _coordinate(machine, touches, place, axis, answers) for place in range(len(touches.poses)) for axis in range(3)
     ]
 
 
-def _coordinate(machine: Machine, touches: Course, place: int, axis: int, answers: Sequence[Answer]) -> Question:
+def _coordinate(machine: Machine, touches: TouchPlan, place: int, axis: int, answers: Sequence[Answer]) -> Question:
     pose = touches.poses[place]
     near = _expected(machine, touches, place)[:, axis]
     least, most = (machine.x, machine.y, machine.z)[axis].limits_mm
@@ -176,7 +176,7 @@ def _coordinate(machine: Machine, touches: Course, place: int, axis: int, answer
     return Question(f"{head}{AXES[axis]} mm (near {_in_words(near)})", None, impossible, doubtful)
 
 
-def _expected(machine: Machine, touches: Course, place: int) -> np.ndarray:
+def _expected(machine: Machine, touches: TouchPlan, place: int) -> np.ndarray:
     """(4, 3) X Y Z of a touch by the profile, whichever way the axes go where their signs are uncalibrated."""
     pose, mark = touches.poses[place], np.array([touches.mark_mm])
     points = []
@@ -198,7 +198,7 @@ def _is_level(machine: Machine, pose: Pose) -> bool:
 def _sheet(name: str, machine: Machine, answers: Sequence[Answer], radius_mm: float | None) -> tuple[Sheet, list[int]]:
     """The sheet, and which of the touches asked for each of its touches is (from 0)."""
     height, angle, *coordinates = answers
-    poses = course(machine, height or 0.0, radius_mm).poses
+    poses = plan_touches(machine, height or 0.0, radius_mm).poses
     complete = [
         (k, tuple(coordinates[3 * k : 3 * k + 3])) for k in range(len(poses)) if None not in coordinates[3 * k : 3 * k + 3]
     ]

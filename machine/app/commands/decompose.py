@@ -47,8 +47,8 @@ def decompose(request: ModelRequest) -> int:
     if outputs.json is not None:
         write_json(outputs.json, figures)
     if outputs.json != STDOUT:
-        made = parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
-        show(made + part_settings_lines(profile) + advice(decomposition, decomposed.better, profile))
+        tables = parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
+        show(tables + part_settings_lines(profile) + advice(decomposition, decomposed.better, profile))
     return 0
 
 

@@ -69,8 +69,8 @@ def _of_plan(file: Path, plan: PlanFile) -> Opened:
     """The model that a plan names: one that ships, or the file of that name beside the plan."""
     path = locate(plan.model) if plan.model.startswith(DEMO) else file.parent / Path(plan.model).name
     if not plan.model or not path.is_file():
-        told = f"its model {plan.model} is not beside it" if plan.model else "it names no model"
-        raise PlanError(f"plan {file}: {told}: open the model first, then choose the plan in the page")
+        reason = f"its model {plan.model} is not beside it" if plan.model else "it names no model"
+        raise PlanError(f"plan {file}: {reason}: open the model first, then choose the plan in the page")
     return Opened(path, plan.model, plan)
 
 

@@ -1,8 +1,10 @@
-"""The export command: a model's G-code, dry-run first."""
+"""The export command: a model's G-code, dry-run first, and one layer's picture."""
+
+import re
+from collections.abc import Sequence
 
 from machine.app.file_roles import check_model_files
 from machine.app.output import check_outputs, write_bytes, write_json, write_lines
-from machine.app.pictures.layer import draw_layer, parse_layer
 from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
 from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.pipeline.programs import refuse_errors
@@ -13,6 +15,8 @@ from machine.app.terminal.report import print_table
 from machine.dryrun.dryrun import summary
 from machine.view.page import print_page
 from profiles.errors import OutputError
+from slicer.drawing import layer_svg
+from slicer.paths import SlicedPart
 
 
 def export(request: ModelRequest) -> int:
@@ -47,3 +51,26 @@ def export(request: ModelRequest) -> int:
     elif outputs.json != STDOUT:
         show(table)
     return 0
+
+
+def parse_layer(layer: str | None, has_file: bool) -> tuple[int, int]:
+    """Part and layer, both counted from 1, of a --layer option; the first layer of all when it is absent.
+
+    Raises OutputError for a text that is not PART:LAYER, and when there is no picture to draw it in.
+    """
+    if layer is None:
+        return 1, 1
+    if not has_file:
+        raise OutputError(f"--layer {layer} says which layer to draw: --svg FILE must say where to")
+    match = re.fullmatch(r"(\d{1,9}):(\d{1,9})", layer)
+    if match is None:
+        raise OutputError(f"--layer {layer}: PART:LAYER is expected, both counted from 1, such as 2:15")
+    return int(match[1]), int(match[2])
+
+
+def draw_layer(sliced: Sequence[SlicedPart], part: int, layer: int) -> bytes:
+    """The SVG file of a layer; raises OutputError or SliceError when there is no such part or layer."""
+    for piece in sliced:
+        if piece.index == part:
+            return layer_svg(piece, layer).encode()
+    raise OutputError(f"--layer {part}:{layer}: there is no part {part}, the parts are 1 to {max(p.index for p in sliced)}")

@@ -6,7 +6,7 @@ from threading import Event
 from machine.app.printer.port_reports import LONGEST_S, PortReport, ask_ports, describe, known_ports, port_json
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
-from machine.link.port import check_baud
+from machine.firmware.line import check_baud
 
 
 def ports(baud: int, as_json: bool, ask: bool) -> int:
@@ -21,6 +21,6 @@ def ports(baud: int, as_json: bool, ask: bool) -> int:
     elif ask:
         say(f"asking {len(devices)} {'ports' if len(devices) > 1 else 'port'}: this takes up to {LONGEST_S:.0f} s")
     reports = ask_ports(devices, baud, Event()) if ask else [PortReport(device) for device in devices]
-    text = json.dumps([port_json(each) for each in reports], indent=2) + "\n"
-    show(text if as_json else "".join(describe(each) for each in reports))
+    text = json.dumps([port_json(report) for report in reports], indent=2) + "\n"
+    show(text if as_json else "".join(describe(report) for report in reports))
     return 0

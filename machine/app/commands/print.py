@@ -1,20 +1,19 @@
 """The print command: a model or a G-code file on a printer at a port, or on the simulated one."""
 
-from pathlib import Path
+from dataclasses import replace
 
 from machine.app.commands.send import print_on_server
 from machine.app.file_roles import check_model_files, printing_files, program_beside
 from machine.app.output import check_writable
 from machine.app.pipeline.programs import load_program
-from machine.app.printer.compatibility import check_machine, check_port
+from machine.app.printer.compatibility import check_machine, check_port, ready_program
 from machine.app.printer.journal_folder import check_new_journal
-from machine.app.printer.ready import ready_program
-from machine.app.printer.stream import PrintJob, print_program
+from machine.app.printer.stream import print_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.report import print_table
-from machine.dryrun.starvation import check_baud
+from machine.firmware.line import check_baud
 from machine.network.address import is_server_address
 
 
@@ -33,13 +32,12 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     if not request.is_gcode:
         check_machine(answer, request.profile.machine, request.force)
     loaded = load_program(request)
-    profile = loaded.profile
     if request.is_gcode:
-        check_machine(answer, profile.machine, request.force)
-    program = ready_program(answer, loaded.program, profile, request.name, printing, request.force)
-    show(print_table(program, profile))
-    job = PrintJob(request.name, program, profile, Path(request.model) if request.is_gcode else None)
-    with serve_watch_page(job.name, program, profile, printing.watch_port) as watchers:
-        code = print_program(job, printing, watchers.follow)
-        watchers.end("stopped" if code else "done")
+        check_machine(answer, loaded.profile.machine, request.force)
+    program = ready_program(answer, loaded.program, loaded.profile, loaded.name, printing, request.force)
+    show(print_table(program, loaded.profile))
+    job = replace(loaded, program=program)
+    with serve_watch_page(job, printing.watch_port) as watched:
+        code = print_program(job, printing, watched.follow)
+        watched.end("stopped" if code else "done")
     return code

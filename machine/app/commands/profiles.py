@@ -33,7 +33,7 @@ def show(name: str, as_json: bool, settings: Sequence[str]) -> int:
         return 0
     for section, model in sections.items():
         for key, value, meaning in rows(section, model):
-            comment = "; ".join(each for each in (meaning, _origin(model, key)) if each)
+            comment = "; ".join(phrase for phrase in (meaning, _origin(model, key)) if phrase)
             sys.stdout.write(plain_lines(f"{key} = {json.dumps(value)}" + (f"  # {comment}" if comment else "")) + "\n")
     return 0
 

@@ -19,9 +19,9 @@ def list_resumable() -> int:
     journals = resumable_journals()
     if not journals:
         say("no print of this computer was cut off or cancelled")
-    for each in journals:
-        what = plain_line(f"{each.name} on {each.machine}, up to line {each.line}")
-        show(f"{plain_line(str(each.path))}\n    {what}, {datetime.fromtimestamp(each.written_s):%Y-%m-%d %H:%M}\n")
+    for journal in journals:
+        what = plain_line(f"{journal.name} on {journal.machine}, up to line {journal.line}")
+        show(f"{plain_line(str(journal.path))}\n    {what}, {datetime.fromtimestamp(journal.written_s):%Y-%m-%d %H:%M}\n")
     return 0
 
 

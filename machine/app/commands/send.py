@@ -11,7 +11,6 @@ from machine.app.printer.attendance import AtServerTerminal, Observers
 from machine.app.printer.network_print import hand_over, print_there, server_session
 from machine.app.printer.serial_log import SerialLog
 from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
-from machine.app.printer.stream import PrintJob
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import ModelRequest, PrintRequest, SendRequest
 from machine.app.terminal.plain import show
@@ -59,11 +58,10 @@ def print_on_server(request: ModelRequest, printing: PrintRequest) -> int:
             f"--journal {printing.journal}: {printing.port} prints from a file of its own, which needs no journal here"
         )
     with _session(request, printing.port, printing.log, "print") as (server, log):
-        loaded = _checked(request, server, printing.port, True)
-        job = PrintJob(request.name, loaded.program, loaded.profile)
-        with serve_watch_page(job.name, job.program, job.profile, printing.watch_port) as watchers:
-            end = print_there(server, job, Observers(log, None, watchers.follow), AtServerTerminal(server.name))
-            watchers.end("done" if end is End.DONE else "stopped")
+        job = _checked(request, server, printing.port, True)
+        with serve_watch_page(job, printing.watch_port) as watched:
+            end = print_there(server, job, Observers(log, None, watched.follow), AtServerTerminal(server.name))
+            watched.end("done" if end is End.DONE else "stopped")
     return 0 if end is End.DONE else 130
 
 

@@ -11,7 +11,8 @@ from machine.app.terminal.plain import show
 from machine.app.terminal.report import agreement_line, print_table
 from machine.dryrun.conformity.agreement import agreement
 from machine.dryrun.dryrun import summary
-from machine.dryrun.starvation import check_baud, find_starvation
+from machine.dryrun.starvation import find_starvation
+from machine.firmware.line import check_baud
 from machine.view.page import print_page
 from mdp.read import check_file, locate, read_mesh
 from profiles.errors import ProfileError
@@ -43,7 +44,7 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
     if baud is not None:
         program = replace(program, run=find_starvation(program.run, program.lines, profile.machine, baud))
     if outputs.html is not None:
-        write_bytes(outputs.html, print_page(request.name, program, profile, loaded.machine_known))
+        write_bytes(outputs.html, print_page(request.name, program, profile, known=loaded.machine_known))
     if outputs.json is not None:
         write_json(outputs.json, summary(program.run) | ({} if agreed is None else {"model": asdict(agreed)}))
     if outputs.json != STDOUT:

@@ -10,12 +10,12 @@ from machine.app.terminal.interrupts import stopping
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.firmware import dialect_of, dialects
-from machine.link.port import BAUDS
+from machine.firmware.line import check_baud
+from machine.quantities import duration
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.faults import FaultScript, read_script
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
-from machine.view.quantities import duration
 from profiles.errors import PrinterError
 
 KEPT = 10000  # moves on record; of the others only the sums are reported
@@ -30,9 +30,12 @@ def simulate_printer(request: SimulatorRequest) -> int:
     machine, baud = request.profile.machine, request.baud
     build = read_build_options(request.habits, build_options(machine, baud))
     stop = threading.Event()
+    simulated = SimulatedPrinter(
+        machine, request.speed or inf, build=build, faults=script, link=request.link, tcp=request.tcp, baud=baud, kept=KEPT
+    )
     with (
         stopping(stop),
-        SimulatedPrinter(machine, request.speed or inf, build, script, request.link, request.tcp, baud, KEPT) as printer,
+        simulated as printer,
         announced(f"simulated printer ({machine.name}, {dialect_of(machine).firmware})", printer.path) as announce,
     ):
         show(f"{printer.path}\n")
@@ -55,8 +58,8 @@ def _check(request: SimulatorRequest) -> None:
         raise PrinterError(f"{machine.name} speaks {machine.dialect}, which takes no lines: {streamed} are simulated")
     if not (isfinite(speed) and speed >= 0):
         raise PrinterError(f"--speed is {speed:g}: it must be 0 (as fast as possible) or a number above")
-    if baud is not None and not BAUDS[0] <= baud <= BAUDS[1]:
-        raise PrinterError(f"--baud is {baud}: {BAUDS[0]} to {BAUDS[1]} is allowed")
+    if baud is not None:
+        check_baud(baud)
     if tcp is not None and not 0 <= tcp <= 65535:
         raise PrinterError(f"--tcp is {tcp}: 0 (a free port) to 65535 is allowed")
     if request.link is not None and tcp is not None:
@@ -92,8 +95,6 @@ def summary(record: Record) -> str:
     ]
     if record.lost_bytes:
         lines.append(f"{record.lost_bytes} bytes lost by a full receive ring")
-    lines += [
-        f"at {seconds:.1f} s: {event}" for seconds, event in record.events if "driven against" in event or "system" in event
-    ]
+    lines += [f"at {seconds:.1f} s: {trouble}" for seconds, trouble in record.troubles]
     heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} deg C"
     return "".join(f"{line}\n" for line in [*lines, heaters])

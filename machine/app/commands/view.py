@@ -10,10 +10,10 @@ from machine.app.pipeline.programs import load_program
 from machine.app.requests import ModelRequest
 from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import say
+from machine.program import Program
 from machine.view.findings import relevant_findings
 from machine.view.page import DATA, print_page
 from machine.view.paths import MOST_ROWS
-from machine.view.program import Program
 from profiles.errors import GcodeError, OutputError, ProfileError
 
 
@@ -31,7 +31,7 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
     if not known:
         say(f"{request.name} does not tell its machine: shown for {profile.machine.name}, --machine names another")
     alternatives = compare_with_one_part(program, profile) if request.compare else ()
-    content = print_page(request.name, program, profile, known, alternatives)
+    content = print_page(request.name, program, profile, known=known, alternatives=alternatives)
     write_bytes(path, content)
     show(plain_line(f"{path}: {len(content) / 1e6:.1f} MB, {_in_words(program, known)}") + "\n")
     if open_browser and not webbrowser.open(path.resolve().as_uri()):

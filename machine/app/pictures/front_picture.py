@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from machine.app.pictures.lettering import write_text
-from machine.app.pictures.picture import FLOOR, add_title, best_view, floor_of, tile
+from machine.app.pictures.picture import FLOOR, add_title, best_view, floor_of, tile, write_text
 from machine.app.pictures.raster import Image, View, draw
+from machine.quantities import minutes
 from machine.view.parts import part_colours
-from machine.view.quantities import minutes
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
@@ -31,13 +30,14 @@ def _frame(row: FrontRow, model: Mesh, profile: Profile, view: View, pixels: int
     parts, reds = _cut(row, model, profile)
     span = 1.25 * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     colours = [FLOOR, *part_colours(len(parts))]
-    frame = draw([floor_of(model), *parts], colours, [None, *reds], view, (pixels, pixels), span)
+    frame = draw([floor_of(model), *parts], colours, reds=[None, *reds], view=view, size=(pixels, pixels), span_mm=span)
     left, height = pixels / 32, pixels / 24
-    frame = write_text(frame, "one piece" if row.parts == 1 else f"{row.parts} parts", left, pixels / 12, pixels / 16, 90)
+    frame = write_text(frame, "one piece" if row.parts == 1 else f"{row.parts} parts", (left, pixels / 12), pixels / 16, 90)
     figures = f"{max(row.support_area_mm2, 0.0):.0f} mm2 on support, {row.seam_mm:.0f} mm of seams"
-    frame = write_text(frame, figures, left, 0.93 * pixels, height, 110)
+    frame = write_text(frame, figures, (left, 0.93 * pixels), height, 110)
     if row.time_s is not None and row.filament_mm is not None:
-        frame = write_text(frame, f"{minutes(row.time_s)}, {row.filament_mm / 1000:.1f} m", left, 0.98 * pixels, height, 110)
+        takes = f"{minutes(row.time_s)}, {row.filament_mm / 1000:.1f} m"
+        frame = write_text(frame, takes, (left, 0.98 * pixels), height, 110)
     return _with_border(frame, max(2, pixels // 120)) if row.chosen else frame
 
 

@@ -4,8 +4,9 @@ from math import ceil, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image as Pillow
+from PIL import ImageDraw, ImageFont
 
-from machine.app.pictures.lettering import write_text
 from machine.app.pictures.raster import Image, View, draw, seen_from
 from machine.view.parts import part_colours, residual_faces
 from mdp.cost.model_need import needing_upright
@@ -31,11 +32,11 @@ def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[in
     model, parts = decomposition.mesh, decomposition.parts
     risky = needing_upright(model, profile)
     floor, view, half = floor_of(model), best_view(model, risky), (size[0] // 2, size[1])
-    plain = draw([floor, model], [FLOOR, PLAIN], [None, risky], view, half)
+    plain = draw([floor, model], [FLOOR, PLAIN], reds=[None, risky], view=view, size=half)
     gap = SPREAD * min(1.0, 5.0 / len(parts)) * float(np.linalg.norm(model.bounds_mm[1] - model.bounds_mm[0]))
     apart = [part.mesh.transform(np.eye(3), shift) for part, shift in zip(parts, _shifts(parts, gap), strict=True)]
     reds = [residual_faces(part, profile) for part in parts]
-    exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], [None, *reds], view, half)
+    exploded = draw([floor, *apart], [FLOOR, *part_colours(len(parts))], reds=[None, *reds], view=view, size=half)
     return np.concatenate([plain, exploded], axis=1)
 
 
@@ -43,7 +44,7 @@ def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[i
     """The parts in colour where they belong. Returns (h, w, 3), uint8; size is width and height in pixels."""
     risky = needing_upright(decomposition.mesh, profile)
     parts = [part.mesh for part in decomposition.parts]
-    return draw(parts, list(part_colours(len(parts))), None, best_view(decomposition.mesh, risky), size)
+    return draw(parts, list(part_colours(len(parts))), view=best_view(decomposition.mesh, risky), size=size)
 
 
 def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: int = 480) -> Image:
@@ -60,7 +61,7 @@ def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: 
         printed = [earlier.mesh.transform(part.rotation) for earlier in parts[: part.index]]
         meshes = [floor.transform(part.rotation), *printed, nozzle.transform(np.eye(3), _last_point(printed[-1]))]
         paints = [FLOOR, *([PRINTED] * (part.index - 1)), colour, NOZZLE]
-        frame = draw(meshes, paints, None, view, (frame_pixels, frame_pixels), span)
+        frame = draw(meshes, paints, view=view, size=(frame_pixels, frame_pixels), span_mm=span)
         frames.append(_label(frame, part, machine))
     return add_title(tile(frames), decomposition.name, frame_pixels)
 
@@ -141,17 +142,27 @@ def add_title(sheet: Image, name: str, frame_pixels: int) -> Image:
     """The sheet below a line with the model's name."""
     height = frame_pixels // 12
     title = np.full((height, *sheet.shape[1:]), 255, dtype=np.uint8)
-    written = write_text(title, name, frame_pixels / 32, 0.8 * height, 0.7 * height, 90)
+    written = write_text(title, name, (frame_pixels / 32, 0.8 * height), 0.7 * height, 90)
     return np.concatenate([written, sheet], axis=0)
+
+
+def write_text(image: Image, text: str, at: tuple[float, float], height: float, grey: int) -> Image:
+    """The image (h, w, 3) with a line of text, in the font that Pillow brings along, so that it is the same on every machine.
+
+    at: where its baseline begins, height: of the font, all in pixels.
+    """
+    picture = Pillow.fromarray(image)
+    ImageDraw.Draw(picture).text(at, text, (grey, grey, grey), ImageFont.load_default(height), anchor="ls")
+    return np.asarray(picture)
 
 
 def _label(frame: Image, part: Part, machine: Machine) -> Image:
     """The frame with the part's number in its upper left corner, and where the table stands in the lower left one."""
     pixels, pose = len(frame), part.pose
     left = pixels / 32
-    labelled = write_text(frame, str(part.index), left, pixels / 10, pixels / 12, 90)
+    labelled = write_text(frame, str(part.index), (left, pixels / 10), pixels / 12, 90)
     axes = (("tilt", machine.tilt.letter, pose.tilt_deg), ("turn", machine.turn.letter, pose.turn_deg)) if machine.tilts else ()
     for row, (word, letter, value) in enumerate(axes):
         text = f"{word} {letter} {round(value, 1) + 0.0:.1f}°"
-        labelled = write_text(labelled, text, left, pixels * (0.93 + 0.04 * row), pixels / 28, 120)
+        labelled = write_text(labelled, text, (left, pixels * (0.93 + 0.04 * row)), pixels / 28, 120)
     return labelled

@@ -47,6 +47,7 @@ def seen_from(azimuth_deg: float, elevation_deg: float) -> View:
 def draw(
     meshes: Sequence[Mesh],
     colours: Any,
+    *,
     reds: Sequence[NDArray[np.bool_] | None] | None = None,
     view: View | None = None,
     size: Size = (800, 800),

@@ -8,9 +8,8 @@ import numpy as np
 from machine.app.pipeline.pipeline import build
 from machine.app.terminal.progress import Report, say
 from machine.app.terminal.report import table
-from machine.view.comparison import Alternative
-from machine.view.program import Program
-from machine.view.quantities import duration, filament_g
+from machine.program import Alternative, Program
+from machine.quantities import duration, filament_g
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh
@@ -121,28 +120,33 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
     return [
         {
             "name": name,
-            "orientation": each.orientation,
-            "parts": each.parts,
-            "time_s": each.time_s,
-            "filament_mm": each.filament_mm,
-            "support_mm3": each.support_mm3,
-            "support_area_mm2": each.risky_mm2,
-            "unsupported_area_mm2": each.unsupported_mm2,
-            "seam_mm": each.seam_mm,
-            "findings": each.findings,
-            "interfaces": [{"part": part, "plastic_mm3": mm3} for part, mm3 in each.interface_mm3.items()],
-            "message": each.message,
+            "orientation": alternative.orientation,
+            "parts": alternative.parts,
+            "time_s": alternative.time_s,
+            "filament_mm": alternative.filament_mm,
+            "support_mm3": alternative.support_mm3,
+            "support_area_mm2": alternative.risky_mm2,
+            "unsupported_area_mm2": alternative.unsupported_mm2,
+            "seam_mm": alternative.seam_mm,
+            "findings": alternative.findings,
+            "interfaces": [{"part": part, "plastic_mm3": mm3} for part, mm3 in alternative.interface_mm3.items()],
+            "message": alternative.message,
         }
-        for name, each in zip(NAMES, alternatives, strict=True)
+        for name, alternative in zip(NAMES, alternatives, strict=True)
     ]
 
 
 def compare_table(alternatives: tuple[Alternative, ...]) -> str:
     """The alternatives for a person."""
     rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
-    rows += [[each.name, *_costs(each), f"{each.risky_mm2:.1f} mm2"] for each in alternatives]
+    rows += [[alternative.name, *_costs(alternative), f"{alternative.risky_mm2:.1f} mm2"] for alternative in alternatives]
     head, *lines = table(rows).splitlines()
-    notes = [f"{each.name}: {note}" for each in alternatives for note in (each.orientation, each.message) if note]
+    notes = [
+        f"{alternative.name}: {note}"
+        for alternative in alternatives
+        for note in (alternative.orientation, alternative.message)
+        if note
+    ]
     return "\n".join(["", head, *lines, *notes]) + "\n"
 
 

@@ -37,10 +37,10 @@ def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
 
 def check_parts_named(profile: Profile, parts: int) -> None:
     """Raise ProfileError for settings of parts that are not there."""
-    for each in profile.parts:
-        if each.part > parts:
+    for settings in profile.parts:
+        if settings.part > parts:
             there = "1 alone" if parts == 1 else f"1 to {parts}"
-            raise ProfileError(f"part {each.part} is not there to have {each.in_words}: the parts are {there}")
+            raise ProfileError(f"part {settings.part} is not there to have {settings.in_words}: the parts are {there}")
 
 
 def refuse_cuts(request: ModelRequest) -> None:
@@ -52,5 +52,5 @@ def refuse_cuts(request: ModelRequest) -> None:
         raise PlanError(f"--copies {request.copies}: {request.model} is G-code, which is sliced already; it goes with a model")
     for stop in request.stops:
         raise PlanError(f"{stop.option}: {request.model} is G-code, which says itself where it stops; it goes with a model")
-    for each in request.profile.parts:
-        raise PlanError(f"--part {each.part}: {request.model} is G-code, which is sliced already; it goes with a model")
+    for settings in request.profile.parts:
+        raise PlanError(f"--part {settings.part}: {request.model} is G-code, which is sliced already; it goes with a model")

@@ -8,13 +8,13 @@ from time import perf_counter
 import numpy as np
 
 from machine.app.output import write_bytes
-from machine.app.pictures.thumbnail import with_thumbnails
+from machine.app.pictures.png import with_thumbnails
 from machine.app.pipeline import compilers
 from machine.app.pipeline.copies import check_copies, in_copies
 from machine.app.pipeline.given_plan import check_parts_named, read_given_plan, with_plan_settings
-from machine.app.pipeline.lying import better_in_words, laid_in_words
 from machine.app.pipeline.pricing import pricing
 from machine.app.requests import ModelRequest
+from machine.app.terminal.advice import better_in_words, laid_in_words
 from machine.app.terminal.progress import Report, reporting, say
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.firmware import dialect_of
@@ -25,7 +25,7 @@ from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
 from machine.planning.purge import has_purge
 from machine.planning.stops import Stop
-from machine.view.program import Program
+from machine.program import Program
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
@@ -135,7 +135,7 @@ class _Search:
 
     def record_of(self, decomposition: Decomposition) -> bytes:
         """What was recorded of the search that ended with a decomposition."""
-        return next(record[0] for found, record in self._records if found is decomposition)
+        return next(record[0] for searched, record in self._records if searched is decomposition)
 
     def _show(self, progress: Progress) -> None:
         if progress.stage == 0:
@@ -148,6 +148,7 @@ class _Search:
 def build(
     decomposition: Decomposition,
     profile: Profile,
+    *,
     pictures: bool = False,
     stops: Sequence[Stop] = (),
     report: Report | None = None,
@@ -163,24 +164,24 @@ def build(
     check_blocks(profile)
     check_parts(parts, profile)
     compilers.wait_for(compilers.PROGRAM, report)
-    with reporting() if report is None else nullcontext(report) as told:
+    with reporting() if report is None else nullcontext(report) as tell:
 
         def show(slicing: SlicingProgress) -> None:
             if on_slices is not None:
                 on_slices(slicing)
             begun, share = max(slicing.begun, 1), slicing.share
-            told(f"slicing part {begun} of {len(parts)}: {int(100 * share)} % of all layers", share)
+            tell(f"slicing part {begun} of {len(parts)}: {int(100 * share)} % of all layers", share)
 
         sliced = slice_parts(parts, profile, show)
-        told("planning moves")
+        tell("planning moves")
         program = plan(decomposition, sliced, profile, stops)
         for note in (*_too_thin(sliced, profile), *_left_out(program, profile)):
             say(f"{decomposition.name}: {note}")
         lines = tuple(write_gcode(program, profile))
         if pictures and profile.machine.thumbnails_px:
-            compilers.wait_for(compilers.PICTURES, told)
+            compilers.wait_for(compilers.PICTURES, tell)
             lines = with_thumbnails(lines, decomposition, profile)
-        told("dry run")
+        tell("dry run")
         run = dry_run(lines, profile)
     return Program(lines, run, _with_own_figures(decomposition, run), sliced)
 
@@ -190,8 +191,8 @@ def _with_own_figures(decomposition: Decomposition, run: DryRun) -> Decompositio
     chosen = decomposition.chosen
     if chosen is None or chosen.time_s is not None or chosen.parts != len(decomposition.parts):
         return decomposition
-    row = replace(chosen, time_s=run.time_s, filament_mm=float(np.max(run.program.filament_mm, initial=0.0)))
-    return replace(decomposition, front=tuple(row if each is chosen else each for each in decomposition.front))
+    printed = replace(chosen, time_s=run.time_s, filament_mm=float(np.max(run.program.filament_mm, initial=0.0)))
+    return replace(decomposition, front=tuple(printed if row is chosen else row for row in decomposition.front))
 
 
 def _too_thin(sliced: Sequence[SlicedPart], profile: Profile) -> Iterator[str]:

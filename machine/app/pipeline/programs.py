@@ -12,20 +12,24 @@ from machine.app.requests import FORCE_GOES_ON, ModelRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import dry_run
 from machine.dryrun.findings import Finding
-from machine.view.program import Program
+from machine.program import Program
+from machine.reader.gcode_file import GcodeFile
 from profiles.errors import GcodeError, MoveError
 from profiles.profile import Profile
 
 
 @dataclass(frozen=True, eq=False)
 class LoadedProgram:
-    """A program and the profile it was tried with, which a G-code file may hold itself.
+    """A program and the profile it was tried with, which a G-code file may hold itself. name: of what it prints.
 
-    machine_known: the machine is told by the file or by the user, not guessed.
+    source: the G-code file that holds it; None: it is kept beside the journal. machine_known: the machine is told by the file
+    or by the user, not guessed.
     """
 
+    name: str
     program: Program
     profile: Profile
+    source: Path | None = None
     machine_known: bool = True
 
 
@@ -33,26 +37,22 @@ def load_program(request: ModelRequest) -> LoadedProgram:
     """The program of a model or of a G-code file. Raises GcodeError for a file that cannot be read."""
     if not request.is_gcode:
         decomposed = decompose_model(request, to_build=True)
-        return LoadedProgram(build(decomposed.decomposition, decomposed.profile, stops=request.stops), decomposed.profile)
+        program = build(decomposed.decomposition, decomposed.profile, stops=request.stops)
+        return LoadedProgram(request.name, program, decomposed.profile)
     refuse_cuts(request)
-    lines = read_gcode_lines(Path(request.model))
+    source = Path(request.model)
+    lines = read_gcode_lines(source)
     profile, sections = read_embedded_profile(lines, request.profile, request.chosen_sections)
     if sections:
         say(f"{request.name}: {in_words(sections, profile)}, as the file itself tells")
     compilers.wait_for(compilers.DRY_RUN)
     known = "machine" in request.chosen_sections or profile.machine is not request.profile.machine
-    return LoadedProgram(Program(lines, dry_run(lines, profile), None), profile, known)
+    return LoadedProgram(request.name, Program(lines, dry_run(lines, profile), None), profile, source, known)
 
 
 def read_gcode_lines(path: Path) -> tuple[str, ...]:
     """The lines of a G-code file. Raises GcodeError when it cannot be read, is no text or is empty."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise GcodeError(f"G-code file {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
-    except UnicodeDecodeError as error:
-        raise GcodeError(f"G-code file {path} is not text: byte {error.start} is {error.object[error.start]:#04x}") from None
-    lines = tuple(text.removesuffix("\n").split("\n"))  # as GcodeFile counts them, which a resume reads
+    lines = tuple(GcodeFile(path))
     if not any(line.strip() for line in lines):
         raise GcodeError(f"G-code file {path} is empty")
     return lines

@@ -10,9 +10,10 @@ from machine.app.printer.serial_log import SerialLog
 from machine.app.terminal.interrupts import calling
 from machine.app.terminal.keys import Keyboard
 from machine.app.terminal.print_display import PrintDisplay
+from machine.app.terminal.printer_messages import PrinterMessages
 from machine.app.terminal.progress import Report, reporting
-from machine.app.terminal.screen import Course, Words
 from machine.app.terminal.server_keys import ServerKeyboard
+from machine.dryrun.timeline import Timeline
 from machine.link.journal import Journal
 from machine.link.pending_commands import Control
 from machine.link.progress import Progress
@@ -42,9 +43,9 @@ class Attendance(Protocol):
 
     control: Control
     stop: Flag
-    words: Words
+    words: PrinterMessages
 
-    def show(self, observers: Observers, course: Course) -> AbstractContextManager[Display]:
+    def show(self, observers: Observers, timeline: Timeline) -> AbstractContextManager[Display]:
         """What shows the print while it runs."""
 
 
@@ -52,11 +53,11 @@ class AtTerminal:
     """A screen with keys on a terminal, plain lines elsewhere."""
 
     def __init__(self) -> None:
-        self.control, self.stop, self.words = Control(), Flag(), Words()
+        self.control, self.stop, self.words = Control(), Flag(), PrinterMessages()
 
-    def show(self, observers: Observers, course: Course) -> PrintDisplay:
+    def show(self, observers: Observers, timeline: Timeline) -> PrintDisplay:
         """The screen."""
-        return PrintDisplay(observers.log.title, course, Keyboard(self.control), self.words)
+        return PrintDisplay(observers.log.title, timeline, Keyboard(self.control), self.words)
 
 
 class ServerAttendance(Protocol):
@@ -73,7 +74,7 @@ class ServerAttendance(Protocol):
     def gone(self) -> bool:
         """Whether the person has left while the print goes on."""
 
-    def show(self, observers: Observers, course: Course) -> AbstractContextManager[Display]:
+    def show(self, observers: Observers, timeline: Timeline) -> AbstractContextManager[Display]:
         """What shows the print while it is followed."""
 
 
@@ -97,7 +98,8 @@ class AtServerTerminal:
         return self._board.gone()
 
     @contextmanager
-    def show(self, observers: Observers, course: Course) -> Iterator[Display]:
+    def show(self, observers: Observers, timeline: Timeline) -> Iterator[Display]:
         """The screen."""
-        with PrintDisplay(observers.log.title, course, self._board, Words()) as display, calling(self._board.interrupt):
+        shown = PrintDisplay(observers.log.title, timeline, self._board, PrinterMessages())
+        with shown as display, calling(self._board.interrupt):
             yield display

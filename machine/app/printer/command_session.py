@@ -6,7 +6,7 @@ from machine.link.protocol.events import Event, Ok, Temperature, unknown_command
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
 from machine.link.shutdown import Heaters, emergency_stop, heaters_off
-from profiles.errors import FirmwareError, LocalProtocolError, PortError
+from profiles.errors import FirmwareError, PortError
 
 FAULT_S = 2.0  # how long a printer that has just failed is asked whether its heaters are off
 
@@ -39,10 +39,7 @@ class CommandSession:
 
     def command(self, line: str) -> None:
         """Send a command and wait for its answer; a comment is none. Raises PrinterError."""
-        try:
-            command = command_of(line, 0, self._limit)
-        except LocalProtocolError as error:
-            raise LocalProtocolError(str(error).replace("line 0", "the line")) from None
+        command = command_of(line, "the line", self._limit)
         if command:
             self._command = command
             self.exchange.send(command)

@@ -1,17 +1,20 @@
 """Compatibility: whether the printer at a port, the machine's profile and the program belong together, before anything moves."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
 from machine.app.embedded_profile import read_embedded_profile
-from machine.app.requests import FORCE_GOES_ON, SIMULATED
+from machine.app.pipeline.programs import refuse_errors
+from machine.app.requests import FORCE_GOES_ON, SIMULATED, PrintRequest
 from machine.app.terminal.progress import say
 from machine.dryrun.dryrun import summary
+from machine.dryrun.starvation import find_starvation
 from machine.firmware import dialect_of, dialects, firmware_of, identify
 from machine.link.identification import Answer, Kind, ask_at_any_rate
 from machine.link.port import Port, open_port
-from machine.view.program import Program
+from machine.program import Program
 from profiles.errors import FirmwareError, PortError, PrinterError, RemoteProtocolError, SilenceError
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -144,6 +147,17 @@ def check_program(answer: Answer | None, program: Program, profile: Profile, fil
         rotary = (machine.tilt.letter, machine.turn.letter)
         followed = machine.coordinates == "workpiece"  # X Y Z of such a file are no places of the axes
         refuse(exceeded_limit(answer, {key: reach for key, reach in reached.items() if key in rotary or not followed}), force)
+
+
+def ready_program(
+    answer: Answer | None, program: Program, profile: Profile, name: str, printing: PrintRequest, force: bool
+) -> Program:
+    """The program with what the dry run finds of this line's rate. Raises PrinterError, MoveError; force: only says so."""
+    check_program(answer, program, profile, name, force)
+    refuse_errors(program.run.errors, force)
+    if not is_rate_limited(printing.port):
+        return program
+    return replace(program, run=find_starvation(program.run, program.lines, profile.machine, printing.baud))
 
 
 def refuse(sentence: str, force: bool) -> None:

@@ -64,8 +64,7 @@ class ResumableJournal:
 def resumable_journals() -> list[ResumableJournal]:
     """The newest first; those that cannot be read, are being printed, are resumed already or have lost their program are left
     out."""
-    found = map(_resumable, _newest_first(_folder()))
-    return [each for each in found if each is not None]
+    return [journal for journal in map(_resumable, _newest_first(_folder())) if journal is not None]
 
 
 def _resumable(path: Path) -> ResumableJournal | None:

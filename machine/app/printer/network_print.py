@@ -6,21 +6,21 @@ from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 
+from machine.app.pipeline.programs import LoadedProgram
 from machine.app.printer.attendance import Observers, ServerAttendance
 from machine.app.printer.rescue import STOPPED
 from machine.app.printer.serial_log import SerialLog, new_log
 from machine.app.printer.server_checks import check_free
-from machine.app.printer.stream import PrintJob
 from machine.app.terminal.plain import plain_line, show
 from machine.app.terminal.progress import reporting, say
-from machine.app.terminal.screen import Course, UnknownCourse
+from machine.dryrun.timeline import Timeline, UnknownTimeline
 from machine.link.pending_commands import CancelledError
 from machine.link.progress import ProgramPosition, Progress, last_known
 from machine.network.follow import End, OnStatus, follow_print, follow_running
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import ACTIVE, JobStatus, PrintServer
 from machine.network.servers import open_server
-from machine.view.quantities import duration
+from machine.quantities import duration
 from profiles.errors import FirmwareError, ServerError
 
 LIMITS = (
@@ -60,14 +60,14 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str, person: Serv
         try:
             file = server.upload(upload, sent)
         except (KeyboardInterrupt, CancelledError):
-            kept = "keeps nothing of" if gone < total else "may hold all of"
-            say(f"upload broken off: {server.name} {kept} {upload.name}")
+            holds = "keeps nothing of" if gone < total else "may hold all of"
+            say(f"upload broken off: {server.name} {holds} {upload.name}")
             raise
     say(f"{file} is on {server.name}, {_megabytes(total)}, complete")
     return file
 
 
-def print_there(server: PrintServer, job: PrintJob, observers: Observers, person: ServerAttendance) -> End:
+def print_there(server: PrintServer, job: LoadedProgram, observers: Observers, person: ServerAttendance) -> End:
     """Hand a program over, have it printed and show it until it ends or the person leaves; says how it ended.
 
     Raises ServerError, FirmwareError after an emergency stop, CancelledError when the person gives it up before it has begun.
@@ -78,9 +78,9 @@ def print_there(server: PrintServer, job: PrintJob, observers: Observers, person
     if person.gives_up():
         raise CancelledError
     say(LIMITS)
-    course = Course(job.program.run)
-    progress = ServerProgress(upload, job.program.lines, course.remaining_s)
-    with _shown(person, observers, course, progress) as on_status:
+    timeline = Timeline(job.program.run)
+    progress = ServerProgress(upload, job.program.lines, timeline.remaining_s)
+    with _shown(person, observers, timeline, progress) as on_status:
         end = follow_print(server, file, len(upload.content), on_status, person.control, person.gone)
     _report_end(end, file, server.name, progress)
     return end
@@ -102,7 +102,7 @@ def follow_there(server: PrintServer, now: JobStatus, observers: Observers, pers
     Raises ServerError, FirmwareError after an emergency stop.
     """
     progress = ProgressToldByServer()
-    with _shown(person, observers, UnknownCourse(), progress) as on_status:
+    with _shown(person, observers, UnknownTimeline(), progress) as on_status:
         end = follow_running(server, now, on_status, person.control, person.gone)
     _report_end(end, file_name(now), server.name, progress)
     return end
@@ -115,10 +115,10 @@ def file_name(status: JobStatus) -> str:
 
 @contextmanager
 def _shown(
-    person: ServerAttendance, observers: Observers, course: Course, progress: "ProgressToldByServer"
+    person: ServerAttendance, observers: Observers, timeline: Timeline, progress: "ProgressToldByServer"
 ) -> Iterator[OnStatus]:
     """Takes what the server tells, and shows it."""
-    with person.show(observers, course) as display:
+    with person.show(observers, timeline) as display:
         display.open()
 
         def on_status(status: JobStatus, message: str) -> None:
@@ -195,15 +195,15 @@ class ServerProgress(ProgressToldByServer):
 
     def at(self, status: JobStatus, message: str) -> Progress:
         """The progress at a moment. message: goes before the server's own."""
-        told = super().at(status, message)
+        progress = super().at(status, message)
         self._read_to(self._line_at(status.bytes_read or 0))
         return replace(
-            told,
+            progress,
             sent=self.line,
             acknowledged=self.line,
             total=len(self._lines),
             file_line=self.line,
-            left_s=self._remaining_s(self.line) * 100.0 / told.feed_percent,
+            left_s=self._remaining_s(self.line) * 100.0 / progress.feed_percent,
             share=self._place.share(self.line, len(self._lines)),
             part=self._place.part,
             parts=self._place.parts,

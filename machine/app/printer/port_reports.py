@@ -8,23 +8,25 @@ from typing import Any
 
 from machine.app.printer.compatibility import describe_answer
 from machine.app.printer.running_simulators import running_simulators
-from machine.link.identification import QUICK_S, RATES, Answer, Kind, ask_at_any_rate
-from machine.link.port import SerialDevice, open_port, serial_devices
+from machine.firmware.line import BAUDS
+from machine.link.identification import QUICK_S, Answer, Kind, ask_at_any_rate
+from machine.link.port import RefusedPortError, SerialDevice, open_port, serial_devices
 from profiles.errors import PortError
 
 TIMEOUT_S = 4.0
-LONGEST_S = TIMEOUT_S + QUICK_S * len(RATES)
+LONGEST_S = TIMEOUT_S + QUICK_S * len(BAUDS)
 AT_A_TIME = 16  # ports asked at once: each takes seconds when nothing answers
 
 
 @dataclass(frozen=True)
 class PortReport:
-    """A port, and what answers there at which rate; trouble: why it could not be asked."""
+    """A port, and what answers there at which rate; trouble: why it could not be asked, reason: the same behind its name."""
 
     device: SerialDevice
     answer: Answer | None = None
     baud: int = 0
     trouble: str = ""
+    reason: str = ""
 
 
 def known_ports() -> tuple[SerialDevice, ...]:
@@ -38,7 +40,7 @@ def ask_ports(devices: Sequence[SerialDevice], baud: int, over: Event, in_use: I
 
     def ask(device: SerialDevice) -> PortReport:
         if names & {device.name, device.path}:
-            return PortReport(device, trouble=f"port {device.name} prints now")
+            return _refused(device, RefusedPortError(device.name, "prints now"))
         return ask_port(device, baud, over)
 
     with ThreadPoolExecutor(AT_A_TIME) as pool:
@@ -55,7 +57,11 @@ def ask_port(device: SerialDevice, baud: int, over: Event | None = None) -> Port
         with open_port(device.name, baud) as port:
             return PortReport(device, *ask_at_any_rate(port, baud, TIMEOUT_S, over))
     except PortError as error:
-        return PortReport(device, trouble=str(error))
+        return _refused(device, error)
+
+
+def _refused(device: SerialDevice, error: PortError) -> PortReport:
+    return PortReport(device, trouble=str(error), reason=error.reason if isinstance(error, RefusedPortError) else str(error))
 
 
 def describe(report: PortReport) -> str:
@@ -72,7 +78,7 @@ def describe(report: PortReport) -> str:
 def answer_words(report: PortReport) -> str:
     """What answers, or why the port could not be asked, for a person who sees the port's name; "" where it was not asked."""
     if report.answer is None:
-        return report.trouble.removeprefix(f"port {report.device.name} ")
+        return report.reason
     return describe_answer(report.answer, report.baud)
 
 

@@ -12,12 +12,13 @@ from os.path import isfile
 from pathlib import Path
 
 from machine.app.file_roles import check_roles, printing_files
+from machine.app.pipeline.programs import LoadedProgram
 from machine.app.printer.attendance import Attendance, Observers
 from machine.app.printer.compatibility import check_dialect
 from machine.app.printer.journal_folder import continue_journal
 from machine.app.printer.serial_log import new_log
 from machine.app.printer.server_checks import check_no_server
-from machine.app.printer.stream import PrintJob, report_end, stream_program
+from machine.app.printer.stream import report_end, stream_program
 from machine.app.printer.watch_page import serve_watch_page
 from machine.app.requests import SIMULATED, PrintRequest
 from machine.app.terminal.progress import say
@@ -45,8 +46,8 @@ from machine.link.resume import (
     read_interrupted_print,
 )
 from machine.link.status import PrinterStatus
+from machine.program import Program
 from machine.reader.gcode_file import GcodeFile
-from machine.view.program import Program
 from profiles.errors import JournalError, ProfileError
 from profiles.profile import Profile, profile_of_tables
 
@@ -116,7 +117,7 @@ def print_rest(
     for none; may raise JournalError. The journal of the request is a new one. attendance: of a person who is not at the terminal.
     Raises PrinterError.
     """
-    job = PrintJob(cut_off.name, Program(cut_off.lines, dry_run(cut_off.lines, cut_off.profile), None), cut_off.profile)
+    job = LoadedProgram(cut_off.name, Program(cut_off.lines, dry_run(cut_off.lines, cut_off.profile), None), cut_off.profile)
     with _further_journal(cut_off, printing) as further:
 
         def begin(status: PrinterStatus) -> ResumePoint:
@@ -138,10 +139,10 @@ def print_rest(
 
         with (
             new_log("print", f"the rest of {job.name} to {printing.port}", printing.log) as log,
-            serve_watch_page(job.name, job.program, job.profile, printing.watch_port) as watchers,
+            serve_watch_page(job, printing.watch_port) as watched,
         ):
-            outcome = stream_program(job, printing, Observers(log, further, watchers.follow), begin, attendance=attendance)
-            watchers.end("stopped" if outcome.cancelled else "done")
+            outcome = stream_program(job, printing, Observers(log, further, watched.follow), begin=begin, attendance=attendance)
+            watched.end("stopped" if outcome.cancelled else "done")
         if outcome.cancelled and outcome.heaters_off is None:
             say("nothing was moved or heated")
             return NOTHING

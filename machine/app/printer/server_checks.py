@@ -8,15 +8,15 @@ from machine.firmware.klipper import OPTIONAL, stepper_name
 from machine.gcode.words import macro_name
 from machine.link.identification import Answer, Kind
 from machine.network.address import ServerAddress, is_server_address
-from machine.network.server import ACTIVE, Greeting, JobStatus, Phase
+from machine.network.server import ACTIVE, JobStatus, Phase, ServerIdentity
 from machine.network.servers import dialect_mismatch
-from machine.view.program import Program
+from machine.program import Program
 from profiles.errors import PrinterError, ServerError
 from profiles.machine import Machine
 from profiles.profile import Profile
 
 
-def check_server_machine(address: ServerAddress, greeting: Greeting, machine: Machine, force: bool) -> None:
+def check_server_machine(address: ServerAddress, greeting: ServerIdentity, machine: Machine, force: bool) -> None:
     """Refuse a machine whose dialect the server's firmware does not read, whose axes or macros it lacks. Raises PrinterError."""
     check_server_dialect(address, machine)
     check_printer(_answer(greeting), machine, force)
@@ -30,13 +30,13 @@ def check_server_dialect(address: ServerAddress, machine: Machine) -> None:
         raise PrinterError(sentence)
 
 
-def ready_for_server(greeting: Greeting, program: Program, profile: Profile, file: str, force: bool) -> None:
+def ready_for_server(greeting: ServerIdentity, program: Program, profile: Profile, file: str, force: bool) -> None:
     """Refuse a program made for another machine, that leaves the limits that the server tells, that calls macros which are not
     there, or with errors of the dry run. Raises PrinterError, MoveError.
     """
     check_program(_answer(greeting), program, profile, file, force)
-    told = lacking_macros(greeting, _block_lines(profile.machine))
-    refuse(_unknown_macros([name for name in lacking_macros(greeting, program.lines) if name not in told], file), force)
+    lacking = lacking_macros(greeting, _block_lines(profile.machine))
+    refuse(_unknown_macros([name for name in lacking_macros(greeting, program.lines) if name not in lacking], file), force)
     refuse_errors(program.run.errors, force)
 
 
@@ -57,7 +57,7 @@ def check_no_server(port: str) -> None:
         )
 
 
-def lacking_steppers(greeting: Greeting, machine: Machine) -> str:
+def lacking_steppers(greeting: ServerIdentity, machine: Machine) -> str:
     """Which [manual_stepper] a Klipper lacks for the machine's table, as a sentence; "" when it has all or does not tell."""
     if greeting.steppers is None or not machine.tilts:
         return ""
@@ -72,7 +72,7 @@ def lacking_steppers(greeting: Greeting, machine: Machine) -> str:
     )
 
 
-def lacking_macros(greeting: Greeting, lines: Iterable[str]) -> list[str]:
+def lacking_macros(greeting: ServerIdentity, lines: Iterable[str]) -> list[str]:
     """The macros that lines call and a Klipper does not have; [] when it has all or does not tell."""
     if greeting.commands is None:
         return []
@@ -93,7 +93,7 @@ def _unknown_macros(names: list[str], caller: str) -> str:
     return f"{caller} calls {' and '.join(names)}, which this Klipper does not know and would pass over: it needs {sections}"
 
 
-def _answer(greeting: Greeting) -> Answer | None:
+def _answer(greeting: ServerIdentity) -> Answer | None:
     """What a server tells of its printer, as a printer at a port would have answered."""
     if not greeting.firmware:
         return None

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
 
+from machine.app.pipeline.programs import LoadedProgram
 from machine.app.printer.attendance import Attendance, AtTerminal, Observers
 from machine.app.printer.journal_folder import new_journal
 from machine.app.printer.serial_log import SerialLog, new_log, tap
@@ -14,7 +15,7 @@ from machine.app.terminal.interrupts import stopping
 from machine.app.terminal.plain import show
 from machine.app.terminal.print_display import Follow
 from machine.app.terminal.progress import say
-from machine.app.terminal.screen import Course
+from machine.dryrun.timeline import Timeline
 from machine.firmware import dialect_of
 from machine.link.identification import Answer, Kind
 from machine.link.journal import Journal
@@ -23,12 +24,10 @@ from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
 from machine.link.stream import Outcome, print_lines
+from machine.quantities import duration
 from machine.simulator.board import BuildOptions
 from machine.simulator.simulator import SimulatedPrinter
-from machine.view.program import Program
-from machine.view.quantities import duration
 from profiles.errors import OutputError, PrinterError
-from profiles.profile import Profile
 
 USB_BYTES, QUEUE = 1024, 16  # the simulated printer is a board with native USB: more lines at a time halve what a line costs
 HEATERS = {
@@ -38,18 +37,8 @@ HEATERS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class PrintJob:
-    """What is printed. source: the G-code file that holds the program; None: it is cached beside the journal."""
-
-    name: str
-    program: Program
-    profile: Profile
-    source: Path | None = None
-
-
 def print_program(
-    job: PrintJob, request: PrintRequest, follow: Follow | None = None, attendance: Attendance | None = None
+    job: LoadedProgram, request: PrintRequest, follow: Follow | None = None, attendance: Attendance | None = None
 ) -> int:
     """Stream a program to the printer asked for and say how it ended; 130 when a person stopped it. Raises PrinterError.
 
@@ -65,7 +54,7 @@ def print_program(
         return report_end(stream_program(job, request, observers, attendance=attendance), log, journal)
 
 
-def _journal(job: PrintJob, file: Path | None) -> AbstractContextManager[Journal | None]:
+def _journal(job: LoadedProgram, file: Path | None) -> AbstractContextManager[Journal | None]:
     """The print's journal; a print that was not told where to keep it goes on without one where none can be written."""
     try:
         return new_journal(job.program.lines, job.profile, job.name, job.source, file)
@@ -76,12 +65,12 @@ def _journal(job: PrintJob, file: Path | None) -> AbstractContextManager[Journal
         return nullcontext()
 
 
-def _print_simulated(job: PrintJob, request: PrintRequest, observers: Observers, attendance: Attendance | None) -> int:
+def _print_simulated(job: LoadedProgram, request: PrintRequest, observers: Observers, attendance: Attendance | None) -> int:
     """Stream to the simulated printer and tell what it has done."""
     machine = job.profile.machine
     usb = job.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
     speed = request.sim_speed or inf
-    with SimulatedPrinter(machine, speed, BuildOptions(queue=QUEUE)) as printer:
+    with SimulatedPrinter(machine, speed, build=BuildOptions(queue=QUEUE)) as printer:
         pace = speed if isfinite(speed) else None
         there = replace(request, port=printer.path)
         outcome = stream_program(replace(job, profile=usb), there, observers, pace=pace, attendance=attendance)
@@ -101,9 +90,10 @@ def _print_simulated(job: PrintJob, request: PrintRequest, observers: Observers,
 
 
 def stream_program(
-    job: PrintJob,
+    job: LoadedProgram,
     request: PrintRequest,
     observers: Observers,
+    *,
     begin: Callable[[PrinterStatus], ResumePoint] | None = None,
     pace: float | None = 1.0,
     attendance: Attendance | None = None,
@@ -112,13 +102,13 @@ def stream_program(
 
     begin: of a resumed print. pace: seconds of the print that pass in one of the clock; None: as fast as it goes.
     """
-    person, course = attendance or AtTerminal(), Course(job.program.run)
+    person, timeline = attendance or AtTerminal(), Timeline(job.program.run)
 
     def traffic(direction: str, data: bytes) -> None:
         observers.log.note(direction, data)
         person.words.hear(direction, data)
 
-    with stopping(person.stop), person.show(observers, course) as display:
+    with stopping(person.stop), person.show(observers, timeline) as display:
 
         def begin_then_show(status: PrinterStatus) -> ResumePoint:
             start = ResumePoint(1, ()) if begin is None else begin(status)
@@ -139,7 +129,7 @@ def stream_program(
             request.baud,
             on_progress,
             person.stop,
-            Schedule(course.remaining_s, pace),
+            Schedule(timeline.remaining_s, pace),
             limit=dialect_of(job.profile.machine).longest_line,
             control=person.control,
             profile=job.profile,

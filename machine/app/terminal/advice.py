@@ -1,12 +1,13 @@
-"""Advice: the ways to print a model side by side, and in one line the one to take."""
+"""Advice: the ways to print a model side by side, and in a line the one to take, and how it is best laid down."""
 
 from collections.abc import Sequence
 
 from machine.app.terminal.report import estimates, table
+from machine.quantities import minutes
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.search.front import ASKED, BY_PLAN, choose, price_of_second_mm2
 from mdp.search.laying import OtherWay
-from mdp.search.orientation import in_words, side_in_words
+from mdp.search.orientation import Orientation, in_words, side_in_words
 from profiles.profile import Profile
 
 
@@ -23,6 +24,22 @@ def advice(decomposition: Decomposition, better: OtherWay | None, profile: Profi
         ways.append((side_in_words(better.orientation) or in_words(better.orientation), better.row))
         best = f"lay it {_lying(better)} and print it in one piece: --orient"
     return _ways_table(ways) + f"advice: {best}\n"
+
+
+def laid_in_words(chosen: Orientation | None) -> str:
+    """What has become of a model that was to be laid down; None: it stays."""
+    return "the model is best printed as it stands" if chosen is None else f"the model is {in_words(chosen)}"
+
+
+def better_in_words(decomposition: Decomposition, better: OtherWay | None) -> str:
+    """What costs much less than these parts, and how much; "" where nothing does."""
+    chosen = decomposition.chosen
+    if better is None or chosen is None:
+        return ""
+    figures = [f"leaves {better.row.cost_mm2:.0f} mm2 of scars instead of {chosen.cost_mm2:.0f}"]
+    if better.row.time_s is not None and chosen.time_s is not None:
+        figures.append(f"takes {minutes(better.row.time_s)} instead of {minutes(chosen.time_s)}")
+    return f"{_lying(better)} in one piece it {' and '.join(figures)}"
 
 
 def in_parts(count: int) -> str:

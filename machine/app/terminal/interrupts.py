@@ -2,7 +2,6 @@
 
 import atexit
 import os
-import select
 import signal
 import socket
 import stat
@@ -17,6 +16,7 @@ ALL: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM, *HANGUP)
 AGAIN_S = 0.1
 PATIENCE_S = 1.2  # how long work may go on after Ctrl-C: native code hears of it only when it is done
 SHOW_CURSOR = "\r\x1b[K\x1b[?25h"
+END = b"\0"  # no signal has this number
 COMPILER = f"{os.sep}llvmlite{os.sep}"
 
 
@@ -35,15 +35,38 @@ def stopping(stop: threading.Event) -> Iterator[None]:
 
 @contextmanager
 def interrupting() -> Iterator[None]:
-    """Every interrupt raises KeyboardInterrupt in the main thread, also one that comes just before that begins to wait."""
-    with _woken() as hear:
+    """Every interrupt raises KeyboardInterrupt in the main thread, also one that comes just before that begins to wait.
 
-        def act() -> None:
-            hear()
-            raise KeyboardInterrupt
+    Python's own handlers run between two of its instructions: a signal that comes after the last one before select() or read()
+    is noted, but ends no waiting. So another signal wakes the main thread until it has heard of the first.
+    """
+    heard, over = threading.Event(), threading.Event()
 
+    def act() -> None:
+        heard.set()
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGUSR2"):
         with _handled(act):
             yield
+        return
+    main = threading.get_ident()
+
+    def wake(number: int) -> None:
+        while number in ALL and not over.is_set() and not heard.wait(AGAIN_S):
+            signal.pthread_kill(main, signal.SIGUSR2)
+        heard.clear()
+
+    before = signal.signal(signal.SIGUSR2, lambda number, frame: heard.set())
+    try:
+        with _overheard(wake), _handled(act):
+            try:
+                yield
+            finally:
+                over.set()
+                heard.set()
+    finally:
+        signal.signal(signal.SIGUSR2, before)
 
 
 @contextmanager
@@ -101,29 +124,39 @@ def outside_compiler() -> Iterator[None]:
 
 @contextmanager
 def _hurried(wanted: Callable[[], bool]) -> Iterator[None]:
-    """End the process when what is inside still runs PATIENCE_S after an interrupt that is wanted to end it.
-
-    A thread hears of the signal by what Python writes at once, whatever the main thread does.
-    """
-    heard, noted = socket.socketpair()
-    heard.settimeout(None)
-    noted.setblocking(False)
+    """End the process when what is inside still runs PATIENCE_S after an interrupt that is wanted to end it."""
     over = threading.Event()
 
+    def hurry(number: int) -> None:
+        if number == signal.SIGINT and wanted() and not over.wait(PATIENCE_S) and wanted():
+            end_at_once()
+
+    with _overheard(hurry):
+        try:
+            yield
+        finally:
+            over.set()
+
+
+@contextmanager
+def _overheard(act: Callable[[int], None]) -> Iterator[None]:
+    """A thread acts on every signal by its number, whatever the main thread does: Python writes it at once to a socket."""
+    heard, noted = socket.socketpair()
+    noted.setblocking(False)
+
     def serve() -> None:
-        while not over.is_set():
-            if signal.SIGINT in heard.recv(64) and wanted() and not over.wait(PATIENCE_S) and wanted():
-                end_at_once()
+        while END not in (numbers := heard.recv(64)):
+            for number in numbers:
+                act(number)
 
     wakeup = signal.set_wakeup_fd(noted.fileno(), warn_on_full_buffer=False)
-    thread = threading.Thread(target=serve, name="hurry", daemon=True)
+    thread = threading.Thread(target=serve, name="signals", daemon=True)
     thread.start()
     try:
         yield
     finally:
-        over.set()
         signal.set_wakeup_fd(wakeup)
-        noted.send(b"\0")
+        noted.send(END)
         thread.join()
         heard.close()
         noted.close()
@@ -148,47 +181,6 @@ def leave(code: int) -> None:
     with suppress(OSError, ValueError):
         sys.stdout.flush()
     os._exit(code)
-
-
-@contextmanager
-def _woken() -> Iterator[Callable[[], None]]:
-    """Wake the main thread until it has heard an interrupt, which it tells by the function given.
-
-    Python's own handlers run between two of its instructions: a signal that comes after the last one before select() or read()
-    is noted, but ends no waiting.
-    """
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGUSR2"):
-        yield lambda: None
-        return
-    main, over = threading.get_ident(), threading.Event()
-    noted, write = os.pipe()  # what is in it has not been heard yet
-    for descriptor in (noted, write):
-        os.set_blocking(descriptor, False)
-
-    def hear() -> None:
-        with suppress(BlockingIOError):
-            os.read(noted, 4096)
-
-    def serve() -> None:
-        while not over.is_set():
-            select.select([noted], [], [])
-            if not over.wait(AGAIN_S) and select.select([noted], [], [], 0.0)[0]:
-                signal.pthread_kill(main, signal.SIGUSR2)
-
-    before = signal.signal(signal.SIGUSR2, lambda number, frame: hear())
-    wakeup = signal.set_wakeup_fd(write, warn_on_full_buffer=False)
-    thread = threading.Thread(target=serve, name="interrupts", daemon=True)
-    thread.start()
-    try:
-        yield hear
-    finally:
-        over.set()
-        signal.set_wakeup_fd(wakeup)
-        os.write(write, b"x")
-        thread.join()
-        signal.signal(signal.SIGUSR2, before)
-        os.close(noted)
-        os.close(write)
 
 
 @contextmanager

@@ -1,65 +1,43 @@
-"""Options: those that several commands share, and what they ask for together."""
+"""Options: those that several commands share, alone or in groups, and what they ask for together."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from machine.app.terminal.completion import names_of
+from machine.app.requests import Cuts, Given, ModelRequest
 
 if TYPE_CHECKING:
     from profiles.profile import Profile
 
 
+def _names_of(kind: str) -> Callable[[str], list[str]]:
+    """What the shell offers where the name of a profile is typed: those that ship and those of the user."""
+
+    def complete(incomplete: str) -> list[str]:
+        from profiles.places import known
+
+        return [name for name in known(kind) if name.startswith(incomplete)]
+
+    return complete
+
+
 def _profile_option(kind: str, otherwise: str = "") -> Any:
-    return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=names_of(kind), help=f"{kind} profile{otherwise}")
+    return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=_names_of(kind), help=f"{kind} profile{otherwise}")
 
 
 Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME")]
 ModelOrGcode = Annotated[str, typer.Argument(metavar="MODEL|FILE.gcode", help="a model file, demo:NAME, or a G-code file")]
 MachineName = Annotated[str, _profile_option("machine")]
-MaterialName = Annotated[str, _profile_option("material")]
-ProcessName = Annotated[str, _profile_option("process")]
 MachineGiven = Annotated[str | None, _profile_option("machine", "; else the G-code file's own")]
-MaterialGiven = Annotated[str | None, _profile_option("material", "; else the file's")]
-ProcessGiven = Annotated[str | None, _profile_option("process", "; else the file's")]
 Settings = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="override a profile key; repeatable")]
+PlanGiven = Annotated[Path | None, typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search")]
 JsonFile = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the result as JSON; - for standard output")]
 HtmlFile = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="page that shows it in a browser, see view")]
-BeamWidth = Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")]
-SearchName = Annotated[
-    str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
-]
-TimeLimit = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")]
-RankerName = Annotated[
-    str,
-    typer.Option(
-        "--ranker",
-        metavar="classic|learned|FILE.onnx",
-        help="which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
-    ),
-]
-Orient = Annotated[bool, typer.Option("--orient", help="lay the model down the way that costs least, chosen with its parts")]
-PlanGiven = Annotated[Path | None, typer.Option("--plan", metavar="FILE", help="cut by this plan of decompose, without a search")]
-PartSettingsGiven = Annotated[
-    list[str] | None,
-    typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
-]
-Copies = Annotated[int, typer.Option("--copies", metavar="N", help="so many on the plate, of a model printed in one part")]
-Pauses = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--pause", metavar="PART:LAYER", help="wait for a person before this layer, or at a height: 1:8.4mm; repeatable"
-    ),
-]
-FilamentChanges = Annotated[
-    list[str] | None, typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable")
-]
-PartsGiven = Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")]
 Force = Annotated[bool, typer.Option("--force", help="go on although the dry run found errors")]
-
-
+ForceAll = Annotated[bool, typer.Option("--force", help="go on although dry run, printer, machine and program do not agree")]
 LogFile = Annotated[
     Path | None, typer.Option("--log", metavar="FILE", help="what is sent and received; else a new file in the state folder")
 ]
@@ -72,39 +50,118 @@ WatchPort = Annotated[
 ]
 
 
-def profile_of(
-    machine: str | None,
-    material: str | None,
-    process: str | None,
-    settings: Sequence[str] | None,
-    part_settings: Sequence[str] | None = None,
-) -> "Profile":
-    """The profile of these names, the default ones where none is given, with these settings. Raises ProfileError."""
-    from profiles.part_settings import parse_part_settings
-    from profiles.profile import DEFAULTS, load, with_part_settings
+@dataclass(frozen=True)
+class SearchOptions:
+    """How a model is cut into parts."""
 
-    names = {"machine": machine, "material": material, "process": process}
-    profile = load(**{kind: DEFAULTS[kind] if name is None else name for kind, name in names.items()}, settings=settings or ())
-    return with_part_settings(profile, map(parse_part_settings, part_settings or ()))
+    beam_width: Annotated[int | None, typer.Option("--beam-width", metavar="B", help="decompositions followed at a time")] = None
+    search: Annotated[
+        str | None, typer.Option("--search", metavar="best|published", help="published: as the 2020 paper searches")
+    ] = None
+    time_limit: Annotated[
+        float | None, typer.Option("--time-limit", metavar="SECONDS", help="then the best parts so far are used")
+    ] = None
+    ranker: Annotated[
+        str,
+        typer.Option(
+            "--ranker",
+            metavar="classic|learned|FILE.onnx",
+            help="which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
+        ),
+    ] = "classic"
+    orient: Annotated[
+        bool, typer.Option("--orient", help="lay the model down the way that costs least, chosen with its parts")
+    ] = False
+    parts: Annotated[int | None, typer.Option("--parts", metavar="N", help="into N parts at most, not as many as pay")] = None
+    part: Annotated[
+        list[str] | None,
+        typer.Option("--part", metavar="N:KEY=VALUE,...", help="process keys of part N alone, as 2:walls=4; repeatable"),
+    ] = None
+
+    @property
+    def settings(self) -> list[str]:
+        """Those of the profile that are given as options of their own."""
+        values = {"beam_width": self.beam_width, "method": self.search, "time_limit_s": self.time_limit}
+        return [f"search.{key}={value}" for key, value in values.items() if value is not None]
 
 
-def machine_profile(machine: str | None, settings: Sequence[str] | None = None) -> "Profile":
-    """The same where only the machine matters."""
-    return profile_of(machine, None, None, settings)
+@dataclass(frozen=True)
+class ProgramOptions(SearchOptions):
+    """What becomes of a model on the way to its G-code; of a G-code file none can be asked for."""
+
+    plan: PlanGiven = None
+    pause: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--pause", metavar="PART:LAYER", help="wait for a person before this layer, or at a height: 1:8.4mm; repeatable"
+        ),
+    ] = None
+    filament_change: Annotated[
+        list[str] | None,
+        typer.Option("--filament-change", metavar="PART:LAYER", help="the same, for another filament; repeatable"),
+    ] = None
+    copies: Annotated[int, typer.Option("--copies", metavar="N", help="so many on the plate, of a model printed in one part")] = 1
 
 
-def with_search(
-    settings: Sequence[str] | None, beam_width: int | None, search: str | None, time_limit_s: float | None
-) -> list[str]:
-    """The settings, and the options of the search, which are settings too."""
-    options = {"search.beam_width": beam_width, "search.method": search, "search.time_limit_s": time_limit_s}
-    return [*(settings or ()), *(f"{key}={value}" for key, value in options.items() if value is not None)]
+@dataclass(frozen=True)
+class ProfileOptions:
+    """The profile, by its names and settings over it; what is None is the G-code file's own, else the default."""
+
+    machine: MachineGiven = None
+    material: Annotated[str | None, _profile_option("material", "; else the file's")] = None
+    process: Annotated[str | None, _profile_option("process", "; else the file's")] = None
+    settings: Settings = None
+
+    @property
+    def names(self) -> tuple[str | None, str | None, str | None]:
+        """Of machine, material and process as they were given."""
+        return self.machine, self.material, self.process
+
+    @property
+    def sections(self) -> frozenset[str]:
+        """The sections of the profile that the user has said something about."""
+        named = {kind for kind in ("machine", "material", "process") if getattr(self, kind) is not None}
+        return frozenset(named | {setting.partition(".")[0] for setting in self.settings or ()})
+
+    def profile(self, search: SearchOptions | None = None) -> "Profile":
+        """The profile, with what the options of a search set in it. Raises ProfileError."""
+        from profiles.part_settings import parse_part_settings
+        from profiles.profile import DEFAULTS, load, with_part_settings
+
+        search = search or SearchOptions()
+        names = {
+            kind: default if name is None else name for (kind, default), name in zip(DEFAULTS.items(), self.names, strict=True)
+        }
+        profile = load(**names, settings=(*(self.settings or ()), *search.settings))
+        return with_part_settings(profile, map(parse_part_settings, search.part or ()))
 
 
-def chosen_sections(settings: Sequence[str] | None, **names: str | None) -> frozenset[str]:
-    """The sections of the profile that the user has said something about."""
-    sections = {kind for kind, name in names.items() if name is not None}
-    return frozenset(sections | {setting.partition(".")[0] for setting in settings or ()})
+@dataclass(frozen=True)
+class ModelProfileOptions(ProfileOptions):
+    """The same of a command that takes models alone: there is always a machine, a material and a process."""
+
+    machine: MachineName = Given.machine
+    material: Annotated[str, _profile_option("material")] = Given.material
+    process: Annotated[str, _profile_option("process")] = Given.process
+
+
+def model_request(model: str, search: SearchOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
+    """What is asked for of a model; further: other fields of the request. Raises ProfileError."""
+    profile = given.profile(search)
+    return ModelRequest(model, profile, given.sections, search.ranker, search.orient, profile_names=given.names, **further)
+
+
+def program_request(model: str, program: ProgramOptions, given: ProfileOptions, **further: Any) -> ModelRequest:
+    """What is asked for of a model's program, or of a G-code file. Raises SliceError, ProfileError."""
+    from machine.planning.stops import parse_stops
+
+    stops, cuts = parse_stops(program.pause or (), program.filament_change or ()), Cuts(program.plan, program.parts)
+    return model_request(model, program, given, cuts=cuts, stops=stops, copies=program.copies, **further)
+
+
+def machine_profile(machine: str | None, settings: list[str] | None = None) -> "Profile":
+    """The profile where only the machine matters."""
+    return ProfileOptions(machine, settings=settings).profile()
 
 
 def page_port(watch: bool, watch_port: int | None) -> int | None:

@@ -4,10 +4,12 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 
 from machine.app.terminal.keys import Keyboard, can_type, typing
+from machine.app.terminal.printer_messages import PrinterMessages
 from machine.app.terminal.progress import PlainLines, is_terminal
-from machine.app.terminal.screen import Course, Screen, Words
+from machine.app.terminal.screen import Screen
+from machine.dryrun.timeline import Timeline
 from machine.link.progress import Progress
-from machine.view.quantities import duration
+from machine.quantities import duration
 
 Follow = Callable[[Progress], None]
 
@@ -17,10 +19,10 @@ class PrintDisplay:
     something, the terminal is theirs. Ends with the terminal as before.
     """
 
-    def __init__(self, title: str, course: Course, board: Keyboard, words: Words) -> None:
+    def __init__(self, title: str, timeline: Timeline, board: Keyboard, messages: PrinterMessages) -> None:
         self._stack = ExitStack()
         self._follow: Follow | None = None
-        self._shown: AbstractContextManager[Follow] = _shown(title, course, board, words)
+        self._shown: AbstractContextManager[Follow] = _shown(title, timeline, board, messages)
 
     def open(self) -> None:
         """Begin to show what comes."""
@@ -39,7 +41,7 @@ class PrintDisplay:
 
 
 @contextmanager
-def _shown(title: str, course: Course, board: Keyboard, words: Words) -> Iterator[Follow]:
+def _shown(title: str, timeline: Timeline, board: Keyboard, messages: PrinterMessages) -> Iterator[Follow]:
     if not is_terminal():
         yield _StatusLines()
         return
@@ -47,7 +49,7 @@ def _shown(title: str, course: Course, board: Keyboard, words: Words) -> Iterato
         keys = can_type()
         if keys:
             stack.enter_context(typing(board.press))
-        screen = stack.enter_context(Screen(title, course, words, lambda: board.hint, keys))
+        screen = stack.enter_context(Screen(title, timeline, messages, lambda: board.hint, keys))
 
         def follow(progress: Progress) -> None:
             board.follow(progress)

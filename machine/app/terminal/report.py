@@ -5,9 +5,9 @@ from textwrap import wrap
 
 from machine.dryrun.conformity.agreement import Agreement
 from machine.dryrun.dryrun import DryRun, summary
+from machine.program import Program
+from machine.quantities import duration, minutes
 from machine.view.parts import risky_before_mm2
-from machine.view.program import Program
-from machine.view.quantities import duration, minutes
 from mdp.decomposition import Decomposition, FrontRow
 from profiles.profile import Profile
 
@@ -94,7 +94,7 @@ def run_table(run: DryRun) -> str:
 
 def part_settings_lines(profile: Profile) -> str:
     """The parts with settings of their own."""
-    lines = (wrap(f"part {each.part} with {each.in_words}", WIDEST, subsequent_indent="  ") for each in profile.parts)
+    lines = (wrap(f"part {settings.part} with {settings.in_words}", WIDEST, subsequent_indent="  ") for settings in profile.parts)
     return "".join(line + "\n" for several in lines for line in several)
 
 
@@ -109,8 +109,8 @@ def interfaces_line(interface_mm3: Mapping[int, float]) -> str:
     """What cutting costs in plastic, by the part that stands on each interface; nothing for a model in one piece."""
     if not interface_mm3:
         return ""
-    each = ", ".join(f"part{NO_BREAK}{index} {mm3 / 1000:.2f}" for index, mm3 in interface_mm3.items())
-    sentence = f"interfaces take {sum(interface_mm3.values()) / 1000:.2f} cm3 that one piece would not: {each}"
+    of_parts = ", ".join(f"part{NO_BREAK}{index} {mm3 / 1000:.2f}" for index, mm3 in interface_mm3.items())
+    sentence = f"interfaces take {sum(interface_mm3.values()) / 1000:.2f} cm3 that one piece would not: {of_parts}"
     lines = wrap(sentence, WIDEST, subsequent_indent="  ", break_long_words=False)
     return "\n".join(lines).replace(NO_BREAK, " ") + "\n"
 

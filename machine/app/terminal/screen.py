@@ -1,13 +1,11 @@
-"""Screen: where a running print stands, render on the terminal: part, layer, pose, heat, time left, the printer's words, keys."""
+"""Screen: where a running print stands, drawn on the terminal: part, layer, pose, heat, time left, the printer's words, keys."""
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from types import TracebackType
 from typing import Self
 
-import numpy as np
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.progress_bar import ProgressBar
@@ -15,78 +13,14 @@ from rich.table import Table
 from rich.text import Text
 
 from machine.app.terminal.plain import plain_line
-from machine.dryrun.dryrun import DryRun
+from machine.app.terminal.printer_messages import PrinterMessages
+from machine.dryrun.timeline import Timeline
 from machine.link.progress import Progress
-from machine.link.protocol.events import Action, Echo, FirmwareFault, LineError, Start, Unknown, read_event, unknown_command
-from machine.reader.parsed import MoveKind
-from machine.view.quantities import duration
+from machine.quantities import duration
 
-WORDS_KEPT = 4  # last words of the printer
 WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell
-HALF_BYTES = 4096
 COLOURS = {"printing": "green", "finishing": "green", "paused": "yellow", "pausing": "yellow", "resuming": "yellow"}
 KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  e emergency stop  ? more"
-
-
-class Course:
-    """What a dry run knows about the way of a print: where the table stands at a line, what is left to do, layers of a part."""
-
-    beginning = "starting"  # as long as there is no part
-
-    def __init__(self, run: DryRun) -> None:
-        program = run.program
-        self.letters = run.letters
-        self._line, self._ends = program.line, program.end
-        self._done_s = np.concatenate([[0.0], np.cumsum(run.times_s)])
-        self._waits = [(event.line, event.value) for event in program.events if event.code == "G4"]
-        laying = program.kind == MoveKind.EXTRUDE  # the way to a part still counts to the layer before it
-        self._layers = {part: len(np.unique(program.layer[laying & (program.part == part)])) for part in program.parts}
-
-    def pose_deg(self, file_line: int) -> tuple[float, float] | None:
-        """Tilt and turn after a line of the program; None before the first move."""
-        row = self._rows(file_line) - 1
-        return None if row < 0 else (float(self._ends[row, 3]), float(self._ends[row, 4]))
-
-    def at(self, file_line: int) -> dict[str, float]:
-        """Where the axes stand after a line of the program, by their letters, mm and deg; {} before the first move."""
-        row = self._rows(file_line) - 1
-        return {} if row < 0 else dict(zip(self.letters, self._ends[row].tolist(), strict=False))
-
-    def remaining_s(self, file_line: int) -> float:
-        """How long moves and dwells after a line of the program take; heating and homing are not counted."""
-        waits_s = sum(wait_s for line, wait_s in self._waits if line > file_line)
-        return float(self._done_s[-1] - self._done_s[self._rows(file_line)]) + waits_s
-
-    def _rows(self, file_line: int) -> int:
-        """How many moves are phrases up to a line."""
-        return int(np.searchsorted(self._line, file_line, side="right"))
-
-    def layers(self, part: int | None) -> int | None:
-        """Layers of a part."""
-        return None if part is None else self._layers.get(part)
-
-
-class UnknownCourse(Course):
-    """Of a program that is not here: nothing is known of it."""
-
-    beginning = "a file that is not known here"
-
-    def __init__(self) -> None:
-        self.letters = ()
-
-    def pose_deg(self, file_line: int) -> None:
-        """None."""
-
-    def at(self, file_line: int) -> dict[str, float]:
-        """{}."""
-        return {}
-
-    def remaining_s(self, file_line: int) -> float:
-        """0."""
-        return 0.0
-
-    def layers(self, part: int | None) -> None:
-        """None."""
 
 
 @dataclass(frozen=True)
@@ -95,56 +29,10 @@ class ScreenState:
 
     title: str
     progress: Progress
-    course: Course
+    timeline: Timeline
     words: tuple[str, ...] = ()
     hint: str = ""
     keys: bool = True
-
-
-class Words:
-    """The last things a printer has said that are no mere answers; hear() takes chunks of bytes in the thread of the port."""
-
-    def __init__(self, kept: int = WORDS_KEPT) -> None:
-        self.last: deque[str] = deque(maxlen=kept)
-        self._half, self._message = b"", ""
-        self._newest, self._times = "", 0
-
-    def hear(self, direction: str, data: bytes) -> None:
-        """Take what was received ("<")."""
-        if direction != "<":
-            return
-        *lines, self._half = (self._half + data).split(b"\n")
-        self._half = self._half[-HALF_BYTES:]
-        for line in lines:
-            if line[:2] != b"ok" and (text := printer_message(line)):
-                self._append(text)
-
-    def _append(self, text: str) -> None:
-        """What is said again takes no line of its own but a count."""
-        again = text == self._newest and bool(self.last)
-        self._newest, self._times = text, self._times + 1 if again else 1
-        if again:
-            self.last[-1] = f"{text} (x {self._times})"
-        else:
-            self.last.append(text)
-
-    def add(self, text: str) -> None:
-        """Take the stream's message of this moment; one that stays is added once."""
-        if text and text != self._message:
-            self._append(text)
-        self._message = text
-
-
-def printer_message(line: bytes) -> str:
-    """What a line tells a person, "" for reports and answers."""
-    event = read_event(line)
-    if isinstance(event, Start):
-        return "the printer has started"
-    if isinstance(event, Action):
-        return f"the printer asks: {event.name} {event.words}".rstrip()
-    if unknown := unknown_command(event):
-        return f"Unknown command: {unknown}"
-    return event.text if isinstance(event, Echo | FirmwareFault | LineError | Unknown) else ""
 
 
 def render(state: ScreenState, now: datetime) -> RenderableType:
@@ -173,17 +61,16 @@ def _head(state: ScreenState) -> RenderableType:
 
 
 def _place(state: ScreenState) -> Text:
-    progress, course = state.progress, state.course
+    progress, timeline = state.progress, state.timeline
     phrases = []
     if progress.part is not None:
         phrases.append(f"part {progress.part}{_of(progress.parts)}")
     if progress.layer is not None:
-        phrases.append(f"layer {progress.layer}{_of(course.layers(progress.part))}")
-    pose = course.pose_deg(progress.file_line)
-    if pose is not None:
-        phrases.append(f"tilt {course.letters[3]} {pose[0]:.1f} deg")
-        phrases.append(f"turn {course.letters[4]} {pose[1]:.1f} deg")
-    return _phrases_line(phrases or [course.beginning])
+        phrases.append(f"layer {progress.layer}{_of(timeline.layers(progress.part))}")
+    at = timeline.at(progress.file_line)
+    turned = zip(("tilt", "turn"), timeline.letters[3:], strict=False)
+    phrases += [f"{axis} {letter} {at[letter]:.1f} deg" for axis, letter in turned if letter in at]
+    return _phrases_line(phrases or [timeline.beginning])
 
 
 def _of(count: int | None) -> str:
@@ -240,8 +127,8 @@ class Screen:
     A terminal that has gone away (a closed window) ends the drawing, not the print.
     """
 
-    def __init__(self, title: str, course: Course, words: Words, hint: Callable[[], str], keys: bool) -> None:
-        self._title, self._course, self._words, self._hint, self._keys = title, course, words, hint, keys
+    def __init__(self, title: str, timeline: Timeline, messages: PrinterMessages, hint: Callable[[], str], keys: bool) -> None:
+        self._title, self._timeline, self._messages, self._hint, self._keys = title, timeline, messages, hint, keys
         self._live = Live(console=Console(stderr=True, highlight=False), auto_refresh=False, transient=True)
         self._gone = False
 
@@ -249,8 +136,8 @@ class Screen:
         """Draw where the print stands."""
         if self._gone:
             return
-        self._words.add(progress.message)
-        state = ScreenState(self._title, progress, self._course, tuple(self._words.last), self._hint(), self._keys)
+        self._messages.add(progress.message)
+        state = ScreenState(self._title, progress, self._timeline, tuple(self._messages.last), self._hint(), self._keys)
         try:
             self._live.update(render(state, datetime.now()), refresh=True)
         except OSError:

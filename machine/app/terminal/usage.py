@@ -29,12 +29,12 @@ def sentence(error: TyperException, given: Sequence[str]) -> str:
     files = [word for word in given if word.startswith("-") and os.path.isfile(word)]
     if files:
         return f"{files[0]} begins with a dash: write ./{files[0]}"
-    if found := UNKNOWN_OPTION.match(message):
-        return _unknown("option", found[1], context.command_path, _options(context.command))
-    if found := UNKNOWN_COMMAND.match(message):
-        return _unknown("command", found[1], context.command_path, list(context.command.commands))
-    if found := WRONG_VALUE.match(message):
-        message = f"{found[1]} is {_value(found[1], given)!r}: it must be {_plainly(found[2])}"
+    if match := UNKNOWN_OPTION.match(message):
+        return _unknown("option", match[1], context.command_path, _options(context.command))
+    if match := UNKNOWN_COMMAND.match(message):
+        return _unknown("command", match[1], context.command_path, list(context.command.commands))
+    if match := WRONG_VALUE.match(message):
+        message = f"{match[1]} is {_value(match[1], given)!r}: it must be {_plainly(match[2])}"
     return f"{message.removeprefix('Invalid value: ')}; see {context.command_path} --help"
 
 

@@ -8,7 +8,7 @@ from machine.dryrun.conformity import registration
 from machine.dryrun.conformity.deposit import Share, inside_share
 from machine.dryrun.conformity.filling import filled_share
 from machine.dryrun.dryrun import DryRun
-from machine.dryrun.findings import Finding
+from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.placement import unsupported_mm
 from machine.dryrun.strokes import beads_of
 from mdp.mesh import Mesh
@@ -62,8 +62,7 @@ def _findings(run: DryRun, share: Share, result: Agreement, profile: Profile) ->
             f"{100 * result.outside:.1f} % of the extruded length lie outside the model by more than half a line, "
             f"{result.farthest_mm:.2f} mm and more at the worst"
         )
-        place = (int(run.program.line[row]), int(run.program.part[row]), int(run.program.layer[row]))
-        findings.append(Finding("error", "outside", *place, message))
+        findings.append(at_row(run.program, row, "error", "outside", message))
     solid = all(profile.of_part(int(part)).process.infill_density >= 1.0 for part in set(run.program.part.tolist()))
     if solid and result.filled < LEAST_FILLED:
         message = (

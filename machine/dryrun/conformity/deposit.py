@@ -108,13 +108,6 @@ def _columns(corners: Floats, size: float, grow: float) -> Columns:
     low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
     origin = low.min(axis=0) - 1e-3
     shape = (np.floor((high.max(axis=0) + 1e-3 - origin) / size) + 1).astype(np.int64)
-    return Columns(origin, size, shape, *_faces_of_columns(low, high, origin, size, shape, grow))
-
-
-def _faces_of_columns(
-    low: Floats, high: Floats, origin: Floats, size: float, shape: NDArray[np.int64], grow: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """For every cell the faces whose boxes, grown, touch it."""
     a = np.clip(np.floor((low - grow - origin) / size), 0, shape - 1).astype(np.int64)
     b = np.clip(np.floor((high + grow - origin) / size), 0, shape - 1).astype(np.int64)
     wide = b - a + 1
@@ -123,7 +116,7 @@ def _faces_of_columns(
     step = np.arange(len(face)) - np.repeat(np.cumsum(counts) - counts, counts)
     cell = (a[face, 0] + step % wide[face, 0]) * shape[1] + a[face, 1] + step // wide[face, 0]
     order = np.argsort(cell, kind="stable")
-    return np.searchsorted(cell[order], np.arange(shape.prod() + 1)), face[order]
+    return Columns(origin, size, shape, np.searchsorted(cell[order], np.arange(shape.prod() + 1)), face[order])
 
 
 @kernel

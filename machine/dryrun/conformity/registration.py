@@ -51,7 +51,7 @@ def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> list[Shift]:
     deposited = beads_of(run.program, run.segments_mm, run.segment_row, profile)
     walls = np.flatnonzero(outer & (deposited.length_mm > LEAST_MM))
     part = run.program.part[run.segment_row]
-    chosen = [_evenly(walls[part[walls] == each]) for each in np.unique(part[walls])]
+    chosen = [_evenly(walls[part[walls] == index]) for index in np.unique(part[walls])]
     if not chosen:
         return []
     pieces = np.concatenate(chosen)
@@ -70,7 +70,7 @@ def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> list[Shift]:
     ]
 
 
-def findings(run: DryRun, found: list[Shift]) -> list[Finding]:
+def findings(run: DryRun, moved: list[Shift]) -> list[Finding]:
     """An error for every part that lies beside the model."""
     return [
         at_row(
@@ -81,7 +81,7 @@ def findings(run: DryRun, found: list[Shift]) -> list[Finding]:
             f"part {shift.part} lies {shift.size_mm:.2f} mm beside the model, by X{shift.by_mm[0]:+.2f} Y{shift.by_mm[1]:+.2f} "
             f"Z{shift.by_mm[2]:+.2f}, {MOST_SHIFT_MM:g} mm are allowed",
         )
-        for shift in found
+        for shift in moved
         if shift.size_mm > MOST_SHIFT_MM
     ]
 
@@ -99,9 +99,9 @@ def _fit(normals: Floats, beside: Floats) -> Floats | None:
             return None
         facing = normals[keep] - normals[keep].mean(axis=0)
         value, axis = np.linalg.eigh(facing.T @ facing / keep.sum())
-        told = axis[:, value > INFORMATION]
-        along, *_ = np.linalg.lstsq(facing @ told, beside[keep] - beside[keep].mean(), rcond=None)
-        shift = told @ along
+        axes = axis[:, value > INFORMATION]
+        along, *_ = np.linalg.lstsq(facing @ axes, beside[keep] - beside[keep].mean(), rcond=None)
+        shift = axes @ along
         left = beside - normals @ shift
         left -= np.median(left[keep])
         usual = 1.4826 * float(np.median(np.abs(left[keep]))) + 1e-3

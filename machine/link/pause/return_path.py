@@ -13,7 +13,7 @@ from machine.gcode.turning import turn
 from machine.kinematics.collision import Printed
 from machine.link.pause.park_moves import NEAR_MM, SLOWLY
 from machine.link.pause.park_position import obstacle_top_mm
-from machine.planning.reorient import Speeds, route
+from machine.planning.reorient import Speeds, Turn, route
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.errors import JournalError
@@ -29,7 +29,8 @@ def return_moves(profile: Profile, printed: Printed, at: Floats, pose: Pose, goa
     near = min(float(goal[2]) + NEAR_MM, machine.z.limits_mm[1])
     down = [f"G0 Z{near:.3f} F{rise:.0f}", f"G1 Z{goal[2]:.3f} F{SLOWLY * rise:.0f}"]
     if hypot(goal_pose.tilt_deg - pose.tilt_deg, goal_pose.turn_deg - pose.turn_deg) > STILL_DEG:
-        path = route(machine, printed, at, goal, pose, goal_pose, Speeds(machine.z.speed_mm_s, process.travel_speed_mm_s), 0)
+        speeds = Speeds(machine.z.speed_mm_s, process.travel_speed_mm_s)
+        path = route(Turn(pose, goal_pose, at, goal), 0, printed, machine, speeds)
         return [
             f"G0 Z{path.z_mm:.3f} F{rise:.0f}",
             f"G0 X{path.over_mm[0]:.3f} Y{path.over_mm[1]:.3f} F{across:.0f}",

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
+from machine.firmware.line import FRAME_CHARACTERS
+from machine.firmware.marlin import DIALECT
 from machine.gcode.words import PAUSE_REMARK
 from profiles.errors import LocalProtocolError
 
-FRAME = 11  # N, five digits (numbers begin anew in time), blank, *, three digits of the checksum
-LINE_LIMIT = 95  # Marlin keeps MAX_CMD_SIZE - 1 characters; a longer line loses its checksum and is asked for again for ever
+LINE_LIMIT = DIALECT.longest_line
 FAR_NUMBER = 999_999  # no line of a print has it: a firmware that checks numbers refuses it with the one it wants
 REFUSED = {
     "M0": "waits for a person at the printer's own buttons",
@@ -46,12 +47,12 @@ def too_long(command: str, limit: int = LINE_LIMIT) -> LocalProtocolError:
     )
 
 
-def command_of(line: str, line_number: int, limit: int = LINE_LIMIT) -> str:
+def command_of(line: str, place: int | str, limit: int = LINE_LIMIT) -> str:
     """The command in a line of a program, without comment and blanks; "" when there is none.
 
     A command with a PAUSE_REMARK is the sender's own affair and counts as none.
-    line_number is the line's number in the program, for messages. Raises LocalProtocolError for a character outside printable
-    ASCII, for a `*`, and for commands that only the sender itself may give.
+    place: the line's number in the program, or what it is called, for messages. Raises LocalProtocolError for a character
+    outside printable ASCII, for a `*`, and for commands that only the sender itself may give.
     """
     command, _, remark = line.partition(";")
     command = command.strip()
@@ -61,17 +62,21 @@ def command_of(line: str, line_number: int, limit: int = LINE_LIMIT) -> str:
         command = command.replace("\t", " ")
         bad = next((c for c in command if not (c.isascii() and c.isprintable())), None)
         if bad is not None:
-            raise LocalProtocolError(f"line {line_number} holds the character {bad!r}: only printable ASCII can be sent")
+            raise LocalProtocolError(f"{_called(place)} holds the character {bad!r}: only printable ASCII can be sent")
     if "*" in command:
-        raise LocalProtocolError(f"line {line_number} ({command[:40]!r}) holds a '*': checksums are added by the sender")
+        raise LocalProtocolError(f"{_called(place)} ({command[:40]!r}) holds a '*': checksums are added by the sender")
     if command[0] in "Mm" and (reason := REFUSED.get(name_of(command))):
-        raise LocalProtocolError(f"line {line_number} holds {name_of(command)}, which {reason}: remove it from the program")
-    if len(command) > limit - FRAME:
+        raise LocalProtocolError(f"{_called(place)} holds {name_of(command)}, which {reason}: remove it from the program")
+    if len(command) > limit - FRAME_CHARACTERS:
         raise LocalProtocolError(
-            f"line {line_number} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
-            f"{limit} are allowed, {limit - FRAME} without"
+            f"{_called(place)} ({command[:40]!r}...) has {len(command)} characters: with number and checksum at most "
+            f"{limit} are allowed, {limit - FRAME_CHARACTERS} without"
         )
     return command
+
+
+def _called(place: int | str) -> str:
+    return f"line {place}" if isinstance(place, int) else place
 
 
 def name_of(command: str) -> str:

@@ -1,12 +1,12 @@
 """Verdicts: the sentences with which a connection ends, one function for each reason."""
 
+from machine.firmware.line import BAUDS
 from machine.link.protocol.decoder import LineDecoder
 from machine.link.protocol.window import GREETING_LINES
 from profiles.errors import FirmwareError, PrinterError, RemoteProtocolError, SilenceError
 
 SYNC_TRIES = 6  # a board that resets on opening spends one or two of them in its boot loader
 RUBBISH_TRIES = 2  # boot loaders speak at rates of their own; what comes after that is the firmware's
-BAUDS = (115200, 250000, 230400, 500000, 1000000, 57600)  # what firmwares are built with, the usual ones first
 LOST = "position and temperatures are lost, the print cannot go on"
 
 

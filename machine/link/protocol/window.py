@@ -3,6 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 
+from machine.firmware.line import FRAME_BYTES, LineRules
 from machine.link.protocol.framing import LINE_LIMIT, frame
 from machine.link.protocol.slow_commands import slow_timeout_s
 
@@ -30,7 +31,7 @@ class Window:
     that the firmware keeps; rx_bytes: what its receive buffer holds.
     """
 
-    def __init__(self, limit: int = LINE_LIMIT, rx_bytes: int = 127) -> None:
+    def __init__(self, limit: int = LINE_LIMIT, rx_bytes: int = LineRules.rx_bytes) -> None:
         self._limit = limit
         self.rx_bytes = rx_bytes
         self.sent = 0
@@ -85,8 +86,7 @@ class Window:
 
     def fits_buffer(self, command: str) -> bool:
         """Whether the receive buffer has a place for it even if nothing of what is in flight has left the buffer yet."""
-        # N, number, blank, *, three digits of the checksum, newline
-        return self._bytes + len(command) + 7 + len(str(self.sent + 1 - self._before)) <= self.rx_bytes
+        return self._bytes + len(command) + FRAME_BYTES + len(str(self.sent + 1 - self._before)) <= self.rx_bytes
 
     def send(self, command: str, now_s: float = 0.0) -> bytes:
         """Give a command the next number, keep it for repeats; its bytes."""

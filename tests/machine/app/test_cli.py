@@ -86,7 +86,7 @@ WRONG = [
     (["print", "demo:tree", "--port", "/dev/nowhere"], "/dev/nowhere does not exist"),
     (["print", "demo:tree", "--port", "/dev/null"], "/dev/null"),
     (["print", "demo:tree", "--port", "sim", "--sim-speed", "-1"], "--sim-speed is -1"),
-    (["print", "short.gcode", "--port", "sim", "--baud", "0"], "--baud is 0"),
+    (["print", "short.gcode", "--port", "sim", "--baud", "0"], "baud rate 0 is not possible"),
     (["print", "short.gcode", "--port", "sim", "--watch-port", "70000"], "--watch-port is '70000': it must be at most 65535"),
     (["decompose", "-lead.stl"], "./-lead.stl"),
     (["decompose", "demo:tree", "--json", "empty.gcode/x.json"], "empty.gcode is a file"),

@@ -10,7 +10,7 @@ from machine.app.cli import main
 from machine.app.commands.calibrate import ask_for_touches
 from machine.app.requests import CalibrationRequest
 from machine.calibration.fit import Touch
-from machine.calibration.program import course
+from machine.calibration.program import plan_touches
 from machine.kinematics.table import machine_points
 from profiles.machine import Machine
 from profiles.places import own_folder
@@ -33,7 +33,7 @@ def test_from_the_program_to_the_own_profile(tmp_path: Path, capsys: pytest.Capt
     machine, out = machine_of("open5x_voron0"), tmp_path / "touch.gcode"
     assert main(["calibrate", "--machine", "open5x_voron0", "--mark-height", "20", "-o", str(out)]) == 0
     real = really(machine, {"point_mm": (1.5, 0.0, -6.0), "sign": 1, "zero_deg": 0.5}, {"point_mm": (0.4, -0.9, 0.2)})
-    tilts = tuple(dict.fromkeys(pose.tilt_deg for pose in course(machine, 20.0).poses))
+    tilts = tuple(dict.fromkeys(pose.tilt_deg for pose in plan_touches(machine, 20.0).poses))
     sheet = tmp_path / "touch.toml"
     sheet.write_text(filled_in(sheet.read_text(), touched(real, tilts)))
     command = ["calibrate", "--machine", "open5x_voron0", "--measured", str(sheet)]
@@ -89,7 +89,7 @@ def talked(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
 
 def at_the_mark(real: Machine) -> list[str]:
     """The twelve lines of X Y Z that a real machine shows when its tip is on the mark where it stands."""
-    touches = course(machine_of("open5x_voron0"), 20.0)
+    touches = plan_touches(machine_of("open5x_voron0"), 20.0)
     places = [machine_points(real, pose, np.array([touches.mark_mm]))[0] for pose in touches.poses]
     return [" ".join(f"{letter}{value:.4f}" for letter, value in zip("XYZ", place, strict=True)) for place in places]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from machine.calibration.program import calibration_lines, course
+from machine.calibration.program import calibration_lines, plan_touches
 from machine.dryrun.dryrun import dry_run
 from profiles.errors import MoveError
 from profiles.profile import load, shipped
@@ -12,7 +12,7 @@ from tests.machine.calibration.touches import machine_of
 @pytest.mark.parametrize("name", [name for name in shipped("machine") if machine_of(name).tilts])
 def test_the_program_of_every_machine_is_clear_and_inside_its_limits(name: str) -> None:
     profile = load(name)
-    touches = course(profile.machine, 30.0)
+    touches = plan_touches(profile.machine, 30.0)
     lines = list(calibration_lines(profile, touches))
     table = profile.model_copy(update={"machine": profile.machine.model_copy(update={"coordinates": "table"})})
     errors = [f for f in dry_run(lines, table).findings if f.severity == "error"]
@@ -23,4 +23,4 @@ def test_the_program_of_every_machine_is_clear_and_inside_its_limits(name: str) 
 
 def test_a_machine_with_three_axes_has_nothing_to_calibrate() -> None:
     with pytest.raises(MoveError, match="there is no rotary axis"):
-        course(machine_of("three_axis"), 20.0)
+        plan_touches(machine_of("three_axis"), 20.0)

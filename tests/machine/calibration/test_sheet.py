@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from machine.calibration.program import course
+from machine.calibration.program import plan_touches
 from machine.calibration.sheet import read_sheet, sheet_text
 from profiles.errors import ProfileError
 from tests.machine.calibration.touches import machine_of
@@ -38,6 +38,6 @@ def test_a_wrong_csv_is_refused(tmp_path: Path) -> None:
 
 def test_an_empty_sheet_holds_no_touch(tmp_path: Path) -> None:
     machine = machine_of("generic_ac")
-    (tmp_path / "sheet.toml").write_text(sheet_text("generic_ac", machine, course(machine, 20.0)))
+    (tmp_path / "sheet.toml").write_text(sheet_text("generic_ac", machine, plan_touches(machine, 20.0)))
     sheet = read_sheet(tmp_path / "sheet.toml")
     assert (sheet.touches, sheet.mark_height_mm, sheet.machine) == ((), 20.0, "generic_ac")

@@ -88,4 +88,7 @@ def test_simulate_takes_a_baud_rate(tmp_path, capsys: pytest.CaptureFixture[str]
     main(["simulate", str(tmp_path / "a.gcode"), "--baud", "115200"])
     assert "warning: 115200 baud bring" in capsys.readouterr().out
     assert main(["simulate", str(tmp_path / "a.gcode"), "--baud", "12"]) == 1
-    assert capsys.readouterr().err == "tiltprint: --baud is 12: 1200 to 4000000 is allowed, printers use 115200 or 250000\n"
+    assert (
+        capsys.readouterr().err
+        == "tiltprint: baud rate 12 is not possible: 1200 to 4000000 is allowed, printers use 115200 or 250000\n"
+    )

@@ -1,7 +1,9 @@
 """The same program in every firmware's words, and every text read back to the same print."""
 
 import re
+from dataclasses import replace
 from functools import cache
+from pathlib import Path as File
 
 import numpy as np
 import pytest
@@ -13,14 +15,16 @@ from machine.gcode.writer import write_gcode
 from machine.kinematics.coordinates import axis_positions, followed_places
 from machine.kinematics.table import workpiece_path
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Reorient, Retract, Stroke, Travel, rows
+from machine.planning.plan import plan
+from machine.planning.stops import parse_stops
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind, ParsedProgram
 from mdp.pose import Pose
 from profiles.errors import ProfileError
 from profiles.machine import Machine
 from profiles.profile import Profile, load
-from slicer.paths import Kind
-from tests.machine.hand import printed
+from slicer.paths import Kind, Path
+from tests.machine.hand import post_and_arm, printed, squares
 
 MODES = [(name, "table") for name in dialects()] + [
     (name, "workpiece") for name, dialect in dialects().items() if dialect.follow_on
@@ -31,12 +35,13 @@ STARTS = {
     "grblhal": "M140 S{bed_c}\nM109 S{first_layer_nozzle_c}\nG92 {tilt}0 {turn}0",
     "klipper_steppers": "M140 S{bed_c}\nG28 X Y Z\nMANUAL_STEPPER STEPPER={tilt_stepper} SET_POSITION=0",
 }
+GOLDEN = File(__file__).parents[1] / "programs"
 ENDS = {"linuxcnc": "M104 P0\nM107"}
 
 
-def profile(dialect: str, coordinates: str = "table", machine: str = "generic_ac") -> Profile:
+def profile(dialect: str, coordinates: str = "table", machine: str = "generic_ac", settings: tuple[str, ...] = ()) -> Profile:
     """A profile whose machine has that firmware, its tilt axis beside the plate and its turn axis off the zero."""
-    made = load(machine=machine, settings=[f"machine.dialect={dialect}", f"machine.coordinates={coordinates}"])
+    made = load(machine=machine, settings=[f"machine.dialect={dialect}", f"machine.coordinates={coordinates}", *settings])
     axes = {
         "tilt": made.machine.tilt.model_copy(update={"point_mm": (0.0, 3.5, -12.0)}),
         "turn": made.machine.turn.model_copy(update={"point_mm": (2.25, -1.5, 0.75)}),
@@ -53,6 +58,27 @@ def both(dialect: str, coordinates: str) -> tuple[Profile, tuple[str, ...], Pars
     chosen = profile(dialect, coordinates)
     lines = tuple(write_gcode(printed()[3], chosen))
     return chosen, lines, parse_gcode(lines, chosen.machine)
+
+
+def golden(dialect: str, coordinates: str) -> list[str]:
+    """The commands of a print that needs a firmware's every word: round walls, heat, fans, accelerations, a pause, a filament."""
+    wanted = ("material.pressure_advance=0.04", "process.acceleration_mm_s2=900", "machine.purge_mm=20", "machine.arcs=true")
+    chosen = profile(dialect, coordinates, settings=wanted)
+    decomposition = post_and_arm(chosen.machine)
+    sliced = [squares(piece, chosen, layers=2) for piece in decomposition.parts]
+    around = np.linspace(0.0, 1.5 * np.pi, 60)
+    ring = np.column_stack([3.0 * np.cos(around), 3.0 * np.sin(around)])
+    hole = Path(Kind.OVERHANG, ring, 0.45, 25.0, 1.05, ring[:1], False, fan=0.6)
+    layers = tuple(replace(layer, paths=(*layer.paths, hole)) for layer in sliced[0].layers)
+    sliced[0] = replace(sliced[0], layers=layers, unsupported=())
+    program = plan(decomposition, sliced, chosen, parse_stops(["1:2"], ["2:2"]))
+    return [line for line in write_gcode(program, chosen) if not line.startswith(";")]
+
+
+@EACH
+def test_every_word_of_a_firmware_stands_as_in_the_golden_text(dialect: str, coordinates: str) -> None:
+    file = GOLDEN / f"every_word_{dialect}_{coordinates}.gcode"
+    assert golden(dialect, coordinates) == file.read_text(encoding="ascii").splitlines()
 
 
 def laid(machine: Machine, parsed: ParsedProgram) -> np.ndarray:

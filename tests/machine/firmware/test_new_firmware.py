@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from machine import firmware
-from machine.calibration.program import calibration_lines, course
+from machine.calibration.program import calibration_lines, plan_touches
 from machine.dryrun.dryrun import dry_run
 from machine.firmware import dialects, identify
 from machine.gcode.modal_state import ModalState
@@ -75,7 +75,7 @@ def test_its_words_for_following_the_table_are_remembered_for_a_resume(profile: 
 
 
 def test_its_calibration_waits_for_a_person_in_its_words(profile: Profile) -> None:
-    lines = list(calibration_lines(profile, course(profile.machine, 20.0)))
+    lines = list(calibration_lines(profile, plan_touches(profile.machine, 20.0)))
     first = next(k for k, line in enumerate(lines) if line.startswith("M118 touch 1 "))
     assert lines[first + 1] == "M1"
 

@@ -6,8 +6,7 @@ import pytest
 
 from machine.app.cli import main
 from machine.firmware import dialects
-from machine.gcode.block_words import refused_lines
-from machine.gcode.blocks import block_problems
+from machine.gcode.blocks import block_problems, refused_lines
 from machine.gcode.writer import write_gcode
 from profiles.errors import ProfileError
 from profiles.profile import load, shipped

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
-from machine.gcode.settings import clock
 from machine.gcode.writer import write_gcode
 from machine.planning.moves import BeginLayer, MachineProgram, Stroke, rows
 from machine.planning.timing import lengths
+from machine.quantities import duration
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind
 from profiles.errors import ProfileError
@@ -151,16 +151,18 @@ def test_the_foot_tells_filament_and_time_as_the_dry_run_does(machine: str) -> N
     assert float(cm3) == pytest.approx(float(mm) * pi * 1.75**2 / 4 / 1000, abs=0.01)
     assert float(grams) == pytest.approx(float(cm3) * 1.24, abs=0.02)
     printing = float(run.times_s[run.program.part > 0].sum())
-    assert _foot(text(machine), "estimated printing time (normal mode)") == clock(printing)
+    assert _foot(text(machine), "estimated printing time (normal mode)") == duration(printing)
 
 
 def _foot(lines, key: str) -> str:
     return next(line.partition(" = ")[2] for line in lines if line.startswith(f"; {key} = "))
 
 
-@pytest.mark.parametrize(("seconds", "words"), [(15.2, "15s"), (75, "1m 15s"), (3975, "1h 6m 15s"), (90061, "1d 1h 1m 1s")])
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0.4, "0s"), (15.2, "15s"), (75, "1m 15s"), (3975, "1h 6m 15s"), (90061, "1d 1h 1m 1s")]
+)
 def test_times_are_written_as_prusaslicer_does(seconds: float, words: str) -> None:
-    assert clock(seconds) == words
+    assert duration(seconds) == words
 
 
 def test_the_settings_can_be_read_from_the_file() -> None:
@@ -190,7 +192,7 @@ def test_an_unknown_placeholder_is_named_with_the_allowed_ones() -> None:
 
 
 def test_a_block_s_line_too_long_for_the_firmware_is_refused() -> None:
-    with pytest.raises(ProfileError, match=r"machine.gcode.start: the line .* has 104 characters, at most 83 are allowed"):
+    with pytest.raises(ProfileError, match=r"machine.gcode.start: the line .* has 104 characters, at most 84 are allowed"):
         write_gcode(printed()[3], _with_block("start", "M117" + " long" * 20))
 
 

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.link.line_history import CHECK_MUTE_S, CHECK_S, PLANNER_BLOCKS, Barriers, LineHistory, SentLine, shifts
+from machine.firmware.marlin import BLOCK_BUFFER_SIZE
+from machine.link.line_history import CHECK_MUTE_S, CHECK_S, Barriers, LineHistory, SentLine, shifts
 
 POSE = (1.5, -2.0, 60.25, 30.0, 725.0, 12.34567)
 
@@ -22,7 +23,7 @@ def test_acknowledged_moves_are_executed_as_far_as_the_planner_has_room() -> Non
     for step in moves(40):
         history.send(step)
     for _ in range(2):
-        history.acknowledge(33, PLANNER_BLOCKS - 1)
+        history.acknowledge(33, BLOCK_BUFFER_SIZE - 1)
     assert (history.sent, history.acknowledged, history.executed) == (40, 30, 29)
     history.acknowledge(33, 5)
     assert history.executed == 29

@@ -7,7 +7,7 @@ import pytest
 
 from machine.kinematics.collision import hull
 from machine.kinematics.table import machine_points
-from machine.planning.reorient import Speeds, poses_between, route, stands, way_s
+from machine.planning.reorient import Speeds, Turn, poses_between, route, stands, way_s
 from mdp.head import corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
@@ -78,10 +78,14 @@ def _least_distance(name: str, tips: np.ndarray) -> np.ndarray:
     return least
 
 
+def _turn_of(machine: Machine, target: np.ndarray | None = TARGET) -> Turn:
+    return Turn(level(machine), TURN, AT, target)
+
+
 @cache
 def _route(name: str):
     machine = _machine(name)
-    return route(machine, hull(PRINT, 0.0), AT, TARGET, level(machine), TURN, SPEEDS, 2)
+    return route(_turn_of(machine), 2, hull(PRINT, 0.0), machine, SPEEDS)
 
 
 ALL = pytest.mark.parametrize("name", ["disc", "cradle", "rectangle", "fractal"])
@@ -97,9 +101,9 @@ def test_through_the_whole_turn_the_head_keeps_the_lift_from_table_cradle_and_pr
 def test_no_stand_of_the_family_is_quicker_and_safe_too(name: str) -> None:
     machine, way = _machine(name), _route(name)
     found = []
-    for x, y in list(stands(machine, AT, TARGET))[::4]:
+    for x, y in list(stands(machine, _turn_of(machine)))[::4]:
         for z in np.arange(AT[2] + machine.clearance_mm, way.z_mm + 40.0, 4.0):
-            seconds = way_s(machine, AT, (x, y), (z, max(z, TARGET[2] + 1)), TARGET, SPEEDS)
+            seconds = way_s(_turn_of(machine), (x, y), (z, max(z, TARGET[2] + 1)), machine, SPEEDS)
             if seconds < way.seconds - 0.25:
                 found.append((x, y, z))
     assert not found or (_least_distance(name, np.array(found)) < machine.lift_mm).all()
@@ -119,4 +123,4 @@ def test_a_machine_too_low_for_every_stand_says_how_high_it_would_need_to_be() -
     low = machine.model_copy(update={axis: machine.x.model_copy(update={"limits_mm": (-5.0, 5.0)}) for axis in "xy"})
     low = low.model_copy(update={"z": machine.z.model_copy(update={"limits_mm": (-80.0, 52.0)})})
     with pytest.raises(MoveError, match=r"part 2: turning the table to A60.000 C50.000 needs the tip at Z \d+\.\d mm"):
-        route(low, hull(PRINT, 0.0), AT, None, level(low), TURN, SPEEDS, 2)
+        route(_turn_of(low, None), 2, hull(PRINT, 0.0), low, SPEEDS)

@@ -5,13 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from machine.firmware.marlin import SIMULATED
+from machine.firmware.marlin import FIRST_MOVE_DELAY_S, SIMULATED
 from machine.link.protocol.framing import frame
 from machine.planning.timing import move_times
 from machine.simulator.board import BuildOptions
 from machine.simulator.cable import Cable
 from machine.simulator.firmware import SimulatedFirmware
-from machine.simulator.planner import DELIVER_S
 from machine.simulator.uart import Uart
 from profiles.profile import load
 
@@ -63,7 +62,7 @@ def test_every_speed_change_is_within_the_acceleration() -> None:
 
 
 def test_the_first_move_waits_a_moment_for_others() -> None:
-    assert ran(["G1 X1 F600", "M400"]).record().begin_s[0] == pytest.approx(DELIVER_S)
+    assert ran(["G1 X1 F600", "M400"]).record().begin_s[0] == pytest.approx(FIRST_MOVE_DELAY_S)
     assert ran(["G1 X1 F600", "G1 X2", "G1 X3", "M400"]).record().begin_s[0] == 0.0
 
 
@@ -106,8 +105,8 @@ def test_whether_a_line_starves_the_printer_depends_on_its_rate(baud: int, starv
 
 
 def test_a_halt_leaves_the_axes_where_the_ramps_had_brought_them() -> None:
-    firmware = ran(["G1 X100 F6000"], until_s=DELIVER_S + 0.02)
-    firmware.board.motion.halt(DELIVER_S + 0.02)
+    firmware = ran(["G1 X100 F6000"], until_s=FIRST_MOVE_DELAY_S + 0.02)
+    firmware.board.motion.halt(FIRST_MOVE_DELAY_S + 0.02)
     record = firmware.record()
     assert record.end[-1, 0] == pytest.approx(0.5 * 1500 * 0.02**2)
     assert firmware.board.motion.place[0] == record.end[-1, 0]

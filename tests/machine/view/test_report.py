@@ -6,10 +6,9 @@ from typing import Any
 import pytest
 
 from machine.dryrun.dryrun import dry_run
-from machine.view.comparison import Alternative
+from machine.program import Alternative, Program
 from machine.view.layers import layers_of
 from machine.view.paths import end_times_s
-from machine.view.program import Program
 from machine.view.report import parts_report, print_report
 from profiles.profile import load
 from tests.machine.view.test_view import STEPS, example
@@ -25,7 +24,7 @@ def seconds(told: str) -> int:
 def tables(program: Program, alternatives: tuple[Alternative, ...] = ()) -> dict[str, Any]:
     profile = example()[0]
     run = program.run
-    report = print_report(program, profile, layers_of(run.program, 0.2), end_times_s(run), alternatives)
+    report = print_report(program, profile, layers_of(run.program, 0.2), end_times_s(run), alternatives=alternatives)
     return {"facts": dict(report["facts"]), **{table["title"]: table for table in report["tables"]}}
 
 

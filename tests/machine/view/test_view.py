@@ -13,13 +13,13 @@ from hypothesis.extra import numpy as arrays
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.writer import write_gcode
 from machine.kinematics.table import workpiece_path
+from machine.program import Program
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind
 from machine.view.contents import of_parts, of_print
 from machine.view.encoding import Column, pack
 from machine.view.layers import layers_of
 from machine.view.paths import shown_rows
-from machine.view.program import Program
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from profiles.profile import Profile, load
@@ -237,7 +237,7 @@ def test_a_guessed_machine_finds_nothing_of_its_own() -> None:
     text = "G28\nG1 Z0.2 F600\nG1 X9999\nG1 X0 E1"
     lines = tuple(text.split("\n"))
     codes = [
-        {finding["code"] for finding in unpacked(of_print("text", program, PLAIN, known))[0]["findings"]}
+        {finding["code"] for finding in unpacked(of_print("text", program, PLAIN, known=known))[0]["findings"]}
         for program, known in [(Program(lines, dry_run(lines, PLAIN), None), known) for known in (True, False)]
     ]
     assert codes[0] - codes[1] == {"axis-limit", "off-plate"}

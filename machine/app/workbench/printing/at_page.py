@@ -9,13 +9,14 @@ from typing import Any
 
 from machine.app.printer.attendance import Observers
 from machine.app.printer.serial_log import SerialLog
+from machine.app.printer.watch_page import state_of
 from machine.app.terminal.plain import plain_line
+from machine.app.terminal.printer_messages import PrinterMessages
 from machine.app.terminal.progress import Report
-from machine.app.terminal.screen import Course, Words
 from machine.app.workbench.printing.teller import Teller
+from machine.dryrun.timeline import Timeline
 from machine.link.pending_commands import Command, Control
 from machine.link.progress import Progress
-from machine.view.live import state_of
 
 WORDS_KEPT = 50
 COMMANDS = {
@@ -34,7 +35,7 @@ class AtPage:
     """hear() and leave() from the thread that listens to the server, all else from the one that prints."""
 
     def __init__(self, teller: Teller) -> None:
-        self.control, self.stop, self.words = Control(), Flag(), Words(WORDS_KEPT)
+        self.control, self.stop, self.words = Control(), Flag(), PrinterMessages(WORDS_KEPT)
         self.agreed = False  # to what was found: from then on something may move
         self._teller = teller
         self._answers: SimpleQueue[bool] = SimpleQueue()
@@ -78,7 +79,7 @@ class AtPage:
         return self.stop.is_set()
 
     @contextmanager
-    def show(self, observers: Observers, course: Course) -> Iterator["_Shown"]:
+    def show(self, observers: Observers, course: Timeline) -> Iterator["_Shown"]:
         """The print as its state."""
         journal = "" if observers.journal is None else str(observers.journal.path)
         self._teller.tell(log=log_told(observers.log), journal=journal)
@@ -94,7 +95,7 @@ class _Shown:
     """A display whose screen is the state that the pages are told. Moments are counted: a print of which nothing changes, as a
     paused one on a print server, is heard of all the same."""
 
-    def __init__(self, teller: Teller, course: Course, words: Words) -> None:
+    def __init__(self, teller: Teller, course: Timeline, words: PrinterMessages) -> None:
         self._teller, self._course, self._words = teller, course, words
         self._opened = False  # before, a person is asked
         self._moments = 0
@@ -115,7 +116,7 @@ class _Shown:
         self._teller.tell(phase=phase, progress=moment, words=words)
 
 
-def told(progress: Progress, course: Course) -> dict[str, Any]:
+def told(progress: Progress, course: Timeline) -> dict[str, Any]:
     """A moment of a print for the page: what every page that watches is told, and what a terminal's screen adds. heat_s: since
     when the temperatures are known, seconds since 1970, for the page goes on counting when nothing more comes."""
     return {

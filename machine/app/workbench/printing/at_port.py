@@ -1,13 +1,13 @@
 """At port: a print on a printer at a port, or on the simulated one, with what `print` asks before anything moves."""
 
-from machine.app.printer.compatibility import check_machine, check_port, describe_answer
-from machine.app.printer.ready import ready_program
-from machine.app.printer.stream import PrintJob, print_program
+from machine.app.pipeline.programs import LoadedProgram
+from machine.app.printer.compatibility import check_machine, check_port, describe_answer, ready_program
+from machine.app.printer.stream import print_program
 from machine.app.requests import SIMULATED
 from machine.app.workbench.printing.at_page import AtPage
 from machine.app.workbench.printing.checks import CLEAN, DONE, LEFT, STOPPED, Checks, figures, program_of
 from machine.app.workbench.printing.order import PrintOrder, State
-from machine.dryrun.starvation import check_baud
+from machine.firmware.line import check_baud
 from machine.link.identification import Answer
 
 
@@ -20,7 +20,7 @@ def print_at_port(order: PrintOrder, person: AtPage, checks: Checks) -> State:
     return STOPPED if print_program(job, order.printing, attendance=person) else DONE
 
 
-def _checked(order: PrintOrder, checks: Checks) -> PrintJob:
+def _checked(order: PrintOrder, checks: Checks) -> LoadedProgram:
     """The job, when nothing speaks against it."""
     printing, profile, tell = order.printing, order.profile, checks.teller.tell
     check_baud(printing.baud)
@@ -32,7 +32,7 @@ def _checked(order: PrintOrder, checks: Checks) -> PrintJob:
     with checks.that(CLEAN):
         program = ready_program(answer, program, profile, order.name, printing, order.force)
     tell(figures=figures(program))  # with what the line's rate adds
-    return PrintJob(order.name, program, profile)
+    return LoadedProgram(order.name, program, profile)
 
 
 def _answers(answer: Answer | None, order: PrintOrder) -> str:

@@ -1,6 +1,7 @@
 """At server: a print on a print server, which is handed the file, as `print --port SERVER` or `send` does it, or
 one that it is at already, as `follow` does."""
 
+from machine.app.pipeline.programs import LoadedProgram
 from machine.app.printer.attendance import Observers
 from machine.app.printer.network_print import (
     LIMITS,
@@ -12,7 +13,6 @@ from machine.app.printer.network_print import (
     server_session,
 )
 from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
-from machine.app.printer.stream import PrintJob
 from machine.app.workbench.printing.at_page import AtPage, log_told
 from machine.app.workbench.printing.checks import CLEAN, DONE, LEFT, STOPPED, Checks, figures, program_of
 from machine.app.workbench.printing.order import FollowOrder, PrintOrder, State
@@ -59,7 +59,7 @@ def _ended(end: End, name: str, address: str) -> State:
     return {End.DONE: DONE, End.CANCELLED: STOPPED, End.LEFT: left}[end]
 
 
-def _checked(order: PrintOrder, server: PrintServer, checks: Checks) -> PrintJob:
+def _checked(order: PrintOrder, server: PrintServer, checks: Checks) -> LoadedProgram:
     """The job, when nothing speaks against it."""
     profile, greeting = order.profile, server.greet()
     free = ", is free," if order.starts else ""
@@ -73,4 +73,4 @@ def _checked(order: PrintOrder, server: PrintServer, checks: Checks) -> PrintJob
         ready_for_server(greeting, program, profile, order.name, order.force)
     if order.starts:
         checks.add(LIMITS)
-    return PrintJob(order.name, program, profile)
+    return LoadedProgram(order.name, program, profile)

@@ -8,7 +8,7 @@ from machine.app.pipeline import compilers
 from machine.app.workbench.printing.order import PrintOrder, State
 from machine.app.workbench.printing.teller import Said, Teller
 from machine.dryrun.dryrun import dry_run, summary
-from machine.view.program import Program
+from machine.program import Program
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"

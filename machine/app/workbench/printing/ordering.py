@@ -6,7 +6,7 @@ from machine.app.printer.server_checks import check_server_dialect
 from machine.app.requests import PrintRequest
 from machine.app.workbench.printing.order import PrintOrder
 from machine.app.workbench.session.session import Session
-from machine.dryrun.starvation import check_baud
+from machine.firmware.line import check_baud
 from machine.network.address import is_server_address, parse_server_address
 from profiles.errors import PlanError
 from profiles.machine import Machine

@@ -20,8 +20,8 @@ from machine.app.workbench.printing.at_page import LEAVE
 from machine.app.workbench.printing.order import Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.news import News
+from machine.firmware.line import check_baud
 from machine.link.medium import stable_name
-from machine.link.port import check_baud
 from machine.network.address import is_server_address, parse_server_address
 from profiles.errors import PrinterError
 

@@ -5,7 +5,7 @@ import asyncio
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.slicing import Slicing
-from machine.view.comparison import Alternative
+from machine.program import Alternative
 
 
 class Comparing:

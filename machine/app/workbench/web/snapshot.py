@@ -13,7 +13,7 @@ from machine.app.workbench.bench.marks import named_faces
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.slices import slices_told
-from machine.view.comparison import front_record
+from machine.view.front import front_record
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
 from mdp.mesh import Mesh

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machine.app.pipeline import compilers
-from machine.app.pipeline.lying import better_in_words, laid_in_words
 from machine.app.pipeline.pricing import pricing
+from machine.app.terminal.advice import better_in_words, laid_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.worker import Tell
 from mdp.decomposition import Decomposition, FrontRow

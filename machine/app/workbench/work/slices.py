@@ -14,7 +14,7 @@ from machine.app.workbench.work.walls import walls
 from machine.app.workbench.work.worker import Tell
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
-from machine.view.comparison import Alternative
+from machine.program import Alternative
 from machine.view.page import print_page
 from mdp.decomposition import Decomposition
 from profiles.profile import Profile

@@ -75,7 +75,7 @@ def test_faults_of_a_file_happen(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("options", "words"), [
     (["--speed", "-1"], "--speed is -1: it must be 0 (as fast as possible) or a number above"),
     (["--speed", "inf"], "--speed is inf"),
-    (["--baud", "3"], "--baud is 3: 1200 to 4000000 is allowed"),
+    (["--baud", "3"], "baud rate 3 is not possible: 1200 to 4000000 is allowed"),
     (["--tcp", "99999"], "--tcp is 99999: 0 (a free port) to 65535"),
     (["--pty", "x", "--tcp", "0"], "one of them is allowed"),
     (["--pty", "/nodir/x"], "the link /nodir/x cannot be made: no such file or directory"),

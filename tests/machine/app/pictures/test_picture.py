@@ -62,26 +62,26 @@ def test_a_picture_that_cannot_be_written_leaves_nothing_and_says_where(tmp_path
 
 
 def test_a_box_seen_from_the_front_covers_its_share_of_the_picture() -> None:
-    image = draw([box(20, 20, 10)], [(120, 120, 120)], None, FRONT, (200, 200), span_mm=40.0)
+    image = draw([box(20, 20, 10)], [(120, 120, 120)], view=FRONT, size=(200, 200), span_mm=40.0)
     assert (image < 250).any(axis=2).mean() == pytest.approx(20 * 10 / 40**2, rel=0.03)
 
 
 def test_a_ball_covers_the_area_of_its_disc() -> None:
-    image = draw([ball(10.0, 96)], [(120, 120, 120)], None, FRONT, (200, 200), span_mm=25.0)
+    image = draw([ball(10.0, 96)], [(120, 120, 120)], view=FRONT, size=(200, 200), span_mm=25.0)
     assert (image < 250).any(axis=2).mean() == pytest.approx(pi * 10**2 / 25**2, rel=0.03)
 
 
 def test_the_nearer_mesh_hides_the_farther_one() -> None:
     near, far = box(10).transform(np.eye(3), (0, -30, 0)), box(10).transform(np.eye(3), (0, 30, 0))
-    image = draw([near, far], [(0, 200, 0), (200, 0, 0)], None, FRONT, (80, 80))
+    image = draw([near, far], [(0, 200, 0), (200, 0, 0)], view=FRONT, size=(80, 80))
     assert image[40, 40, 1] > 2 * image[40, 40, 0]
 
 
 def test_red_faces_are_red_and_the_others_are_not() -> None:
     mesh = box(10, 10, 10)
-    image = draw([mesh], [(200, 200, 200)], [mesh.normals[:, 1] < -0.5], FRONT, (80, 80), span_mm=20.0)
+    image = draw([mesh], [(200, 200, 200)], reds=[mesh.normals[:, 1] < -0.5], view=FRONT, size=(80, 80), span_mm=20.0)
     assert share_like(image, RED) == pytest.approx(0.25, rel=0.12)
-    behind = draw([mesh], [(200, 200, 200)], [mesh.normals[:, 1] > 0.5], FRONT, (80, 80), span_mm=20.0)
+    behind = draw([mesh], [(200, 200, 200)], reds=[mesh.normals[:, 1] > 0.5], view=FRONT, size=(80, 80), span_mm=20.0)
     assert share_like(behind, RED) == 0.0
 
 

@@ -4,7 +4,7 @@ import struct
 from base64 import b64decode
 from itertools import pairwise
 
-from machine.app.pictures.thumbnail import thumbnail, with_thumbnails
+from machine.app.pictures.png import thumbnail, with_thumbnails
 from machine.reader.parse import parse_gcode
 from profiles.profile import load
 from tests.machine.hand import printed, text

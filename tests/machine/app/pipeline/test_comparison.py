@@ -4,8 +4,7 @@ from functools import cache
 
 from machine.app.pipeline.comparison import alternatives_json, compare_table, compare_with_one_part
 from machine.app.pipeline.pipeline import build
-from machine.view.comparison import Alternative
-from machine.view.program import Program
+from machine.program import Alternative, Program
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
 from tests.shapes import tee

@@ -9,8 +9,8 @@ from machine.app.pipeline.pipeline import build, decompose_model
 from machine.app.requests import ModelRequest
 from machine.dryrun.conformity.deposit import inside_share
 from machine.link.stream import print_lines
+from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
-from machine.view.program import Program
 from profiles.profile import load
 from slicer.parts import slice_parts
 

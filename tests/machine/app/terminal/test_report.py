@@ -5,7 +5,6 @@ import pytest
 
 from machine.app.terminal.report import front_table, interfaces_line, parts_table, run_table, table
 from machine.dryrun.dryrun import dry_run
-from machine.view.quantities import duration
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.mesh import Mesh
@@ -117,11 +116,6 @@ def test_a_long_finding_is_told_in_lines_with_every_key_whole() -> None:
 
 def test_a_program_without_a_move_says_so() -> None:
     assert run_lines("")[2] == "nothing moves"
-
-
-@pytest.mark.parametrize(("seconds", "told"), [(3975.4, "1h 6m 15s"), (61, "1m 1s"), (0.4, "0s")])
-def test_a_duration_is_hours_minutes_seconds(seconds: float, told: str) -> None:
-    assert duration(seconds) == told
 
 
 def test_a_table_aligns_words_left_and_numbers_right() -> None:

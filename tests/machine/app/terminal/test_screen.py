@@ -1,4 +1,4 @@
-"""The live screen: what stands on it for a given moment, and which words of the printer it keeps."""
+"""The live screen: what stands on it for a given moment."""
 
 import io
 from dataclasses import replace
@@ -10,8 +10,9 @@ from rich.console import Console
 
 from machine.app.terminal.keys import MORE
 from machine.app.terminal.print_display import status
-from machine.app.terminal.screen import KEYS, Course, ScreenState, Words, printer_message, render
+from machine.app.terminal.screen import KEYS, ScreenState, render
 from machine.dryrun.dryrun import dry_run
+from machine.dryrun.timeline import Timeline
 from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
 from profiles.profile import load
@@ -22,7 +23,7 @@ PROGRAM = [
     ";PART:1 of 2", ";POSE:A0 C0", ";LAYER_CHANGE", "G1 X10 E1 F600", ";LAYER_CHANGE", "G1 X20 E1",
     ";PART:2 of 2", "G0 Z50", "G0 A30 C120", ";LAYER_CHANGE", "G1 X30 E1", "M104 S0",
 ]  # fmt: skip
-COURSE = Course(dry_run(PROGRAM, PROFILE))
+TIMELINE = Timeline(dry_run(PROGRAM, PROFILE))
 NOON = datetime(2026, 11, 21, 12, 0, 0)
 MOMENT = Progress(
     sent=14, acknowledged=12, total=14, elapsed_s=754.0, left_s=4335.0, share=0.62,
@@ -33,7 +34,7 @@ MOMENT = Progress(
 def lines(progress: Progress, words: tuple[str, ...] = (), hint: str = "", keys: bool = True, width: int = 100) -> list[str]:
     """The screen as plain lines without the spaces at their ends."""
     console = Console(file=io.StringIO(), record=True, width=width, force_terminal=True, no_color=True)
-    console.print(render(ScreenState("tree.gcode to /dev/ttyACM0", progress, COURSE, words, hint, keys), NOON))
+    console.print(render(ScreenState("tree.gcode to /dev/ttyACM0", progress, TIMELINE, words, hint, keys), NOON))
     return [line.rstrip() for line in console.export_text().splitlines()]
 
 
@@ -51,23 +52,6 @@ def test_a_moment_of_a_print_is_drawn_whole() -> None:
 def test_the_pose_is_that_of_the_acknowledged_line() -> None:
     turned = replace(MOMENT, part=2, layer=None, file_line=16)
     assert lines(turned)[1] == "part 2 of 2   tilt A 30.0 deg   turn C 120.0 deg"
-
-
-def test_what_is_left_after_a_line_are_the_moves_and_dwells_behind_it() -> None:
-    run = dry_run(["G21", "G90", "M83", "G28", "G1 X60 F600", "G4 S5", "G1 X0 F600", "G4 S7"], PROFILE)
-    course, ends_s = Course(run), run.times_s
-    assert course.remaining_s(0) == pytest.approx(run.time_s)
-    assert course.remaining_s(5) == pytest.approx(ends_s[1] + 12.0)
-    assert course.remaining_s(7) == pytest.approx(7.0)
-
-
-def test_the_way_to_a_part_is_no_layer_of_it() -> None:
-    assert [COURSE.layers(part) for part in (1, 2, 3, None)] == [2, 1, None, None]
-
-
-@pytest.mark.parametrize(("line", "pose"), [(0, None), (10, None), (11, (0.0, 0.0)), (15, (0.0, 0.0)), (99, (30.0, 120.0))])
-def test_the_table_stands_where_the_last_move_before_a_line_has_left_it(line: int, pose: tuple[float, float] | None) -> None:
-    assert COURSE.pose_deg(line) == pose
 
 
 def test_what_is_not_known_is_left_out() -> None:
@@ -119,49 +103,3 @@ def test_a_long_word_of_the_printer_is_wrapped_and_cut() -> None:
 
 def test_the_explanation_of_q_fits_on_two_lines() -> None:
     assert len(lines(MOMENT, hint=MORE, width=80)) <= 7
-
-
-@pytest.mark.parametrize(("line", "text"), [
-    (b"ok N3 P15 B3", ""),
-    (b" T:20.00 /0.00 B:20.00 /0.00", ""),
-    (b"X:0.00 Y:0.00 Z:0.00 E:0.00 Count X:0", ""),
-    (b"echo:busy: processing", ""),
-    (b"Cap:EEPROM:1", ""),
-    (b"echo: cold extrusion prevented", "cold extrusion prevented"),
-    (b"// probe at 5,5", "probe at 5,5"),
-    (b"//action:pause", "the printer asks: pause"),
-    (b"Error:Heating failed", "Error:Heating failed"),
-    (b"start", "the printer has started"),
-])  # fmt: skip
-def test_of_what_the_printer_says_only_words_are_kept(line: bytes, text: str) -> None:
-    assert printer_message(line) == text
-
-
-def test_words_cut_anywhere_are_put_together_and_the_last_four_kept() -> None:
-    words, said = Words(), b"".join(b"ok\necho:word %d\n" % n for n in range(9))
-    for at in range(0, len(said), 7):
-        words.hear("<", said[at : at + 7])
-    words.hear(">", b"echo:sent\n")
-    assert list(words.last) == ["word 5", "word 6", "word 7", "word 8"]
-
-
-def test_a_message_that_stays_is_told_once_whatever_the_printer_says_meanwhile() -> None:
-    words = Words()
-    for text in ("pausing", "pausing", "", "paused"):
-        words.add(text)
-        words.hear("<", b"ok\n" if text else b"echo:busy here\n")
-        words.add(text)
-    assert list(words.last) == ["pausing", "busy here", "paused"]
-
-
-def test_a_printer_that_never_ends_its_line_takes_no_memory() -> None:
-    words = Words()
-    for _ in range(100):
-        words.hear("<", b"x" * 1000)
-    assert len(words._half) == 4096
-
-
-def test_words_said_again_are_one_line_with_a_count() -> None:
-    words = Words()
-    words.hear("<", b'echo:Unknown command: "M486 S1"\nok\n' + b'echo:Unknown command: "M486 S-1"\nok\n' * 18 + b"echo:done\n")
-    assert list(words.last) == ["Unknown command: M486 (x 19)", "done"]

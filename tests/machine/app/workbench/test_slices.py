@@ -12,7 +12,7 @@ from machine.app.workbench.web.downloads import gcode
 from machine.app.workbench.work.slices import Sliced
 from machine.app.workbench.work.walls import walls
 from machine.dryrun.findings import Finding, known_findings
-from machine.view.comparison import Alternative
+from machine.program import Alternative
 from profiles.errors import PlanError
 from slicer.parts import slice_parts
 from tests.shapes import box

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from machine.firmware import FIRMWARES, Firmware
 from machine.firmware.klipper import KLIPPER
+from machine.firmware.line import FRAME_CHARACTERS
 from machine.firmware.marlin import MARLIN
 from machine.firmware.repetier import REPETIER
 from machine.firmware.reprapfirmware import REPRAPFIRMWARE
@@ -21,7 +22,7 @@ from machine.link.protocol.events import (
     Event,
     Ok,
 )
-from machine.link.protocol.framing import FRAME, LINE_LIMIT, command_of, frame
+from machine.link.protocol.framing import LINE_LIMIT, command_of, frame
 from machine.link.protocol.questions import QUESTIONS_MOST
 from machine.link.protocol.resends import ASKED_LIMIT
 from machine.link.protocol.states import State
@@ -561,7 +562,7 @@ def test_a_new_beginning_without_answer_ends_the_print() -> None:
 
 
 def test_no_number_is_longer_than_a_checked_line_has_room_for() -> None:
-    longest = "M117 " + "x" * (LINE_LIMIT - FRAME - 5)
+    longest = "M117 " + "x" * (LINE_LIMIT - FRAME_CHARACTERS - 5)
     assert command_of(longest, 1) == longest
     assert all(len(frame(row.line.last_number + QUESTIONS_MOST, longest)) - 1 <= LINE_LIMIT for row in FIRMWARES)
 

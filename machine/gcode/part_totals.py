@@ -1,4 +1,4 @@
-"""Contents: a comment that tells what a part's beads come to, so that a program that was changed later gives itself away."""
+"""Part totals: a comment that tells what a part's beads come to, so that a program that was changed later gives itself away."""
 
 import re
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ FORM = re.compile(rf"X{NUMBER} {NUMBER} Y{NUMBER} {NUMBER} Z{NUMBER} {NUMBER} E{
 
 
 @dataclass(frozen=True, eq=False)
-class Contents:
+class PartTotals:
     """What a part's beads come to: (2, 3) least and greatest axis positions X Y Z, filament, the layers that have any.
 
     line: of the comment.
@@ -29,7 +29,7 @@ class Contents:
     layers: int
 
 
-def contents_comment(strokes: Iterable[Stroke], layers: int) -> str:
+def totals_comment(strokes: Iterable[Stroke], layers: int) -> str:
     """The comment of a part with these strokes in so many layers; a purge is no part's. Empty where it has no strokes."""
     own = [stroke for stroke in strokes if stroke.kind is not Kind.PURGE]
     if not own:
@@ -41,10 +41,10 @@ def contents_comment(strokes: Iterable[Stroke], layers: int) -> str:
     return f";{KEY}:{sides} E{sum(float(stroke.filament_mm.sum()) for stroke in own):.3f} layers {layers}"
 
 
-def read_contents(text: str, line: int, part: int) -> Contents | None:
+def read_totals(text: str, line: int, part: int) -> PartTotals | None:
     """What the comment's text behind its colon tells of a part; None where it is no such text."""
-    told = FORM.fullmatch(text.strip())
-    if told is None:
+    match = FORM.fullmatch(text.strip())
+    if match is None:
         return None
-    figures = [float(value) for value in told.groups()[:7]]
-    return Contents(line, part, np.array(figures[:6]).reshape(3, 2).T, figures[6], int(told[8]))
+    figures = [float(value) for value in match.groups()[:7]]
+    return PartTotals(line, part, np.array(figures[:6]).reshape(3, 2).T, figures[6], int(match[8]))

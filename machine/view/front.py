@@ -1,33 +1,10 @@
-"""Comparison: what one way to print a model costs, to be held against other ways."""
+"""Front: the ways to cut a model that a search has found, as pages know them."""
 
 import shlex
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 from machine.view.parts import page_colours
 from mdp.decomposition import Decomposition, FrontRow
-
-
-@dataclass(frozen=True)
-class Alternative:
-    """One way to print a model. risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm:
-    length of the seams between parts; interface_mm3: plastic that one piece would not have, by the part that stands
-    there; findings: how many its dry run has; message: why it cannot be printed so, or ""."""
-
-    name: str
-    orientation: str
-    parts: int
-    time_s: float | None
-    filament_mm: float | None
-    filament_g: float | None
-    support_mm3: float | None
-    risky_mm2: float
-    message: str = ""
-    unsupported_mm2: float | None = None
-    seam_mm: float = 0.0
-    interface_mm3: Mapping[int, float] = field(default_factory=dict)
-    findings: int = 0
 
 
 def front_record(row: FrontRow) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from machine.app.cli import main
-from machine.app.pictures.layer import draw_layer, parse_layer
+from machine.app.commands.export import draw_layer, parse_layer
 from profiles.errors import OutputError, SliceError
 from tests.machine.app.test_cli import FAST
 from tests.machine.hand import printed

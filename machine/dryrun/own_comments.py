@@ -1,0 +1,146 @@
+"""Own comments: what a file of ours tells of itself in comments, held against its own moves and against the profile.
+
+Its configuration and poses say whether it was made for this machine, its parts' totals whether it was changed since.
+"""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from machine.dryrun.findings import Finding, at_row
+from machine.gcode.part_totals import PartTotals
+from machine.gcode.settings import CONFIG_BEGIN, CONFIG_END, comment, flat
+from machine.reader.parsed import MoveKind, ParsedProgram
+from profiles.profile import Profile
+from slicer.paths import Kind
+
+CENTRE = ("machine.tilt.point_mm", "machine.turn.point_mm", "machine.tool_mm")
+SIGN = tuple(f"machine.{axis}.{key}" for axis in ("tilt", "turn") for key in ("sign", "axis", "letter", "zero_deg"))
+POSE = re.compile(r";POSE:([A-Z])(-?[0-9.]+) ([A-Z])(-?[0-9.]+)")
+LEVEL_DEG = 1e-3
+PLACE_MM = 0.02  # rounded coordinates, arcs read as chords, followed places taken back to axis positions
+FILAMENT_SHARE, FILAMENT_MM = 2e-3, 0.05
+
+
+def findings(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> list[Finding]:
+    """Errors of code centre, sign, pose, contents and missing."""
+    return [*_part_totals(program), *_geometry(lines, profile), *_poses(lines, program, profile)]
+
+
+def has_material(lines: Sequence[str], profile: Profile) -> bool:
+    """Whether the file's own configuration has the profile's material."""
+    recorded = _configuration(lines)
+    material = [(f"material.{key}", value) for key, value in flat(profile.material.model_dump(), "")]
+    return bool(recorded) and all(recorded[key][1] == comment(f"{key} = {value}") for key, value in material if key in recorded)
+
+
+def _geometry(lines: Sequence[str], profile: Profile) -> list[Finding]:
+    """Keys of the chain of axes that the file's configuration has otherwise than the profile."""
+    recorded = _configuration(lines)
+    now = {key: (comment(f"{key} = {value}"), value) for key, value in flat(profile.model_dump(), "")}
+    problems = []
+    for code, keys, what in (("centre", CENTRE, "rotation centre"), ("sign", SIGN, "sense of the axes")):
+        for key in keys:
+            line, text = recorded.get(key, (0, ""))
+            if line and key in now and text != now[key][0]:
+                was = text.partition(" = ")[2]
+                message = f"the file was made for another {what}: {key} = {was}, the profile has {now[key][1]}"
+                problems.append(Finding("error", code, line, 0, 0, message))
+    return problems
+
+
+def _configuration(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
+    """Key -> (line number, the whole comment) of the block at a file's foot; empty without one."""
+    recorded: dict[str, tuple[int, str]] = {}
+    inside = False
+    for number in range(len(lines), 0, -1):
+        text = lines[number - 1].rstrip()
+        if text == CONFIG_END:
+            inside = True
+        elif text == CONFIG_BEGIN or (text and not text.startswith(";")):
+            break
+        elif inside:
+            recorded.setdefault(text[2:].partition(" = ")[0], (number, text))
+    return recorded
+
+
+def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> list[Finding]:
+    """Parts of which beads are laid at another pose than their ;POSE: comment tells."""
+    letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
+    rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
+    problems = []
+    for number in [k for k, line in enumerate(lines, start=1) if line[:6] == ";POSE:"]:
+        comment_pose = POSE.match(lines[number - 1])
+        if comment_pose is None or (comment_pose[1], comment_pose[3]) != letters:
+            continue
+        after = int(np.searchsorted(program.line[rows], number))
+        if after == len(rows):
+            continue
+        row, wanted = int(rows[after]), np.array([float(comment_pose[2]), float(comment_pose[4])])
+        at = program.end[row, 3:]
+        if np.abs(at - wanted).max() > LEVEL_DEG:
+            message = (
+                f"the part is printed at {letters[0]}{at[0]:.3f} {letters[1]}{at[1]:.3f}, "
+                f"it was made for {letters[0]}{wanted[0]:.3f} {letters[1]}{wanted[1]:.3f}"
+            )
+            problems.append(at_row(program, row, "error", "pose", message))
+    return problems
+
+
+def _part_totals(program: ParsedProgram) -> list[Finding]:
+    """Parts whose beads do not come to what the file tells of them, and parts that are missing."""
+    beads = (program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value)
+    problems = _missing(program, beads)
+    for totals in program.part_totals:
+        rows = np.flatnonzero(beads & (program.part == totals.part))
+        if len(rows):
+            problems += _of_part(program, rows, totals)
+    return problems
+
+
+def _missing(program: ParsedProgram, beads: NDArray[np.bool_]) -> list[Finding]:
+    """The parts of which nothing is printed, of those that `;PART:1 of 3` tells."""
+    printed = set(np.unique(program.part[beads]).tolist())
+    absent = [index for index in range(1, program.announced + 1) if index not in printed]
+    if not absent:
+        return []
+    line = int(program.line[-1]) if len(program.line) else 0
+    names = f"part {absent[0]}" if len(absent) == 1 else f"parts {', '.join(map(str, absent[:10]))}"
+    message = f"nothing of {names} is printed: the file tells of {program.announced} parts, beads are laid of {len(printed)}"
+    return [Finding("error", "missing", line, absent[0], 0, message)]
+
+
+def _of_part(program: ParsedProgram, rows: NDArray[np.int64], totals: PartTotals) -> list[Finding]:
+    """What differs in a part: its layers, its filament, where it lies."""
+    problems = []
+    layers = len(np.unique(program.layer[rows]))
+    if layers != totals.layers:
+        message = f"beads are laid in {layers} layers of part {totals.part}, the file tells of {totals.layers}"
+        problems.append(at_row(program, int(rows[-1]), "error", "contents", message))
+    pushed = float(program.e_mm[rows].sum())
+    if abs(pushed - totals.filament_mm) > max(FILAMENT_MM, FILAMENT_SHARE * totals.filament_mm):
+        message = f"part {totals.part} pushes {pushed:.2f} mm of filament, the file tells of {totals.filament_mm:.2f} mm"
+        problems.append(at_row(program, int(rows[0]), "error", "contents", message))
+    ends = np.stack([program.start[rows, :3], program.end[rows, :3]])
+    bounds = np.stack([ends.min(axis=(0, 1)), ends.max(axis=(0, 1))])
+    apart = bounds - totals.bounds_mm
+    if np.abs(apart).max() <= PLACE_MM:
+        return problems
+    side, axis = (int(v) for v in np.unravel_index(np.abs(apart).argmax(), apart.shape))
+    extreme = np.abs(ends[:, :, axis] - bounds[side, axis]).min(axis=0).argmin()
+    moved = (
+        f"part {totals.part} lies {abs(apart[side, axis]):.2f} mm aside" if _is_shift(apart) else f"part {totals.part} reaches"
+    )
+    message = (
+        f"{moved} to {'XYZ'[axis]}{bounds[side, axis]:.3f}, the file tells of {'XYZ'[axis]}{totals.bounds_mm[side, axis]:.3f} "
+        f"({PLACE_MM:g} mm are allowed)"
+    )
+    row = int(rows[0] if _is_shift(apart) else rows[extreme])
+    return [*problems, at_row(program, row, "error", "contents", message)]
+
+
+def _is_shift(apart: NDArray[np.float64]) -> bool:
+    """True where both sides of a part are moved alike."""
+    return bool(np.abs(apart[0] - apart[1]).max() <= PLACE_MM)

@@ -1,0 +1,48 @@
+"""Program: the G-code of a print with its dry run, and the parts it was made of; what ways to print a model come to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from machine.dryrun.dryrun import DryRun
+from mdp.decomposition import Decomposition
+from slicer.paths import SlicedPart
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """The G-code of a print, its dry run, and its parts where it was made from a model."""
+
+    lines: tuple[str, ...]
+    run: DryRun
+    decomposition: Decomposition | None
+    sliced: tuple[SlicedPart, ...] = ()
+
+    @property
+    def interface_mm3(self) -> dict[int, float]:
+        """Plastic that there would not be if the model were in one piece, by the part that stands on it; {} where not known."""
+        more: dict[int, float] = {}
+        for piece in self.sliced:
+            for index, mm3 in piece.interface_mm3.items():
+                more[index] = more.get(index, 0.0) + mm3
+        return dict(sorted(more.items()))
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """One way to print a model. risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm:
+    length of the seams between parts; interface_mm3: plastic that one piece would not have, by the part that stands
+    there; findings: how many its dry run has; message: why it cannot be printed so, or ""."""
+
+    name: str
+    orientation: str
+    parts: int
+    time_s: float | None
+    filament_mm: float | None
+    filament_g: float | None
+    support_mm3: float | None
+    risky_mm2: float
+    message: str = ""
+    unsupported_mm2: float | None = None
+    seam_mm: float = 0.0
+    interface_mm3: Mapping[int, float] = field(default_factory=dict)
+    findings: int = 0

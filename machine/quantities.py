@@ -1,0 +1,32 @@
+"""Quantities: figures of a print in the units that people know."""
+
+from math import pi
+
+from profiles.material import Material
+
+
+def duration(seconds: float) -> str:
+    """Days, hours, minutes and seconds as 1h 6m 15s."""
+    left = round(seconds)
+    words: list[str] = []
+    for letter, size in (("d", 86400), ("h", 3600), ("m", 60)):
+        count, left = divmod(left, size)
+        if count or words:
+            words.append(f"{count}{letter}")
+    return " ".join([*words, f"{left}s"])
+
+
+def minutes(seconds: float) -> str:
+    """Seconds as 1h 6m, to the minute as an estimate deserves; less than one as 0m."""
+    whole = round(seconds / 60.0)
+    return f"{whole // 60}h {whole % 60}m" if whole >= 60 else f"{whole}m"
+
+
+def filament_cm3(filament_mm: float, material: Material) -> float:
+    """Volume of a length of filament."""
+    return filament_mm * pi * material.diameter_mm**2 / 4.0 / 1000.0
+
+
+def filament_g(filament_mm: float, material: Material) -> float:
+    """Weight of a length of filament."""
+    return filament_cm3(filament_mm, material) * material.density_g_cm3
