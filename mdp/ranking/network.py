@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdp.mesh import Floats
+from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import FEATURES, features
-from mdp.ranking.ranking import CandidateTable, RankedCandidate
+from mdp.ranking.ranking import RankedCandidate
 from profiles.errors import RankerError
 
 if TYPE_CHECKING:

@@ -14,10 +14,10 @@ from math import isqrt
 
 from mdp.kernels.threads import ahead
 from mdp.plane import Plane
+from mdp.ranking.candidate_table import CandidateTable, nearly_equal, relaxation_round
 from mdp.ranking.ranker import Ranker
-from mdp.ranking.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
+from mdp.ranking.ranking import LISTED, RankedCandidate, rank_by_trade_off, rank_classic, shortlist
 from mdp.ranking.record import Child, Trace, offer
-from mdp.ranking.shortlist import LISTED, shortlist
 from mdp.search.front import Front
 from mdp.search.node import Node
 from mdp.search.problem import Problem

@@ -16,6 +16,7 @@ from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
+from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import (
     Bounds,
     Feasibility,
@@ -28,8 +29,6 @@ from mdp.ranking.candidates import (
     residual_mm2,
     score_candidates,
 )
-from mdp.ranking.features import Model, Situation
-from mdp.ranking.ranking import CandidateTable
 from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton

@@ -5,8 +5,9 @@ from itertools import chain, islice
 
 import numpy as np
 
+from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.ranker import Ranker
-from mdp.ranking.ranking import CandidateTable, RankedCandidate, rank_classic
+from mdp.ranking.ranking import RankedCandidate, rank_classic
 from mdp.ranking.record import Child, Trace, offer
 from mdp.search.node import Node
 from mdp.search.problem import Problem

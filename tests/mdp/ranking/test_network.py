@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from mdp.mesh import Floats
+from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import CHECKED, COLUMNS, features
 from mdp.ranking.network import Network
 from mdp.ranking.ranker import ByReduction, ranker_named, shipped
-from mdp.ranking.ranking import CandidateTable, RankedCandidate, rank_classic
-from mdp.ranking.shortlist import EACH, LISTED, shortlist
+from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_classic, shortlist
 from mdp.search.beam import Beam
 from mdp.search.problem import Problem
 from mdp.search.published import _fill

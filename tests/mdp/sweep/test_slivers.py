@@ -5,9 +5,8 @@ import pytest
 from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
+from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import Reason, bounds_of, check, platform_disc, score_candidates
-from mdp.ranking.features import Model, Situation
-from mdp.ranking.ranking import CandidateTable
 from mdp.sweep.sweep import Remainder
 from profiles.profile import load
 from tests import shapes

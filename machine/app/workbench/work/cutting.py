@@ -12,7 +12,7 @@ from machine.app.pipeline import compilers
 from machine.app.pipeline.lying import better_in_words, laid_in_words
 from machine.app.pipeline.pricing import pricing
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
-from machine.app.workbench.work.worker import Tell
+from machine.app.workbench.work.tell import Tell
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
