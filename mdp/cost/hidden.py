@@ -6,11 +6,11 @@ dihedral angle times its length along the edge, so single noisy edges cancel out
 rays over the hemisphere, spread so that each stands for the same share of the light.
 """
 
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
+from mdp.directions.spread import spread_like_light
 from mdp.kernels.arrays import floats, ints
 from mdp.kernels.kernel import kernel, part
 from mdp.kernels.threads import in_threads
@@ -44,15 +44,9 @@ def hidden_shares(mesh: Mesh) -> Floats:
     diagonal_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     surface = _look_around(mesh)
     occluded, hidden = np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
-    in_threads(_occlude, len(mesh.faces), triangle_tree(mesh), surface.middles, _hemisphere(), diagonal_mm, occluded)
+    in_threads(_occlude, len(mesh.faces), triangle_tree(mesh), surface.middles, spread_like_light(RAYS), diagonal_mm, occluded)
     in_threads(_hide, len(mesh.faces), surface, NEIGHBOURHOOD * diagonal_mm, occluded, hidden)
     return hidden
-
-
-def _hemisphere() -> Floats:
-    """(RAYS, 3) unit vectors around +z, each for the same share of the light that a matt face receives (Malley)."""
-    share, turn = (np.arange(RAYS) + 0.5) / RAYS, np.arange(RAYS) * pi * (3.0 - 5.0**0.5)
-    return np.stack([np.sqrt(share) * np.cos(turn), np.sqrt(share) * np.sin(turn), np.sqrt(1.0 - share)], axis=1)
 
 
 def _look_around(mesh: Mesh) -> Neighbourhood:

@@ -11,6 +11,7 @@ from math import radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 
@@ -72,9 +73,7 @@ def _quadrature(mesh: Mesh) -> tuple[Floats, Floats]:
 
 def _is_even(around: Floats, areas: Floats, axis: Floats) -> bool:
     """Whether the moments of the surface that are odd along an axis nearly vanish."""
-    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    side = side / np.linalg.norm(side)
-    x, y, z = around @ axis, around @ side, around @ np.cross(axis, side)
+    x, (y, z) = around @ axis, frame_across(axis) @ around.T
     for odd in (x * y, x * z, x**3, x * y * y, x * z * z, x * y * z):
         if abs(float((odd * areas).sum())) > ODD * float((np.abs(odd) * np.abs(areas)).sum()):
             return False

@@ -7,12 +7,13 @@ platform), III (the platform lies below the plane), IV (a large volume above the
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import pi, radians, sin, sqrt
+from math import radians, sin, sqrt
 
 import numpy as np
 
 from mdp.clearance import least_height_mm
 from mdp.cost.cost import CostTerms
+from mdp.directions.spread import spread
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.plane import Plane
@@ -57,12 +58,8 @@ REASONS = {
 
 
 def directions(search: Search) -> Floats:
-    """(k, 3) unit directions spread evenly over the sphere's cap above the least elevation (a Fibonacci lattice)."""
-    index = np.arange(search.directions) + 0.5
-    z = 1.0 - (1.0 - sin(radians(search.least_elevation_deg))) * index / search.directions
-    angle = index * pi * (3.0 - sqrt(5.0))
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+    """(k, 3) unit directions spread evenly over the sphere's cap above the least elevation."""
+    return spread(search.directions, sin(radians(search.least_elevation_deg))).copy()
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from math import ceil, inf
 
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.mesh import Mesh
 from mdp.search.front import EQUAL, Pricing, front_row, price_of_second_mm2, price_row
-from mdp.search.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.search.parts import one_piece
 from mdp.search.problem import Problem
 from mdp.search.search import decompose

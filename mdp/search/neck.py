@@ -10,8 +10,8 @@ from math import atan2, ceil, cos, pi, radians, sin
 
 import numpy as np
 
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats, Ints, Mesh, dot
-from mdp.overhang import UP
 from mdp.plane import Plane
 from mdp.pose import about
 from mdp.sweep.rims import measure_rim
@@ -120,20 +120,12 @@ def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plan
 
 def _directions(normal: Floats, reach_deg: float) -> Iterator[Floats]:
     """A direction and rings of others around it, up to the reach."""
-    aside, across = _beside(normal)
+    aside, across = frame_across(normal)
     yield normal
     for ring in range(1, RINGS + 1):
         for k in range(6 * ring):
             turn, tilt = pi * k / (3 * ring), radians(reach_deg * ring / RINGS)
             yield cos(tilt) * normal + sin(tilt) * (cos(turn) * aside + sin(turn) * across)
-
-
-def _beside(normal: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors across a direction and each other."""
-    helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else UP
-    aside = np.cross(normal, helper)
-    aside /= np.linalg.norm(aside)
-    return aside, np.cross(normal, aside)
 
 
 def _refined(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -> Plane:
@@ -159,7 +151,7 @@ def _around(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) ->
     centre, tilt = surface.centre_mm(plane), radians(step_deg)
     yield Plane(plane.normal, plane.offset_mm + step_mm)
     yield Plane(plane.normal, plane.offset_mm - step_mm)
-    aside, across = _beside(plane.normal)
+    aside, across = frame_across(plane.normal)
     for k in range(8):
         axis = cos(0.25 * pi * k) * aside + sin(0.25 * pi * k) * across
         normal = about(axis, tilt) @ plane.normal

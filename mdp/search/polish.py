@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from itertools import product
 from math import cos, radians, sin
 
-import numpy as np
-
 from mdp.cost.forecast import Surface
 from mdp.cost.symmetry import Mirror
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
@@ -178,11 +177,9 @@ def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> I
 def _neighbours(plane: Plane, pivot: Floats, step_mm: float, turn_deg: float) -> Iterator[Plane]:
     """The planes next to one: shifted both ways, and leaning four ways about a point with and without a shift."""
     yield from (Plane(plane.normal, plane.offset_mm + shift) for shift in (-step_mm, step_mm))
-    side = np.cross(plane.normal, np.eye(3)[int(np.argmin(np.abs(plane.normal)))])
-    side = side / np.linalg.norm(side)
-    other = np.cross(plane.normal, side)
+    aside, across = frame_across(plane.normal)
     height_mm = plane.offset_mm - float(plane.normal @ pivot)
-    for lean in (side, -side, other, -other):
+    for lean in (-aside, aside, -across, across):
         normal = cos(radians(turn_deg)) * plane.normal + sin(radians(turn_deg)) * lean
         offset_mm = float(normal @ pivot) + height_mm
         yield from (Plane(normal, offset_mm + shift) for shift in (0.0, -step_mm, step_mm))

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import floats, ints, table
+from mdp.directions.frame import FramedDirections
+from mdp.kernels.arrays import floats, ints
 from mdp.kernels.kernel import kernel, part, vector_part
 from mdp.mesh import Floats, Ints
 from mdp.support_need.banks import UNKNOWN, Patches, find_sides, hoped_sides, is_rim, place_across, rests
@@ -55,21 +56,21 @@ class Patch(NamedTuple):
 
 
 @kernel
-def classify(begin_row: int, end_row: int, surface: LinkedFaces, directions: Floats, limits: Limits, out: Classes) -> None:
-    """For each of (k, 3) directions put CARRIES_ITSELF where it holds among the classes of the faces, (k, m)."""
+def classify(begin_row: int, end_row: int, surface: LinkedFaces, along: FramedDirections, limits: Limits, out: Classes) -> None:
+    """For each of k directions put CARRIES_ITSELF where it holds among the classes of the faces, (k, m)."""
     count, size = surface.normals.shape[1], surface.vertices.shape[1]
     risky, place = ints(count + 1, 0), floats(3, 0.0)
     patches = Patches(ints(count, 0), ints(count + 2, 0), ints(count + 2, 0), ints(count + 2, 0))
     pool = Pool(ints(size, 0), ints(size, 0))
     heights, cosines, number = floats(size, 0.0), floats(count, 0.0), ints(count, 0)
     for row in range(begin_row, end_row):
-        d = directions[row]
+        d = along.directions[row]
         view = View(surface, d, heights, cosines, number, limits.ground_mm, place)
         _find_heights(surface.vertices[0], surface.vertices[1], surface.vertices[2], d, heights, pool.seen)
         _find_cosines(surface.normals[0], surface.normals[1], surface.normals[2], d, cosines)
         many = _find_risky(view, limits.risky_below, risky)
         for own in range(1, _find_patches(view, risky[:many], patches) + 1):
-            patch = _measure(view, patches, own)
+            patch = _measure(view, patches, own, along.frames[row])
             if _carries_itself(view, patches, patch, pool, limits):
                 for f in patch.faces:
                     out[row, f] = CARRIES_ITSELF
@@ -131,11 +132,11 @@ def _find_patches(view: View, risky: Ints, patches: Patches) -> int:
 
 
 @part
-def _measure(view: View, patches: Patches, own: int) -> Patch:
+def _measure(view: View, patches: Patches, own: int, frame: Floats) -> Patch:
     """A patch along the direction."""
     vertices, corners, neighbours = view.surface.vertices, view.surface.faces, view.surface.neighbours
     areas, heights, cosines, number = view.surface.areas_mm2, view.heights, view.cosines, view.number
-    faces, frame = patches.faces[patches.starts[own] : patches.starts[own + 1]], frame_across(view.direction)
+    faces = patches.faces[patches.starts[own] : patches.starts[own + 1]]
     area, low, high, around = 0.0, np.inf, -np.inf, 0.0
     for f in faces:
         area -= areas[f] * cosines[f]
@@ -147,21 +148,6 @@ def _measure(view: View, patches: Patches, own: int) -> Patch:
                 bx, by = place_across(vertices, corners[f, (corner + 1) % 3], frame)
                 around += np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
     return Patch(own, faces, frame, area, high - low, around)
-
-
-@part
-def frame_across(d: Floats) -> Floats:
-    """(2, 3) unit vectors across a direction and each other."""
-    frame, least = table(2, 3), 0
-    for axis in range(1, 3):
-        least = axis if abs(d[axis]) < abs(d[least]) else least
-    p, q = (least + 1) % 3, (least + 2) % 3
-    size = np.sqrt(d[p] * d[p] + d[q] * d[q])
-    frame[0, p], frame[0, q] = -d[q] / size, d[p] / size
-    for axis in range(3):
-        a, b = (axis + 1) % 3, (axis + 2) % 3
-        frame[1, axis] = d[a] * frame[0, b] - d[b] * frame[0, a]
-    return frame
 
 
 @part

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdp.directions.frame import frame_across
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints, Mesh
@@ -30,9 +31,7 @@ class Section(NamedTuple):
 def stress_per_newton(mesh: Mesh, plane: Plane, crumb_mm: float) -> float:
     """The greatest stress at a plane, MPa for every newton that pushes the top of a piece above it sideways; infinite where a
     piece hangs on nothing. Pieces lower than crumb_mm are crumbs."""
-    side = np.cross(plane.normal, np.eye(3)[int(np.argmin(np.abs(plane.normal)))])
-    side = side / np.linalg.norm(side)
-    across = (mesh.vertices - mesh.vertices[0]) @ np.stack([side, np.cross(plane.normal, side)], axis=1)
+    across = (mesh.vertices - mesh.vertices[0]) @ frame_across(plane.normal).T
     return _most_stress(mesh.faces, plane.heights_mm(mesh.vertices), np.ascontiguousarray(across), crumb_mm)
 
 

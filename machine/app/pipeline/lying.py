@@ -2,8 +2,8 @@
 
 from machine.view.quantities import minutes
 from mdp.decomposition import Decomposition
+from mdp.directions.orientation import Orientation, in_words, side_in_words
 from mdp.search.laying import OtherWay
-from mdp.search.orientation import Orientation, in_words, side_in_words
 
 
 def laid_in_words(chosen: Orientation | None) -> str:

@@ -27,13 +27,13 @@ from machine.planning.purge import has_purge
 from machine.planning.stops import Stop
 from machine.view.program import Program
 from mdp.decomposition import Decomposition
+from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.ranking.ranker import ranker_named
 from mdp.read import locate, read_mesh
 from mdp.search.front import price_of_second_mm2
 from mdp.search.laying import OtherWay, find_better_way, lay_down
-from mdp.search.orientation import standing_still
 from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from machine.app.terminal.report import estimates, table
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import in_words, side_in_words
 from mdp.search.front import ASKED, BY_PLAN, choose, price_of_second_mm2
 from mdp.search.laying import OtherWay
-from mdp.search.orientation import in_words, side_in_words
 from profiles.profile import Profile
 
 

@@ -8,13 +8,13 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mdp.cut import simplify
+from mdp.directions.orientation import resting_orientations, standing_still
 from mdp.formats.readers import READERS
 from mdp.formats.surface import check_surface
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import UP
 from mdp.read import read_mesh
 from mdp.repair.repair import repair
-from mdp.search.orientation import resting_orientations, standing_still
 from profiles.errors import LearningError, MeshError
 
 ARRAYS = ".npz"

@@ -14,13 +14,13 @@ from machine.app.pipeline.pricing import pricing
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
 from machine.app.workbench.work.tell import Tell
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import standing_still
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
 from mdp.search.laying import find_better_way, lay_down
-from mdp.search.orientation import standing_still
 from mdp.search.search import Progress, cut_by_plan, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
@@ -139,7 +139,7 @@ def standing_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
     """The mesh as it is cut, turned as the plan says or else as the bench does."""
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
-    return bench.model.mesh if turned is None else standing_still(bench.model.mesh, turned)
+    return standing_still(bench.model.mesh, turned)
 
 
 def _name(bench: Bench) -> str:

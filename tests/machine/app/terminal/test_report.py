@@ -8,10 +8,10 @@ from machine.dryrun.dryrun import dry_run
 from machine.view.quantities import duration
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, FrontRow, Part
+from mdp.directions.orientation import best_orientation, in_words
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, about
-from mdp.search.orientation import best_orientation, in_words
 from profiles.profile import load, load_one
 from tests.shapes import box, hollow, tee
 
