@@ -7,7 +7,8 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask
-from mdp.repair.edges import connected_components, edges_of
+from mdp.topology.components import connected_components
+from mdp.topology.edges import edges_of
 from profiles.frozen import Vector
 
 FARTHEST_MM = 1.0  # from a surface that a point may lie to mean a place of it

@@ -10,13 +10,12 @@ from itertools import product
 
 import numpy as np
 
-from mdp.formats.surface import Indices
 from mdp.grown import Grown
 from mdp.head import corners
-from mdp.mesh import Floats, Ints, Mesh
+from mdp.mesh import Floats, Indices, Ints, Mesh
 from mdp.overhang import Mask
 from mdp.plane import Plane
-from mdp.repair.edges import connected_components
+from mdp.topology.components import vertex_components
 from profiles.frozen import Vector
 
 ROUNDING_MM = 1e-6  # a plane may touch what it must not pass through
@@ -84,8 +83,8 @@ class Patches:
     @classmethod
     def of(cls, mesh: Mesh, chosen: Mask) -> "Patches":
         """The chosen (m,) faces of a mesh."""
-        faces = mesh.faces[chosen].astype(np.int64)
-        label = connected_components(len(mesh.vertices), faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())
+        faces = mesh.faces[chosen]
+        label = vertex_components(len(mesh.vertices), faces)
         vertices = np.unique(faces)
         vertices = vertices[np.argsort(label[vertices], kind="stable")]
         return cls(mesh.vertices[vertices], np.unique(label[vertices], return_index=True)[1])

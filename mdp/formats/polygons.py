@@ -6,8 +6,8 @@ import manifold3d as m3
 import numpy as np
 
 from mdp.directions.frame import frame_across
-from mdp.formats.surface import Indices, Surface, check_surface, check_vertices
-from mdp.mesh import Floats
+from mdp.formats.surface import Surface, check_surface, check_vertices
+from mdp.mesh import Floats, Indices
 from profiles.errors import MeshError
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface
-from mdp.mesh import Floats
-from mdp.repair.edges import areas_of, edges_of
+from mdp.formats.surface import Surface
+from mdp.mesh import Floats, Indices, areas_of
 from mdp.repair.winding import format_point, pair_half_edges
+from mdp.topology.edges import edges_of
 from profiles.errors import MeshError
 
 # A hole is a defect when it is small beside the model; the opening of a cup is meant, and a lid on it would be another model.

@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface, concatenate
-from mdp.mesh import Floats
-from mdp.repair.edges import connected_components, edges_of, normals_of
+from mdp.formats.surface import Surface, concatenate
+from mdp.mesh import Floats, Indices, crosses_of
 from mdp.repair.weld import drop_unused_vertices
 from mdp.repair.winding import pair_half_edges
+from mdp.topology.components import connected_components
+from mdp.topology.edges import edges_of
 from profiles.errors import MeshError
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def shells_of(surface: Surface) -> list[Shell]:
     label = connected_components(len(surface.faces), pairs[:, 0], pairs[:, 1])
     middle = surface.vertices.mean(axis=0)
     signed = (
-        np.einsum("ij,ij->i", surface.vertices[surface.faces[:, 0]] - middle, normals_of(surface.vertices, surface.faces)) / 6.0
+        np.einsum("ij,ij->i", surface.vertices[surface.faces[:, 0]] - middle, crosses_of(surface.vertices, surface.faces)) / 6.0
     )
     order = np.argsort(label, kind="stable")
     shells = []
@@ -77,7 +78,7 @@ def volume_of(surface: Surface) -> float:
     """Signed volume of a closed surface by the divergence theorem."""
     middle = surface.vertices.mean(axis=0)
     return float(
-        np.einsum("ij,ij->", surface.vertices[surface.faces[:, 0]] - middle, normals_of(surface.vertices, surface.faces)) / 6
+        np.einsum("ij,ij->", surface.vertices[surface.faces[:, 0]] - middle, crosses_of(surface.vertices, surface.faces)) / 6
     )
 
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface
-from mdp.mesh import Floats
-from mdp.repair.edges import Edges, connected_components, edges_of, normals_of
+from mdp.formats.surface import Surface
+from mdp.mesh import Floats, Indices, crosses_of
 from mdp.repair.weld import drop_unused_vertices
+from mdp.topology.components import connected_components
+from mdp.topology.edges import Edges, edges_of
 from profiles.errors import MeshError
 
 
@@ -16,7 +17,7 @@ def pair_half_edges(surface: Surface, edges: Edges) -> Indices:
     """
     order, runs = edges.by_edge
     pairs = [edges.twins]
-    normals = normals_of(surface.vertices, surface.faces)
+    normals = crosses_of(surface.vertices, surface.faces)
     for number in np.flatnonzero(edges.counts > 2):
         around = order[runs[number] : runs[number + 1]]
         neighbours = _match_around_edge(_angles(surface, edges, around), edges.forward[around], normals[around // 3])
@@ -87,7 +88,7 @@ def _turn_faces(surface: Surface, edges: Edges, pairs: Indices, strict: bool) ->
                 f"is not orientable: {int(one_sided.sum())} faces form a one-sided sheet, one of them near {format_point(where)}"
             )
         return surface.faces
-    area = np.linalg.norm(normals_of(surface.vertices, surface.faces), axis=1)
+    area = np.linalg.norm(crosses_of(surface.vertices, surface.faces), axis=1)
     weight = np.bincount(cover[:m], area, minlength=2 * m) - np.bincount(cover[m:], area, minlength=2 * m)
     turn = weight[cover[:m]] < 0
     tie = (weight[cover[:m]] == 0) & (cover[:m] > cover[m:])

@@ -13,8 +13,8 @@ from mdp.directions.frame import FramedDirections
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints
-from mdp.support_need.linked_faces import LinkedFaces
 from mdp.support_need.patches import Classes
+from mdp.topology.linked_faces import LinkedFaces
 
 CELLS = 96  # of a grid along its longer side
 LEAST_COSINE = 0.05  # of a surface that looks up and the direction

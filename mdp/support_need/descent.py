@@ -10,7 +10,7 @@ import numpy as np
 
 from mdp.kernels.kernel import inlined, part
 from mdp.mesh import Floats, Ints
-from mdp.support_need.linked_faces import LinkedFaces
+from mdp.topology.linked_faces import LinkedFaces
 
 BANK_MM = 1.0  # a ridge that goes down less than this is no bank: it hangs in the air itself
 ROUNDING_MM = 1e-6  # of a way down just as deep

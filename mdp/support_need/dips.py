@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from mdp.kernels.kernel import part
 from mdp.mesh import Floats, Ints
-from mdp.support_need.linked_faces import LinkedFaces
+from mdp.topology.linked_faces import LinkedFaces
 
 DIP_MM = 0.05  # a quarter of a usual layer: no layer shows it
 ROUNDING_MM = 1e-6

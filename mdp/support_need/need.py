@@ -11,8 +11,8 @@ from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, threshold
 from mdp.support_need.beneath import find_over_air
-from mdp.support_need.linked_faces import LinkedFaces, flat_places, link
 from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, Classes, Limits, classify
+from mdp.topology.linked_faces import LinkedFaces, flat_places, link
 from profiles.process import Process
 
 MOST_KEPT = 256  # single directions whose classes are kept; a polished plane comes back to the same few again and again

@@ -17,10 +17,10 @@ from mdp.mesh import Floats, Ints
 from mdp.support_need.banks import UNKNOWN, Patches, find_sides, hoped_sides, is_rim, place_across, rests
 from mdp.support_need.descent import SAFE, View
 from mdp.support_need.dips import UNSEEN, Pool, begins_in_air
-from mdp.support_need.linked_faces import LinkedFaces
 from mdp.support_need.narrow import is_near_banks, triangles_room
 from mdp.support_need.spans import ROUNDING_MM as SPAN_ROUNDING_MM
 from mdp.support_need.spans import Sides, spans
+from mdp.topology.linked_faces import LinkedFaces
 
 Classes = NDArray[np.uint8]
 CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2

@@ -16,8 +16,9 @@ from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.plane import Plane
-from mdp.sweep.components import UNKNOWN, root
+from mdp.sweep.components import UNKNOWN
 from mdp.sweep.section_moments import MOMENTS, add_edge, stress_per_moment
+from mdp.topology.union_find import join, root
 
 
 class Section(NamedTuple):
@@ -70,8 +71,7 @@ def _find_shells(faces: Ints, heights: Floats) -> Ints:
         for k in range(3):
             v, w = faces[f, k], faces[f, k - 2]
             if shells[v] >= 0 and shells[w] >= 0:
-                a, b = root(shells, v), root(shells, w)
-                shells[max(a, b)] = min(a, b)
+                join(shells, v, w)
     for v in range(len(heights)):
         if shells[v] >= 0:
             shells[v] = root(shells, v)

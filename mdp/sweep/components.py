@@ -20,6 +20,7 @@ from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.facets import Rings
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.sweep.rays import TriangleTree, first_hit
+from mdp.topology.union_find import root, singletons
 
 UNKNOWN = -2
 
@@ -191,24 +192,6 @@ def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
     for k in range(len(joins)):
         columns[k] = min(column_over(grid.heights[joins[k, 2]]), grid.columns)
     return columns
-
-
-@part
-def singletons(size: int) -> Ints:
-    """The parents of a union-find in which nothing has been joined."""
-    parent = ints(size, 0)
-    for leaf in range(size):
-        parent[leaf] = leaf
-    return parent
-
-
-@inlined
-def root(parent: Ints, v: int) -> int:
-    """The leaf that stands for all that v has been joined with (union-find, paths halved)."""
-    while parent[v] != v:
-        parent[v] = parent[parent[v]]
-        v = parent[v]
-    return v
 
 
 @part
