@@ -183,7 +183,7 @@ def score_candidates(
 
 def residual_mm2(swept: Gains, terms: CostTerms) -> Floats:
     """What each cut costs for ever: what stays risky on its part, the scar of its seam, and that it is made."""
-    return swept.residual_mm2 + terms.seam_mm * swept.rim_mm + terms.cut_mm2 if terms.seam_mm > 0.0 else swept.residual_mm2
+    return swept.residual_mm2 + terms.seam_mm * swept.rim_mm + terms.cut_mm2
 
 
 def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Feasibility:

@@ -122,7 +122,7 @@ def _refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
     reason = Reason(int(checked.reason[0]))
     if reason == Reason.WEAK:
         stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
-        return Refusal(f"{REASONS[reason]}: {problem.load_n:g} N at its top are {stress}", reason)
+        return Refusal(f"{REASONS[reason]}: {problem.settings.nozzle_load_n:g} N at its top are {stress}", reason)
     text = _explain(problem, plane, limits, reason, float(checked.fragile_mm[0]))
     return None if text is None else Refusal(text, reason)
 

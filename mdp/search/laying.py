@@ -167,7 +167,7 @@ def _guess(profile: Profile) -> Callable[[Orientation], float]:
 def _row_of_one_piece(mesh: Mesh, profile: Profile, pricing: PricingBy) -> FrontRow:
     """What a mesh costs uncut. Where seams may hide and how the head may come near matters to cuts only, so it is left out."""
     problem = Problem(mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))
-    return price_row(front_row(problem.root, problem.terms), (one_piece(mesh, profile.machine),), pricing(profile))
+    return price_row(front_row(problem.root), (one_piece(mesh, profile.machine),), pricing(profile))
 
 
 def _bare_s(mesh: Mesh, profile: Profile, pricing: PricingBy) -> float | None:

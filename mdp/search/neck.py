@@ -40,7 +40,7 @@ class _Surface:
     def rim_mm(self, plane: Plane) -> float:
         """The length of a plane's rim where it is seen."""
         heights = self._heights_mm(plane)
-        return float(measure_rim(self.faces, heights, dot(self.normals, plane.normal), self.areas_mm2, self.seen, 0.0).length)
+        return float(measure_rim(self.faces, heights, dot(self.normals, plane.normal), self.areas_mm2, self.seen, 0.0).length_mm)
 
     def _heights_mm(self, plane: Plane) -> Floats:
         heights: Floats = plane.heights_mm(self.vertices)

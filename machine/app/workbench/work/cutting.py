@@ -20,8 +20,9 @@ from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
+from mdp.search.by_plan import cut_by_plan
 from mdp.search.laying import find_better_way, lay_down
-from mdp.search.search import Progress, cut_by_plan, decompose
+from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
 
@@ -83,7 +84,7 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
             otherwise = "" if lying is mesh else "laid down otherwise: "
             tell(Searched(f"{otherwise}stage {progress.stage}, {progress.beam} in the beam, {left}", best))
 
-        return decompose(lying, name, profile, way.ranker, show, by_hand=locked, price=price)
+        return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, by_hand=locked, price=price)
 
     if way.orient:
         lying = lay_down(mesh, profile, pricing, search)
