@@ -62,6 +62,7 @@ class CandidateTable:
         scored: ScoredCandidates,
         limits: Bounds,
         situation: Situation,
+        *,
         check: Callable[[Ints, Floats], Feasibility],
         least_gain_mm2: float = 0.0,
         is_weak: Callable[[Plane], bool] = lambda plane: False,

@@ -78,6 +78,7 @@ class Bounds:
 
 def bounds_of(
     chosen: Floats,
+    *,
     disc: tuple[Floats, float],
     volume_mm3: float,
     machine: Machine,
@@ -153,17 +154,15 @@ class Feasibility:
 
 
 def score_candidates(
-    remainder: Remainder, limits: Bounds, step_mm: float, terms: CostTerms, least_gain_mm2: float, hopeless: Mask | None = None
+    remainder: Remainder, limits: Bounds, terms: CostTerms, *, step_mm: float, least_gain_mm2: float, hopeless: Mask | None = None
 ) -> ScoredCandidates:
     """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe, less its seam.
     hopeless: the faces that no cut can save, see sweep.gains."""
     swept = gains(remainder, limits.directions, step_mm, threshold(terms.angle_deg), hopeless)
-    used = np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None]
-    residual = residual_mm2(swept, terms)
+    residual, offset = residual_mm2(swept, terms), swept.offsets_mm(step_mm)
     gain = swept.up_mm2 - residual
-    offset: Floats = (swept.first[:, None] + np.arange(gain.shape[1])) * np.float64(step_mm)
     above = (offset >= limits.least_offset_mm[:, None]) & np.isfinite(limits.least_height_mm)[:, None]
-    scored = used & above & (gain >= least_gain_mm2)
+    scored = swept.used & above & (gain >= least_gain_mm2)
     for low, high in np.moveaxis(limits.keep_mm, 0, 2):
         scored &= (offset <= low[:, None]) | (offset >= high[:, None])
     direction = np.nonzero(scored)[0].astype(np.int32)
@@ -213,16 +212,16 @@ def refusals(
     limits: Bounds,
     search: Search,
     terms: CostTerms,
+    *,
     least_gain_mm2: float,
     is_weak: Callable[[Plane], bool],
 ) -> dict[Reason, int]:
     """How many of all candidates of a solid each reason takes, to report why nothing can be cut; is_weak: asked for those that
     nothing else forbids."""
     swept = gains(remainder, limits.directions, search.offset_step_mm, threshold(terms.angle_deg))
-    direction, column = np.nonzero(np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None])
-    offset: Floats = (swept.first[direction] + column) * np.float64(search.offset_step_mm)
+    direction, offset = np.nonzero(swept.used)[0], swept.offsets_mm(search.offset_step_mm)[swept.used]
     reason = check(remainder, limits, search, direction.astype(np.int32), offset).reason
-    gain = (swept.up_mm2 - residual_mm2(swept, terms))[direction, column]
+    gain = (swept.up_mm2 - residual_mm2(swept, terms))[swept.used]
     reason[(reason == Reason.FEASIBLE) & (gain < least_gain_mm2)] = Reason.GAIN
     for row in np.flatnonzero(reason == Reason.FEASIBLE):
         if is_weak(Plane(limits.directions[direction[row]], float(offset[row]))):

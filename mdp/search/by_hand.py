@@ -184,16 +184,14 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
     directions = problem.limits.directions if planned.normal is None else np.array([planned.normal])
     limits, step_mm = _limits(problem, directions), problem.step_mm(planned.offset_mm or 0.0)
     swept = gains(node.remainder, directions, step_mm, threshold(problem.terms.angle_deg))
-    number = swept.first[:, None] + np.arange(swept.up_mm2.shape[1])
-    wanted = np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None]
+    wanted = swept.used
     if planned.offset_mm is not None:
-        wanted &= number == round(planned.offset_mm / step_mm)
-    direction, column = np.nonzero(wanted)
+        wanted &= swept.first[:, None] + np.arange(wanted.shape[1]) == round(planned.offset_mm / step_mm)
+    direction = np.nonzero(wanted)[0]
     missing = "normal" if planned.normal is None else "offset_mm"
     if len(direction) == 0:
         raise PlanError(f"{label}: no {missing} can be found for it, every such plane misses what is left of the model")
-    offset_mm: Floats = number[direction, column] * np.float64(step_mm)
-    gain_mm2 = (swept.up_mm2 - residual_mm2(swept, problem.terms))[direction, column]
+    offset_mm, gain_mm2 = swept.offsets_mm(step_mm)[wanted], (swept.up_mm2 - residual_mm2(swept, problem.terms))[wanted]
     own = problem.settings.model_copy(update={"offset_step_mm": step_mm})
     reason = check(node.remainder, limits, own, direction.astype(np.int32), offset_mm).reason
     for row in np.lexsort((offset_mm, -directions[direction, 2], -np.round(gain_mm2 / EQUAL_MM2))):

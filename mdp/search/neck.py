@@ -96,9 +96,9 @@ def _first_look(
     step_mm, directions = 2.0 * reach_mm / OFFSETS, np.array(list(_directions(normal, reach_deg)))
     remainder = Remainder(mesh, np.zeros(len(mesh.faces), dtype=np.bool_), np.where(seen > 0.0, 1.0, 0.0))
     swept = gains(remainder, directions, step_mm, NOTHING_RISKY)
+    all_offsets_mm = swept.offsets_mm(step_mm)
     for row, direction in enumerate(directions):
-        offsets_mm = (swept.first[row] + np.arange(swept.columns[row])) * step_mm
-        rims = swept.rim_mm[row, : swept.columns[row]]
+        offsets_mm, rims = (values[row, : swept.columns[row]] for values in (all_offsets_mm, swept.rim_mm))
         near = np.abs(offsets_mm - direction @ centre) <= reach_mm
         before, here, after = rims[:-2], rims[1:-1], rims[2:]
         low = near[1:-1] & (here > 0.0) & (here <= np.minimum(before, after)) & (here < np.maximum(before, after))

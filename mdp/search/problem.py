@@ -119,16 +119,24 @@ class Problem:
         least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
         hopeless = self._hopeless(node) if described else None
         remainder, step_mm = node.remainder, self.settings.offset_step_mm
-        scored = score_candidates(remainder, self.limits, step_mm, self.terms, least_mm2, hopeless)
+        scored = score_candidates(
+            remainder, self.limits, self.terms, step_mm=step_mm, least_gain_mm2=least_mm2, hopeless=hopeless
+        )
         self._evaluated.append(scored.evaluated)
 
         def check_planes(direction: Ints, offset_mm: Floats) -> Feasibility:
             return check(remainder, self.limits, self.settings, direction, offset_mm)
 
         hopeless_mm2 = 0.0 if hopeless is None else float(remainder.facets.counted_mm2[hopeless].sum())
-        enough_mm2, is_weak = self.least_gain_mm2, partial(self.is_weak, node)
         situation = self._situation(node, hopeless_mm2)
-        return CandidateTable(scored, self.limits, situation, check_planes, enough_mm2, is_weak)
+        return CandidateTable(
+            scored,
+            self.limits,
+            situation,
+            check=check_planes,
+            least_gain_mm2=self.least_gain_mm2,
+            is_weak=partial(self.is_weak, node),
+        )
 
     def _hopeless(self, node: Node) -> Mask:
         """(m,) the faces of what remains that no cut can save, in the order of its facets."""
@@ -150,7 +158,8 @@ class Problem:
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""
         root, is_weak = self.root, partial(self.is_weak, self.root)
-        return refusals(root.remainder, self.limits, self.settings, self.terms, self.least_gain_mm2, is_weak)
+        least_mm2 = self.least_gain_mm2
+        return refusals(root.remainder, self.limits, self.settings, self.terms, least_gain_mm2=least_mm2, is_weak=is_weak)
 
     def allowed(self, node: Node, plane: Plane) -> bool:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""
@@ -160,8 +169,14 @@ class Problem:
 
     def bounds_along(self, directions: Floats) -> Bounds:
         """The bounds of (k, 3) directions."""
-        volume_mm3, keep = self.model.volume_mm3, self.zones.keep
-        return bounds_of(directions, self.platform_disc, volume_mm3, self.machine, self.settings, keep)
+        return bounds_of(
+            directions,
+            disc=self.platform_disc,
+            volume_mm3=self.model.volume_mm3,
+            machine=self.machine,
+            search=self.settings,
+            keep=self.zones.keep,
+        )
 
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
         """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""

@@ -57,6 +57,17 @@ class Gains(NamedTuple):
     rim_mm: Floats
     hopeless_mm2: Floats
 
+    @property
+    def used(self) -> Mask:
+        """(k, n) which values are of offsets."""
+        used: Mask = np.arange(self.up_mm2.shape[1]) < self.columns[:, None]
+        return used
+
+    def offsets_mm(self, step_mm: float) -> Floats:
+        """(k, n) the offsets."""
+        offsets: Floats = (self.first[:, None] + np.arange(self.up_mm2.shape[1])) * np.float64(step_mm)
+        return offsets
+
 
 class Sweep(NamedTuple):
     """Rows and columns as in Gains.
