@@ -1,5 +1,6 @@
-"""Mesh: a closed, oriented triangle mesh in mm, and its measures."""
+"""Mesh: a closed, oriented triangle mesh in mm, its measures, and what its file paints its faces with: whole numbers 0xRRGGBB."""
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Indices = NDArray[np.int64]
+NO_COLOUR = -1
+WRITTEN_COLOUR = re.compile(r"#([0-9a-fA-F]{6})(?:[0-9a-fA-F]{2})?")
 
 
 def dot(vectors: Floats, direction: Floats) -> Floats:
@@ -42,7 +45,7 @@ class Mesh:
     """A closed, consistently outward-oriented triangle mesh.
 
     vertices: (n, 3) float64, mm; faces: (m, 3) int32, counter-clockwise seen from outside; colours: (m,) what the model's file
-    paints each face with, mdp.colour.NO_COLOUR: nothing; None: it paints none. The arrays are read-only.
+    paints each face with, NO_COLOUR: nothing; None: it paints none. The arrays are read-only.
     """
 
     vertices: Floats
@@ -94,3 +97,14 @@ class Mesh:
         """The mesh with every vertex v at rotation @ v + shift_mm; rotation is (3, 3)."""
         vertices = self.vertices @ np.asarray(rotation, dtype=np.float64).T + np.asarray(shift_mm, dtype=np.float64)
         return Mesh(vertices, self.faces, self.colours)
+
+
+def parse_colour(text: str) -> int | None:
+    """The colour of #RRGGBB or #RRGGBBAA, whose alpha is not kept; None for anything else."""
+    match = WRITTEN_COLOUR.fullmatch(text.strip())
+    return None if match is None else int(match[1], 16)
+
+
+def colour_text(colour: int) -> str:
+    """A colour as #rrggbb."""
+    return f"#{colour:06x}"

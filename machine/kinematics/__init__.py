@@ -1,1 +1,1 @@
-"""Machine shapes: one file per shape, the same few functions in each."""
+"""Kinematics: where points of the workpiece are on a table that tilts and turns, and what of the head could meet what."""

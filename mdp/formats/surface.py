@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mdp.colour import NO_COLOUR
-from mdp.mesh import Floats, Indices
+from mdp.mesh import NO_COLOUR, Floats, Indices
 from profiles.errors import MeshError
 
 # What a file may place by reference: doubled at every level, a small file would place more than any memory holds.

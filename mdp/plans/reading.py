@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mdp.colour import parse_colour
-from mdp.grown import MOST_GROWN_DEG, Grown
+from mdp.mesh import parse_colour
 from mdp.plans.plan_file import KEYS, PART_KEYS, ROW_KEYS, VERSION, ZONE_KEYS, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
-from mdp.zone import AnyZone, Painted, Zone, Zones
+from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings

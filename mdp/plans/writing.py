@@ -5,10 +5,9 @@ from typing import Any
 
 import tomlkit
 
-from mdp.colour import colour_text
-from mdp.grown import Grown
+from mdp.mesh import colour_text
 from mdp.plans.plan_file import ROW_KEYS, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
-from mdp.zone import AnyZone, Painted
+from mdp.zone import AnyZone, Grown, Painted
 
 
 def plan_text(plan: PlanFile) -> str:

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from mdp.colour import NO_COLOUR
 from mdp.formats.surface import Surface, concatenate
-from mdp.mesh import Floats, Indices
+from mdp.mesh import NO_COLOUR, Floats, Indices
 
 NEAR_SHARE = 1e-4  # of the model's size: as far as repairs move a vertex
 SAME_DIRECTION = 1.0 - 1e-6  # cosine of two normals

@@ -10,10 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdp.clearance import find_obstacle, lowest_body
-from mdp.colour import NO_COLOUR, colour_text
 from mdp.cut import corners_above
-from mdp.grown import FARTHEST_MM, Grown
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import NO_COLOUR, Floats, Mesh, colour_text
 from mdp.overhang import threshold
 from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, mesh_sha256
@@ -22,7 +20,7 @@ from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, 
 from mdp.search.node import Node
 from mdp.search.problem import FINEST, Problem
 from mdp.sweep.sweep import gains
-from mdp.zone import Painted
+from mdp.zone import FARTHEST_MM, Grown, Painted
 from profiles.errors import PlanError
 
 EQUAL_MM2 = 1e-6

@@ -6,8 +6,7 @@ from mdp.decomposition import Part
 from mdp.mesh import Mesh
 from mdp.overhang import Mask, risky_above, risky_upright
 from mdp.plane import PLATFORM, Plane
-from mdp.pose import Pose, level, poses, rotation
-from mdp.pose_sequence import least_rotation
+from mdp.pose import Pose, least_rotation, level, poses, rotation
 from mdp.search.node import Node
 from mdp.search.problem import Problem
 from mdp.support_need.need import ModelPieces

@@ -8,12 +8,11 @@ import numpy as np
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.planes import MOST_MM, is_number, rotation_rows
 from mdp.directions.orientation import standing_still
-from mdp.grown import FARTHEST_MM, MOST_GROWN_DEG, Grown
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
 from mdp.plans.plan_file import ZONE_KINDS
 from mdp.plans.reading import MOST_ZONES
-from mdp.zone import AnyZone, Zone, Zones, faces_of
+from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones, faces_of
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 
