@@ -89,15 +89,15 @@ def _sliver(mesh: Mesh, plane: Plane) -> Obstacle | None:
     return Obstacle((_vector(mesh.vertices[mesh.faces[face, corner]]),)) if np.isfinite(outward[face, corner]) else None
 
 
-def _lowest(solid: Solid, upward: Floats, ground_mm: float) -> Obstacle | None:
-    """The lowest place, along a direction, of every piece of a solid that does not reach down to the ground."""
+def _lowest(solid: Solid, upward: Floats, base_mm: float) -> Obstacle | None:
+    """The lowest place, along a direction, of every piece of a solid that does not reach down to its base."""
     places = []
     for piece in solid.decompose():
         if piece.volume() <= 0.0:
             continue  # a closed void
         vertices = mesh_of(piece).vertices
         heights = vertices @ upward
-        if heights.min() > ground_mm:
+        if heights.min() > base_mm:
             places.append(_vector(vertices[int(np.argmin(heights))]))
     return Obstacle(tuple(places[:MOST_PLACES])) if places else None
 

@@ -1,4 +1,4 @@
-"""Beneath: which faces have, along a direction, nothing of the solid beneath them, only air (a numba kernel).
+"""Over air: which faces have, along a direction, nothing of the solid beneath them (a numba kernel).
 
 Support leans, so a few directions spread evenly stand for those between them. For each a grid of cells across it keeps the lowest
 surface that looks up; a place is over air where none in its cell lies lower than itself. Flat places are asked as a whole, at the
