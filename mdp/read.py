@@ -41,7 +41,7 @@ def locate(model: str) -> Path:
         else {}
     )
     if name not in demos:
-        known = ", ".join(f"{DEMO}{each}" for each in sorted(demos))
+        known = ", ".join(f"{DEMO}{demo}" for demo in sorted(demos))
         raise MeshError(f"there is no demo model {name!r}; allowed are {known or 'none: none is installed'}")
     return Path(str(demos[name]))
 

@@ -30,10 +30,10 @@ def planes_of(planes: Sequence[Plane]) -> Planes:
 
 
 @part
-def along(points: Floats, row: int, directions: Floats, other: int) -> float:
+def along(points: Floats, row: int, directions: Floats, second_row: int) -> float:
     """Product of a row with a row of another array."""
-    product: float = points[row, 0] * directions[other, 0] + points[row, 1] * directions[other, 1]
-    product += points[row, 2] * directions[other, 2]
+    product: float = points[row, 0] * directions[second_row, 0] + points[row, 1] * directions[second_row, 1]
+    product += points[row, 2] * directions[second_row, 2]
     return product
 
 

@@ -53,12 +53,12 @@ def find_mirrors(mesh: Mesh) -> list[Mirror]:
     centre = (points * areas[:, None]).sum(axis=0) / areas.sum()
     around = points - centre
     _, axes = np.linalg.eigh((around * areas[:, None]).T @ around)
-    found: list[Mirror] = []
+    mirrors: list[Mirror] = []
     for axis in (*DIRECTIONS, *axes.T):
-        fresh = all(abs(float(axis @ other.normal)) < 1.0 - 1e-3 for other in found)
+        fresh = all(abs(float(axis @ mirror.normal)) < 1.0 - 1e-3 for mirror in mirrors)
         if abs(axis[2]) < UPRIGHT and fresh and _is_even(around, areas, axis) and _is_mirrored(mesh, centre, axis):
-            found.append(Mirror(axis, float(axis @ centre)))
-    return found
+            mirrors.append(Mirror(axis, float(axis @ centre)))
+    return mirrors
 
 
 def _quadrature(mesh: Mesh) -> tuple[Floats, Floats]:

@@ -33,7 +33,7 @@ def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | In
             raise MeshError(f"{path}: face {number} names vertex {worst} (counted from 0) of {len(vertices)} vertices")
         triangles.append(corners[triangulate(vertices[corners])])
     if colours is not None:
-        colours = np.repeat(colours, [len(each) for each in triangles])
+        colours = np.repeat(colours, [len(triangle) for triangle in triangles])
     return check_surface(path, vertices, np.concatenate(triangles), colours)
 
 

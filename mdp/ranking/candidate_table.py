@@ -192,7 +192,7 @@ class _TradeOffRanking:
 
     def _append_if_feasible(self, row: int) -> None:
         plane = self._table.plane(row)
-        if any(nearly_equal(plane, other) for other in self._planes):
+        if any(nearly_equal(plane, earlier) for earlier in self._planes):
             return
         if self._table.reason[row] == UNKNOWN:
             self._table.check_rows(self._order[self._next : self._next + self._ahead])

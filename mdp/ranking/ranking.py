@@ -109,7 +109,7 @@ class _ClassicRanking:
                 if table.reason[row] != FEASIBLE or not least_mm3 <= table.volume_mm3[row] < most_mm3:
                     continue
                 plane = table.plane(row)
-                if not any(nearly_equal(plane, other) for other in near[index]) and table.feasible(row):
+                if not any(nearly_equal(plane, earlier) for earlier in near[index]) and table.feasible(row):
                     near[index].append(plane)
                     best = max(best, float(sorted_round.reduction[position]))
                     yield RankedCandidate(index, row, number)

@@ -65,8 +65,8 @@ def _pieces(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
 
 def _holds(corners: Floats, normals: Floats, point: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Whether a point lies over (n, 3, 3) triangles of (n, 3) unit normals."""
-    following = np.roll(corners, -1, axis=1)
-    turns = np.einsum("ncx,nx->nc", np.cross(following - corners, point - corners), normals)
+    next_corners = np.roll(corners, -1, axis=1)
+    turns = np.einsum("ncx,nx->nc", np.cross(next_corners - corners, point - corners), normals)
     whole = turns.sum(axis=1)
     inside: np.ndarray[tuple[int], np.dtype[np.bool_]] = (turns >= INSIDE * whole[:, None]).all(axis=1)
     return inside

@@ -45,7 +45,7 @@ def fill_holes(surface: Surface) -> tuple[Surface, list[str]]:
 
 
 def _too_large(loops: list[Indices], surface: Surface, loop: Indices, rim: float) -> MeshError:
-    open_edges = sum(len(each) for each in loops)
+    open_edges = sum(len(rim) for rim in loops)
     where: Floats = surface.vertices[loop[0]]
     return MeshError(
         f"is not closed: {open_edges} open edges around {len(loops)} hole{'s' * (len(loops) > 1)}, one with a {rim:.4g} mm rim "

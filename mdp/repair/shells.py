@@ -37,12 +37,12 @@ class Shell:
         """The same shell inside out."""
         return Shell(self.vertices, self.faces[:, ::-1], -self.volume, self.low, self.high)
 
-    def contains(self, other: "Shell") -> bool:
+    def contains(self, inner: "Shell") -> bool:
         """Whether the other shell lies inside this one, judged by its box and a sample of its vertices."""
-        if (other.low < self.low).any() or (other.high > self.high).any():
+        if (inner.low < self.low).any() or (inner.high > self.high).any():
             return False
-        corners = np.unique(other.faces)
-        sample = other.vertices[corners[np.linspace(0, len(corners) - 1, SAMPLES).astype(np.int64)]]
+        corners = np.unique(inner.faces)
+        sample = inner.vertices[corners[np.linspace(0, len(corners) - 1, SAMPLES).astype(np.int64)]]
         return all(abs(winding_number(p, self.vertices, self.faces)) > 0.5 for p in sample)
 
 

@@ -67,10 +67,10 @@ def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
         planned, label = plan.parts[number - 2], f"plan {plan.name}: part {number}"
         _check_offset(problem, planned, label)
         plane = planned.plane or _complete(problem, node, planned, label)
-        following = cut_or_refuse(problem, node, plane)
-        if isinstance(following, Refusal):
-            raise PlanError(f"{label} cannot be cut off: {following.text}")
-        node = following
+        child = cut_or_refuse(problem, node, plane)
+        if isinstance(child, Refusal):
+            raise PlanError(f"{label} cannot be cut off: {child.text}")
+        node = child
     return node
 
 
@@ -85,8 +85,8 @@ class Refusal:
 def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     """The node after a person's cut, or the reason why it cannot be made."""
     why = refusal(problem, node, plane)
-    following = problem.cut(node, plane) if why is None else None
-    return following if following is not None else why or Refusal(OUT_OF_REACH, Reason.REACH)
+    child = problem.cut(node, plane) if why is None else None
+    return child if child is not None else why or Refusal(OUT_OF_REACH, Reason.REACH)
 
 
 def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
@@ -151,7 +151,7 @@ def _explain(problem: Problem, plane: Plane, limits: Bounds, reason: Reason, fra
         case Reason.REACH:
             return f"{REASONS[reason]} of its normal on {problem.machine.name}"
         case Reason.CLEARANCE:
-            needed, body = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
+            needed, body, _ = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
             return f"the head's {body} would meet the table: what is cut off must begin at least {needed:.1f} mm above it"
         case Reason.INTERFACE:
             return "a piece of it would hang in the air: it stands on nothing that is printed before"

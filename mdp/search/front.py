@@ -41,13 +41,13 @@ class Front:
         while step is not None and len(step.cuts) >= self._start:
             held = self._alike.setdefault(len(step.cuts), [])
             if step not in held:
-                most_mm2 = min(other.cost_mm2 for other in (step, *held)) * (1.0 + self._equal)
-                held[:] = [other for other in (*held, step) if other.cost_mm2 <= most_mm2]
+                most_mm2 = min(alternative.cost_mm2 for alternative in (step, *held)) * (1.0 + self._equal)
+                held[:] = [alternative for alternative in (*held, step) if alternative.cost_mm2 <= most_mm2]
             step = step.parent
 
-    def replace(self, node: Node, other: Node) -> None:
+    def replace(self, node: Node, alternative: Node) -> None:
         """Put another node, alike in cost, in the place of one."""
-        self._alike[len(node.cuts)] = [other]
+        self._alike[len(node.cuts)] = [alternative]
 
     @property
     def nodes(self) -> list[Node]:

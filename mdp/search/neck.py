@@ -70,8 +70,8 @@ def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float, reach_deg
     if surface.rim_mm(plane) <= 0.0:
         return None
     centre = surface.centre_mm(plane)
-    found = sorted(_first_look(mesh, seen, plane.normal, centre, (reach_mm, reach_deg)), key=lambda each: each[0])
-    begins = _apart(surface, [begin for _, begin in found], APART * reach_mm)
+    shorter = sorted(_first_look(mesh, seen, plane.normal, centre, (reach_mm, reach_deg)), key=lambda pair: pair[0])
+    begins = _apart(surface, [begin for _, begin in shorter], APART * reach_mm)
     necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS, reach_deg / RINGS) for begin in begins]
     allowed = [neck for neck in necks if _is_neck(surface, neck, plane, centre, (reach_mm, reach_deg))]
     return min(allowed, key=surface.rim_mm, default=None)
@@ -111,7 +111,7 @@ def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plan
     taken: list[tuple[Floats, Plane]] = []
     for plane in planes:
         centre = surface.centre_mm(plane)
-        if all(float(np.linalg.norm(centre - other)) > apart_mm for other, _ in taken):
+        if all(float(np.linalg.norm(centre - middle)) > apart_mm for middle, _ in taken):
             taken.append((centre, plane))
         if len(taken) == MOST_TRIED:
             break
@@ -135,8 +135,9 @@ def _refined(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -
     """
     least = surface.rim_mm(plane)
     for _ in range(MOST_STEPS):
-        tried = [(rim, each) for each in _around(surface, plane, step_mm, step_deg) if (rim := surface.rim_mm(each)) > 0.0]
-        rim, best = min(tried, key=lambda each: each[0], default=(least, plane))
+        planes = _around(surface, plane, step_mm, step_deg)
+        tried = [(rim, near) for near in planes if (rim := surface.rim_mm(near)) > 0.0]
+        rim, best = min(tried, key=lambda pair: pair[0], default=(least, plane))
         if rim < (1.0 - LEAST_GAIN) * least:
             least, plane = rim, best
         elif step_mm <= LEAST_MM and step_deg <= LEAST_DEG:

@@ -90,10 +90,10 @@ def _pair(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
     """The planes from a position on, one that is nearly the first one's image made its image, or the other way round."""
     here, *later = chain.planes[position:]
     image = mirror.image(here)
-    for number, other in enumerate(later):
-        if float(other.normal @ image.normal) > PARTNER_COSINE and abs(other.offset_mm - image.offset_mm) < PARTNER_MM:
+    for number, partner in enumerate(later):
+        if float(partner.normal @ image.normal) > PARTNER_COSINE and abs(partner.offset_mm - image.offset_mm) < PARTNER_MM:
             yield [here, *later[:number], image, *later[number + 1 :]]
-            yield [mirror.image(other), *later]
+            yield [mirror.image(partner), *later]
 
 
 def _drop_cuts(problem: Problem, best: Chain) -> Chain:
@@ -139,10 +139,10 @@ def _add_cuts(problem: Problem, chain: Chain) -> Chain:
             problem.cut(node, table.plane(candidate.row), float(table.scored.residual_mm2[candidate.row]))
             for candidate in rank_by_trade_off([table], TRADE_OFF, node.cost_mm2)
         )
-        following = next((child for child in cuts if child is not None), None)
-        if following is None or following.cost_mm2 >= node.cost_mm2:
+        child = next((child for child in cuts if child is not None), None)
+        if child is None or child.cost_mm2 >= node.cost_mm2:
             break
-        nodes.append(following)
+        nodes.append(child)
     return Chain(nodes)
 
 

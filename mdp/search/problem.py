@@ -208,13 +208,13 @@ class Problem:
         if residual_mm2 is None:
             residual_mm2 = self._residual_mm2(node, plane)
         cuts = (*node.cuts, Cut(plane, node.solid, residual_mm2))
-        following = Node(rest, cuts, self.terms, node.places, node)
+        child = Node(rest, cuts, self.terms, node.places, node)
         if self.settings.clearance:
-            lower = following.remainder.mesh.vertices
+            lower = child.remainder.mesh.vertices
             corners = np.vstack([upper, lower[plane.heights_mm(lower) >= -BASE_TOLERANCE_MM]])
             if not allowed_poses(self.machine, plane.normal, corners):
                 return None
-        return following
+        return child
 
     def _residual_mm2(self, node: Node, plane: Plane) -> float:
         """What a cut costs for ever, see candidates.residual_mm2."""
@@ -233,10 +233,10 @@ class Problem:
         cut."""
         nodes = [node]
         for plane in planes:
-            following = self.cut(nodes[-1], plane) if self.allowed(nodes[-1], plane) else None
-            if following is None:
+            child = self.cut(nodes[-1], plane) if self.allowed(nodes[-1], plane) else None
+            if child is None:
                 return None
-            nodes.append(following)
+            nodes.append(child)
         return nodes
 
 

@@ -88,8 +88,8 @@ class SupportNeed:
     def _classes(self, directions: Floats) -> Classes:
         nearest = np.argsort(-(directions @ COARSE.T), axis=1, kind="stable")[:, :LEANS].T
         over_air = self._over_air[nearest[0]]
-        for other in nearest[1:]:
-            over_air &= self._over_air[other]
+        for lean in nearest[1:]:
+            over_air &= self._over_air[lean]
         return _classify(self.surface, directions, limits_of(self.process, NO_BASE_MM), NEEDS_SUPPORT + over_air)
 
     @cached_property
