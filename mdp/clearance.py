@@ -8,6 +8,7 @@ table is not under that plane: it is tried against the head wherever the tip goe
 """
 
 from math import hypot
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,35 +19,38 @@ from profiles.frozen import Vector
 from profiles.machine import Machine
 
 
+class LowestBody(NamedTuple):
+    """The body of the head that asks for the greatest height of the tip above the table, clearance included, and its point that
+    comes nearest to the table, from the tip in the machine frame, mm."""
+
+    needed_mm: float
+    name: str
+    point_mm: Vector
+
+
 def least_tip_height_mm(machine: Machine, pose: Pose) -> float:
-    """Least height of the tip above the table's plane at a pose, the profile's clearance included; 0 at a level table."""
-    return lowest_body(machine, pose)[0]
+    """Least height of the tip above the table's plane at a pose; 0 at a level table."""
+    return lowest_body(machine, pose).needed_mm
 
 
-def lowest_body(machine: Machine, pose: Pose) -> tuple[float, str]:
-    """The same, and the body of the head that asks for it."""
-    needed_mm, name, _ = lowest_place(machine, pose)
-    return needed_mm, name
-
-
-def lowest_place(machine: Machine, pose: Pose) -> tuple[float, str, Vector]:
-    """The same, and the place of that body that comes nearest to the table, from the tip in the machine frame, mm."""
+def lowest_body(machine: Machine, pose: Pose) -> LowestBody:
+    """The body that asks for that height."""
     normal = rotation(machine, pose) @ UP
     across, along = hypot(normal[0], normal[1]), float(normal[2])
     if across < 1e-9:
-        return 0.0, "nozzle tip", (0.0, 0.0, 0.0)
+        return LowestBody(0.0, "nozzle tip", (0.0, 0.0, 0.0))
     aside = -normal[:2] / across
-    needed: list[tuple[float, str, Vector]] = []
+    needed: list[LowestBody] = []
     for radius, height in machine.head.silhouette_mm:
-        place = float(radius * aside[0]), float(radius * aside[1]), float(height)
-        needed.append((radius * across - height * along, "hot end", place))
+        point = float(radius * aside[0]), float(radius * aside[1]), float(height)
+        needed.append(LowestBody(radius * across - height * along, "hot end", point))
     for box in machine.head.boxes:
-        places = corners(box.min_mm, box.max_mm)
-        heights = places @ normal
-        x, y, z = (float(value) for value in places[int(np.argmin(heights))])
-        needed.append((float(-heights.min()), box.name, (x, y, z)))
-    height, name, place = max(needed)
-    return max(0.0, height + machine.clearance_mm), name, place
+        points = corners(box.min_mm, box.max_mm)
+        heights = points @ normal
+        x, y, z = (float(value) for value in points[int(np.argmin(heights))])
+        needed.append(LowestBody(float(-heights.min()), box.name, (x, y, z)))
+    lowest = max(needed)
+    return lowest._replace(needed_mm=max(0.0, lowest.needed_mm + machine.clearance_mm))
 
 
 def least_height_mm(machine: Machine, direction: Floats) -> float:
@@ -67,7 +71,7 @@ def find_obstacle(machine: Machine, pose: Pose, points_mm: Floats) -> str | None
         least, most = (machine.x, machine.y, machine.z)[axis].limits_mm
         if low[axis] < least or high[axis] > most:
             return f"{letter} would go from {low[axis]:.1f} to {high[axis]:.1f} mm, {least:g} to {most:g} is allowed"
-    lowest, (needed, body) = float(points_mm[:, 2].min()), lowest_body(machine, pose)
+    lowest, (needed, body, _) = float(points_mm[:, 2].min()), lowest_body(machine, pose)
     if lowest < needed:
         return f"the head's {body} would meet the table: the part begins {lowest:.1f} mm above it, {needed:.1f} mm are needed"
     met = _find_in_cradle(machine, pose, reached)

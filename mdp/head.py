@@ -6,12 +6,11 @@ right.
 """
 
 from dataclasses import dataclass
-from functools import cache
 from itertools import product
-from math import pi
 
 import numpy as np
 
+from mdp.directions.spread import spread
 from mdp.mesh import Floats
 from mdp.pose import UP
 from profiles.frozen import Vector
@@ -77,18 +76,6 @@ def directions(normal: Floats) -> Floats:
     size = np.linalg.norm(tried, axis=1)
     units: Floats = tried[size > 1e-9] / size[size > 1e-9][:, None]
     return units
-
-
-@cache
-def spread(count: int) -> Floats:
-    """(count, 3) unit directions spread evenly over the sphere (Fibonacci lattice); read only."""
-    k = np.arange(count) + 0.5
-    z = 1.0 - 2.0 * k / count
-    angle = pi * (1.0 + 5.0**0.5) * k
-    around = np.sqrt(1.0 - z * z)
-    points: Floats = np.column_stack([around * np.cos(angle), around * np.sin(angle), z])
-    points.flags.writeable = False
-    return points
 
 
 def corners(least_mm: Vector, most_mm: Vector) -> Floats:

@@ -1,5 +1,6 @@
-"""Mesh: a closed, oriented triangle mesh in mm, and its measures."""
+"""Mesh: a closed, oriented triangle mesh in mm, its measures, and what its file paints its faces with: whole numbers 0xRRGGBB."""
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Indices = NDArray[np.int64]
+NO_COLOUR = -1
+WRITTEN_COLOUR = re.compile(r"#([0-9a-fA-F]{6})(?:[0-9a-fA-F]{2})?")
 
 
 def dot(vectors: Floats, direction: Floats) -> Floats:
@@ -29,12 +33,24 @@ def dot(vectors: Floats, direction: Floats) -> Floats:
     return products
 
 
+def crosses_of(vertices: Floats, faces: Ints | Indices) -> Floats:
+    """(m, 3) normals of the faces, as long as twice their areas."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def areas_of(vertices: Floats, faces: Ints | Indices) -> Floats:
+    """(m,) areas of the faces."""
+    areas: Floats = 0.5 * np.linalg.norm(crosses_of(vertices, faces), axis=1)
+    return areas
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """A closed, consistently outward-oriented triangle mesh.
 
     vertices: (n, 3) float64, mm; faces: (m, 3) int32, counter-clockwise seen from outside; colours: (m,) what the model's file
-    paints each face with, mdp.colour.NO_COLOUR: nothing; None: it paints none. The arrays are read-only.
+    paints each face with, NO_COLOUR: nothing; None: it paints none. The arrays are read-only.
     """
 
     vertices: Floats
@@ -55,8 +71,7 @@ class Mesh:
 
     @cached_property
     def _crosses(self) -> Floats:
-        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return np.cross(b - a, c - a)
+        return crosses_of(self.vertices, self.faces)
 
     @cached_property
     def areas_mm2(self) -> Floats:
@@ -103,3 +118,14 @@ class Mesh:
         if not (mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0):
             raise MeshError("the trimesh is no solid: closed, one way wound and outside out is expected")
         return cls(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def parse_colour(text: str) -> int | None:
+    """The colour of #RRGGBB or #RRGGBBAA, whose alpha is not kept; None for anything else."""
+    match = WRITTEN_COLOUR.fullmatch(text.strip())
+    return None if match is None else int(match[1], 16)
+
+
+def colour_text(colour: int) -> str:
+    """A colour as #rrggbb."""
+    return f"#{colour:06x}"

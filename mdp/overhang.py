@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Mesh, dot
+from mdp.plane import UP as UP
 from mdp.plane import Plane
 
 ROUNDING = 1e-4
 PLATFORM_TOLERANCE_MM = 0.3  # a first layer's chamfer still stands on the platform
 BASE_TOLERANCE_MM = 1e-6  # faces of a part that a cut made lie in its base plane up to rounding
-UP = np.array([0.0, 0.0, 1.0])
 
 Mask = NDArray[np.bool_]
 

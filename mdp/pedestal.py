@@ -3,9 +3,8 @@
 import manifold3d as m3
 import numpy as np
 
-from mdp.colour import NO_COLOUR
 from mdp.cut import mesh_of, run_faces, solid_of
-from mdp.mesh import Ints, Mesh
+from mdp.mesh import NO_COLOUR, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.errors import MeshError
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from mdp.mesh import Floats, dot
 
+UP = np.array([0.0, 0.0, 1.0])
+
 
 @dataclass(frozen=True, eq=False)
 class Plane:
@@ -24,4 +26,4 @@ class Plane:
         return dot(points, self.normal) - self.offset_mm
 
 
-PLATFORM = Plane(np.array([0.0, 0.0, 1.0]), 0.0)
+PLATFORM = Plane(UP, 0.0)

@@ -1,19 +1,22 @@
-"""Pose: the tilt and turn of the table that bring a direction of the workpiece upright.
+"""Pose: the tilt and turn of the table that bring a direction of the workpiece upright, and the poses of a whole print.
 
 The table's rotation is R = R_tilt R_turn with each factor a right-handed rotation about its axis by
--sign * (value - zero_deg), the rule of LinuxCNC's xyzac-trt-kins written for any two axes.
+-sign * (value - zero_deg), the rule of LinuxCNC's xyzac-trt-kins written for any two axes. The search asks for poses as well as
+the machine does; where the workpiece's points are at a pose is in machine.kinematics.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import atan2, ceil, cos, degrees, floor, hypot, radians, sin
 
 import numpy as np
 
 from mdp.mesh import Floats
+from mdp.plane import UP as UP
 from profiles.axes import RotaryAxis
 from profiles.machine import Machine
 
-UP = np.array([0.0, 0.0, 1.0])
 SINGULAR = 1e-7  # sine of an angle that no table can show; nearer to the singular pose the turn is not defined
 
 
@@ -59,8 +62,8 @@ def rotation(machine: Machine, pose: Pose) -> Floats:
 def shift(machine: Machine, pose: Pose) -> Floats:
     """(3,) X Y Z of the workpiece origin at a pose: a workpiece point w is reached at rotation @ w + shift."""
     tilt_point, turn_point = np.array(machine.tilt.point_mm), np.array(machine.turn.point_mm)
-    carried: Floats = axis_rotation(machine.tilt, pose.tilt_deg) @ (turn_point - tilt_point)
-    origin: Floats = carried + tilt_point + np.array(machine.tool_mm)
+    turn_from_tilt: Floats = axis_rotation(machine.tilt, pose.tilt_deg) @ (turn_point - tilt_point)
+    origin: Floats = turn_from_tilt + tilt_point + np.array(machine.tool_mm)
     return origin
 
 
@@ -90,6 +93,65 @@ def nearest_turn(value_deg: float, limits_deg: tuple[float, float], near_deg: fl
         return None
     turns = min(max(round((near_deg - value_deg) / 360.0), low), high)
     return value_deg + 360.0 * turns
+
+
+def least_rotation(
+    machine: Machine, options: Sequence[Sequence[Pose]], fits: Callable[[int, Pose], bool] | None = None
+) -> list[Pose]:
+    """One pose for every part so that tilt and turn together move least over the whole print, inside limits and cables.
+
+    options: for every part the poses that reach its direction, at least one each; turn equivalents (whole turns) are
+    added here, but not to the first part's, where the print begins. A part printed on the level table may keep the turn
+    of the part before it, whatever that is, where fits(position in options, pose) is true (None: anywhere).
+    Shortest path through the parts, so the result is the best of all combinations; where the cables are wound up, the
+    turn back is part of the path.
+    """
+    states = [list(options[0])]
+    for position, poses in enumerate(options[1:], start=1):
+        here = _equivalents(machine, poses, len(options))
+        here += [pose for pose in _keep_turn(machine, poses, states[-1], here) if fits is None or fits(position, pose)]
+        states.append(here)
+    cost = [0.0] * len(states[0])
+    came_from: list[list[int]] = []
+    for before, here in pairwise(states):
+        steps = [min((cost[k] + rotation_deg(p, q), k) for k, p in enumerate(before)) for q in here]
+        cost = [total for total, _ in steps]
+        came_from.append([k for _, k in steps])
+    state = min(range(len(cost)), key=cost.__getitem__)
+    chosen = [states[-1][state]]
+    for back, before in zip(reversed(came_from), reversed(states[:-1]), strict=True):
+        state = back[state]
+        chosen.append(before[state])
+    return chosen[::-1]
+
+
+def rotation_deg(a: Pose, b: Pose) -> float:
+    """How far tilt and turn together move from one pose to the other."""
+    return abs(a.tilt_deg - b.tilt_deg) + abs(a.turn_deg - b.turn_deg)
+
+
+def _equivalents(machine: Machine, poses: Sequence[Pose], reach: int) -> list[Pose]:
+    """The poses with whole turns added, inside the turn's limits and cables, at most `reach` turns from where they are."""
+    least, most = machine.turn.reach_deg
+    equivalents = []
+    for pose in poses:
+        low = max(ceil((least - pose.turn_deg) / 360.0 - 1e-9), -reach)
+        high = min(floor((most - pose.turn_deg) / 360.0 + 1e-9), reach)
+        equivalents += [Pose(pose.tilt_deg, pose.turn_deg + 360.0 * turns) for turns in range(low, high + 1)]
+    return equivalents
+
+
+def _keep_turn(machine: Machine, poses: Sequence[Pose], before: Sequence[Pose], known: Sequence[Pose]) -> list[Pose]:
+    """The poses in which any turn serves, at each turn the part before may be printed at."""
+    free = dict.fromkeys(pose.tilt_deg for pose in poses if _any_turn_serves(machine, pose))
+    unturned = dict.fromkeys(Pose(tilt, pose.turn_deg) for tilt in free for pose in before)
+    return [pose for pose in unturned if pose not in known]
+
+
+def _any_turn_serves(machine: Machine, pose: Pose) -> bool:
+    """True when the turn axis stands upright: turning does not change which direction of the workpiece is up."""
+    x, y, _ = axis_rotation(machine.tilt, pose.tilt_deg) @ unit(machine.turn.axis)
+    return hypot(x, y) < SINGULAR
 
 
 def _angles(tilt_axis: Floats, turn_axis: Floats, direction: Floats) -> list[tuple[float, float | None]]:

@@ -12,8 +12,8 @@ from mdp.mesh import Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.pose import about
 from mdp.repair.colours import carry_colours
-from mdp.repair.edges import connected_components
 from mdp.repair.repair import repair
+from mdp.topology.components import vertex_components
 from profiles.errors import MeshError
 
 DEMO = "demo:"
@@ -41,7 +41,7 @@ def locate(model: str) -> Path:
         else {}
     )
     if name not in demos:
-        known = ", ".join(f"{DEMO}{each}" for each in sorted(demos))
+        known = ", ".join(f"{DEMO}{demo}" for demo in sorted(demos))
         raise MeshError(f"there is no demo model {name!r}; allowed are {known or 'none: none is installed'}")
     return Path(str(demos[name]))
 
@@ -80,9 +80,7 @@ def too_fine(mesh: Mesh) -> tuple[str, ...]:
 
 def floating_pieces(mesh: Mesh) -> tuple[str, ...]:
     """A sentence about the pieces that do not reach the platform, if there are any; closed voids are no pieces."""
-    faces = mesh.faces.astype(np.int64)
-    label = connected_components(len(mesh.vertices), faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())[faces[:, 0]]
-    corners = mesh.vertices[faces]
+    label, corners = vertex_components(len(mesh.vertices), mesh.faces)[mesh.faces[:, 0]], mesh.vertices[mesh.faces]
     volumes = np.bincount(label, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
     lowest = np.full(len(volumes), np.inf)
     np.minimum.at(lowest, label, corners[:, :, 2].min(axis=1))

@@ -6,6 +6,10 @@ from pydantic import Field
 
 from profiles.frozen import Frozen
 
+PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4, "objective": "risky"}
+OF_SCARS = {"seam_mm": 0.0, "nozzle_load_n": 0.0}  # what the paper's terms do not know
+OF_SEAMS = {"cut_mm2": 0.0, "second_mm2": 0.0, "hidden_seam_share": 1.0}
+
 
 class Search(Frozen):
     """How the parts are searched."""
@@ -131,3 +135,15 @@ class Search(Frozen):
         False, description="true: faces standing on the platform count as risky (the authors' terms)"
     )
     clearance: bool = Field(True, description="false: the head's bodies and the axis limits are ignored (the authors' terms)")
+
+    @property
+    def effective(self) -> "Search":
+        """The settings as they hold: the published search has the paper's terms, and what means nothing beside others is nothing.
+
+        >>> Search(objective="risky").effective.cut_mm2
+        0.0
+        """
+        published = PUBLISHED if self.method == "published" else {}
+        paper = OF_SCARS if published or self.objective == "risky" else {}
+        free = OF_SEAMS if paper or self.seam_mm == 0.0 else {}
+        return self.model_copy(update={**published, **paper, **free})

@@ -14,8 +14,8 @@ from mdp.kernels.arrays import ints, longs, table
 from mdp.kernels.kernel import kernel, part
 from mdp.kernels.sorting import rank, sort_into_bins
 from mdp.mesh import Floats, Ints, Mesh
+from mdp.topology.linked_faces import opposites
 from profiles.errors import SliceError
-from slicer.geometry.halfedges import opposites
 
 
 def sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:

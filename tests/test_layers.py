@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tools.draw_rooms import LAYERS, PICTURE, draw, floors, imports, room_graph, rooms_of
+from tools import draw_rooms
+from tools.draw_rooms import LAYERS, PICTURE, draw, floors, import_graph, imports, room_graph, rooms_of
 
 ROOT = Path(__file__).resolve().parents[1]
 MOST_FILES = 15
@@ -150,6 +151,17 @@ def test_two_rooms_that_import_each_other_are_found() -> None:
     graph = {"a.one.x": {"a.two.y"}, "a.two.y": {"a.one.x"}}
     with pytest.raises(CycleError):
         floors(room_graph(graph, rooms_of(graph)))
+
+
+def test_no_file_imports_itself_by_way_of_others_not_even_for_types() -> None:
+    sources = {module: source for module, source in draw_rooms.modules().items() if not module.endswith("__init__")}
+    floors(import_graph(sources))  # raises CycleError with the files of a circle
+
+
+def test_a_circle_behind_type_checking_is_found() -> None:
+    late = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from a.one import One"
+    with pytest.raises(CycleError):
+        floors(import_graph({"a.one": "from a.two import Two", "a.two": late}))
 
 
 def test_files_at_the_top_of_a_folder_are_values_below_its_rooms_or_stages_above_them() -> None:

@@ -70,7 +70,7 @@ def test_the_check_tells_what_exists_from_what_does_not() -> None:
     "signature",
     [
         "mdp.read.read_mesh(path, scale, rotate_deg)",
-        "mdp.search.search.decompose(mesh, name, profile, ranker, on_stage, on_record, by_hand, parts, price)",
+        "mdp.search.search.decompose(mesh, name, profile)",
         "slicer.parts.slice_parts(parts, profile, on_progress, processes)",
         "machine.planning.plan.plan(decomposition, sliced, profile, stops)",
         "machine.gcode.writer.write_gcode(program, profile)",

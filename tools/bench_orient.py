@@ -15,9 +15,9 @@ from typing import TypeVar
 
 from machine.app.pipeline.pricing import pricing
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import in_words
 from mdp.read import locate, read_mesh
 from mdp.search.laying import find_better_way, lay_down
-from mdp.search.orientation import in_words
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
 

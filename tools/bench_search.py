@@ -99,7 +99,8 @@ def growth(mesh: Mesh, profile: Profile, largest: int) -> None:
 def sampled_bounds(mesh: Mesh, profile: Profile) -> Bounds:
     """The bounds of the sampled directions, as a search has them."""
     search = profile.search
-    return bounds_of(directions(search), platform_disc(mesh, search), mesh.volume_mm3, profile.machine, search)
+    disc, volume_mm3 = platform_disc(mesh, search), mesh.volume_mm3
+    return bounds_of(directions(search), disc=disc, volume_mm3=volume_mm3, machine=profile.machine, search=search)
 
 
 def all_candidates(mesh: Mesh, profile: Profile) -> tuple[Callable[[], object], int]:

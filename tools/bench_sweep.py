@@ -26,7 +26,7 @@ from mdp.sweep.integrals import (
     integrate_volume,
 )
 from mdp.sweep.slivers import find_slivers
-from mdp.sweep.sweep import Remainder, gains, sweep
+from mdp.sweep.sweep import NeedsTable, Remainder, gains, sweep
 from profiles.profile import Profile, load
 from tools.bench_search import on_cores, sampled_bounds
 
@@ -64,7 +64,7 @@ def pieces_of_work(
     cosines = np.ascontiguousarray(directions @ rows.vertex_normals)
     areas, lost = facets.mesh.areas_mm2, np.zeros(0, np.bool_)
     surface = Overhangs(facets.points, facets.corners, facets.normals, areas, facets.risky, angle, lost)
-    needs = remainder.needs(directions)
+    needs = NeedsTable(facets.sources, remainder.classes(directions), remainder.weight)
     grids = (directions, heights, counts, step, columns)
     return {
         "heights": lambda: _all_heights(rows.points, directions, step),

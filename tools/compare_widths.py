@@ -152,7 +152,7 @@ def rows(path: Path, missing: Sequence[Key], limit: int | None, most_faces: int 
 def _warm_up(settings: str, ranker: str) -> None:
     """Load the kernels and the ranker once, before anything is timed."""
     tree, _ = read_mesh(locate("demo:tree"))
-    decompose(tree, "tree", load(settings=(*settings.split(), "search.directions=50")), ranker)
+    decompose(tree, "tree", load(settings=(*settings.split(), "search.directions=50")), ranker=ranker)
 
 
 def searched(key: Key, mesh: Mesh) -> Row:
@@ -162,7 +162,7 @@ def searched(key: Key, mesh: Mesh) -> Row:
     core, wall = time.process_time(), time.perf_counter()
     search = (name, settings, method, width, len(mesh.faces))
     try:
-        found = decompose(mesh, name, profile, ranker)
+        found = decompose(mesh, name, profile, ranker=ranker)
     except Exception as error:  # noqa: BLE001 - whatever fails is what the table counts
         spent = (time.process_time() - core, time.perf_counter() - wall)
         return Row(*search, 0.0, 0.0, 1.0, 0, *spent, 0, f"{type(error).__name__}: {error}", ranker)

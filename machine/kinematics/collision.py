@@ -13,7 +13,8 @@ import numpy as np
 from manifold3d import Manifold
 
 from machine.kinematics.table import machine_points
-from mdp.head import Body, corners, directions, spread
+from mdp.directions.spread import spread
+from mdp.head import Body, corners, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.machine import CradleBox, Machine, Table

@@ -14,7 +14,8 @@ import numpy as np
 
 from machine.kinematics.collision import Printed, solids, sweep_gaps, swing_mm
 from machine.planning.timing import move_times
-from mdp.head import bodies, directions, spread
+from mdp.directions.spread import spread
+from mdp.head import bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
 from profiles.errors import MoveError

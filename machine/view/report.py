@@ -19,8 +19,8 @@ from machine.view.paths import PRIME, WIPE, page_kinds
 from machine.view.settings import settings_tables
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
+from mdp.directions.orientation import best_orientation, in_words, standing_still
 from mdp.mesh import Floats
-from mdp.search.orientation import best_orientation, in_words, standing_still
 from profiles.profile import Profile
 
 Table = dict[str, Any]

@@ -3,40 +3,48 @@
 Directions, normals and corners are rows of (n, 3) arrays.
 """
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
-from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import part
 from mdp.mesh import Floats
+from mdp.plane import Plane
 from mdp.sweep.rims import weigh_chord
 
 LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no length of its own
 
 
+class Planes(NamedTuple):
+    """Planes in the order of their cuts: (k, 3) normals and (k,) offsets."""
+
+    directions: Floats
+    offsets_mm: Floats
+
+
+def planes_of(planes: Sequence[Plane]) -> Planes:
+    """Planes for kernels."""
+    directions = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
+    return Planes(directions, np.array([plane.offset_mm for plane in planes], dtype=np.float64))
+
+
 @part
-def along(points: Floats, row: int, directions: Floats, other: int) -> float:
+def along(points: Floats, row: int, directions: Floats, second_row: int) -> float:
     """Product of a row with a row of another array."""
-    product: float = points[row, 0] * directions[other, 0] + points[row, 1] * directions[other, 1]
-    product += points[row, 2] * directions[other, 2]
+    product: float = points[row, 0] * directions[second_row, 0] + points[row, 1] * directions[second_row, 1]
+    product += points[row, 2] * directions[second_row, 2]
     return product
 
 
 @part
-def chord_mm(polygon: Floats, heights: Floats, size: int) -> float:
-    """Length of a convex polygon's chord at height 0; it reaches to both sides."""
-    first, last = floats(3, 0.0), floats(3, 0.0)
-    count = 0
+def find_heights(polygon: Floats, size: int, planes: Planes, cut: int, heights: Floats) -> tuple[float, float]:
+    """Put the heights of a polygon's corners above one of some planes into `heights`; the least and the greatest."""
+    lowest, highest = np.inf, -np.inf
     for i in range(size):
-        j = i + 1 if i + 1 < size else 0
-        crosses = heights[i] * heights[j] < 0.0
-        if crosses or heights[i] == 0.0:
-            share = heights[i] / (heights[i] - heights[j]) if crosses else 0.0
-            for axis in range(3):
-                last[axis] = polygon[i, axis] + share * (polygon[j, axis] - polygon[i, axis])
-                if count == 0:
-                    first[axis] = last[axis]
-            count += 1
-    return float(np.sqrt((last[0] - first[0]) ** 2 + (last[1] - first[1]) ** 2 + (last[2] - first[2]) ** 2))
+        heights[i] = along(polygon, i, planes.directions, cut) - planes.offsets_mm[cut]
+        lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
+    return lowest, highest
 
 
 @part

@@ -6,16 +6,17 @@ dihedral angle times its length along the edge, so single noisy edges cancel out
 rays over the hemisphere, spread so that each stands for the same share of the light.
 """
 
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
+from mdp.directions.spread import spread_like_light
 from mdp.kernels.arrays import floats, ints
 from mdp.kernels.kernel import kernel, part
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.sweep.rays import TriangleTree, first_hit, triangle_tree
+from mdp.topology.linked_faces import opposites
 
 NEIGHBOURHOOD = 0.03  # radius over which the surface is looked at, as a share of the model's diagonal
 FULL_BEND = 0.6  # radians by which a place bends inward over such a radius where it counts as hidden altogether
@@ -44,15 +45,9 @@ def hidden_shares(mesh: Mesh) -> Floats:
     diagonal_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
     surface = _look_around(mesh)
     occluded, hidden = np.zeros(len(mesh.faces)), np.zeros(len(mesh.faces))
-    in_threads(_occlude, len(mesh.faces), triangle_tree(mesh), surface.middles, _hemisphere(), diagonal_mm, occluded)
+    in_threads(_occlude, len(mesh.faces), triangle_tree(mesh), surface.middles, spread_like_light(RAYS), diagonal_mm, occluded)
     in_threads(_hide, len(mesh.faces), surface, NEIGHBOURHOOD * diagonal_mm, occluded, hidden)
     return hidden
-
-
-def _hemisphere() -> Floats:
-    """(RAYS, 3) unit vectors around +z, each for the same share of the light that a matt face receives (Malley)."""
-    share, turn = (np.arange(RAYS) + 0.5) / RAYS, np.arange(RAYS) * pi * (3.0 - 5.0**0.5)
-    return np.stack([np.sqrt(share) * np.cos(turn), np.sqrt(share) * np.sin(turn), np.sqrt(1.0 - share)], axis=1)
 
 
 def _look_around(mesh: Mesh) -> Neighbourhood:
@@ -60,23 +55,11 @@ def _look_around(mesh: Mesh) -> Neighbourhood:
     edges = np.roll(corners, -1, axis=1) - corners
     lengths = np.linalg.norm(edges, axis=2)
     directions = edges / np.where(lengths > 0.0, lengths, 1.0)[..., None]
-    across, normals = _faces_across(mesh), mesh.normals
+    across, normals = opposites(mesh.faces).reshape(-1, 3) // 3, mesh.normals
     beyond = normals[across]
     sine = np.einsum("mki,mki->mk", np.cross(normals[:, None], beyond), directions)
     angles = np.arctan2(-sine, np.einsum("mi,mki->mk", normals, beyond))
     return Neighbourhood(corners.mean(axis=1), normals, mesh.areas_mm2, across, angles * lengths, directions)
-
-
-def _faces_across(mesh: Mesh) -> Ints:
-    """(m, 3) the face on the other side of the edge from each corner to the next."""
-    starts, ends = mesh.faces.astype(np.int64).ravel(), np.roll(mesh.faces, -1, axis=1).astype(np.int64).ravel()
-    size = len(mesh.vertices)
-    rising, falling = np.flatnonzero(starts < ends), np.flatnonzero(starts > ends)
-    rising = rising[np.argsort(starts[rising] * size + ends[rising], kind="stable")]
-    falling = falling[np.argsort(ends[falling] * size + starts[falling], kind="stable")]
-    across = np.repeat(np.arange(len(mesh.faces), dtype=np.int32), 3)
-    across[rising], across[falling] = falling // 3, rising // 3
-    return across.reshape(-1, 3)
 
 
 @kernel

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface
-from mdp.cut import Solid, mesh_of
-from mdp.mesh import Mesh, dot
-from mdp.overhang import Mask, risky_upright, threshold
+from mdp.cost.model_surface import MADE_BY_A_CUT, Piece
+from mdp.mesh import Mesh
+from mdp.overhang import Mask, facing_down, risky_upright
 from mdp.plane import Plane
 from mdp.support_need.need import ModelPieces, SupportNeed, needs_support
 from mdp.support_need.patches import CARRIES_ITSELF, UNSUPPORTABLE
@@ -19,29 +18,27 @@ NO_SUPPORT_WEIGHT = 100.0  # of an area that needs support where a person wants 
 
 @dataclass(frozen=True, eq=False)
 class ModelNeed:
-    """The surface of a model and what it needs along any direction; no_support: where an area that needs it counts
-    NO_SUPPORT_WEIGHT times, for it would hang."""
+    """What a model needs along any direction; no_support: where an area that needs it counts NO_SUPPORT_WEIGHT times, for it
+    would hang."""
 
-    surface: ModelSurface
     need: SupportNeed
     no_support: Marked = UNMARKED
 
-    def pieces(self, solid: Solid) -> ModelPieces:
-        """The faces of what was cut from the model, as mesh_of orders them. manifold3d may number a few more than the model has:
-        they count as made by a cut."""
-        sources = self.surface.sources(solid)
-        sources = np.where(sources < len(self.surface.mesh.faces), sources, np.int32(MADE_BY_A_CUT))
+    def pieces(self, piece: Piece) -> ModelPieces:
+        """The faces of what was cut from the model. manifold3d may number a few more than the model has: they count as made by a
+        cut."""
+        sources = np.where(piece.sources < len(self.need.surface.faces), piece.sources, np.int32(MADE_BY_A_CUT))
         if not self.no_support.anywhere:
             return ModelPieces(self.need, sources)
-        barred = self.no_support.among(sources).touched(mesh_of(solid))
+        barred = self.no_support.among(sources).touched(piece.mesh)
         return ModelPieces(self.need, sources, np.where(barred, NO_SUPPORT_WEIGHT, 1.0))
 
 
 def needing_upright(mesh: Mesh, profile: Profile) -> Mask:
     """(m,) faces of a whole model that need support printed straight up, by the terms of the profile's search."""
-    search = profile.search
+    search = profile.search.effective
     risky = risky_upright(mesh, profile.process.self_supporting_angle_deg, search.count_platform_faces)
-    if search.objective != "scar" or search.method == "published":
+    if search.objective == "risky":
         return risky
     needing: Mask = risky & needs_support(mesh, profile.process, on_platform=True)
     return needing
@@ -50,9 +47,9 @@ def needing_upright(mesh: Mesh, profile: Profile) -> Mask:
 def excess_mm2(mesh: Mesh, pieces: ModelPieces, plane: Plane) -> float:
     """By how much what needs support above a plane along its normal counts more than its area: over nothing but air, and where
     none is wanted. mesh: what the plane cuts."""
-    classes, counts = pieces.along(plane.normal), np.ones(len(mesh.faces)) if pieces.counts is None else pieces.counts
+    classes, counts = pieces.along(plane.normal), 1.0 if pieces.counts is None else pieces.counts
     times = np.where(classes == UNSUPPORTABLE, pieces.need.weight, 1.0) * counts
-    risky = dot(mesh.normals, plane.normal) < threshold(pieces.need.process.self_supporting_angle_deg)
+    risky = facing_down(mesh, plane.normal, pieces.need.process.self_supporting_angle_deg)
     chosen = np.flatnonzero(risky & (classes != CARRIES_ITSELF) & (times != 1.0))
     low, middle, high = np.sort(plane.heights_mm(mesh.vertices)[mesh.faces[chosen]], axis=1).T
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -14,13 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.cost.clipping import along, clip_below, find_chord, flat_area_mm2
+from mdp.cost.clipping import Planes, along, clip_below, find_chord, find_heights, flat_area_mm2, planes_of
 from mdp.cost.cost import CostTerms
-from mdp.cost.forecast import Faces, counts_of, weight_along
+from mdp.cost.forecast import Faces, faces_of, weight_along
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import inlined, kernel, part
 from mdp.mesh import Floats, Ints
-from mdp.overhang import threshold
 from mdp.plane import Plane
 from mdp.support_need.patches import Classes
 from mdp.sweep.rims import ROUNDING_MM
@@ -52,26 +51,17 @@ class ModelForecast:
     @classmethod
     def of(cls, remainder: Remainder, weights: Floats, terms: CostTerms) -> "ModelForecast":
         """The forecasts of an uncut model; weights (m,): how much a mm of rim counts on each face."""
-        mesh, pieces = remainder.mesh, remainder.pieces
-        sources = np.zeros(0, np.int32) if pieces is None else pieces.sources
-        weight = 1.0 if pieces is None else pieces.need.weight
-        corners, risky_below = mesh.vertices[mesh.faces], threshold(terms.angle_deg)
-        areas, normals = mesh.areas_mm2, mesh.normals
-        faces = Faces(
-            corners, normals, areas, remainder.risky, risky_below, weights, terms.feather, sources, weight, counts_of(remainder)
-        )
-        return cls(remainder, faces, mesh.bounds_mm.mean(axis=0))
+        faces = faces_of(remainder, terms, weights, np.ones(len(weights), dtype=np.bool_))
+        return cls(remainder, faces, remainder.mesh.bounds_mm.mean(axis=0))
 
     def parts(self, planes: Sequence[Plane]) -> tuple[tuple[PartForecast, ...], float]:
         """The parts that planes cut off, in the order of the cuts, and the area of what remains that needs support printed
         straight up, mm2."""
-        directions = np.array([plane.normal for plane in planes], dtype=np.float64).reshape(-1, 3)
-        offsets = np.array([plane.offset_mm for plane in planes], dtype=np.float64)
-        apexes = self.middle - (directions @ self.middle - offsets)[:, None] * directions
-        pieces = self.remainder.pieces
-        classes = np.zeros((len(planes), 0), np.uint8) if pieces is None else pieces.need.along(directions)
+        cuts = planes_of(planes)
+        directions = cuts.directions
+        apexes = self.middle - (directions @ self.middle - cuts.offsets_mm)[:, None] * directions
         meeting = np.zeros((len(planes), len(planes)))
-        sums = _sum_parts(self.faces, Planes(directions, offsets, apexes), classes, meeting)
+        sums = _sum_parts(self.faces, Cuts(cuts, apexes, self.remainder.classes(directions)), meeting)
         rows, before = np.nonzero(np.abs(meeting) > LEAST_EDGE_MM)
         np.maximum.at(sums[:, COSINE], rows, np.abs((directions[rows] * directions[before]).sum(axis=1)))
         return tuple(_part(row) for row in sums[:-1]), float(sums[-1, NEEDED])
@@ -82,12 +72,20 @@ def _part(row: Floats) -> PartForecast:
     return PartForecast(values[NEEDED], values[RIM], degrees(acos(min(values[COSINE], 1.0))), values[VOLUME])
 
 
-class Planes(NamedTuple):
-    """Base planes in the order of their cuts: (k, 3) normals, (k,) offsets and (k, 3) points in them."""
+class Cuts(NamedTuple):
+    """Base planes in the order of their cuts, (k, 3) points in them, and (k, n) what the faces of the model need along each."""
 
-    directions: Floats
-    offsets_mm: Floats
+    planes: Planes
     apexes: Floats
+    classes: Classes
+
+
+class Sums(NamedTuple):
+    """What is summed: (k + 1, COLUMNS) over the parts in the order of the cuts, the last one what remains; meeting (k, k), the
+    signed length of the line in which a plane (row) meets the cut of one before (column)."""
+
+    parts: Floats
+    meeting: Floats
 
 
 class Room(NamedTuple):
@@ -104,11 +102,10 @@ class Room(NamedTuple):
 
 
 @kernel
-def _sum_parts(surface: Faces, planes: Planes, classes: Classes, meeting: Floats) -> Floats:
-    """(k + 1, COLUMNS) sums over the parts in the order of the cuts, the last one what remains; meeting (k, k) is given the
-    signed length of the line in which a plane (row) meets the cut of one before (column)."""
-    count = len(planes.offsets_mm)
-    sums, most = table(count + 1, COLUMNS), (count + 1) * (count + 2) // 2
+def _sum_parts(surface: Faces, cuts: Cuts, meeting: Floats) -> Floats:
+    """The sums over the parts; the other ones are put into meeting."""
+    count = len(cuts.apexes)
+    sums, most = Sums(table(count + 1, COLUMNS), meeting), (count + 1) * (count + 2) // 2
     polygon, spare, heights = table(count + 4, 3), table(count + 4, 3), floats(count + 4, 0.0)
     room = Room(table(3 * most, 3), ints(most, 0), ints(most, 0), polygon, spare, heights, table(2, 3))
     for face in range(len(surface.areas_mm2)):
@@ -117,50 +114,47 @@ def _sum_parts(surface: Faces, planes: Planes, classes: Classes, meeting: Floats
             for axis in range(3):
                 room.corners[corner, axis] = surface.corners[face, corner, axis]
         while waiting > 0:
-            waiting = _divide(surface, planes, classes, room, face, waiting - 1, sums, meeting)
-    return sums
+            waiting = _divide(surface, cuts, room, face, waiting - 1, sums)
+    return sums.parts
 
 
 @inlined
-def _divide(
-    surface: Faces, planes: Planes, classes: Classes, room: Room, face: int, waiting: int, sums: Floats, meeting: Floats
-) -> int:
+def _divide(surface: Faces, cuts: Cuts, room: Room, face: int, waiting: int, sums: Sums) -> int:
     """Divide the last triangle that waits among the parts; how many wait afterwards."""
-    fan, cut, count, size = room.fans[waiting], room.cuts[waiting], len(planes.offsets_mm), 3
-    polygon, spare, heights, ends = room.polygon, room.spare, room.heights, room.ends
-    normals, row = (surface.normals, face) if fan < 0 else (planes.directions, int(fan))
+    fan, cut, directions, size = room.fans[waiting], room.cuts[waiting], cuts.planes.directions, 3
+    polygon, spare, heights, ends, parts = room.polygon, room.spare, room.heights, room.ends, sums.parts
+    normals, row = (surface.normals, face) if fan < 0 else (directions, int(fan))
     for corner in range(3):
         for axis in range(3):
             polygon[corner, axis] = room.corners[3 * waiting + corner, axis]
     area = flat_area_mm2(polygon, size, normals, row)
-    while cut < count and size > 0:
-        lowest, highest = np.inf, -np.inf
-        for i in range(size):
-            heights[i] = along(polygon, i, planes.directions, cut) - planes.offsets_mm[cut]
-            lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
+    while cut < len(directions) and size > 0:
+        lowest, highest = find_heights(polygon, size, cuts.planes, cut, heights)
         if highest > 0.0:
-            height, left = along(polygon, 0, normals, row) - along(planes.apexes, cut, normals, row), 0.0
+            cosine, left = along(normals, row, directions, cut), 0.0
+            height = along(polygon, 0, normals, row) - along(cuts.apexes, cut, normals, row)
             if lowest < 0.0:
                 length = find_chord(polygon, heights, size, ends)
                 if fan >= 0:
-                    meeting[cut, fan] += _signed(ends, planes.directions, fan, cut)
+                    sums.meeting[cut, fan] += _signed(ends, directions, fan, cut)
                 elif highest > ROUNDING_MM and lowest < -ROUNDING_MM:
-                    _add_rim(surface, face, along(normals, row, planes.directions, cut), length, sums[cut])
-                _add_fan(room, waiting, planes.apexes[cut], cut)
+                    parts[cut, COSINE] = max(parts[cut, COSINE], abs(cosine))
+                    parts[cut, RIM] += length if surface.rim_weights[face] > 0.0 else 0.0
+                _add_fan(room, waiting, cuts.apexes[cut], cut)
                 waiting += 1
                 size = clip_below(polygon, spare, heights, size)
                 polygon, spare = spare, polygon
                 left = flat_area_mm2(polygon, size, normals, row)
             else:
                 size = 0
-            sums[cut, VOLUME] += (area - left) * height / 3.0
-            if along(normals, row, planes.directions, cut) < surface.risky_below:
-                needing = fan >= 0 or weight_along(surface, classes, cut, face) > 0.0
-                sums[cut, NEEDED] += area - left if needing else 0.0
+            parts[cut, VOLUME] += (area - left) * height / 3.0
+            if cosine < surface.risky_below:
+                needing = fan >= 0 or weight_along(surface, cuts.classes, cut, face) > 0.0
+                parts[cut, NEEDED] += area - left if needing else 0.0
             area = left
         cut += 1
-    if size > 0 and (surface.risky[face] if fan < 0 else planes.directions[fan, 2] < surface.risky_below):
-        sums[count, NEEDED] += area
+    if size > 0 and (surface.risky[face] if fan < 0 else directions[fan, 2] < surface.risky_below):
+        parts[len(directions), NEEDED] += area
     return waiting
 
 
@@ -175,18 +169,11 @@ def _add_fan(room: Room, waiting: int, apex: Floats, cut: int) -> None:
 
 
 @part
-def _add_rim(surface: Faces, face: int, cosine: float, length: float, sums: Floats) -> None:
-    """Add the chord of a face of the model to the sums of a part."""
-    sums[COSINE] = max(sums[COSINE], abs(cosine))
-    sums[RIM] += length if surface.seam_mm[face] > 0.0 else 0.0
-
-
-@part
-def _signed(ends: Floats, directions: Floats, one: int, other: int) -> float:
+def _signed(ends: Floats, directions: Floats, first: int, second: int) -> float:
     """Length of a chord along the line in which two planes meet, with the sign of its sense."""
     total = 0.0
     for axis in range(3):
         j, k = (axis + 1) % 3, (axis + 2) % 3
-        across = directions[one, j] * directions[other, k] - directions[one, k] * directions[other, j]
+        across = directions[first, j] * directions[second, k] - directions[first, k] * directions[second, j]
         total += (ends[1, axis] - ends[0, axis]) * across
     return total

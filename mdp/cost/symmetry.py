@@ -11,6 +11,7 @@ from math import radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 
@@ -52,12 +53,12 @@ def find_mirrors(mesh: Mesh) -> list[Mirror]:
     centre = (points * areas[:, None]).sum(axis=0) / areas.sum()
     around = points - centre
     _, axes = np.linalg.eigh((around * areas[:, None]).T @ around)
-    found: list[Mirror] = []
+    mirrors: list[Mirror] = []
     for axis in (*DIRECTIONS, *axes.T):
-        fresh = all(abs(float(axis @ other.normal)) < 1.0 - 1e-3 for other in found)
+        fresh = all(abs(float(axis @ mirror.normal)) < 1.0 - 1e-3 for mirror in mirrors)
         if abs(axis[2]) < UPRIGHT and fresh and _is_even(around, areas, axis) and _is_mirrored(mesh, centre, axis):
-            found.append(Mirror(axis, float(axis @ centre)))
-    return found
+            mirrors.append(Mirror(axis, float(axis @ centre)))
+    return mirrors
 
 
 def _quadrature(mesh: Mesh) -> tuple[Floats, Floats]:
@@ -72,9 +73,7 @@ def _quadrature(mesh: Mesh) -> tuple[Floats, Floats]:
 
 def _is_even(around: Floats, areas: Floats, axis: Floats) -> bool:
     """Whether the moments of the surface that are odd along an axis nearly vanish."""
-    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    side = side / np.linalg.norm(side)
-    x, y, z = around @ axis, around @ side, around @ np.cross(axis, side)
+    x, (y, z) = around @ axis, frame_across(axis) @ around.T
     for odd in (x * y, x * z, x**3, x * y * y, x * z * z, x * y * z):
         if abs(float((odd * areas).sum())) > ODD * float((np.abs(odd) * np.abs(areas)).sum()):
             return False

@@ -4,7 +4,8 @@ from itertools import islice
 from pathlib import Path
 
 from mdp.formats.polygons import polygon_surface
-from mdp.formats.surface import Indices, Surface, parse_floats, parse_integers
+from mdp.formats.surface import Surface, parse_floats, parse_integers
+from mdp.mesh import Indices
 from profiles.errors import MeshError
 
 KINDS = ("OFF", "COFF", "NOFF", "CNOFF", "STOFF")  # the letters name columns behind the position, which are left alone

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from mdp.colour import NO_COLOUR
 from mdp.formats.polygons import polygon_surface
-from mdp.formats.surface import Indices, Surface
+from mdp.formats.surface import Surface
+from mdp.mesh import NO_COLOUR, Indices
 from profiles.errors import MeshError
 
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8"}

@@ -5,8 +5,9 @@ from pathlib import Path
 import manifold3d as m3
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface, check_surface, check_vertices
-from mdp.mesh import Floats
+from mdp.directions.frame import frame_across
+from mdp.formats.surface import Surface, check_surface, check_vertices
+from mdp.mesh import Floats, Indices
 from profiles.errors import MeshError
 
 
@@ -32,7 +33,7 @@ def polygon_surface(path: Path, vertices: Floats, polygons: list[list[int]] | In
             raise MeshError(f"{path}: face {number} names vertex {worst} (counted from 0) of {len(vertices)} vertices")
         triangles.append(corners[triangulate(vertices[corners])])
     if colours is not None:
-        colours = np.repeat(colours, [len(each) for each in triangles])
+        colours = np.repeat(colours, [len(triangle) for triangle in triangles])
     return check_surface(path, vertices, np.concatenate(triangles), colours)
 
 
@@ -47,7 +48,6 @@ def triangulate(points: Floats) -> Indices:
     normal = crosses.sum(axis=0)
     if (crosses @ normal >= 0).all() or not 0 < normal @ normal < np.inf:
         return np.array([(0, after, after + 1) for after in range(1, len(points) - 1)], dtype=np.int64)
-    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    x, y = (axis / np.linalg.norm(axis) for axis in (across, np.cross(normal, across)))
-    triangles: Indices = np.asarray(m3.triangulate([(points - points[0]) @ np.stack([x, y], axis=1)])).astype(np.int64)
+    flat = (points - points[0]) @ frame_across(normal / np.linalg.norm(normal)).T
+    triangles: Indices = np.asarray(m3.triangulate([flat])).astype(np.int64)
     return triangles

@@ -7,13 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mdp.colour import NO_COLOUR
-from mdp.mesh import Floats
+from mdp.mesh import NO_COLOUR, Floats, Indices
 from profiles.errors import MeshError
 
-Indices = NDArray[np.int64]
 # What a file may place by reference: doubled at every level, a small file would place more than any memory holds.
 MOST_PLACED = 20_000  # objects, components and nodes
 MOST_PLACED_MESHES = 2_000  # those of them that are meshes, which are united where they touch

@@ -11,9 +11,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from mdp.colour import NO_COLOUR, parse_colour
-from mdp.formats.surface import Indices, Surface, check_meshes, check_placed, check_surface, parse_floats, parse_integers
-from mdp.mesh import Floats
+from mdp.formats.surface import Surface, check_meshes, check_placed, check_surface, parse_floats, parse_integers
+from mdp.mesh import NO_COLOUR, Floats, Indices, parse_colour
 from profiles.errors import MeshError
 
 UNIT_MM = {"micron": 0.001, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1000.0}

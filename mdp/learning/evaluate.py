@@ -67,21 +67,21 @@ def _compare(options: argparse.Namespace) -> None:
 
     given = {file: read_ranker(file) for file in options.ranker}
     learnt = COLUMN_SETS[options.columns or "paper"]
-    columns = tuple(dict.fromkeys([*learnt, *ALWAYS, *(name for one in given.values() for name in one.columns)]))
+    columns = tuple(dict.fromkeys([*learnt, *ALWAYS, *(name for ranker in given.values() for name in ranker.columns)]))
     lists = read_lists(options.folder, options.manifest, columns, options.terms)
     cut, known = (_sides(options.folder, some, columns) for some in (lists, followed(lists)))
-    rankers: dict[str, Scores] = {f"{one.kind}, {file}": as_searched(one.scores) for file, one in given.items()}
+    rankers: dict[str, Scores] = {f"{ranker.kind}, {file}": as_searched(ranker.scores) for file, ranker in given.items()}
     rankers |= _fitted(BASELINES, options.without, cut, learnt) | _fitted(REGRET_BASELINES, options.without, known, learnt)
     for text in (*tables(rankers, cut[Side.TEST]), *regret_tables(rankers, known[Side.TEST])):
         sys.stdout.write(f"{text}\n\n")
-    for file, one in given.items():
+    for file, ranker in given.items():
         picture = options.pictures / f"figure8-{file.stem}.png"
-        _analyse(as_searched(one.scores), one.columns, cut[Side.TEST], options.repeats, picture)
+        _analyse(as_searched(ranker.scores), ranker.columns, cut[Side.TEST], options.repeats, picture)
 
 
 def _sides(folder: Path, lists: Sequence[TrainingList], columns: Sequence[str]) -> Sides:
     """The lists of each side that have something to tell apart; LearningError where a side has none."""
-    sides = {side: [one for one in rate(of_side(lists, side), columns) if one.teaches] for side in Side}
+    sides = {side: [rated for rated in rate(of_side(lists, side), columns) if rated.teaches] for side in Side}
     for side, some in sides.items():
         if not some:
             raise LearningError(f"folder {folder}: no list of it is on the side {side}; record models of more sources")

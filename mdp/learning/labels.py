@@ -70,25 +70,25 @@ def ratings(outcome: Floats) -> Ints:
 def rate(lists: Sequence[TrainingList], columns: Sequence[str]) -> list[RatedList]:
     """The lists with a candidate that was cut, rated; features: the named columns in single precision, as a ranker gets them."""
     rated = []
-    for one in lists:
-        cut = ~np.isnan(one.outcome)
+    for recorded in lists:
+        cut = ~np.isnan(recorded.outcome)
         if cut.any():
-            outcome = one.outcome[cut]
-            features = one.table(columns)[cut].astype(np.float32)
-            rated.append(RatedList(features, tuple(columns), outcome, ratings(outcome), one.model, one.record))
+            outcome = recorded.outcome[cut]
+            features = recorded.table(columns)[cut].astype(np.float32)
+            rated.append(RatedList(features, tuple(columns), outcome, ratings(outcome), recorded.model, recorded.record))
     return rated
 
 
 def followed(lists: Sequence[TrainingList]) -> list[TrainingList]:
     """The lists without the candidates that nobody followed, unless they are the best there."""
-    kept = []
-    for one in lists:
-        known = ~np.isnan(one.outcome)
+    lists_left = []
+    for recorded in lists:
+        known = ~np.isnan(recorded.outcome)
         if known.any():
-            rows = known & (~one.censored | (one.outcome <= np.min(one.outcome[known]) + TIE))
-            table, outcome, censored = one.features[rows], one.outcome[rows], one.censored[rows]
-            kept.append(replace(one, features=table, outcome=outcome, censored=censored))
-    return kept
+            rows = known & (~recorded.censored | (recorded.outcome <= np.min(recorded.outcome[known]) + TIE))
+            table, outcome, censored = recorded.features[rows], recorded.outcome[rows], recorded.censored[rows]
+            lists_left.append(replace(recorded, features=table, outcome=outcome, censored=censored))
+    return lists_left
 
 
 def scale(features: Singles) -> Singles:

@@ -127,4 +127,4 @@ def _censored(record: Arrays) -> Mask:
 
 def of_side(lists: Sequence[TrainingList], wanted: Side) -> list[TrainingList]:
     """The lists whose source is on one side of the split."""
-    return [one for one in lists if side(one.source) is wanted]
+    return [recorded for recorded in lists if side(recorded.source) is wanted]

@@ -26,7 +26,7 @@ def order(scores: Floats) -> Ints:
 
 def as_searched(scores: Scores) -> Scores:
     """Scores of a network rounded as a search compares them, so that candidates alike stay in the order they come."""
-    return lambda one: np.asarray(np.round(scores(one), DECIMALS), np.float64)
+    return lambda rated: np.asarray(np.round(scores(rated), DECIMALS), np.float64)
 
 
 def ndcg(scores: Floats, ratings: Ints, cut: int) -> float:
@@ -43,22 +43,22 @@ def _dcg(ratings: Ints, cut: int) -> float:
 
 def at(cut: int) -> Measure:
     """NDCG at a place as a measure."""
-    return lambda scores, one: ndcg(scores, one.ratings, cut)
+    return lambda scores, rated: ndcg(scores, rated.ratings, cut)
 
 
 def best_within(first: int) -> Measure:
     """1 where a candidate with the least outcome of the list is among the first few, else 0."""
-    return lambda scores, one: float(one.outcome[order(scores)[:first]].min() - one.outcome.min() <= TIE)
+    return lambda scores, rated: float(rated.outcome[order(scores)[:first]].min() - rated.outcome.min() <= TIE)
 
 
 def regret(first: int) -> Measure:
     """By how much the best of the first few ends with more than the best of the list, as share of that."""
-    return lambda scores, one: float(one.regrets[order(scores)[:first]].min())
+    return lambda scores, rated: float(rated.regrets[order(scores)[:first]].min())
 
 
 def full_lists(lists: Sequence[RatedList]) -> list[RatedList]:
     """The lists that the beam filled."""
-    return [one for one in lists if len(one.ratings) >= FULL]
+    return [rated for rated in lists if len(rated.ratings) >= FULL]
 
 
 def interval(values: Floats, models: Sequence[str]) -> tuple[float, float]:

@@ -59,8 +59,9 @@ def summary(folder: Path) -> Iterator[str]:
 
 def _lengths(folder: Path, rows: Sequence[Row]) -> Ints:
     """The lengths of all lists."""
-    each = [np.unique(read_record(folder / row.search.file)["stage"], return_counts=True)[1] for row in rows if not row.excluded]
-    return np.concatenate(each).astype(np.int32) if each else np.zeros(0, np.int32)
+    stages = [read_record(folder / row.search.file)["stage"] for row in rows if not row.excluded]
+    lengths = [np.unique(stage, return_counts=True)[1] for stage in stages]
+    return np.concatenate(lengths).astype(np.int32) if lengths else np.zeros(0, np.int32)
 
 
 def _of_terms(terms: str, rows: Sequence[Row], lengths: Ints) -> tuple[str, ...]:

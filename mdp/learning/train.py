@@ -61,7 +61,7 @@ def train(arguments: Sequence[str] | None) -> None:
         "kind": options.loss,
         "data_set": f"{options.folder.resolve().name}: {counts(teach)}",
         "commit": commit(),
-        "figures": json.dumps(judged(options.loss, as_searched(scores), [one for one in judge if one.teaches])),
+        "figures": json.dumps(judged(options.loss, as_searched(scores), [rated for rated in judge if rated.teaches])),
     }
     write(options.output, export(about))
     for file in checkpoints:
@@ -142,7 +142,7 @@ def show(epoch: "Epoch") -> None:
 
 def counts(lists: Sequence[RatedList]) -> str:
     """How many records, lists and models."""
-    records, models = len({one.record for one in lists}), len({one.model for one in lists})
+    records, models = len({rated.record for rated in lists}), len({rated.model for rated in lists})
     return f"{records} records, {len(lists)} lists, {models} models"
 
 
@@ -152,12 +152,13 @@ def judged(loss: str, scores: "Scores", lists: Sequence[RatedList]) -> dict[str,
     kinds: dict[str, Sequence[RatedList]] = {"NDCG": lists, "full NDCG": full_lists(lists)}
     measures = {f"@{cut}": at(cut) for cut in CUTS}
     if loss == "regret":
-        kinds = {f"{terms}:": [one for one in lists if one.terms == terms] for terms in sorted({one.terms for one in lists})}
+        all_terms = sorted({rated.terms for rated in lists})
+        kinds = {f"{terms}:": [rated for rated in lists if rated.terms == terms] for terms in all_terms}
         measures = {f" regret@{first}": regret(first) for first in PLACES}
         measures |= {f" best in first {first}": best_within(first) for first in PLACES}
     for kind, some in kinds.items():
         for name, measure in measures.items() if some else ():
-            figures[f"{kind}{name}".strip()] = round(sum(measure(scores(one), one) for one in some) / len(some), 4)
+            figures[f"{kind}{name}".strip()] = round(sum(measure(scores(rated), rated) for rated in some) / len(some), 4)
     return figures
 
 

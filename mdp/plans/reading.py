@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mdp.colour import parse_colour
-from mdp.grown import MOST_GROWN_DEG, Grown
+from mdp.mesh import parse_colour
 from mdp.plans.plan_file import KEYS, PART_KEYS, ROW_KEYS, VERSION, ZONE_KEYS, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
-from mdp.zone import AnyZone, Painted, Zone, Zones
+from mdp.zone import MOST_GROWN_DEG, AnyZone, Grown, Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.part_settings import MOST_PARTS, PartSettings
@@ -115,8 +114,8 @@ class _Reader:
 
     def _painted(self, values: dict[str, Any], where: str) -> Painted:
         if len(values) > 1:
-            other = "a point" if set(values) & {"point_mm", "angle_deg"} else "a box"
-            raise self._error(f"{where}has a colour and {other}: one of them is allowed")
+            beside = "a point" if set(values) & {"point_mm", "angle_deg"} else "a box"
+            raise self._error(f"{where}has a colour and {beside}: one of them is allowed")
         text = values["colour"]
         colour = parse_colour(text) if isinstance(text, str) else None
         if colour is None:
@@ -138,7 +137,7 @@ class _Reader:
 
     def _list(self, table: dict[str, Any], key: str, most: int) -> list[dict[str, Any]]:
         tables = table.get(key, [])
-        if not isinstance(tables, list) or not all(isinstance(each, dict) for each in tables):
+        if not isinstance(tables, list) or not all(isinstance(entry, dict) for entry in tables):
             raise self._error(f"{key} is {_show(tables)}: [[{key}]] tables are expected")
         if len(tables) > most:
             raise self._error(f"there are {len(tables)} [[{key}]] tables: up to {most} are allowed")
@@ -163,7 +162,7 @@ class _Reader:
         return (x, y, z) if abs(x * x + y * y + z * z - 1.0) <= UNIT else (x / length, y / length, z / length)
 
     def _vector(self, value: Any, key: str) -> Vector:
-        x, y, z = (self._number(each, key) for each in self._numbers(value, key, 3))
+        x, y, z = (self._number(entry, key) for entry in self._numbers(value, key, 3))
         return x, y, z
 
     def _number(self, value: Any, key: str, most: float = MOST_MM) -> float:
@@ -176,7 +175,7 @@ class _Reader:
     def _numbers(self, value: Any, key: str, count: int) -> list[float]:
         if not isinstance(value, list) or len(value) != count or not all(map(_is_number, value)):
             raise self._error(f"{key} is {_show(value)}: {count} numbers in brackets are expected")
-        return [float(each) for each in value]
+        return [float(entry) for entry in value]
 
     def _error(self, text: str) -> PlanError:
         return PlanError(f"plan {self.name}: {text}")

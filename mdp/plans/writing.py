@@ -5,10 +5,9 @@ from typing import Any
 
 import tomlkit
 
-from mdp.colour import colour_text
-from mdp.grown import Grown
+from mdp.mesh import colour_text
 from mdp.plans.plan_file import ROW_KEYS, VERSION, ZONE_KINDS, PlanFile, PlannedPart, PlannedRow
-from mdp.zone import AnyZone, Painted
+from mdp.zone import AnyZone, Grown, Painted
 
 
 def plan_text(plan: PlanFile) -> str:
@@ -22,7 +21,7 @@ def plan_text(plan: PlanFile) -> str:
     if plan.orientation is not None:
         document["orientation"] = [list(row) for row in plan.orientation]
     parts = (PlannedPart(None, None, "part 1 stands on the platform"), *plan.parts)
-    settings = {each.part: each.process for each in plan.settings}
+    settings = {part.part: part.process for part in plan.settings}
     document["part"] = _tables([_part_table(part, settings.get(k, {})) for k, part in enumerate(parts, start=1)])
     for kind in ZONE_KINDS:
         zones: Sequence[AnyZone] = getattr(plan.zones, kind)

@@ -7,12 +7,13 @@ platform), III (the platform lies below the plane), IV (a large volume above the
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import pi, radians, sin, sqrt
+from math import radians, sin, sqrt
 
 import numpy as np
 
 from mdp.clearance import least_height_mm
 from mdp.cost.cost import CostTerms
+from mdp.directions.spread import spread
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.plane import Plane
@@ -57,12 +58,8 @@ REASONS = {
 
 
 def directions(search: Search) -> Floats:
-    """(k, 3) unit directions spread evenly over the sphere's cap above the least elevation (a Fibonacci lattice)."""
-    index = np.arange(search.directions) + 0.5
-    z = 1.0 - (1.0 - sin(radians(search.least_elevation_deg))) * index / search.directions
-    angle = index * pi * (3.0 - sqrt(5.0))
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+    """(k, 3) unit directions spread evenly over the sphere's cap above the least elevation."""
+    return spread(search.directions, sin(radians(search.least_elevation_deg))).copy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +78,7 @@ class Bounds:
 
 def bounds_of(
     chosen: Floats,
+    *,
     disc: tuple[Floats, float],
     volume_mm3: float,
     machine: Machine,
@@ -156,17 +154,15 @@ class Feasibility:
 
 
 def score_candidates(
-    remainder: Remainder, limits: Bounds, step_mm: float, terms: CostTerms, least_gain_mm2: float, hopeless: Mask | None = None
+    remainder: Remainder, limits: Bounds, terms: CostTerms, *, step_mm: float, least_gain_mm2: float, hopeless: Mask | None = None
 ) -> ScoredCandidates:
     """The candidates of a solid with a gain of at least least_gain_mm2: the risky area that a cut makes safe, less its seam.
     hopeless: the faces that no cut can save, see sweep.gains."""
     swept = gains(remainder, limits.directions, step_mm, threshold(terms.angle_deg), hopeless)
-    used = np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None]
-    residual = residual_mm2(swept, terms)
+    residual, offset = residual_mm2(swept, terms), swept.offsets_mm(step_mm)
     gain = swept.up_mm2 - residual
-    offset: Floats = (swept.first[:, None] + np.arange(gain.shape[1])) * np.float64(step_mm)
     above = (offset >= limits.least_offset_mm[:, None]) & np.isfinite(limits.least_height_mm)[:, None]
-    scored = used & above & (gain >= least_gain_mm2)
+    scored = swept.used & above & (gain >= least_gain_mm2)
     for low, high in np.moveaxis(limits.keep_mm, 0, 2):
         scored &= (offset <= low[:, None]) | (offset >= high[:, None])
     direction = np.nonzero(scored)[0].astype(np.int32)
@@ -186,7 +182,7 @@ def score_candidates(
 
 def residual_mm2(swept: Gains, terms: CostTerms) -> Floats:
     """What each cut costs for ever: what stays risky on its part, the scar of its seam, and that it is made."""
-    return swept.residual_mm2 + terms.seam_mm * swept.rim_mm + terms.cut_mm2 if terms.seam_mm > 0.0 else swept.residual_mm2
+    return swept.residual_mm2 + terms.seam_mm * swept.rim_mm + terms.cut_mm2
 
 
 def check(remainder: Remainder, limits: Bounds, search: Search, direction: Ints, offset_mm: Floats) -> Feasibility:
@@ -216,16 +212,16 @@ def refusals(
     limits: Bounds,
     search: Search,
     terms: CostTerms,
+    *,
     least_gain_mm2: float,
     is_weak: Callable[[Plane], bool],
 ) -> dict[Reason, int]:
     """How many of all candidates of a solid each reason takes, to report why nothing can be cut; is_weak: asked for those that
     nothing else forbids."""
     swept = gains(remainder, limits.directions, search.offset_step_mm, threshold(terms.angle_deg))
-    direction, column = np.nonzero(np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None])
-    offset: Floats = (swept.first[direction] + column) * np.float64(search.offset_step_mm)
+    direction, offset = np.nonzero(swept.used)[0], swept.offsets_mm(search.offset_step_mm)[swept.used]
     reason = check(remainder, limits, search, direction.astype(np.int32), offset).reason
-    gain = (swept.up_mm2 - residual_mm2(swept, terms))[direction, column]
+    gain = (swept.up_mm2 - residual_mm2(swept, terms))[swept.used]
     reason[(reason == Reason.FEASIBLE) & (gain < least_gain_mm2)] = Reason.GAIN
     for row in np.flatnonzero(reason == Reason.FEASIBLE):
         if is_weak(Plane(limits.directions[direction[row]], float(offset[row]))):

@@ -13,50 +13,16 @@ relaxation; risky, the model's risky area in great circles; scale, the radius in
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mdp.mesh import Floats, Ints
-
-if TYPE_CHECKING:
-    from mdp.ranking.ranking import CandidateTable
+from mdp.ranking.candidate_table import CandidateTable
 
 TENS, DECIMETRE_MM = 10.0, 100.0
 
 
-@dataclass(frozen=True)
-class Model:
-    """What the features are measured against."""
-
-    risky_mm2: float
-    volume_mm3: float
-    radius_mm: float
-
-    @property
-    def circle_mm2(self) -> float:
-        """Area of the bounding sphere's great circle."""
-        return pi * self.radius_mm**2
-
-
-@dataclass(frozen=True, eq=False)
-class Situation:
-    """What the cuts before have made of a model: what they saved and cost for ever, the area that is risky now and how much of
-    it no cut can save (0: not asked for), the volume that remains, how many they were, and (3,) the last one's direction."""
-
-    model: Model
-    saved_mm2: float
-    residual_mm2: float
-    risky_mm2: float
-    hopeless_mm2: float
-    volume_mm3: float
-    cuts: int
-    last: Floats
-
-
-Column = Callable[["CandidateTable", Ints], Floats]
+Column = Callable[[CandidateTable, Ints], Floats]
 
 
 def _share(value: Floats) -> Floats:
@@ -64,31 +30,31 @@ def _share(value: Floats) -> Floats:
     return clipped
 
 
-def _wasted(table: "CandidateTable", rows: Ints) -> Floats:
+def _wasted(table: CandidateTable, rows: Ints) -> Floats:
     scored = table.scored
     return (scored.residual_mm2 - scored.seam_mm2 - scored.hopeless_mm2)[rows] / table.model.risky_mm2
 
 
-def _risky_left(table: "CandidateTable", rows: Ints) -> Floats:
+def _risky_left(table: CandidateTable, rows: Ints) -> Floats:
     saved = table.scored.gain_mm2[rows] + table.scored.residual_mm2[rows]
     return (table.situation.risky_mm2 - saved) / table.model.risky_mm2
 
 
-def _hopeless_left(table: "CandidateTable", rows: Ints) -> Floats:
+def _hopeless_left(table: CandidateTable, rows: Ints) -> Floats:
     return (table.situation.hopeless_mm2 - table.scored.hopeless_mm2[rows]) / table.model.risky_mm2
 
 
-def _above_platform(table: "CandidateTable", rows: Ints) -> Floats:
+def _above_platform(table: CandidateTable, rows: Ints) -> Floats:
     return _share(
         (table.scored.offset_mm[rows] - table.limits.least_offset_mm[table.scored.direction[rows]]) / table.model.radius_mm
     )
 
 
-def _fragile(table: "CandidateTable", rows: Ints) -> Floats:
+def _fragile(table: CandidateTable, rows: Ints) -> Floats:
     return _share(np.array([table.fragile_mm(int(row)) for row in rows], dtype=np.float64) / table.model.radius_mm)
 
 
-def _extent(table: "CandidateTable", rows: Ints) -> Floats:
+def _extent(table: CandidateTable, rows: Ints) -> Floats:
     return (table.scored.end_mm - table.scored.offset_mm)[rows] / table.model.radius_mm
 
 
@@ -120,6 +86,6 @@ PAPER_COLUMNS = COLUMNS[:6]
 CHECKED = frozenset({"M3", "M5", "section", "contact", "volume_left"})  # known only of candidates that were checked
 
 
-def features(table: "CandidateTable", rows: Ints, columns: tuple[str, ...] = COLUMNS) -> Floats:
+def features(table: CandidateTable, rows: Ints, columns: tuple[str, ...] = COLUMNS) -> Floats:
     """(n, len(columns)) the features of a table's rows, of checked ones where a column is one of CHECKED."""
     return np.stack([FEATURES[name](table, rows) for name in columns], axis=1)

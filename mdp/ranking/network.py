@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdp.mesh import Floats
+from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import FEATURES, features
-from mdp.ranking.ranking import CandidateTable, RankedCandidate
+from mdp.ranking.ranking import RankedCandidate
 from profiles.errors import RankerError
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class Network:
         first = list(islice(others, RANKED_TOGETHER))
         if len(first) > 1:
             scores = self.scores(self._features(first, tables))
-            first = [first[place] for place in np.argsort(-scores, kind="stable")]
+            first = [first[position] for position in np.argsort(-scores, kind="stable")]
         yield from first
         yield from others
 
@@ -77,10 +78,10 @@ class Network:
         """(n, len(columns)) the features of candidates."""
         rows = np.zeros((len(candidates), len(self.columns)))
         for number, table in enumerate(tables):
-            here = [place for place, candidate in enumerate(candidates) if candidate.table == number]
-            if here:
-                chosen = np.array([candidates[place].row for place in here], dtype=np.int32)
-                rows[here] = features(table, chosen, self.columns)
+            positions = [position for position, candidate in enumerate(candidates) if candidate.table == number]
+            if positions:
+                chosen = np.array([candidates[position].row for position in positions], dtype=np.int32)
+                rows[positions] = features(table, chosen, self.columns)
         return rows
 
     @cached_property
@@ -100,7 +101,7 @@ class Network:
             raise RankerError(f"ranker {self.file}: cannot be read ({error.strerror})") from None
         except Exception as error:  # noqa: BLE001 - as above
             raise RankerError(f"ranker {self.file}: is no ONNX file ({_first_line(error)})") from None
-        named = ([each.name for each in session.get_inputs()], [each.name for each in session.get_outputs()])
+        named = ([value.name for value in session.get_inputs()], [value.name for value in session.get_outputs()])
         if named != ([INPUT], [OUTPUT]):
             raise RankerError(f"ranker {self.file}: takes {named[0]} and gives {named[1]}; {INPUT} and {OUTPUT} are needed")
         return session

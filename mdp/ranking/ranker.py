@@ -9,8 +9,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Protocol
 
+from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.network import Network
-from mdp.ranking.ranking import CandidateTable, RankedCandidate
+from mdp.ranking.ranking import RankedCandidate
 from profiles.errors import RankerError
 
 CLASSIC, LEARNED = "classic", "learned"

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from mdp.mesh import Floats, Ints
 from mdp.plane import Plane
-from mdp.ranking.features import COLUMNS, Model, features
-from mdp.ranking.ranking import CandidateTable, RankedCandidate
+from mdp.ranking.candidate_table import CandidateTable, Model
+from mdp.ranking.features import COLUMNS, features
+from mdp.ranking.ranking import RankedCandidate
 
 VERSION = 2  # of the arrays; 1 had the six metrics of the paper only
 NO_NODE = -1

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from mdp.colour import NO_COLOUR
-from mdp.formats.surface import Indices, Surface, concatenate
-from mdp.mesh import Floats
+from mdp.formats.surface import Surface, concatenate
+from mdp.mesh import NO_COLOUR, Floats, Indices
 
 NEAR_SHARE = 1e-4  # of the model's size: as far as repairs move a vertex
 SAME_DIRECTION = 1.0 - 1e-6  # cosine of two normals
@@ -66,8 +65,8 @@ def _pieces(corners: Floats, colours: Indices, wanted: Floats) -> Indices:
 
 def _holds(corners: Floats, normals: Floats, point: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Whether a point lies over (n, 3, 3) triangles of (n, 3) unit normals."""
-    following = np.roll(corners, -1, axis=1)
-    turns = np.einsum("ncx,nx->nc", np.cross(following - corners, point - corners), normals)
+    next_corners = np.roll(corners, -1, axis=1)
+    turns = np.einsum("ncx,nx->nc", np.cross(next_corners - corners, point - corners), normals)
     whole = turns.sum(axis=1)
     inside: np.ndarray[tuple[int], np.dtype[np.bool_]] = (turns >= INSIDE * whole[:, None]).all(axis=1)
     return inside

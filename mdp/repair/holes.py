@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface
-from mdp.mesh import Floats
-from mdp.repair.edges import areas_of, edges_of
+from mdp.formats.surface import Surface
+from mdp.mesh import Floats, Indices, areas_of
 from mdp.repair.winding import format_point, pair_half_edges
+from mdp.topology.edges import edges_of
 from profiles.errors import MeshError
 
 # A hole is a defect when it is small beside the model; the opening of a cup is meant, and a lid on it would be another model.
@@ -45,7 +45,7 @@ def fill_holes(surface: Surface) -> tuple[Surface, list[str]]:
 
 
 def _too_large(loops: list[Indices], surface: Surface, loop: Indices, rim: float) -> MeshError:
-    open_edges = sum(len(each) for each in loops)
+    open_edges = sum(len(rim) for rim in loops)
     where: Floats = surface.vertices[loop[0]]
     return MeshError(
         f"is not closed: {open_edges} open edges around {len(loops)} hole{'s' * (len(loops) > 1)}, one with a {rim:.4g} mm rim "

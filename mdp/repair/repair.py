@@ -6,7 +6,6 @@ import numpy as np
 
 from mdp.formats.surface import Surface, concatenate
 from mdp.mesh import Floats
-from mdp.repair.edges import edges_of
 from mdp.repair.holes import fill_holes
 from mdp.repair.overlap import overlaps_itself, resolve_overlap
 from mdp.repair.sheets import cancel_opposite_faces, drop_duplicate_faces, drop_loose_sheets
@@ -23,6 +22,7 @@ from mdp.repair.shells import (
 )
 from mdp.repair.weld import drop_collapsed_faces, drop_unused_vertices, merge_rim_vertices, merge_vertices
 from mdp.repair.winding import format_point, orient_faces, split_shared_edges, split_touching_fans
+from mdp.topology.edges import edges_of
 from profiles.errors import MeshError
 
 if TYPE_CHECKING:

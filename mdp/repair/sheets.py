@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface
-from mdp.repair.edges import Edges, Flags, areas_of, connected_components, edges_of
+from mdp.formats.surface import Surface
+from mdp.mesh import Indices, areas_of
 from mdp.repair.weld import drop_unused_vertices
+from mdp.topology.components import connected_components
+from mdp.topology.edges import Edges, Flags, edges_of
 
 LOOSE_SHARE = 0.2  # of the area; a larger loose patch may well be the model itself
 MOST_LOOSE = 300  # patches taken away; a surface with more of them is no solid with a blemish

@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface, concatenate
-from mdp.mesh import Floats
-from mdp.repair.edges import connected_components, edges_of, normals_of
+from mdp.formats.surface import Surface, concatenate
+from mdp.mesh import Floats, Indices, crosses_of
 from mdp.repair.weld import drop_unused_vertices
 from mdp.repair.winding import pair_half_edges
+from mdp.topology.components import connected_components
+from mdp.topology.edges import edges_of
 from profiles.errors import MeshError
 
 if TYPE_CHECKING:
@@ -36,12 +37,12 @@ class Shell:
         """The same shell inside out."""
         return Shell(self.vertices, self.faces[:, ::-1], -self.volume, self.low, self.high)
 
-    def contains(self, other: "Shell") -> bool:
+    def contains(self, inner: "Shell") -> bool:
         """Whether the other shell lies inside this one, judged by its box and a sample of its vertices."""
-        if (other.low < self.low).any() or (other.high > self.high).any():
+        if (inner.low < self.low).any() or (inner.high > self.high).any():
             return False
-        corners = np.unique(other.faces)
-        sample = other.vertices[corners[np.linspace(0, len(corners) - 1, SAMPLES).astype(np.int64)]]
+        corners = np.unique(inner.faces)
+        sample = inner.vertices[corners[np.linspace(0, len(corners) - 1, SAMPLES).astype(np.int64)]]
         return all(abs(winding_number(p, self.vertices, self.faces)) > 0.5 for p in sample)
 
 
@@ -62,7 +63,7 @@ def shells_of(surface: Surface) -> list[Shell]:
     label = connected_components(len(surface.faces), pairs[:, 0], pairs[:, 1])
     middle = surface.vertices.mean(axis=0)
     signed = (
-        np.einsum("ij,ij->i", surface.vertices[surface.faces[:, 0]] - middle, normals_of(surface.vertices, surface.faces)) / 6.0
+        np.einsum("ij,ij->i", surface.vertices[surface.faces[:, 0]] - middle, crosses_of(surface.vertices, surface.faces)) / 6.0
     )
     order = np.argsort(label, kind="stable")
     shells = []
@@ -77,7 +78,7 @@ def volume_of(surface: Surface) -> float:
     """Signed volume of a closed surface by the divergence theorem."""
     middle = surface.vertices.mean(axis=0)
     return float(
-        np.einsum("ij,ij->", surface.vertices[surface.faces[:, 0]] - middle, normals_of(surface.vertices, surface.faces)) / 6
+        np.einsum("ij,ij->", surface.vertices[surface.faces[:, 0]] - middle, crosses_of(surface.vertices, surface.faces)) / 6
     )
 
 

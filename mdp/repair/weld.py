@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface
-from mdp.repair.edges import connected_components, edges_of
+from mdp.formats.surface import Surface
+from mdp.mesh import Indices
+from mdp.topology.components import connected_components
+from mdp.topology.edges import edges_of
 
 SKEW = np.array([0.5773, 0.6841, 0.4459])  # a line that no common direction of a model is square to, to sort vertices along
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from mdp.formats.surface import Indices, Surface
-from mdp.mesh import Floats
-from mdp.repair.edges import Edges, connected_components, edges_of, normals_of
+from mdp.formats.surface import Surface
+from mdp.mesh import Floats, Indices, crosses_of
 from mdp.repair.weld import drop_unused_vertices
+from mdp.topology.components import connected_components
+from mdp.topology.edges import Edges, edges_of
 from profiles.errors import MeshError
 
 
@@ -16,7 +17,7 @@ def pair_half_edges(surface: Surface, edges: Edges) -> Indices:
     """
     order, runs = edges.by_edge
     pairs = [edges.twins]
-    normals = normals_of(surface.vertices, surface.faces)
+    normals = crosses_of(surface.vertices, surface.faces)
     for number in np.flatnonzero(edges.counts > 2):
         around = order[runs[number] : runs[number + 1]]
         neighbours = _match_around_edge(_angles(surface, edges, around), edges.forward[around], normals[around // 3])
@@ -43,13 +44,13 @@ def _match_around_edge(angles: Floats, forward: object, normals: Floats) -> Indi
     ring = [int(k) for k in np.lexsort((directions, angles))]
     pairs = []
     while len(ring) >= 2:
-        following = ring[1:] + ring[:1]
+        ring_on = ring[1:] + ring[:1]
         gaps = [
             (bool(directions[a] == directions[b]), float((angles[b] - angles[a]) % (2 * np.pi)), place)
-            for place, (a, b) in enumerate(zip(ring, following, strict=True))
+            for place, (a, b) in enumerate(zip(ring, ring_on, strict=True))
         ]
         place = min(gaps)[2]
-        a, b = ring[place], following[place]
+        a, b = ring[place], ring_on[place]
         pairs.append((a, b))
         ring = [k for k in ring if k not in (a, b)]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -87,7 +88,7 @@ def _turn_faces(surface: Surface, edges: Edges, pairs: Indices, strict: bool) ->
                 f"is not orientable: {int(one_sided.sum())} faces form a one-sided sheet, one of them near {format_point(where)}"
             )
         return surface.faces
-    area = np.linalg.norm(normals_of(surface.vertices, surface.faces), axis=1)
+    area = np.linalg.norm(crosses_of(surface.vertices, surface.faces), axis=1)
     weight = np.bincount(cover[:m], area, minlength=2 * m) - np.bincount(cover[m:], area, minlength=2 * m)
     turn = weight[cover[:m]] < 0
     tie = (weight[cover[:m]] == 0) & (cover[:m] > cover[m:])
@@ -104,12 +105,12 @@ def split_touching_fans(surface: Surface) -> Surface:
     if not (edges.counts > 2).any():
         return surface
     pairs = pair_half_edges(surface, edges)
-    one, other = pairs[:, 0], pairs[:, 1]
-    same = edges.starts[one] == edges.starts[other]
+    first, second = pairs[:, 0], pairs[:, 1]
+    same = edges.starts[first] == edges.starts[second]
     corners = connected_components(
         surface.faces.size,
-        np.concatenate([one, _next(one)]),
-        np.concatenate([np.where(same, other, _next(other)), np.where(same, _next(other), other)]),
+        np.concatenate([first, _next(first)]),
+        np.concatenate([np.where(same, second, _next(second)), np.where(same, _next(second), second)]),
     )
     corner, place = np.unique(corners, return_inverse=True)
     return drop_unused_vertices(Surface(surface.vertices[surface.faces.ravel()[corner]], place.reshape(-1, 3)))

@@ -14,10 +14,10 @@ from math import isqrt
 
 from mdp.kernels.threads import ahead
 from mdp.plane import Plane
+from mdp.ranking.candidate_table import CandidateTable, nearly_equal, relaxation_round
 from mdp.ranking.ranker import Ranker
-from mdp.ranking.ranking import CandidateTable, RankedCandidate, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
+from mdp.ranking.ranking import LISTED, RankedCandidate, rank_by_trade_off, rank_classic, shortlist
 from mdp.ranking.record import Child, Trace, offer
-from mdp.ranking.shortlist import LISTED, shortlist
 from mdp.search.front import Front
 from mdp.search.node import Node
 from mdp.search.problem import Problem
@@ -120,7 +120,7 @@ class Beam:
         for candidate in self._rank(branches, slot):
             branch = branches[candidate.table]
             plane, taken = branch.table.plane(candidate.row), self._taken.setdefault(candidate.table, [])
-            if any(nearly_equal(plane, other) for other in taken):
+            if any(nearly_equal(plane, earlier) for earlier in taken):
                 continue
             child = self._child(branch, candidate)
             if child is not None and self._seen.get(child.signature, slot + 1) > slot:
@@ -167,4 +167,5 @@ class Beam:
                 residual_mm2 = float(tables[table].scored.residual_mm2[row])
                 offered.append(RankedCandidate(table, row, relaxation_round(residual_mm2 / risky_mm2)))
             children.append(Child(number_of[table, row], pick.node.signature, pick.node.cost_mm2))
-        trace.add([offer(branches[each.table].node.signature, tables[each.table], each) for each in offered], children)
+        signatures = [branch.node.signature for branch in branches]
+        trace.add([offer(signatures[ranked.table], tables[ranked.table], ranked) for ranked in offered], children)

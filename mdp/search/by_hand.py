@@ -10,10 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdp.clearance import find_obstacle, lowest_body
-from mdp.colour import NO_COLOUR, colour_text
 from mdp.cut import corners_above
-from mdp.grown import FARTHEST_MM, Grown
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import NO_COLOUR, Floats, Mesh, colour_text
 from mdp.overhang import threshold
 from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS, PlanFile, PlannedPart, mesh_sha256
@@ -22,7 +20,7 @@ from mdp.ranking.candidates import COPLANAR_MM, REASONS, Bounds, Reason, check, 
 from mdp.search.node import Node
 from mdp.search.problem import FINEST, Problem
 from mdp.sweep.sweep import gains
-from mdp.zone import Painted
+from mdp.zone import FARTHEST_MM, Grown, Painted
 from profiles.errors import PlanError
 
 EQUAL_MM2 = 1e-6
@@ -69,10 +67,10 @@ def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
         planned, label = plan.parts[number - 2], f"plan {plan.name}: part {number}"
         _check_offset(problem, planned, label)
         plane = planned.plane or _complete(problem, node, planned, label)
-        following = cut_or_refuse(problem, node, plane)
-        if isinstance(following, Refusal):
-            raise PlanError(f"{label} cannot be cut off: {following.text}")
-        node = following
+        child = cut_or_refuse(problem, node, plane)
+        if isinstance(child, Refusal):
+            raise PlanError(f"{label} cannot be cut off: {child.text}")
+        node = child
     return node
 
 
@@ -87,8 +85,8 @@ class Refusal:
 def cut_or_refuse(problem: Problem, node: Node, plane: Plane) -> Node | Refusal:
     """The node after a person's cut, or the reason why it cannot be made."""
     why = refusal(problem, node, plane)
-    following = problem.cut(node, plane) if why is None else None
-    return following if following is not None else why or Refusal(OUT_OF_REACH, Reason.REACH)
+    child = problem.cut(node, plane) if why is None else None
+    return child if child is not None else why or Refusal(OUT_OF_REACH, Reason.REACH)
 
 
 def refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
@@ -122,7 +120,7 @@ def _refusal(problem: Problem, node: Node, plane: Plane) -> Refusal | None:
     reason = Reason(int(checked.reason[0]))
     if reason == Reason.WEAK:
         stress = f"{problem.stress_mpa(node, plane):.3g} MPa at its base, {problem.bearable_mpa:.3g} are allowed"
-        return Refusal(f"{REASONS[reason]}: {problem.load_n:g} N at its top are {stress}", reason)
+        return Refusal(f"{REASONS[reason]}: {problem.settings.nozzle_load_n:g} N at its top are {stress}", reason)
     text = _explain(problem, plane, limits, reason, float(checked.fragile_mm[0]))
     return None if text is None else Refusal(text, reason)
 
@@ -153,7 +151,7 @@ def _explain(problem: Problem, plane: Plane, limits: Bounds, reason: Reason, fra
         case Reason.REACH:
             return f"{REASONS[reason]} of its normal on {problem.machine.name}"
         case Reason.CLEARANCE:
-            needed, body = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
+            needed, body, _ = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
             return f"the head's {body} would meet the table: what is cut off must begin at least {needed:.1f} mm above it"
         case Reason.INTERFACE:
             return "a piece of it would hang in the air: it stands on nothing that is printed before"
@@ -184,16 +182,14 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
     directions = problem.limits.directions if planned.normal is None else np.array([planned.normal])
     limits, step_mm = _limits(problem, directions), problem.step_mm(planned.offset_mm or 0.0)
     swept = gains(node.remainder, directions, step_mm, threshold(problem.terms.angle_deg))
-    number = swept.first[:, None] + np.arange(swept.up_mm2.shape[1])
-    wanted = np.arange(swept.up_mm2.shape[1]) < swept.columns[:, None]
+    wanted = swept.used
     if planned.offset_mm is not None:
-        wanted &= number == round(planned.offset_mm / step_mm)
-    direction, column = np.nonzero(wanted)
+        wanted &= swept.first[:, None] + np.arange(wanted.shape[1]) == round(planned.offset_mm / step_mm)
+    direction = np.nonzero(wanted)[0]
     missing = "normal" if planned.normal is None else "offset_mm"
     if len(direction) == 0:
         raise PlanError(f"{label}: no {missing} can be found for it, every such plane misses what is left of the model")
-    offset_mm: Floats = number[direction, column] * np.float64(step_mm)
-    gain_mm2 = (swept.up_mm2 - residual_mm2(swept, problem.terms))[direction, column]
+    offset_mm, gain_mm2 = swept.offsets_mm(step_mm)[wanted], (swept.up_mm2 - residual_mm2(swept, problem.terms))[wanted]
     own = problem.settings.model_copy(update={"offset_step_mm": step_mm})
     reason = check(node.remainder, limits, own, direction.astype(np.int32), offset_mm).reason
     for row in np.lexsort((offset_mm, -directions[direction, 2], -np.round(gain_mm2 / EQUAL_MM2))):

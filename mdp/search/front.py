@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from mdp.cost.cost import CostTerms
 from mdp.cost.model_need import excess_mm2
 from mdp.decomposition import FrontRow, Part
 from mdp.search.node import Node
@@ -42,13 +41,13 @@ class Front:
         while step is not None and len(step.cuts) >= self._start:
             held = self._alike.setdefault(len(step.cuts), [])
             if step not in held:
-                most_mm2 = min(other.cost_mm2 for other in (step, *held)) * (1.0 + self._equal)
-                held[:] = [other for other in (*held, step) if other.cost_mm2 <= most_mm2]
+                most_mm2 = min(alternative.cost_mm2 for alternative in (step, *held)) * (1.0 + self._equal)
+                held[:] = [alternative for alternative in (*held, step) if alternative.cost_mm2 <= most_mm2]
             step = step.parent
 
-    def replace(self, node: Node, other: Node) -> None:
+    def replace(self, node: Node, alternative: Node) -> None:
         """Put another node, alike in cost, in the place of one."""
-        self._alike[len(node.cuts)] = [other]
+        self._alike[len(node.cuts)] = [alternative]
 
     @property
     def nodes(self) -> list[Node]:
@@ -66,9 +65,9 @@ class Front:
         return min(alike, key=lambda node: sum(seam.length_mm for seam in node.seams))
 
 
-def front_row(node: Node, terms: CostTerms) -> FrontRow:
+def front_row(node: Node) -> FrontRow:
     """A node with what it costs, the cuts apart. Every area counts once in the area that needs support."""
-    seams = node.seams
+    terms, seams = node.terms, node.seams
     scars_mm2 = sum(terms.seam_mm * seam.weighted_mm + terms.cut_mm2 for seam in seams)
     seam_mm = sum((seam.length_mm for seam in seams), 0.0)
     planes = tuple(cut.base for cut in node.cuts)
@@ -102,11 +101,8 @@ def pays(rows: Sequence[FrontRow]) -> list[bool]:
 
 
 def price_of_second_mm2(profile: Profile) -> float:
-    """What a second of printing counts: nothing in the terms of the 2020 paper, and nothing where no support is printed, for
-    then time is no reason to leave a model whole."""
-    search = profile.search
-    scars = search.method == "best" and search.objective == "scar" and search.seam_mm > 0.0
-    return search.second_mm2 if scars and profile.process.support != "none" else 0.0
+    """What a second of printing counts; without support nothing, for then time is no reason to leave a model whole."""
+    return profile.search.effective.second_mm2 if profile.process.support != "none" else 0.0
 
 
 @dataclass(frozen=True)

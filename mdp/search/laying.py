@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from math import ceil, inf
 
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.mesh import Mesh
 from mdp.search.front import EQUAL, Pricing, front_row, price_of_second_mm2, price_row
-from mdp.search.orientation import Orientation, measure_upright, resting_orientations, standing_still
 from mdp.search.parts import one_piece
 from mdp.search.problem import Problem
 from mdp.search.search import decompose
@@ -57,9 +57,9 @@ def lay_down(mesh: Mesh, profile: Profile, pricing: PricingBy, search: Callable[
     orientation = _most_promising(mesh, profile, pricing, CLEARLY * best.total_mm2)
     if orientation is None:
         return best
-    found = search(standing_still(mesh, orientation.rotation))
-    other = Lying(orientation, found, total_mm2(found.chosen, second_mm2))
-    return other if other.total_mm2 < CLEARLY * best.total_mm2 else best
+    decomposition = search(standing_still(mesh, orientation.rotation))
+    lying = Lying(orientation, decomposition, total_mm2(decomposition.chosen, second_mm2))
+    return lying if lying.total_mm2 < CLEARLY * best.total_mm2 else best
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,21 +84,21 @@ def _most_promising(mesh: Mesh, profile: Profile, pricing: PricingBy, limit_mm2:
         if bare_s is not None:
             whole_mm2 = second_mm2 * bare_s + scar_mm2 * orientation.risky_mm2
             glimpses.append(_Glimpse(orientation, turned, second_mm2 * bare_s, whole_mm2))
-    best = min(glimpses, key=lambda each: each.whole_mm2, default=None)
+    best = min(glimpses, key=lambda glimpse: glimpse.whole_mm2, default=None)
     if best is None:
         return None
     chosen = None
     if best.whole_mm2 < limit_mm2:
         chosen, limit_mm2 = best.orientation, best.whole_mm2
-    others = [each for each in glimpses if each is not best and each.bare_mm2 < limit_mm2]
+    others = [glimpse for glimpse in glimpses if glimpse is not best and glimpse.bare_mm2 < limit_mm2]
     if chosen is not None and not others:
         return chosen  # in one piece already it costs less than the others may
     quick = _with_search(profile, beam_width=1, directions=ceil(profile.search.directions / COARSER))
-    for each in sorted([best, *others], key=lambda each: each.whole_mm2)[:SEARCHED]:
-        rows = decompose(each.mesh, "", quick).front
-        cost_mm2 = each.bare_mm2 + min(row.cost_mm2 + (scar_mm2 - 1.0) * row.support_area_mm2 for row in rows)
+    for glimpse in sorted([best, *others], key=lambda glimpse: glimpse.whole_mm2)[:SEARCHED]:
+        rows = decompose(glimpse.mesh, "", quick).front
+        cost_mm2 = glimpse.bare_mm2 + min(row.cost_mm2 + (scar_mm2 - 1.0) * row.support_area_mm2 for row in rows)
         if cost_mm2 < limit_mm2:
-            chosen, limit_mm2 = each.orientation, cost_mm2
+            chosen, limit_mm2 = glimpse.orientation, cost_mm2
     return chosen
 
 
@@ -134,16 +134,16 @@ def distinct_orientations(mesh: Mesh, profile: Profile) -> list[Orientation]:
     upright = measure_upright(mesh, angle_deg)
     resting = resting_orientations(mesh, angle_deg)
     worst_mm2 = max(orientation.risky_mm2 for orientation in [upright, *resting])
-    kept = [upright]
+    distinct = [upright]
     for orientation in sorted(resting, key=_guess(profile)):
-        if not any(_alike(orientation, other, worst_mm2) for other in kept):
-            kept.append(orientation)
-    return kept[1 : RESTING + 1]
+        if not any(_alike(orientation, known, worst_mm2) for known in distinct):
+            distinct.append(orientation)
+    return distinct[1 : RESTING + 1]
 
 
-def _alike(one: Orientation, other: Orientation, worst_mm2: float) -> bool:
-    same_area = abs(one.risky_mm2 - other.risky_mm2) <= EQUAL * worst_mm2
-    return same_area and abs(one.height_mm - other.height_mm) <= EQUAL * other.height_mm
+def _alike(first: Orientation, second: Orientation, worst_mm2: float) -> bool:
+    same_area = abs(first.risky_mm2 - second.risky_mm2) <= EQUAL * worst_mm2
+    return same_area and abs(first.height_mm - second.height_mm) <= EQUAL * second.height_mm
 
 
 def total_mm2(row: FrontRow | None, second_mm2: float) -> float:
@@ -167,7 +167,7 @@ def _guess(profile: Profile) -> Callable[[Orientation], float]:
 def _row_of_one_piece(mesh: Mesh, profile: Profile, pricing: PricingBy) -> FrontRow:
     """What a mesh costs uncut. Where seams may hide and how the head may come near matters to cuts only, so it is left out."""
     problem = Problem(mesh, _with_search(profile, hidden_seam_share=1.0, clearance=False))
-    return price_row(front_row(problem.root, problem.terms), (one_piece(mesh, profile.machine),), pricing(profile))
+    return price_row(front_row(problem.root), (one_piece(mesh, profile.machine),), pricing(profile))
 
 
 def _bare_s(mesh: Mesh, profile: Profile, pricing: PricingBy) -> float | None:

@@ -10,8 +10,8 @@ from math import atan2, ceil, cos, pi, radians, sin
 
 import numpy as np
 
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats, Ints, Mesh, dot
-from mdp.overhang import UP
 from mdp.plane import Plane
 from mdp.pose import about
 from mdp.sweep.rims import measure_rim
@@ -40,7 +40,7 @@ class _Surface:
     def rim_mm(self, plane: Plane) -> float:
         """The length of a plane's rim where it is seen."""
         heights = self._heights_mm(plane)
-        return float(measure_rim(self.faces, heights, dot(self.normals, plane.normal), self.areas_mm2, self.seen, 0.0).length)
+        return float(measure_rim(self.faces, heights, dot(self.normals, plane.normal), self.areas_mm2, self.seen, 0.0).length_mm)
 
     def _heights_mm(self, plane: Plane) -> Floats:
         heights: Floats = plane.heights_mm(self.vertices)
@@ -70,8 +70,8 @@ def find_neck(mesh: Mesh, seen: Floats, plane: Plane, reach_mm: float, reach_deg
     if surface.rim_mm(plane) <= 0.0:
         return None
     centre = surface.centre_mm(plane)
-    found = sorted(_first_look(mesh, seen, plane.normal, centre, (reach_mm, reach_deg)), key=lambda each: each[0])
-    begins = _apart(surface, [begin for _, begin in found], APART * reach_mm)
+    shorter = sorted(_first_look(mesh, seen, plane.normal, centre, (reach_mm, reach_deg)), key=lambda pair: pair[0])
+    begins = _apart(surface, [begin for _, begin in shorter], APART * reach_mm)
     necks = [_refined(surface, begin, 2.0 * reach_mm / OFFSETS, reach_deg / RINGS) for begin in begins]
     allowed = [neck for neck in necks if _is_neck(surface, neck, plane, centre, (reach_mm, reach_deg))]
     return min(allowed, key=surface.rim_mm, default=None)
@@ -96,9 +96,9 @@ def _first_look(
     step_mm, directions = 2.0 * reach_mm / OFFSETS, np.array(list(_directions(normal, reach_deg)))
     remainder = Remainder(mesh, np.zeros(len(mesh.faces), dtype=np.bool_), np.where(seen > 0.0, 1.0, 0.0))
     swept = gains(remainder, directions, step_mm, NOTHING_RISKY)
+    all_offsets_mm = swept.offsets_mm(step_mm)
     for row, direction in enumerate(directions):
-        offsets_mm = (swept.first[row] + np.arange(swept.columns[row])) * step_mm
-        rims = swept.rim_mm[row, : swept.columns[row]]
+        offsets_mm, rims = (values[row, : swept.columns[row]] for values in (all_offsets_mm, swept.rim_mm))
         near = np.abs(offsets_mm - direction @ centre) <= reach_mm
         before, here, after = rims[:-2], rims[1:-1], rims[2:]
         low = near[1:-1] & (here > 0.0) & (here <= np.minimum(before, after)) & (here < np.maximum(before, after))
@@ -111,7 +111,7 @@ def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plan
     taken: list[tuple[Floats, Plane]] = []
     for plane in planes:
         centre = surface.centre_mm(plane)
-        if all(float(np.linalg.norm(centre - other)) > apart_mm for other, _ in taken):
+        if all(float(np.linalg.norm(centre - middle)) > apart_mm for middle, _ in taken):
             taken.append((centre, plane))
         if len(taken) == MOST_TRIED:
             break
@@ -120,20 +120,12 @@ def _apart(surface: _Surface, planes: list[Plane], apart_mm: float) -> list[Plan
 
 def _directions(normal: Floats, reach_deg: float) -> Iterator[Floats]:
     """A direction and rings of others around it, up to the reach."""
-    aside, across = _beside(normal)
+    aside, across = frame_across(normal)
     yield normal
     for ring in range(1, RINGS + 1):
         for k in range(6 * ring):
             turn, tilt = pi * k / (3 * ring), radians(reach_deg * ring / RINGS)
             yield cos(tilt) * normal + sin(tilt) * (cos(turn) * aside + sin(turn) * across)
-
-
-def _beside(normal: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors across a direction and each other."""
-    helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.9 else UP
-    aside = np.cross(normal, helper)
-    aside /= np.linalg.norm(aside)
-    return aside, np.cross(normal, aside)
 
 
 def _refined(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -> Plane:
@@ -143,8 +135,9 @@ def _refined(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) -
     """
     least = surface.rim_mm(plane)
     for _ in range(MOST_STEPS):
-        tried = [(rim, each) for each in _around(surface, plane, step_mm, step_deg) if (rim := surface.rim_mm(each)) > 0.0]
-        rim, best = min(tried, key=lambda each: each[0], default=(least, plane))
+        planes = _around(surface, plane, step_mm, step_deg)
+        tried = [(rim, near) for near in planes if (rim := surface.rim_mm(near)) > 0.0]
+        rim, best = min(tried, key=lambda pair: pair[0], default=(least, plane))
         if rim < (1.0 - LEAST_GAIN) * least:
             least, plane = rim, best
         elif step_mm <= LEAST_MM and step_deg <= LEAST_DEG:
@@ -159,7 +152,7 @@ def _around(surface: _Surface, plane: Plane, step_mm: float, step_deg: float) ->
     centre, tilt = surface.centre_mm(plane), radians(step_deg)
     yield Plane(plane.normal, plane.offset_mm + step_mm)
     yield Plane(plane.normal, plane.offset_mm - step_mm)
-    aside, across = _beside(plane.normal)
+    aside, across = frame_across(plane.normal)
     for k in range(8):
         axis = cos(0.25 * pi * k) * aside + sin(0.25 * pi * k) * across
         normal = about(axis, tilt) @ plane.normal

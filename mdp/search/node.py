@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from mdp.cost.cost import CostTerms, Seam, SeamPlaces, measure_seam
-from mdp.cut import Solid, above, mesh_of
+from mdp.cost.cost import CostTerms, SeamPlaces, measure_seam
+from mdp.cost.model_surface import Piece
+from mdp.cut import Solid, above
 from mdp.mesh import Floats
 from mdp.overhang import risky_upright
 from mdp.plane import Plane
+from mdp.sweep.rims import Rim
 from mdp.sweep.sweep import Remainder
 
 
@@ -37,12 +39,17 @@ class Node:
     parent: "Node | None" = None
 
     @cached_property
+    def piece(self) -> Piece:
+        """The remaining solid, and which faces of the model its own are."""
+        return self.places.surface.piece(self.solid)
+
+    @cached_property
     def remainder(self) -> Remainder:
         """The remaining solid for the sweep."""
-        mesh, terms = mesh_of(self.solid), self.terms
+        mesh, terms = self.piece.mesh, self.terms
         weights = self.seam_weights if terms.seam_mm > 0.0 else None
         risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
-        pieces = None if terms.need is None else terms.need.pieces(self.solid)
+        pieces = None if terms.need is None else terms.need.pieces(self.piece)
         if pieces is not None:
             risky = risky & pieces.upright
         return Remainder(mesh, risky, weights, terms.feather, pieces)
@@ -50,10 +57,10 @@ class Node:
     @cached_property
     def seam_weights(self) -> Floats:
         """(m,) how much a mm of rim counts on each face of what remains."""
-        return self.places.weights(self.solid)
+        return self.places.weights(self.piece)
 
     @cached_property
-    def seams(self) -> tuple[Seam, ...]:
+    def seams(self) -> tuple[Rim, ...]:
         """The seams of the cuts."""
         before = self.parent
         if before is None:
@@ -83,5 +90,5 @@ class Node:
 
     def let_go(self) -> None:
         """Forget what is large and made again when it is asked for: a search keeps all its nodes and comes back to few."""
-        for name in ("remainder", "seam_weights"):
+        for name in ("piece", "remainder", "seam_weights"):
             self.__dict__.pop(name, None)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdp.clearance import lowest_place
+from mdp.clearance import lowest_body
 from mdp.cut import Solid, above, below, corners_above, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
@@ -70,13 +70,13 @@ def find_refused(problem: Problem, node: Node, plane: Plane, refusal: Refusal) -
 def _touch(problem: Problem, node: Node, plane: Plane) -> Touch | None:
     """The head at the lowest place of what is cut off, at the pose that needs least."""
     machine, mesh = problem.machine, node.remainder.mesh
-    options = [(*lowest_place(machine, pose), pose) for pose in poses(machine, plane.normal)]
+    options = [(*lowest_body(machine, pose), pose) for pose in poses(machine, plane.normal)]
     if not options:
         return None
-    _, body, place, pose = min(options, key=lambda option: option[0])
+    _, body, point, pose = min(options, key=lambda option: option[0])
     printed = corners_above(mesh, plane)
     tip, turned = printed[int(np.argmin(printed[:, 2]))], rotation(machine, pose)
-    x, y, _ = tip + np.array(place) @ turned
+    x, y, _ = tip + np.array(point) @ turned
     return Touch(body, _vector(tip), tuple(_vector(row) for row in turned), (float(x), float(y), 0.0))
 
 
@@ -89,29 +89,29 @@ def _sliver(mesh: Mesh, plane: Plane) -> Obstacle | None:
     return Obstacle((_vector(mesh.vertices[mesh.faces[face, corner]]),)) if np.isfinite(outward[face, corner]) else None
 
 
-def _lowest(solid: Solid, upward: Floats, ground_mm: float) -> Obstacle | None:
-    """The lowest place, along a direction, of every piece of a solid that does not reach down to the ground."""
+def _lowest(solid: Solid, upward: Floats, base_mm: float) -> Obstacle | None:
+    """The lowest place, along a direction, of every piece of a solid that does not reach down to its base."""
     places = []
     for piece in solid.decompose():
         if piece.volume() <= 0.0:
             continue  # a closed void
         vertices = mesh_of(piece).vertices
         heights = vertices @ upward
-        if heights.min() > ground_mm:
+        if heights.min() > base_mm:
             places.append(_vector(vertices[int(np.argmin(heights))]))
     return Obstacle(tuple(places[:MOST_PLACES])) if places else None
 
 
 def _outside(problem: Problem, points: Floats, plane: Plane) -> Obstacle | None:
     """The places of a part that the axes do not reach, the farthest for each axis and side."""
-    machine, places = problem.machine, []
+    machine, outside = problem.machine, []
     for pose in poses(machine, plane.normal)[:1] if len(points) else []:
         reached = points @ rotation(machine, pose).T + shift(machine, pose)
         for axis, limits in enumerate(axis.limits_mm for axis in (machine.x, machine.y, machine.z)):
             low, high = int(np.argmin(reached[:, axis])), int(np.argmax(reached[:, axis]))
-            places += [points[low]] if reached[low, axis] < limits[0] else []
-            places += [points[high]] if reached[high, axis] > limits[1] else []
-    return Obstacle(tuple(_vector(place) for place in places)) if places else None
+            outside += [points[low]] if reached[low, axis] < limits[0] else []
+            outside += [points[high]] if reached[high, axis] > limits[1] else []
+    return Obstacle(tuple(_vector(point) for point in outside)) if outside else None
 
 
 def _vector(values: object) -> Vector:

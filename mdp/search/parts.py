@@ -2,19 +2,16 @@
 
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms
-from mdp.cut import Solid, mesh_of
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
 from mdp.overhang import Mask, risky_above, risky_upright
 from mdp.plane import PLATFORM, Plane
-from mdp.pose import Pose, level, poses, rotation
-from mdp.pose_sequence import least_rotation
+from mdp.pose import Pose, least_rotation, level, poses, rotation
 from mdp.search.node import Node
+from mdp.search.problem import Problem
 from mdp.support_need.need import ModelPieces
 from mdp.support_need.patches import CARRIES_ITSELF
-from mdp.zone import Marked
 from profiles.machine import Machine
-from profiles.profile import Profile
 
 
 def one_piece(mesh: Mesh, machine: Machine) -> Part:
@@ -23,59 +20,58 @@ def one_piece(mesh: Mesh, machine: Machine) -> Part:
     return Part(1, mesh, PLATFORM, pose, rotation(machine, pose), mesh.volume_mm3, 0.0)
 
 
-def make_parts(node: Node, machine: Machine, profile: Profile) -> tuple[Part, ...]:
-    """Parts in print order: what remains first, then the cuts, last one first. machine: the profile's, or one without limits."""
-    clearance = profile.search.clearance
-    solids = [(PLATFORM, node.remainder.mesh), *((c.base, mesh_of(c.solid)) for c in reversed(node.cuts))]
-    options = [[level(machine)]]
-    for base, mesh in solids[1:]:
-        options.append(allowed_poses(machine, base.normal, mesh.vertices) if clearance else poses(machine, base.normal))
+def make_parts(problem: Problem, node: Node) -> tuple[Part, ...]:
+    """Parts in print order: what remains first, then the cuts, last one first."""
+    machine, clearance = problem.machine, problem.settings.clearance
+    bases = [PLATFORM, *(cut.base for cut in reversed(node.cuts))]
+    pieces = [node.piece, *(node.places.surface.piece(cut.solid) for cut in reversed(node.cuts))]
+
+    def allowed(position: int, near_turn_deg: float | None = None) -> list[Pose]:
+        normal = bases[position].normal
+        if not clearance:
+            return poses(machine, normal, near_turn_deg)
+        return allowed_poses(machine, normal, pieces[position].mesh.vertices, near_turn_deg)
 
     def fits(position: int, pose: Pose) -> bool:
-        base, mesh = solids[position]
-        return not clearance or pose in allowed_poses(machine, base.normal, mesh.vertices, pose.turn_deg)
+        return not clearance or pose in allowed(position, pose.turn_deg)
 
+    options = [[level(machine)], *(allowed(position) for position in range(1, len(bases)))]
+    chosen = least_rotation(machine, options, fits)
     feathered = (0.0, *(seam.feather_share for seam in reversed(node.seams)))
-    need, parts = node.terms.need, []
-    for position, ((base, mesh), pose) in enumerate(zip(solids, least_rotation(machine, options, fits), strict=True)):
-        pieces = None if need is None else need.pieces(node.cuts[-position].solid if position else node.solid)
-        risky = _needing(mesh, base, pieces, node.terms) if position else node.remainder.risky
+    zones, need, parts = node.places.zones, node.terms.need, []
+    for position, (base, piece, pose) in enumerate(zip(bases, pieces, chosen, strict=True)):
+        needs = None if need is None else need.pieces(piece)
+        risky = _needing(piece.mesh, base, needs, node.terms) if position else node.remainder.risky
         parts.append(
             Part(
                 index=position + 1,
-                mesh=mesh,
+                mesh=piece.mesh,
                 base=base,
                 pose=pose,
                 rotation=rotation(machine, pose),
-                volume_mm3=mesh.volume_mm3,
-                risky_area_mm2=float(mesh.areas_mm2[risky].sum()),
+                volume_mm3=piece.mesh.volume_mm3,
+                risky_area_mm2=float(piece.mesh.areas_mm2[risky].sum()),
                 feather_share=feathered[position],
-                needing=None if pieces is None else risky,
-                needing_upright=None if pieces is None else _needing_upright(mesh, pieces, node.terms),
-                **_marked(node, node.cuts[-position].solid if position else node.solid),
+                needing=None if needs is None else risky,
+                needing_upright=None if needs is None else _needing_upright(piece.mesh, needs, node.terms),
+                no_seam=zones.no_seam.among(piece.sources),
+                no_support=zones.no_support.among(piece.sources),
             )
         )
     return tuple(parts)
 
 
-def _marked(node: Node, solid: Solid) -> dict[str, Marked]:
-    """Where of a part no seam and no support is wanted."""
-    zones = node.places.zones
-    sources = node.places.surface.sources(solid)
-    return {"no_seam": zones.no_seam.among(sources), "no_support": zones.no_support.among(sources)}
-
-
-def _needing(mesh: Mesh, base: Plane, pieces: ModelPieces | None, terms: CostTerms) -> Mask:
+def _needing(mesh: Mesh, base: Plane, needs: ModelPieces | None, terms: CostTerms) -> Mask:
     """(m,) faces of a part that need support."""
     risky = risky_above(mesh, base, terms.angle_deg)
-    if pieces is None:
+    if needs is None:
         return risky
-    needing: Mask = risky & (pieces.along(base.normal) != CARRIES_ITSELF)
+    needing: Mask = risky & (needs.along(base.normal) != CARRIES_ITSELF)
     return needing
 
 
-def _needing_upright(mesh: Mesh, pieces: ModelPieces, terms: CostTerms) -> Mask:
+def _needing_upright(mesh: Mesh, needs: ModelPieces, terms: CostTerms) -> Mask:
     """(m,) faces of a part that would need it if the model were printed straight up; those of cuts are not the model's."""
     risky = risky_upright(mesh, terms.angle_deg, terms.count_platform_faces)
-    needing: Mask = risky & pieces.upright & (pieces.sources >= 0)
+    needing: Mask = risky & needs.upright & (needs.sources >= 0)
     return needing

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from itertools import product
 from math import cos, radians, sin
 
-import numpy as np
-
 from mdp.cost.forecast import Surface
 from mdp.cost.symmetry import Mirror
+from mdp.directions.frame import frame_across
 from mdp.mesh import Floats
 from mdp.overhang import BASE_TOLERANCE_MM
 from mdp.plane import Plane
@@ -91,10 +90,10 @@ def _pair(chain: Chain, position: int, mirror: Mirror) -> Iterator[list[Plane]]:
     """The planes from a position on, one that is nearly the first one's image made its image, or the other way round."""
     here, *later = chain.planes[position:]
     image = mirror.image(here)
-    for number, other in enumerate(later):
-        if float(other.normal @ image.normal) > PARTNER_COSINE and abs(other.offset_mm - image.offset_mm) < PARTNER_MM:
+    for number, partner in enumerate(later):
+        if float(partner.normal @ image.normal) > PARTNER_COSINE and abs(partner.offset_mm - image.offset_mm) < PARTNER_MM:
             yield [here, *later[:number], image, *later[number + 1 :]]
-            yield [mirror.image(other), *later]
+            yield [mirror.image(partner), *later]
 
 
 def _drop_cuts(problem: Problem, best: Chain) -> Chain:
@@ -140,10 +139,10 @@ def _add_cuts(problem: Problem, chain: Chain) -> Chain:
             problem.cut(node, table.plane(candidate.row), float(table.scored.residual_mm2[candidate.row]))
             for candidate in rank_by_trade_off([table], TRADE_OFF, node.cost_mm2)
         )
-        following = next((child for child in cuts if child is not None), None)
-        if following is None or following.cost_mm2 >= node.cost_mm2:
+        child = next((child for child in cuts if child is not None), None)
+        if child is None or child.cost_mm2 >= node.cost_mm2:
             break
-        nodes.append(following)
+        nodes.append(child)
     return Chain(nodes)
 
 
@@ -178,11 +177,9 @@ def _climb(problem: Problem, surface: Surface, chain: Chain, position: int) -> I
 def _neighbours(plane: Plane, pivot: Floats, step_mm: float, turn_deg: float) -> Iterator[Plane]:
     """The planes next to one: shifted both ways, and leaning four ways about a point with and without a shift."""
     yield from (Plane(plane.normal, plane.offset_mm + shift) for shift in (-step_mm, step_mm))
-    side = np.cross(plane.normal, np.eye(3)[int(np.argmin(np.abs(plane.normal)))])
-    side = side / np.linalg.norm(side)
-    other = np.cross(plane.normal, side)
+    aside, across = frame_across(plane.normal)
     height_mm = plane.offset_mm - float(plane.normal @ pivot)
-    for lean in (side, -side, other, -other):
+    for lean in (-aside, aside, -across, across):
         normal = cos(radians(turn_deg)) * plane.normal + sin(radians(turn_deg)) * lean
         offset_mm = float(normal @ pivot) + height_mm
         yield from (Plane(normal, offset_mm + shift) for shift in (0.0, -step_mm, step_mm))

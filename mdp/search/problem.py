@@ -1,7 +1,6 @@
 """Problem: what one search holds fixed, which planes may cut a node, and what a cut makes of it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property, partial
 from math import sqrt
 from time import perf_counter
@@ -9,13 +8,14 @@ from time import perf_counter
 import numpy as np
 
 from mdp.clearance import allowed_poses
-from mdp.cost.cost import SeamPlaces, cost_terms
+from mdp.cost.cost import CostTerms, SeamPlaces
 from mdp.cost.model_need import ModelNeed
 from mdp.cost.model_surface import ModelSurface
 from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, UP, Mask, standing, threshold
 from mdp.plane import Plane
+from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import (
     Bounds,
     Feasibility,
@@ -28,8 +28,7 @@ from mdp.ranking.candidates import (
     residual_mm2,
     score_candidates,
 )
-from mdp.ranking.features import Model, Situation
-from mdp.ranking.ranking import CandidateTable
+from mdp.search.front import price_of_second_mm2
 from mdp.search.node import Cut, Node
 from mdp.support_need.need import SupportNeed
 from mdp.sweep.bending import stress_per_newton
@@ -38,8 +37,6 @@ from mdp.sweep.sweep import gains
 from mdp.zone import NO_ZONES, Zones
 from profiles.machine import Machine
 from profiles.profile import Profile
-
-PUBLISHED = {"least_volume_share": 0.1, "least_interface_mm2": 0.0, "least_gain": 1e-4, "objective": "risky"}
 
 FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the origin would have too many planes
 
@@ -51,28 +48,31 @@ class Problem:
     """
 
     def __init__(self, mesh: Mesh, profile: Profile, zones: Zones = NO_ZONES) -> None:
-        settings = profile.search
-        if settings.method == "published":
-            settings = settings.model_copy(update=PUBLISHED)
-        self.settings = settings
+        self.settings = settings = profile.search.effective
         self.machine = profile.machine if settings.clearance else without_limits(profile.machine)
         self.mesh, self.zones = mesh, zones.on(mesh)
         solid = solid_of(mesh, apart=self.zones.by_face)
-        self.surface = ModelSurface.of(mesh, solid)
-        self.terms = cost_terms(profile, settings)
+        surface, need = ModelSurface.of(mesh, solid), None
         if settings.objective == "scar":
-            need = SupportNeed.of(mesh, profile.process, settings.unsupportable_weight)
-            self.terms = replace(self.terms, need=ModelNeed(self.surface, need, self.zones.no_support))
-        hidden_share = settings.hidden_seam_share if self.terms.seam_mm > 0.0 else 1.0
-        places = SeamPlaces.of(self.surface, solid, hidden_share, self.zones)
+            support_need = SupportNeed.of(mesh, profile.process, settings.unsupportable_weight)
+            need = ModelNeed(support_need, self.zones.no_support)
+        self.terms = CostTerms(
+            angle_deg=profile.process.self_supporting_angle_deg,
+            count_platform_faces=settings.count_platform_faces,
+            seam_mm=settings.seam_mm,
+            feather=settings.feather_weight,
+            cut_mm2=settings.cut_mm2,
+            need=need,
+        )
+        places = SeamPlaces.of(surface, solid, settings.hidden_seam_share, self.zones)
         self.root = self.start = Node(solid, (), self.terms, places)
         radius_mm = 0.5 * float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
         self.model = Model(self.root.risky_mm2, mesh.volume_mm3, radius_mm)
         self.platform_disc = platform_disc(mesh, settings)
+        self.second_mm2 = price_of_second_mm2(profile)
         self.preferred_mm3 = settings.preferred_volume_share * mesh.volume_mm3
         savable_mm2 = self._savable_mm2()
         self.least_gain_mm2 = settings.least_gain * savable_mm2
-        self.load_n = settings.nozzle_load_n if settings.objective == "scar" else 0.0
         self.bearable_mpa = profile.material.interlayer_strength_mpa / settings.strength_safety
         self.large_gain_mm2 = min(self.least_gain_mm2, settings.least_gain_preferred * savable_mm2)
         self._evaluated: list[int] = []  # appended to by several threads
@@ -119,16 +119,24 @@ class Problem:
         least_mm2 = self.large_gain_mm2 if large and self.preferred_mm3 > 0 else self.least_gain_mm2
         hopeless = self._hopeless(node) if described else None
         remainder, step_mm = node.remainder, self.settings.offset_step_mm
-        scored = score_candidates(remainder, self.limits, step_mm, self.terms, least_mm2, hopeless)
+        scored = score_candidates(
+            remainder, self.limits, self.terms, step_mm=step_mm, least_gain_mm2=least_mm2, hopeless=hopeless
+        )
         self._evaluated.append(scored.evaluated)
 
         def check_planes(direction: Ints, offset_mm: Floats) -> Feasibility:
             return check(remainder, self.limits, self.settings, direction, offset_mm)
 
         hopeless_mm2 = 0.0 if hopeless is None else float(remainder.facets.counted_mm2[hopeless].sum())
-        enough_mm2, is_weak = self.least_gain_mm2, partial(self.is_weak, node)
         situation = self._situation(node, hopeless_mm2)
-        return CandidateTable(scored, self.limits, situation, check_planes, enough_mm2, is_weak)
+        return CandidateTable(
+            scored,
+            self.limits,
+            situation,
+            check=check_planes,
+            least_gain_mm2=self.least_gain_mm2,
+            is_weak=partial(self.is_weak, node),
+        )
 
     def _hopeless(self, node: Node) -> Mask:
         """(m,) the faces of what remains that no cut can save, in the order of its facets."""
@@ -150,7 +158,8 @@ class Problem:
     def refusals(self) -> dict[Reason, int]:
         """How many of the root's candidates each reason takes."""
         root, is_weak = self.root, partial(self.is_weak, self.root)
-        return refusals(root.remainder, self.limits, self.settings, self.terms, self.least_gain_mm2, is_weak)
+        least_mm2 = self.least_gain_mm2
+        return refusals(root.remainder, self.limits, self.settings, self.terms, least_gain_mm2=least_mm2, is_weak=is_weak)
 
     def allowed(self, node: Node, plane: Plane) -> bool:
         """Whether a plane, on the grid of candidates or off it, may cut a node."""
@@ -160,8 +169,14 @@ class Problem:
 
     def bounds_along(self, directions: Floats) -> Bounds:
         """The bounds of (k, 3) directions."""
-        volume_mm3, keep = self.model.volume_mm3, self.zones.keep
-        return bounds_of(directions, self.platform_disc, volume_mm3, self.machine, self.settings, keep)
+        return bounds_of(
+            directions,
+            disc=self.platform_disc,
+            volume_mm3=self.model.volume_mm3,
+            machine=self.machine,
+            search=self.settings,
+            keep=self.zones.keep,
+        )
 
     def check_plane(self, node: Node, plane: Plane, limits: Bounds) -> Feasibility:
         """Whether a plane that lies on no grid can cut a node; limits: those of its direction."""
@@ -173,11 +188,13 @@ class Problem:
 
     def is_weak(self, node: Node, plane: Plane) -> bool:
         """Whether what lies above a plane could break off while it is printed."""
-        return self.load_n > 0.0 and self.stress_mpa(node, plane) > self.bearable_mpa
+        return self.settings.nozzle_load_n > 0.0 and self.stress_mpa(node, plane) > self.bearable_mpa
 
     def stress_mpa(self, node: Node, plane: Plane) -> float:
         """The stress at the base of what lies above a plane when the nozzle pushes its top."""
-        return self.load_n * stress_per_newton(node.remainder.mesh, plane, sqrt(self.settings.least_interface_mm2))
+        return self.settings.nozzle_load_n * stress_per_newton(
+            node.remainder.mesh, plane, sqrt(self.settings.least_interface_mm2)
+        )
 
     def cut(self, node: Node, plane: Plane, residual_mm2: float | None = None) -> Node | None:
         """The node after a cut; None when nothing is cut off or no pose serves the part.
@@ -191,13 +208,13 @@ class Problem:
         if residual_mm2 is None:
             residual_mm2 = self._residual_mm2(node, plane)
         cuts = (*node.cuts, Cut(plane, node.solid, residual_mm2))
-        following = Node(rest, cuts, self.terms, node.places, node)
+        child = Node(rest, cuts, self.terms, node.places, node)
         if self.settings.clearance:
-            lower = following.remainder.mesh.vertices
+            lower = child.remainder.mesh.vertices
             corners = np.vstack([upper, lower[plane.heights_mm(lower) >= -BASE_TOLERANCE_MM]])
             if not allowed_poses(self.machine, plane.normal, corners):
                 return None
-        return following
+        return child
 
     def _residual_mm2(self, node: Node, plane: Plane) -> float:
         """What a cut costs for ever, see candidates.residual_mm2."""
@@ -216,10 +233,10 @@ class Problem:
         cut."""
         nodes = [node]
         for plane in planes:
-            following = self.cut(nodes[-1], plane) if self.allowed(nodes[-1], plane) else None
-            if following is None:
+            child = self.cut(nodes[-1], plane) if self.allowed(nodes[-1], plane) else None
+            if child is None:
                 return None
-            nodes.append(following)
+            nodes.append(child)
         return nodes
 
 

@@ -5,8 +5,9 @@ from itertools import chain, islice
 
 import numpy as np
 
+from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.ranker import Ranker
-from mdp.ranking.ranking import CandidateTable, RankedCandidate, rank_classic
+from mdp.ranking.ranking import RankedCandidate, rank_classic
 from mdp.ranking.record import Child, Trace, offer
 from mdp.search.node import Node
 from mdp.search.problem import Problem
@@ -76,5 +77,5 @@ def _record(
 ) -> None:
     """Put a stage on record: the candidates that filled the beam. Nodes of the last stage are not expanded, the loop ended."""
     trace.begin_stage([node.signature for node in beam])
-    offers = [offer(beam[each.table].signature, tables[each.table], each) for each in chosen]
+    offers = [offer(beam[candidate.table].signature, tables[candidate.table], candidate) for candidate in chosen]
     trace.add(offers, [Child(row, child.signature, child.cost_mm2) for row, child in enumerate(children)])

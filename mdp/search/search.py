@@ -22,10 +22,9 @@ from mdp.ranking.ranker import Ranker, ranker_named
 from mdp.ranking.record import Trace
 from mdp.search.beam import Beam
 from mdp.search.by_hand import check_model, check_zones, cut_by_hand
-from mdp.search.front import ASKED, BY_PLAN, Choice, Front, Pricing, choose, front_row, pays, price_of_second_mm2, price_row
+from mdp.search.front import ASKED, Choice, Front, Pricing, choose, front_row, pays, price_row
 from mdp.search.node import Node
 from mdp.search.parts import make_parts
-from mdp.search.plan_front import price_plan, with_own_row
 from mdp.search.polish import make_symmetric, polish
 from mdp.search.problem import Problem
 from mdp.search.published import search_as_published
@@ -51,6 +50,7 @@ def decompose(
     mesh: Mesh,
     name: str,
     profile: Profile,
+    *,
     ranker: str = "classic",
     on_stage: Callable[[Progress], None] | None = None,
     on_record: Callable[[bytes], None] | None = None,
@@ -92,31 +92,29 @@ def decompose(
         best, front, rounds = _search_beam(problem, ranker_named(ranker), trace, report)
     if on_record is not None and trace is not None:
         on_record(trace.to_bytes())
-    taken = _take(problem, front, best, profile, parts, price)
+    taken = _take(problem, front, best, parts, price)
     notes = (*_notes(problem, taken, parts), *_zone_notes(problem), *_front_note(planned))
-    return _decomposition(problem, taken, profile, Outcome(name, ranker, rounds, perf_counter() - began, notes))
+    return made_of(problem, taken, Outcome(name, ranker, rounds, perf_counter() - began, notes))
 
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """The node that is taken, its parts, and the front with its row marked; note: what it gives up for its time."""
+    """The parts that are taken, and the front with their row marked; note: what is given up for their time."""
 
-    node: Node
     parts: tuple[Part, ...]
     front: tuple[FrontRow, ...]
     note: tuple[str, ...] = ()
 
 
-def _take(problem: Problem, front: Front, best: Node, profile: Profile, wanted: int | None, price: Pricing | None) -> Taken:
+def _take(problem: Problem, front: Front, best: Node, wanted: int | None, price: Pricing | None) -> Taken:
     """The decomposition of a front to take: of at most the wanted number of parts, else the one that costs least, with its time
     where seconds cost anything; best: the one to take where seams cost nothing."""
-    nodes, made = front.nodes, cache(lambda node: make_parts(node, problem.machine, profile))
-    rows = [front_row(node, problem.terms) for node in nodes]
+    nodes, parts_of = front.nodes, cache(partial(make_parts, problem))
+    rows = [front_row(node) for node in nodes]
     if price is not None:
-        rows = [
-            price_row(row, made(node), price) if good else row for row, node, good in zip(rows, nodes, pays(rows), strict=True)
-        ]
-    choice = choose(rows, price_of_second_mm2(profile), profile.search.most_longer)
+        pairs = zip(rows, nodes, pays(rows), strict=True)
+        rows = [price_row(row, parts_of(node), price) if good else row for row, node, good in pairs]
+    choice = choose(rows, problem.second_mm2, problem.settings.most_longer)
     if wanted is not None:
         choice = Choice(nodes.index(front.up_to(wanted)), ASKED)
     elif problem.terms.seam_mm <= 0.0:
@@ -124,51 +122,9 @@ def _take(problem: Problem, front: Front, best: Node, profile: Profile, wanted: 
         choice = Choice(place, "the least risky area")
     node, row = nodes[choice.place], rows[choice.place]
     if price is not None and row.time_s is None:
-        row = price_row(row, made(node), price)
+        row = price_row(row, parts_of(node), price)
     rows[choice.place] = replace(row, chosen=True, reason=choice.reason)
-    return Taken(node, made(node), tuple(rows), choice.note)
-
-
-def cut_by_plan(
-    mesh: Mesh,
-    name: str,
-    profile: Profile,
-    plan: PlanFile,
-    ranker: str = "classic",
-    parts: int | None = None,
-    price: Pricing | None = None,
-) -> Decomposition:
-    """The parts of a closed mesh by the planes of a plan, without a search; parts: of its row with at most so many.
-
-    The rows of the front are those of the plan, its own parts in place of the row of their number, the one that is cut measured
-    anew; price: as for a search. Raises PlanError for a plan of another model and for a plane that cannot be cut.
-    """
-    began = perf_counter()
-    own = plan
-    if parts is not None:
-        check_part_count(parts)
-        plan = replace(plan, parts=plan.row(parts))
-    for number, part in enumerate(plan.parts, start=2):
-        if part.plane is None:
-            missing = "normal" if part.normal is None else "offset_mm"
-            raise PlanError(f"plan {plan.name}: part {number} has no {missing}: decompose --planes {plan.name} has it found")
-    mesh = on_pedestal(mesh, profile.search.pedestal_mm)
-    check_model(plan, mesh, name)
-    check_zones(plan, mesh, name)
-    problem = Problem(mesh, profile, plan.zones)
-    node = cut_by_hand(problem, plan)
-    if own.parts != plan.parts:
-        plan = replace(plan, front=with_own_row(problem, own))
-    made = make_parts(node, problem.machine, profile)
-    others = {len(row.parts): row for row in plan.front}
-    rows = {count: FrontRow(row.planes, row.support_area_mm2, row.seam_mm, row.cost_mm2) for count, row in others.items()}
-    rows[len(node.cuts)] = replace(front_row(node, problem.terms), chosen=True, reason=BY_PLAN)
-    front = [rows[count] for count in sorted(rows)]
-    if price is not None:
-        front = price_plan(problem, plan, front, made, profile, price)
-    notes = _fewer_parts(parts, len(plan.parts) + 1, f"the plan {plan.name} holds")
-    taken = Taken(node, made, tuple(front))
-    return _decomposition(problem, taken, profile, Outcome(name, ranker, 0, perf_counter() - began, notes))
+    return Taken(parts_of(node), tuple(rows), choice.note)
 
 
 @dataclass(frozen=True)
@@ -182,14 +138,15 @@ class Outcome:
     notes: tuple[str, ...]
 
 
-def _decomposition(problem: Problem, taken: Taken, profile: Profile, outcome: Outcome) -> Decomposition:
+def made_of(problem: Problem, taken: Taken, outcome: Outcome) -> Decomposition:
+    """The decomposition that was taken."""
     mesh, parts = problem.mesh, taken.parts
     folded = folded_mm3(mesh, parts)
     return Decomposition(
         name=outcome.name,
         mesh=mesh,
         parts=parts,
-        beam_width=profile.search.beam_width,
+        beam_width=problem.settings.beam_width,
         ranker=outcome.ranker,
         risky_area_mm2=float(problem.root.remainder.mesh.areas_mm2[problem.root.remainder.risky].sum()),
         residual_area_mm2=sum(part.risky_area_mm2 for part in parts),
@@ -280,12 +237,12 @@ def _prefer_symmetry(problem: Problem, front: Front) -> None:
 def _begin(problem: Problem, report: Callable[[Progress], None]) -> None:
     """Tell that a search begins, where there is anything to search; its time limit counts from then on."""
     if _continues(problem, 0):
-        report(Progress(0, 1, 1.0, partial(front_row, problem.start, problem.terms)))
+        report(Progress(0, 1, 1.0, partial(front_row, problem.start)))
         problem.begin()
 
 
 def _report(problem: Problem, report: Callable[[Progress], None], stage: int, held: int, best: Node) -> None:
-    report(Progress(stage, held, best.cost_mm2 / problem.model.risky_mm2, partial(front_row, best, problem.terms)))
+    report(Progress(stage, held, best.cost_mm2 / problem.model.risky_mm2, partial(front_row, best)))
 
 
 def _continues(problem: Problem, stage: int) -> bool:
@@ -301,13 +258,14 @@ def _notes(problem: Problem, taken: Taken, wanted: int | None) -> tuple[str, ...
     if problem.late():
         return (f"search.time_limit_s = {problem.settings.time_limit_s:g} ended the search; the best so far is used",)
     if len(taken.front) > 1 or parts > 1 or wanted == 1:
-        return _fewer_parts(wanted, parts, "the search found")
+        return fewer_parts(wanted, parts, "the search found")
     counts = problem.refusals()
     shares = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
     return (f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(shares)}",)
 
 
-def _fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
+def fewer_parts(wanted: int | None, parts: int, where: str) -> tuple[str, ...]:
+    """That there are fewer parts than were wanted, where there are."""
     return (f"--parts {wanted}: {where} no more than {parts}",) if wanted is not None and parts < wanted else ()
 
 

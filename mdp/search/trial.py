@@ -95,10 +95,10 @@ class Trials:
 
     def _cut_off(self, plane: Plane) -> Refusal | None:
         """Make one more cut, or say why it cannot be made."""
-        following = cut_or_refuse(self._problem, self._node, plane)
-        if isinstance(following, Refusal):
-            return following
-        self._cut.append((_key(plane), following))
+        child = cut_or_refuse(self._problem, self._node, plane)
+        if isinstance(child, Refusal):
+            return child
+        self._cut.append((_key(plane), child))
         return None
 
     def _allowed(self, order: Sequence[Plane], unchecked: int) -> Trial:

@@ -10,11 +10,11 @@ import numpy as np
 
 from mdp.kernels.kernel import inlined, part
 from mdp.mesh import Floats, Ints
-from mdp.support_need.linked_faces import LinkedFaces
+from mdp.topology.linked_faces import LinkedFaces
 
-BANK_MM = 1.0  # a ridge that goes down less than this is no bank: it hangs in the air itself
+ANCHOR_MM = 1.0  # a ridge that goes down less than this is no anchor: it hangs in the air itself
 ROUNDING_MM = 1e-6  # of a way down just as deep
-BANKED, LOOSE = 0, -1  # what a way down comes to, if not to a patch, whose number is above 0
+ANCHORED, LOOSE = 0, -1  # what a way down comes to, if not to a patch, whose number is above 0
 SAFE = 0  # the number of faces that belong to no patch
 LEVEL = 1e-6  # slope of a face that water does not leave
 ASIDE = 1e-9  # a way that leaves an edge by less runs along it
@@ -32,27 +32,27 @@ class View(NamedTuple):
     heights: Floats
     cosines: Floats
     number: Ints
-    ground_mm: float
+    base_mm: float
     place: Floats
 
 
 @part
 def descend(view: View, f: int, corner: int, share: float, own: int) -> int:
-    """The way down a face from a place on its edge: BANKED where it goes BANK_MM deep, to the ground or to what has solid beneath
-    it; the number of the patch on which it ends before, LOOSE where that is the own one or none."""
+    """The way down a face from a place on its edge: ANCHORED where it goes ANCHOR_MM deep, to the base or to what has solid
+    beneath it; the number of the patch on which it ends before, LOOSE where that is the own one or none."""
     surface, heights = view.surface, view.heights
     height = _put(view, f, corner, share)
-    deep = max(height - BANK_MM + ROUNDING_MM, view.ground_mm)
+    deep = max(height - ANCHOR_MM + ROUNDING_MM, view.base_mm)
     for _ in range(MOST_STEPS):
         if height <= deep:
-            return BANKED
+            return ANCHORED
         if view.cosines[f] ** 2 >= 1.0 - LEVEL**2:
             return _end_on_face(view, f, own)
         corner, share = _leave(surface, view.direction, view.place, f)
         if corner >= 0 and END < share < 1.0 - END:
             height = _put(view, f, corner, share)
             g = surface.neighbours[f, corner]
-            if g >= 0 and flows_out(view, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3])) <= ASIDE:
+            if g >= 0 and outflow(view, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3])) <= ASIDE:
                 f = g
                 continue
         v = _lower_end(view, f, corner, share)
@@ -78,21 +78,15 @@ def corner_of(surface: LinkedFaces, f: int, v: int) -> int:
 
 
 @part
-def outflow(vertices: Floats, faces: Ints, normals: Floats, d: Floats, f: int, corner: int) -> float:
+def outflow(view: View, f: int, corner: int) -> float:
     """How fast water on a face runs out over the edge that begins at a corner; below 0: away from it."""
+    vertices, faces, normals, d = view.surface.vertices, view.surface.faces, view.surface.normals, view.direction
     a, b = faces[f, corner], faces[f, (corner + 1) % 3]
     x, y, z = vertices[0, b] - vertices[0, a], vertices[1, b] - vertices[1, a], vertices[2, b] - vertices[2, a]
     p, q, r = _across(x, y, z, normals[0, f], normals[1, f], normals[2, f])
     size = p * p + q * q + r * r
     # at right angles to the normal, so that the direction itself will do
     return -(d[0] * p + d[1] * q + d[2] * r) / np.sqrt(size) if size > 0.0 else 0.0
-
-
-@part
-def flows_out(view: View, f: int, corner: int) -> float:
-    """outflow of a face in a view."""
-    surface = view.surface
-    return outflow(surface.vertices, surface.faces, surface.normals, view.direction, f, corner)
 
 
 @inlined
@@ -195,14 +189,14 @@ def _slope(view: View, v: int, w: int) -> float:
 def _begins_within(view: View, f: int, corner: int) -> bool:
     """Whether water at a corner of a face runs into it: out over neither of the edges there."""
     before = (corner + 2) % 3
-    return flows_out(view, f, corner) <= ASIDE and flows_out(view, f, before) <= ASIDE and view.surface.areas_mm2[f] > 0.0
+    return outflow(view, f, corner) <= ASIDE and outflow(view, f, before) <= ASIDE and view.surface.areas_mm2[f] > 0.0
 
 
 @part
 def _end_on_face(view: View, f: int, own: int) -> int:
     """What a way comes to that ends on a level face."""
     if view.cosines[f] > 0.0:
-        return BANKED
+        return ANCHORED
     return int(view.number[f]) if _is_others(view, f, own) else LOOSE
 
 
@@ -223,4 +217,4 @@ def _end_at_vertex(view: View, first: int, v: int, own: int) -> int:
         f, forward = _turn(view.surface, first, f, v, forward)
         if f < 0:
             break
-    return BANKED if pit else LOOSE
+    return ANCHORED if pit else LOOSE

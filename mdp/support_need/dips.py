@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from mdp.kernels.kernel import part
 from mdp.mesh import Floats, Ints
-from mdp.support_need.linked_faces import LinkedFaces
+from mdp.topology.linked_faces import LinkedFaces
 
 DIP_MM = 0.05  # a quarter of a usual layer: no layer shows it
 ROUNDING_MM = 1e-6
@@ -23,13 +23,13 @@ class Pool(NamedTuple):
 
 
 @part
-def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, pool: Pool, ground_mm: float) -> bool:
+def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, pool: Pool, base_mm: float) -> bool:
     """Whether a patch has a bottom in the air."""
     for f in patch:
         for k in range(3):
             v = surface.faces[f, k]
-            candidate = pool.seen[v] == UNSEEN and heights[v] > ground_mm and _is_bottom(surface, heights, v)
-            if candidate and not _has_way_out(surface, heights, v, pool, ground_mm):
+            candidate = pool.seen[v] == UNSEEN and heights[v] > base_mm and _is_bottom(surface, heights, v)
+            if candidate and not _has_way_out(surface, heights, v, pool, base_mm):
                 return True
     return False
 
@@ -44,8 +44,8 @@ def _is_bottom(surface: LinkedFaces, heights: Floats, v: int) -> bool:
 
 
 @part
-def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool, ground_mm: float) -> bool:
-    """Whether what hangs together with a bottom and lies no higher than DIP_MM above it goes on below it or to the ground. If so,
+def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool, base_mm: float) -> bool:
+    """Whether what hangs together with a bottom and lies no higher than DIP_MM above it goes on below it or to the base. If so,
     it has been seen, as far as one had to look."""
     seen, queue = pool.seen, pool.queue
     low = heights[bottom] - ROUNDING_MM
@@ -55,7 +55,7 @@ def _has_way_out(surface: LinkedFaces, heights: Floats, bottom: int, pool: Pool,
         v = queue[at]
         for k in range(surface.starts[v], surface.starts[v + 1]):
             w = surface.around[k]
-            if heights[w] < low or heights[w] <= ground_mm or _leads_out(seen[w], bottom, heights):
+            if heights[w] < low or heights[w] <= base_mm or _leads_out(seen[w], bottom, heights):
                 return True
             if seen[w] != bottom and heights[w] <= heights[bottom] + DIP_MM:
                 seen[w], queue[count] = bottom, w

@@ -1,19 +1,19 @@
-"""Narrow: whether a hanging place reaches nowhere far from its banks (numba kernels)."""
+"""Narrow: whether a hanging place reaches nowhere far from its anchors (numba kernels)."""
 
 from mdp.kernels.arrays import table
 from mdp.kernels.kernel import part
 from mdp.mesh import Floats, Ints
 from mdp.support_need.spans import Sides
 
-FINE_MM = 0.1  # between two places that are looked at, neither of them too far from a bank
+FINE_MM = 0.1  # between two places that are looked at, neither of them too far from an anchor
 ROUNDING_MM = 1e-6
 DEEP = 64  # halvings of a triangle, one within the other
 
 
 @part
-def is_near_banks(sides: Sides, reach_mm: float, triangle: Floats, todo: Floats, nearest: int) -> int:
-    """A bank within reach of a triangle (6,), x, y of its corners, all of which lies within reach of banks; -1: some of it does
-    not. nearest: the bank to try first; todo (DEEP, 6): room for triangles."""
+def is_near_anchors(sides: Sides, reach_mm: float, triangle: Floats, todo: Floats, nearest: int) -> int:
+    """An anchor within reach of a triangle (6,), x, y of its corners, all of which lies within reach of anchors; -1: some of it
+    does not. nearest: the anchor to try first; todo (DEEP, 6): room for triangles."""
     count = 1
     for k in range(6):
         todo[0, k] = triangle[k]
@@ -21,7 +21,7 @@ def is_near_banks(sides: Sides, reach_mm: float, triangle: Floats, todo: Floats,
         count -= 1
         t = todo[count]
         for k in range(3):
-            nearest = _near_bank(sides.ends, sides.banked, t[2 * k], t[2 * k + 1], reach_mm, nearest)
+            nearest = _near_anchor(sides.ends, sides.anchored, t[2 * k], t[2 * k + 1], reach_mm, nearest)
             if nearest < 0:
                 return -1
         longest, split = 0.0, 0
@@ -38,7 +38,7 @@ def is_near_banks(sides: Sides, reach_mm: float, triangle: Floats, todo: Floats,
 
 @part
 def triangles_room() -> Floats:
-    """Room for the triangles of is_near_banks."""
+    """Room for the triangles of is_near_anchors."""
     return table(DEEP, 6)
 
 
@@ -54,11 +54,11 @@ def _halve(todo: Floats, at: int, split: int) -> None:
 
 @part
 def _all_near_one(sides: Sides, t: Floats, reach_mm: float, first: int) -> bool:
-    """Whether one bank lies near all corners of a triangle, and so near all of it."""
-    ends, banked, count = sides.ends, sides.banked, len(sides.banked)
+    """Whether one anchor lies near all corners of a triangle, and so near all of it."""
+    ends, anchored, count = sides.ends, sides.anchored, len(sides.anchored)
     for k in range(count):
         e = (first + k) % count
-        if banked[e] > 0:
+        if anchored[e] > 0:
             near = 0
             while near < 3 and _is_near(ends, e, t[2 * near], t[2 * near + 1], reach_mm):
                 near += 1
@@ -68,12 +68,12 @@ def _all_near_one(sides: Sides, t: Floats, reach_mm: float, first: int) -> bool:
 
 
 @part
-def _near_bank(ends: Floats, banked: Ints, x: float, y: float, reach_mm: float, first: int) -> int:
-    """A banked side within reach of a place, looked for from a side on; -1: none."""
-    count = len(banked)
+def _near_anchor(ends: Floats, anchored: Ints, x: float, y: float, reach_mm: float, first: int) -> int:
+    """A anchored side within reach of a place, looked for from a side on; -1: none."""
+    count = len(anchored)
     for k in range(count):
         e = (first + k) % count
-        if banked[e] > 0 and _is_near(ends, e, x, y, reach_mm):
+        if anchored[e] > 0 and _is_near(ends, e, x, y, reach_mm):
             return e
     return -1
 

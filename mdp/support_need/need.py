@@ -5,26 +5,29 @@ from functools import cached_property
 
 import numpy as np
 
+from mdp.directions.frame import framed
+from mdp.directions.spread import spread
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, PLATFORM_TOLERANCE_MM, UP, Mask, threshold
-from mdp.support_need.beneath import coarse_directions, find_over_air
-from mdp.support_need.linked_faces import LinkedFaces, flat_places, link
+from mdp.support_need.over_air import find_over_air
 from mdp.support_need.patches import CARRIES_ITSELF, NEEDS_SUPPORT, Classes, Limits, classify
+from mdp.topology.linked_faces import LinkedFaces, flat_places, link
 from profiles.process import Process
 
 MOST_KEPT = 256  # single directions whose classes are kept; a polished plane comes back to the same few again and again
 LEVEL_LAYERS = 2.0  # a patch no higher than this is printed as one bridge
-NO_GROUND_MM = -np.inf
+NO_BASE_MM = -np.inf
+COARSE = spread(37, 0.0)  # directions over the half sphere, some 24 degrees apart
 LEANS = 3  # coarse directions nearest to a direction; support that leans reaches what lies beneath along any of them
 FEW = 16  # directions that are kept singly
 
 
-def limits_of(process: Process, ground_mm: float) -> Limits:
-    """What carries itself with a process. ground_mm: height along the direction up to which a surface rests on something."""
+def limits_of(process: Process, base_mm: float) -> Limits:
+    """What carries itself with a process. base_mm: height along the direction up to which a surface rests on something."""
     return Limits(
         risky_below=threshold(process.self_supporting_angle_deg),
-        ground_mm=ground_mm,
+        base_mm=base_mm,
         level_mm=LEVEL_LAYERS * process.layer_height_mm,
         bridge_mm=process.bridge_mm,
         arch_mm=process.arch_longest_mm,
@@ -83,25 +86,24 @@ class SupportNeed:
         return row
 
     def _classes(self, directions: Floats) -> Classes:
-        nearest = np.argsort(-(directions @ coarse_directions().T), axis=1, kind="stable")[:, :LEANS].T
+        nearest = np.argsort(-(directions @ COARSE.T), axis=1, kind="stable")[:, :LEANS].T
         over_air = self._over_air[nearest[0]]
-        for other in nearest[1:]:
-            over_air &= self._over_air[other]
-        return _classify(self.surface, directions, limits_of(self.process, NO_GROUND_MM), NEEDS_SUPPORT + over_air)
+        for lean in nearest[1:]:
+            over_air &= self._over_air[lean]
+        return _classify(self.surface, directions, limits_of(self.process, NO_BASE_MM), NEEDS_SUPPORT + over_air)
 
     @cached_property
     def _over_air(self) -> Classes:
-        """(COUNT, m) which faces are over air along each of the coarse directions, flat places as a whole: of their faces what
+        """(37, m) which faces are over air along each of the coarse directions, flat places as a whole: of their faces what
         cuts leave remembers but one."""
-        directions = coarse_directions()
-        over_air = np.zeros((len(directions), len(self.surface.faces)), np.uint8)
-        in_threads(find_over_air, len(directions), self.surface, flat_places(self.surface), directions, over_air)
+        over_air = np.zeros((len(COARSE), len(self.surface.faces)), np.uint8)
+        in_threads(find_over_air, len(COARSE), self.surface, flat_places(self.surface), framed(COARSE), over_air)
         return over_air
 
 
 def _classify(surface: LinkedFaces, directions: Floats, limits: Limits, classes: Classes) -> Classes:
     """The classes with CARRIES_ITSELF filled in."""
-    in_threads(classify, len(directions), surface, np.ascontiguousarray(directions), limits, classes)
+    in_threads(classify, len(directions), surface, framed(directions), limits, classes)
     return classes
 
 

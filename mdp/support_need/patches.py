@@ -1,8 +1,8 @@
 """Patches: the connected places that overhang along a direction, and which of them carry themselves (numba kernels).
 
-A patch carries itself when it is too small to matter, when it nowhere reaches further than two line widths from its banks, or
-when lines over it reach from bank to bank, all in one direction and short enough; not so where it begins in mid-air, at a local
-minimum. All that is asked of the shape, never of its triangles: however a surface is cut into faces, it needs the same.
+A patch carries itself when it is too small to matter, when it nowhere reaches further than two line widths from its anchors, or
+when lines over it reach from anchor to anchor, all in one direction and short enough; not so where it begins in mid-air, at a
+local minimum. All that is asked of the shape, never of its triangles: however a surface is cut into faces, it needs the same.
 """
 
 from typing import NamedTuple
@@ -10,31 +10,32 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.arrays import floats, ints, table
+from mdp.directions.frame import FramedDirections
+from mdp.kernels.arrays import floats, ints
 from mdp.kernels.kernel import kernel, part, vector_part
 from mdp.mesh import Floats, Ints
-from mdp.support_need.banks import UNKNOWN, Patches, find_sides, hoped_sides, is_rim, place_across, rests
 from mdp.support_need.descent import SAFE, View
 from mdp.support_need.dips import UNSEEN, Pool, begins_in_air
-from mdp.support_need.linked_faces import LinkedFaces
-from mdp.support_need.narrow import is_near_banks, triangles_room
+from mdp.support_need.narrow import is_near_anchors, triangles_room
+from mdp.support_need.sides import UNKNOWN, Patches, find_sides, is_rim, place_across, rests
 from mdp.support_need.spans import ROUNDING_MM as SPAN_ROUNDING_MM
 from mdp.support_need.spans import Sides, spans
+from mdp.topology.linked_faces import LinkedFaces
 
 Classes = NDArray[np.uint8]
 CARRIES_ITSELF, NEEDS_SUPPORT, UNSUPPORTABLE = 0, 1, 2
-NARROW = 2.0  # line widths from a bank that lines hold on to their neighbours
+NARROW = 2.0  # line widths from an anchor that lines hold on to their neighbours
 UNNUMBERED = -1  # faces that belong to no patch yet
 ROUNDING_MM, ROUNDING_MM2 = 1e-6, 1e-6  # of a patch just as high or as large as it may be
 
 
 class Limits(NamedTuple):
-    """risky_below: cosine of normal and direction below which a face overhangs; ground_mm: height along the direction up to which
+    """risky_below: cosine of normal and direction below which a face overhangs; base_mm: height along the direction up to which
     the surface rests on something; level_mm: a patch no higher than this is a level bridge, others are arches; how far these
     reach; width_mm of a line; least_mm2: a smaller patch, seen along the direction, holds itself."""
 
     risky_below: float
-    ground_mm: float
+    base_mm: float
     level_mm: float
     bridge_mm: float
     arch_mm: float
@@ -55,21 +56,21 @@ class Patch(NamedTuple):
 
 
 @kernel
-def classify(begin_row: int, end_row: int, surface: LinkedFaces, directions: Floats, limits: Limits, out: Classes) -> None:
-    """For each of (k, 3) directions put CARRIES_ITSELF where it holds among the classes of the faces, (k, m)."""
+def classify(begin_row: int, end_row: int, surface: LinkedFaces, along: FramedDirections, limits: Limits, out: Classes) -> None:
+    """For each of k directions put CARRIES_ITSELF where it holds among the classes of the faces, (k, m)."""
     count, size = surface.normals.shape[1], surface.vertices.shape[1]
     risky, place = ints(count + 1, 0), floats(3, 0.0)
     patches = Patches(ints(count, 0), ints(count + 2, 0), ints(count + 2, 0), ints(count + 2, 0))
     pool = Pool(ints(size, 0), ints(size, 0))
     heights, cosines, number = floats(size, 0.0), floats(count, 0.0), ints(count, 0)
     for row in range(begin_row, end_row):
-        d = directions[row]
-        view = View(surface, d, heights, cosines, number, limits.ground_mm, place)
+        d = along.directions[row]
+        view = View(surface, d, heights, cosines, number, limits.base_mm, place)
         _find_heights(surface.vertices[0], surface.vertices[1], surface.vertices[2], d, heights, pool.seen)
         _find_cosines(surface.normals[0], surface.normals[1], surface.normals[2], d, cosines)
         many = _find_risky(view, limits.risky_below, risky)
         for own in range(1, _find_patches(view, risky[:many], patches) + 1):
-            patch = _measure(view, patches, own)
+            patch = _measure(view, patches, own, along.frames[row])
             if _carries_itself(view, patches, patch, pool, limits):
                 for f in patch.faces:
                     out[row, f] = CARRIES_ITSELF
@@ -102,7 +103,7 @@ def _find_risky(view: View, risky_below: float, risky: Ints) -> int:
     for k in range(many):
         f = risky[k]
         risky[k - resting] = f
-        if rests(faces, heights, f, view.ground_mm):
+        if rests(faces, heights, f, view.base_mm):
             resting += 1
         else:
             number[f] = UNNUMBERED
@@ -131,11 +132,11 @@ def _find_patches(view: View, risky: Ints, patches: Patches) -> int:
 
 
 @part
-def _measure(view: View, patches: Patches, own: int) -> Patch:
+def _measure(view: View, patches: Patches, own: int, frame: Floats) -> Patch:
     """A patch along the direction."""
     vertices, corners, neighbours = view.surface.vertices, view.surface.faces, view.surface.neighbours
     areas, heights, cosines, number = view.surface.areas_mm2, view.heights, view.cosines, view.number
-    faces, frame = patches.faces[patches.starts[own] : patches.starts[own + 1]], frame_across(view.direction)
+    faces = patches.faces[patches.starts[own] : patches.starts[own + 1]]
     area, low, high, around = 0.0, np.inf, -np.inf, 0.0
     for f in faces:
         area -= areas[f] * cosines[f]
@@ -150,21 +151,6 @@ def _measure(view: View, patches: Patches, own: int) -> Patch:
 
 
 @part
-def frame_across(d: Floats) -> Floats:
-    """(2, 3) unit vectors across a direction and each other."""
-    frame, least = table(2, 3), 0
-    for axis in range(1, 3):
-        least = axis if abs(d[axis]) < abs(d[least]) else least
-    p, q = (least + 1) % 3, (least + 2) % 3
-    size = np.sqrt(d[p] * d[p] + d[q] * d[q])
-    frame[0, p], frame[0, q] = -d[q] / size, d[p] / size
-    for axis in range(3):
-        a, b = (axis + 1) % 3, (axis + 2) % 3
-        frame[1, axis] = d[a] * frame[0, b] - d[b] * frame[0, a]
-    return frame
-
-
-@part
 def _carries_itself(view: View, patches: Patches, patch: Patch, pool: Pool, limits: Limits) -> bool:
     if patch.area_mm2 < limits.least_mm2 - ROUNDING_MM2:
         return True
@@ -172,11 +158,13 @@ def _carries_itself(view: View, patches: Patches, patch: Patch, pool: Pool, limi
     longest_mm = limits.bridge_mm if patch.rise_mm <= limits.level_mm + ROUNDING_MM else limits.arch_mm
     if patch.area_mm2 > max(reach_mm, 0.5 * (longest_mm + SPAN_ROUNDING_MM)) * patch.around_mm + ROUNDING_MM2:
         return False  # no rim is long enough for a place of that size to lie near it, or for lines that short
-    if not _is_held(view, patch, hoped_sides(view, patches, patch.number, patch.frame), longest_mm, limits.width_mm):
-        return False
-    if begins_in_air(view.surface, view.heights, patch.faces, pool, view.ground_mm):
-        return False
-    return _is_held(view, patch, find_sides(view, patches, patch.number, patch.frame), longest_mm, limits.width_mm)
+    for at_best in (True, False):
+        if not at_best and begins_in_air(view.surface, view.heights, patch.faces, pool, view.base_mm):
+            return False
+        sides = find_sides(view, patches, patch.number, patch.frame, at_best)
+        if not _is_held(view, patch, sides, longest_mm, limits.width_mm):
+            return False
+    return True
 
 
 @part
@@ -190,13 +178,13 @@ def _is_held(view: View, patch: Patch, sides: Sides, longest_mm: float, width_mm
 
 @part
 def _is_narrow(surface: LinkedFaces, patch: Patch, sides: Sides, reach_mm: float) -> bool:
-    """Whether no place of a patch lies further than that from the nearest bank."""
+    """Whether no place of a patch lies further than that from the nearest anchor."""
     todo, triangle, nearest = triangles_room(), floats(6, 0.0), 0
     for f in patch.faces:
         for corner in range(3):
             x, y = place_across(surface.vertices, surface.faces[f, corner], patch.frame)
             triangle[2 * corner], triangle[2 * corner + 1] = x, y
-        nearest = is_near_banks(sides, reach_mm, triangle, todo, nearest)
+        nearest = is_near_anchors(sides, reach_mm, triangle, todo, nearest)
         if nearest < 0:
             return False
     return True

@@ -1,4 +1,4 @@
-"""Spans: whether straight lines over a hanging place, all in one direction, reach from bank to bank and are short enough."""
+"""Spans: whether straight lines over a hanging place, all in one direction, reach from anchor to anchor and are short enough."""
 
 from typing import NamedTuple
 
@@ -13,22 +13,22 @@ TURNS = 8  # directions tried over half a turn, besides those of the place's own
 BINS = 36  # of directions of the sides, over half a turn
 BESIDE = 0.37  # of a bin: where in the first one the direction 0 lies; usual angles lie at no end of a bin
 LINES = 24  # over a place at most; else one every line width
-HOPELESS = 0.2  # share of the ends of lines that lie on no bank, beyond which lines need not be drawn
+HOPELESS = 0.2  # share of the ends of lines that lie on no anchor, beyond which lines need not be drawn
 TOLERATED = 0.02  # share of the lines' length that may have a loose end: corners of the place, as for the slicer's bridges
 ROUNDING_MM = 0.05  # a span may seem longer by this than it was drawn
 
 
 class Sides(NamedTuple):
-    """The rim of a hanging place seen along the direction, mm: ends (n, 4) x, y, x, y, and which sides are banks (n,)."""
+    """The rim of a hanging place seen along the direction, mm: ends (n, 4) x, y, x, y, and which sides are anchors (n,)."""
 
     ends: Floats
-    banked: Ints
+    anchored: Ints
 
 
 @part
 def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> bool:
     """Whether lines of one direction span a place of that area, none longer than that; they lie a line width apart or further."""
-    if longest_mm <= 0.0 or len(sides.banked) == 0:
+    if longest_mm <= 0.0 or len(sides.anchored) == 0:
         return False
     angles = _angles(sides.ends)
     for a in range(len(angles)):
@@ -45,12 +45,12 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
 
 @part
 def _across(sides: Sides, cos: float, sin: float) -> tuple[float, float]:
-    """How far the sides reach across lines at an angle, all together and those that are no banks."""
+    """How far the sides reach across lines at an angle, all together and those that are no anchors."""
     ends, whole, loose = sides.ends, 0.0, 0.0
     for e in range(len(ends)):
         reach = abs((ends[e, 3] - ends[e, 1]) * cos - (ends[e, 2] - ends[e, 0]) * sin)
         whole += reach
-        loose += 0.0 if sides.banked[e] > 0 else reach
+        loose += 0.0 if sides.anchored[e] > 0 else reach
     return whole, loose
 
 
@@ -82,13 +82,13 @@ def _angles(ends: Floats) -> Floats:
 @part
 def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_mm: float) -> bool:
     """Whether lines at an angle span the place. The middle line is tried first, it tells the most."""
-    ends, count = sides.ends, len(sides.banked)
+    ends, count = sides.ends, len(sides.anchored)
     low, high = np.inf, -np.inf
     for e in range(count):
         y = ends[e, 1] * cos - ends[e, 0] * sin
         low, high = min(low, y), max(high, y)
     lines = max(min(int((high - low) / width_mm), LINES), 1)
-    places, banked = floats(count, 0.0), ints(count, 0)
+    places, anchored = floats(count, 0.0), ints(count, 0)
     total, loose = 0.0, 0.0
     for k in range(lines):
         y = low + (high - low) * (((lines // 2 + k) % lines) + 0.5) / lines
@@ -99,7 +99,7 @@ def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_
                 share = begin / (begin - end)
                 x = ends[e, 0] + share * (ends[e, 2] - ends[e, 0])
                 places[crossed] = x * cos + (ends[e, 1] + share * (ends[e, 3] - ends[e, 1])) * sin
-                banked[crossed] = sides.banked[e]
+                anchored[crossed] = sides.anchored[e]
                 crossed += 1
         order = argsort(places[:crossed])
         for c in range(0, crossed - 1, 2):
@@ -107,5 +107,5 @@ def _spans_along(sides: Sides, cos: float, sin: float, longest_mm: float, width_
             if span > longest_mm + ROUNDING_MM:
                 return False
             total += span
-            loose += 0.0 if banked[order[c]] > 0 and banked[order[c + 1]] > 0 else span
+            loose += 0.0 if anchored[order[c]] > 0 and anchored[order[c + 1]] > 0 else span
     return loose <= TOLERATED * total

@@ -11,12 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdp.directions.frame import frame_across
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.plane import Plane
-from mdp.sweep.components import UNKNOWN, root
+from mdp.sweep.components import UNKNOWN
 from mdp.sweep.section_moments import MOMENTS, add_edge, stress_per_moment
+from mdp.topology.union_find import join, root
 
 
 class Section(NamedTuple):
@@ -30,9 +32,7 @@ class Section(NamedTuple):
 def stress_per_newton(mesh: Mesh, plane: Plane, crumb_mm: float) -> float:
     """The greatest stress at a plane, MPa for every newton that pushes the top of a piece above it sideways; infinite where a
     piece hangs on nothing. Pieces lower than crumb_mm are crumbs."""
-    side = np.cross(plane.normal, np.eye(3)[int(np.argmin(np.abs(plane.normal)))])
-    side = side / np.linalg.norm(side)
-    across = (mesh.vertices - mesh.vertices[0]) @ np.stack([side, np.cross(plane.normal, side)], axis=1)
+    across = (mesh.vertices - mesh.vertices[0]) @ frame_across(plane.normal).T
     return _most_stress(mesh.faces, plane.heights_mm(mesh.vertices), np.ascontiguousarray(across), crumb_mm)
 
 
@@ -71,8 +71,7 @@ def _find_shells(faces: Ints, heights: Floats) -> Ints:
         for k in range(3):
             v, w = faces[f, k], faces[f, k - 2]
             if shells[v] >= 0 and shells[w] >= 0:
-                a, b = root(shells, v), root(shells, w)
-                shells[max(a, b)] = min(a, b)
+                join(shells, v, w)
     for v in range(len(heights)):
         if shells[v] >= 0:
             shells[v] = root(shells, v)

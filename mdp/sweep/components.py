@@ -20,6 +20,7 @@ from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.sweep.facets import Rings
 from mdp.sweep.integrals import OffsetGrid, column_over
 from mdp.sweep.rays import TriangleTree, first_hit
+from mdp.topology.union_find import root, singletons
 
 UNKNOWN = -2
 
@@ -194,24 +195,6 @@ def join_columns(joins: Ints, grid: OffsetGrid) -> Ints:
 
 
 @part
-def singletons(size: int) -> Ints:
-    """The parents of a union-find in which nothing has been joined."""
-    parent = ints(size, 0)
-    for leaf in range(size):
-        parent[leaf] = leaf
-    return parent
-
-
-@inlined
-def root(parent: Ints, v: int) -> int:
-    """The leaf that stands for all that v has been joined with (union-find, paths halved)."""
-    while parent[v] != v:
-        parent[v] = parent[parent[v]]
-        v = parent[v]
-    return v
-
-
-@part
 def _stands_on(tree: MergeTree, v: int, vertices: Floats) -> bool:
     """Whether a neighbour further down stands on the platform too: then v's component stands there already."""
     starts, neighbours = tree.rings.starts, tree.rings.neighbours
@@ -230,24 +213,24 @@ def count_pieces(topology: Topology, view: View, pieces: Ints) -> None:
     leaves = number_leaves(tree)
     joins = join_leaves(tree, leaves, topology, view.cosines)
     size = len(leaves)
-    begun, grounded_at = ints(size, 0), ints(size, n + 1)
+    begun, standing_from = ints(size, 0), ints(size, n + 1)
     for leaf in range(size):
         begun[leaf] = min(column_over(heights[leaves[leaf]]), n)
     for k in range(len(topology.standing)):
         v = int(topology.standing[k])
         if not _stands_on(tree, v, topology.triangles.vertices):
             leaf = find_leaf(tree, v)
-            grounded_at[leaf] = min(grounded_at[leaf], min(column_over(heights[v]), n))
-    _count(begun, grounded_at, joins, join_columns(joins, view.grid), pieces[:n])
+            standing_from[leaf] = min(standing_from[leaf], min(column_over(heights[v]), n))
+    _count(begun, standing_from, joins, join_columns(joins, view.grid), pieces[:n])
 
 
 @part
-def _count(begun: Ints, grounded_at: Ints, joins: Ints, columns: Ints, pieces: Ints) -> None:
+def _count(begun: Ints, standing_from: Ints, joins: Ints, columns: Ints, pieces: Ints) -> None:
     """Join leaves in the order of the offsets and count the components that hang free."""
     size, n = len(begun), len(pieces)
-    parent, grounded = singletons(size), ints(size, 0)
+    parent, stands = singletons(size), ints(size, 0)
     birth, _ = counting_sort(begun, n + 2)
-    landing, landed = counting_sort(grounded_at, n + 2)
+    landing, landed = counting_sort(standing_from, n + 2)
     joining, joined = counting_sort(columns, n + 2)
     floating = 0
     for b in range(n):
@@ -256,13 +239,13 @@ def _count(begun: Ints, grounded_at: Ints, joins: Ints, columns: Ints, pieces: I
             k = joined[at]
             p, q = root(parent, joins[k, 0]), root(parent, joins[k, 1])
             if p != q:
-                if grounded[p] == 0 or grounded[q] == 0:
+                if stands[p] == 0 or stands[q] == 0:
                     floating -= 1
                 parent[max(p, q)] = min(p, q)
-                grounded[min(p, q)] = max(grounded[p], grounded[q])
+                stands[min(p, q)] = max(stands[p], stands[q])
         for at in range(landing[b], landing[b + 1]):
             here = root(parent, landed[at])
-            if grounded[here] == 0:
-                grounded[here] = 1
+            if stands[here] == 0:
+                stands[here] = 1
                 floating -= 1
         pieces[b] = floating

@@ -21,11 +21,10 @@ from mdp.sweep.components import (
     join_columns,
     join_leaves,
     number_leaves,
-    root,
-    singletons,
 )
 from mdp.sweep.facets import Rows
 from mdp.sweep.integrals import OffsetGrid, column_over
+from mdp.topology.union_find import root, singletons
 
 
 @part

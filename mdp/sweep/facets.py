@@ -52,7 +52,7 @@ class Rows(NamedTuple):
 class Facets:
     """Made once a solid. mesh has its vertices and faces in spatial order; risky (m,) tells which faces are risky upright,
     seam_weights (m,) how much a mm of rim counts on each, (0,): not at all; sources (m,) of which face of the model each is a
-    piece, (0,): not known; counted_mm2 (m,) what each counts where it needs support."""
+    piece, below 0: of none; counted_mm2 (m,) what each counts where it needs support."""
 
     mesh: Mesh
     risky: Mask
@@ -135,11 +135,12 @@ class Facets:
 def lay_out(
     mesh: Mesh,
     risky: Mask,
-    seam_weights: Floats | None = None,
-    sources: Ints | None = None,
-    counts: Floats | None = None,
+    seam_weights: Floats | None,
+    sources: Ints,
+    counts: Floats,
 ) -> Facets:
-    """The surface of a solid along a space-filling curve."""
+    """The surface of a solid along a space-filling curve; its values as in Facets, counts: how many times an area on each face
+    counts."""
     low = mesh.bounds_mm[0]
     scale = (2**GRID_BITS - 1) / max(float((mesh.bounds_mm[1] - low).max()), 1e-12)
     order = np.argsort(_morton(mesh.vertices, low, scale), kind="stable")
@@ -147,9 +148,8 @@ def lay_out(
     number[order] = np.arange(len(order), dtype=np.int32)
     turn = np.argsort(_morton(mesh.vertices[mesh.faces].mean(axis=1), low, scale), kind="stable")
     weights = np.zeros(0) if seam_weights is None else np.ascontiguousarray(seam_weights[turn])
-    origins = np.zeros(0, np.int32) if sources is None else np.ascontiguousarray(sources[turn])
     laid = Mesh(mesh.vertices[order], number[mesh.faces[turn]])
-    return Facets(laid, risky[turn], weights, origins, laid.areas_mm2 if counts is None else laid.areas_mm2 * counts[turn])
+    return Facets(laid, risky[turn], weights, np.ascontiguousarray(sources[turn]), laid.areas_mm2 * counts[turn])
 
 
 @kernel

@@ -55,8 +55,8 @@ class Areas(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What of the risky faces needs support along a direction: of which face of the model each is a piece (m,), below 0: a cut
-    laid it open, (0,): every risky face counts once; the classes (n,) of the model's faces, and how many times the
+    """What of the risky faces needs support along a direction: of which face of the model each is a piece (m,), below 0: of
+    none, it needs it; the classes (n,) of the model's faces, and how many times the
     unsupportable count."""
 
     sources: Ints
@@ -243,8 +243,8 @@ def _select(surface: Overhangs, needs: Needs, d: Floats, chosen: Ints, kind: Int
 @inlined
 def _class(needs: Needs, f: int) -> int:
     """What a face that is risky along the direction needs."""
-    sources = needs.sources
-    return int(needs.classes[sources[f]]) if len(sources) > 0 and sources[f] >= 0 else NEEDS_SUPPORT
+    source = needs.sources[f]
+    return int(needs.classes[source]) if source >= 0 else NEEDS_SUPPORT
 
 
 @vector_part

@@ -101,11 +101,17 @@ def integrate_rim(surface: Rims, grid: OffsetGrid, rim: Floats) -> None:
 
 
 class Rim(NamedTuple):
-    """The rim of one plane: its length on faces that count, that with their weights, and that of feather edges, mm."""
+    """The rim of one plane on faces that count: its length, that with their weights, and that of feather edges of less than 20
+    degrees, mm."""
 
-    length: float
-    weighted: float
-    feathered: float
+    length_mm: float
+    weighted_mm: float
+    feathered_mm: float
+
+    @property
+    def feather_share(self) -> float:
+        """Share of the rim that is a feather edge; 0 where nothing of it is seen."""
+        return self.feathered_mm / self.length_mm if self.length_mm > 0.0 else 0.0
 
 
 @kernel

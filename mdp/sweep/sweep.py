@@ -57,6 +57,17 @@ class Gains(NamedTuple):
     rim_mm: Floats
     hopeless_mm2: Floats
 
+    @property
+    def used(self) -> Mask:
+        """(k, n) which values are of offsets."""
+        used: Mask = np.arange(self.up_mm2.shape[1]) < self.columns[:, None]
+        return used
+
+    def offsets_mm(self, step_mm: float) -> Floats:
+        """(k, n) the offsets."""
+        offsets: Floats = (self.first[:, None] + np.arange(self.up_mm2.shape[1])) * np.float64(step_mm)
+        return offsets
+
 
 class Sweep(NamedTuple):
     """Rows and columns as in Gains.
@@ -98,27 +109,34 @@ class Remainder:
     feather: float = 0.0
     pieces: ModelPieces | None = None
 
+    @property
+    def sources(self) -> Ints:
+        """(m,) of which face of the model each is a piece, below 0: of none, it needs support wherever it is risky."""
+        return np.full(len(self.risky), -1, np.int32) if self.pieces is None else self.pieces.sources
+
+    @property
+    def counts(self) -> Floats:
+        """(m,) how many times an area on each counts that needs support."""
+        return np.ones(len(self.risky)) if self.pieces is None or self.pieces.counts is None else self.pieces.counts
+
+    @property
+    def weight(self) -> float:
+        """How many times an area counts that is over air."""
+        return 1.0 if self.pieces is None else self.pieces.need.weight
+
+    def classes(self, directions: Floats) -> Classes:
+        """(k, n) what the faces of the model need along (k, 3) directions."""
+        return np.zeros((len(directions), 0), np.uint8) if self.pieces is None else self.pieces.need.along(directions)
+
     @cached_property
     def facets(self) -> Facets:
         """The surface laid out for sweeping."""
-        pieces = self.pieces
-        if pieces is None:
-            return lay_out(self.mesh, self.risky, self.seam_weights)
-        return lay_out(self.mesh, self.risky, self.seam_weights, pieces.sources, pieces.counts)
+        return lay_out(self.mesh, self.risky, self.seam_weights, self.sources, self.counts)
 
     @cached_property
     def risky_mm2(self) -> float:
         """What is risky upright, as it counts."""
-        areas = self.mesh.areas_mm2
-        counts = None if self.pieces is None else self.pieces.counts
-        return float((areas if counts is None else areas * counts)[self.risky].sum())
-
-    def needs(self, directions: Floats) -> NeedsTable:
-        """What the risky faces need along (k, 3) directions."""
-        if self.pieces is None:
-            return NeedsTable(self.facets.sources, np.zeros((len(directions), 0), np.uint8), 1.0)
-        need = self.pieces.need
-        return NeedsTable(self.facets.sources, need.along(directions), need.weight)
+        return float((self.mesh.areas_mm2 * self.counts)[self.risky].sum())
 
     @cached_property
     def triangles(self) -> TriangleTree:
@@ -180,9 +198,8 @@ def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below:
     columns = np.zeros((2, shape[0]), np.int32)
     swept = Gains(columns[0], columns[1], *(np.zeros(shape) for _ in range(4)))
     rims = Rims(facets.corners, facets.normals, facets.mesh.areas_mm2, facets.seam_weights, remainder.feather)
-    in_threads(
-        _gains, shape[0], Scars(surface, remainder.needs(directions), rims), np.ascontiguousarray(directions), step_mm, swept
-    )
+    needs = NeedsTable(facets.sources, remainder.classes(directions), remainder.weight)
+    in_threads(_gains, shape[0], Scars(surface, needs, rims), np.ascontiguousarray(directions), step_mm, swept)
     return swept
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mdp.kernels.arrays import flags, longs
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints
-from slicer.geometry.halfedges import opposites
+from mdp.topology.linked_faces import opposites
 from slicer.geometry.segments import Segment, orientation
 
 Indices = NDArray[np.int64]

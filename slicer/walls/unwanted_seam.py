@@ -3,8 +3,7 @@
 import numpy as np
 
 from mdp.decomposition import Part
-from mdp.formats.surface import Indices
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Floats, Indices, Mesh
 from mdp.overhang import Mask
 from mdp.zone import Zone, touched
 

@@ -10,7 +10,7 @@ import pytest
 from machine.app.cli import main
 from mdp.plans.plan_file import PlanFile, PlannedPart
 from mdp.save import stl
-from mdp.search.search import cut_by_plan
+from mdp.search.by_plan import cut_by_plan
 from profiles.profile import load
 from tests.machine.browser import Browser
 from tests.machine.workbench import QUICK, Running

@@ -4,9 +4,8 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
-from mdp.colour import NO_COLOUR
 from mdp.cut import solid_of
-from mdp.mesh import Mesh
+from mdp.mesh import NO_COLOUR, Mesh
 from mdp.overhang import risky_upright
 from mdp.pedestal import on_pedestal
 from tests import shapes

@@ -388,3 +388,21 @@ def test_a_machine_with_three_axes_needs_no_rotary_axis() -> None:
 
 def test_a_machine_without_heated_bed_takes_any_material() -> None:
     assert load("open5x_voron0", "abs").machine.bed_limit_c == 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "nothing"),
+    [
+        (("search.seam_mm=0",), {"cut_mm2": 0.0, "second_mm2": 0.0, "hidden_seam_share": 1.0}),
+        (("search.objective=risky",), {"seam_mm": 0.0, "cut_mm2": 0.0, "second_mm2": 0.0, "nozzle_load_n": 0.0}),
+        (("search.method=published",), {"objective": "risky", "seam_mm": 0.0, "least_volume_share": 0.1, "nozzle_load_n": 0.0}),
+        ((), {}),
+    ],
+)
+def test_what_means_nothing_beside_other_settings_of_a_search_is_nothing(
+    given: tuple[str, ...], nothing: dict[str, object]
+) -> None:
+    search = load(settings=given).search
+    assert search.effective.model_dump().items() >= nothing.items()
+    assert search.effective.effective == search.effective
+    assert not given or search.effective != search

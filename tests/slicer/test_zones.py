@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mdp.decomposition import Part
-from mdp.grown import Grown
 from mdp.mesh import Floats
-from mdp.zone import AnyZone, Marked, Zone
+from mdp.zone import AnyZone, Grown, Marked, Zone
 from profiles.frozen import Vector
 from slicer.estimate.sampled_part import sample_part
 from slicer.estimate.shell import NOTHING

@@ -12,10 +12,10 @@ from machine.program import Alternative, Program
 from machine.quantities import duration, filament_g
 from mdp.cost.model_need import needing_upright
 from mdp.decomposition import Decomposition, Part
+from mdp.directions.orientation import Orientation, best_orientation, in_words, standing_still
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM
 from mdp.pose import level, rotation
-from mdp.search.orientation import Orientation, best_orientation, in_words, standing_still
 from profiles.errors import UserError
 from profiles.profile import Profile
 from slicer.paths import Kind

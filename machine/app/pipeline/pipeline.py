@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -27,14 +28,15 @@ from machine.planning.purge import has_purge
 from machine.planning.stops import Stop
 from machine.program import Program
 from mdp.decomposition import Decomposition
+from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.ranking.ranker import ranker_named
 from mdp.read import locate, read_mesh
+from mdp.search.by_plan import cut_by_plan
 from mdp.search.front import price_of_second_mm2
 from mdp.search.laying import OtherWay, find_better_way, lay_down
-from mdp.search.orientation import standing_still
-from mdp.search.search import Progress, cut_by_plan, decompose
+from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.profile import Profile
 from slicer.parts import OnProgress, SlicingProgress, slice_parts
@@ -116,19 +118,18 @@ class _Search:
     def search(self, mesh: Mesh) -> Decomposition:
         """The parts of a mesh."""
         request, given, cuts = self._request, self._given, self._request.cuts
+        asked: dict[str, Any] = {"ranker": request.ranker, "parts": cuts.parts, "price": self._price}
         if given is not None and cuts.plan is not None:
-            return cut_by_plan(mesh, request.name, request.profile, given, request.ranker, cuts.parts, self._price)
+            return cut_by_plan(mesh, request.name, request.profile, given, **asked)
         record: list[bytes] = []
         decomposition = decompose(
             mesh,
             request.name,
             request.profile,
-            request.ranker,
-            self._show,
-            None if request.outputs.record is None else record.append,
-            given,
-            cuts.parts,
-            self._price,
+            on_stage=self._show,
+            on_record=None if request.outputs.record is None else record.append,
+            by_hand=given,
+            **asked,
         )
         self._records.append((decomposition, record))
         return decomposition

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from machine.app.terminal.report import estimates, table
 from machine.quantities import minutes
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import Orientation, in_words, side_in_words
 from mdp.search.front import ASKED, BY_PLAN, choose, price_of_second_mm2
 from mdp.search.laying import OtherWay
-from mdp.search.orientation import Orientation, in_words, side_in_words
 from profiles.profile import Profile
 
 

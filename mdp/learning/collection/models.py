@@ -8,13 +8,13 @@ from zipfile import BadZipFile
 import numpy as np
 
 from mdp.cut import simplify
+from mdp.directions.orientation import resting_orientations, standing_still
 from mdp.formats.readers import READERS
 from mdp.formats.surface import check_surface
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import UP
 from mdp.read import read_mesh
 from mdp.repair.repair import repair
-from mdp.search.orientation import resting_orientations, standing_still
 from profiles.errors import LearningError, MeshError
 
 ARRAYS = ".npz"
@@ -36,9 +36,9 @@ def model_files(folder: Path, only: str = "", every: int = 1) -> list[Path]:
     if not files:
         words = f" with {only!r} in its name" if only else ""
         raise LearningError(f"folder {folder}: holds no model{words}; {', '.join(kinds)} are read")
-    for file, other in pairwise(files):
-        if name_of(file) == name_of(other):
-            raise LearningError(f"folder {folder}: {file.name} and {other.name} would have the same records; rename one")
+    for file, next_file in pairwise(files):
+        if name_of(file) == name_of(next_file):
+            raise LearningError(f"folder {folder}: {file.name} and {next_file.name} would have the same records; rename one")
     return files
 
 
@@ -68,11 +68,11 @@ def coarser(mesh: Mesh, most_faces: int) -> Mesh:
     if len(mesh.faces) <= most_faces:
         return mesh
     diagonal_mm = float(np.linalg.norm(mesh.bounds_mm[1] - mesh.bounds_mm[0]))
-    share, made = FINEST_MOVED, mesh
-    while len(made.faces) > most_faces and share <= MOST_MOVED:
-        made = simplify(mesh, share * diagonal_mm)
+    share, simpler = FINEST_MOVED, mesh
+    while len(simpler.faces) > most_faces and share <= MOST_MOVED:
+        simpler = simplify(mesh, share * diagonal_mm)
         share *= 2.0
-    return standing_still(made, np.eye(3))
+    return standing_still(simpler, np.eye(3))
 
 
 def oriented(mesh: Mesh, number: int, angle_deg: float) -> Mesh:
@@ -89,14 +89,14 @@ def oriented(mesh: Mesh, number: int, angle_deg: float) -> Mesh:
 
 def other_sides(mesh: Mesh, angle_deg: float) -> list[Floats]:
     """Rotations (3, 3) onto the sides that a mesh can rest on beside the present one, the most different first."""
-    left = [each.rotation for each in resting_orientations(mesh, angle_deg) if each.risky_mm2 > 0.0]
+    left = [orientation.rotation for orientation in resting_orientations(mesh, angle_deg) if orientation.risky_mm2 > 0.0]
     directions, sides = [UP], list[Floats]()
     while left:
         nearest = [max(float(direction @ rotation[2]) for direction in directions) for rotation in left]
-        place = int(np.argmin(np.round(nearest, 6)))
-        if nearest[place] > cos(radians(SIDES_APART_DEG)):
+        farthest = int(np.argmin(np.round(nearest, 6)))
+        if nearest[farthest] > cos(radians(SIDES_APART_DEG)):
             break
-        sides.append(left.pop(place))
+        sides.append(left.pop(farthest))
         directions.append(sides[-1][2])
     return sides
 

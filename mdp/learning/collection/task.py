@@ -67,17 +67,17 @@ def run(search: Search, path: Path, settings: Settings) -> Result:
             row = replace(row, faces_after=len(mesh.faces))
         mesh = oriented(mesh, search.orientation, profile.process.self_supporting_angle_deg)
         records: list[bytes] = []
-        found = decompose(mesh, search.id, profile, on_record=records.append)
+        decomposition = decompose(mesh, search.id, profile, on_record=records.append)
     except UserError as error:
         return Result(replace(row, excluded=f"{FAILED}{error}", seconds=round(process_time() - began, 2)))
     limit_s = settings.time_limit_s
-    late = int(limit_s is not None and found.search_s >= limit_s)
-    row = replace(row, candidates=found.candidates_evaluated, late=late, seconds=round(process_time() - began, 2))
+    late = int(limit_s is not None and decomposition.search_s >= limit_s)
+    row = replace(row, candidates=decomposition.candidates_evaluated, late=late, seconds=round(process_time() - began, 2))
     with np.load(io.BytesIO(records[0])) as record:
         outcome, stage, risky = float(record["node_outcome"][0]), record["stage"], float(record["risky_mm2"]) > 0.0
     if len(stage) == 0:
         return Result(replace(row, excluded=NO_CUT if risky else NO_RISK))
     lists = len(np.unique(stage))
     length = round(len(stage) / lists, 2)
-    row = replace(row, stages=found.rounds, lists=lists, mean_list_length=length, outcome=round(outcome, 6))
+    row = replace(row, stages=decomposition.rounds, lists=lists, mean_list_length=length, outcome=round(outcome, 6))
     return Result(row, records[0])

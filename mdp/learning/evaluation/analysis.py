@@ -22,21 +22,21 @@ def importance(scores: Scores, columns: Sequence[str], lists: Sequence[RatedList
 
 def mean_ndcg(scores: Scores, lists: Sequence[RatedList]) -> float:
     """Mean NDCG@5."""
-    return float(np.mean([ndcg(scores(one), one.ratings, CUT) for one in lists]))
+    return float(np.mean([ndcg(scores(rated), rated.ratings, CUT) for rated in lists]))
 
 
 def shuffled(name: str, lists: Sequence[RatedList], rng: np.random.Generator) -> list[RatedList]:
     """The lists with one feature dealt out anew among the candidates of all of them."""
-    features = np.vstack([one.features for one in lists])
+    features = np.vstack([rated.features for rated in lists])
     column = lists[0].columns.index(name)
     features[:, column] = rng.permutation(features[:, column])
-    parts = np.split(features, np.cumsum([len(one.features) for one in lists])[:-1])
-    return [replace(one, features=part) for one, part in zip(lists, parts, strict=True)]
+    parts = np.split(features, np.cumsum([len(rated.features) for rated in lists])[:-1])
+    return [replace(rated, features=part) for rated, part in zip(lists, parts, strict=True)]
 
 
 def correlation(columns: Sequence[str], lists: Sequence[RatedList]) -> Floats:
     """(k, k) Pearson correlation of the named features over all candidates; 0 with one that never changes."""
-    rows = np.vstack([one.table(columns) for one in lists]).astype(np.float64)
+    rows = np.vstack([rated.table(columns) for rated in lists]).astype(np.float64)
     spread = rows - rows.mean(axis=0)
     length = np.sqrt((spread**2).sum(axis=0))
     products = np.outer(length, length)

@@ -69,19 +69,21 @@ def _search(row: dict[str, str]) -> Search:
 
 def compare(searches: Sequence[Search]) -> list[Comparison]:
     """A comparison for every method and its settings, in the order they come; none where no model was searched at all widths."""
-    kinds = dict.fromkeys((one.method, one.settings) for one in searches)
-    made = [_comparison(kind, [one for one in searches if (one.method, one.settings) == kind]) for kind in kinds]
-    return [one for one in made if one.models > 0]
+    kinds = dict.fromkeys((search.method, search.settings) for search in searches)
+    of_kinds = [(kind, [search for search in searches if (search.method, search.settings) == kind]) for kind in kinds]
+    comparisons = [_comparison(kind, of_kind) for kind, of_kind in of_kinds]
+    return [comparison for comparison in comparisons if comparison.models > 0]
 
 
 def _comparison(kind: tuple[str, str], searches: Sequence[Search]) -> Comparison:
-    known = {(one.ranker, one.width, one.mesh): one for one in searches}
-    wanted = sorted({(one.ranker, one.width) for one in searches}, key=lambda each: (each[0] != CLASSIC, *each))
-    meshes = [mesh for mesh in sorted({one.mesh for one in searches}) if all((*each, mesh) in known for each in wanted)]
+    known = {(search.ranker, search.width, search.mesh): search for search in searches}
+    wanted = sorted({(search.ranker, search.width) for search in searches}, key=lambda pair: (pair[0] != CLASSIC, *pair))
+    meshes = [mesh for mesh in sorted({search.mesh for search in searches}) if all((*pair, mesh) in known for pair in wanted)]
     series = []
     for ranker in dict.fromkeys(ranker for ranker, _ in wanted) if meshes else ():
-        widths = tuple(width for each, width in wanted if each == ranker)
+        widths = tuple(width for name, width in wanted if name == ranker)
         of_width = [[known[ranker, width, mesh] for mesh in meshes] for width in widths]
-        share = tuple(float(np.mean([one.share for one in each])) for each in of_width)
-        series.append(Series(ranker, widths, share, tuple(float(np.mean([one.core_s for one in each])) for each in of_width)))
+        share = tuple(float(np.mean([search.share for search in searched])) for searched in of_width)
+        core_s = tuple(float(np.mean([search.core_s for search in searched])) for searched in of_width)
+        series.append(Series(ranker, widths, share, core_s))
     return Comparison(*kind, len(meshes), tuple(series))

@@ -40,16 +40,16 @@ Columns = Sequence[str]
 Fit = Callable[[Lists, Lists, Columns], Scores]  # lists to train with and to validate with, and what is learnt from
 
 
-def random_order(one: RatedList) -> Floats:
+def random_order(rated: RatedList) -> Floats:
     """Scores drawn anew for every list, the same whenever it comes again."""
-    return np.random.default_rng(crc32(one.features.tobytes())).random(len(one.ratings))
+    return np.random.default_rng(crc32(rated.features.tobytes())).random(len(rated.ratings))
 
 
 def trade_off(weight: float, lost: str = "M6") -> Scores:
     """M2 - weight M6: what is saved so far less what is lost for ever; lost: another feature in the place of M6."""
 
-    def of_list(one: RatedList) -> Floats:
-        gain, loss = one.table(("M2", lost)).T.astype(np.float64)
+    def of_list(rated: RatedList) -> Floats:
+        gain, loss = rated.table(("M2", lost)).T.astype(np.float64)
         scores: Floats = gain - weight * loss
         return scores
 
@@ -59,7 +59,7 @@ def trade_off(weight: float, lost: str = "M6") -> Scores:
 def fit_trade_off(training: Lists, validation: Lists, columns: Columns) -> Scores:
     """The trade-off with the highest NDCG on the training lists."""
     del validation, columns
-    means = [np.mean([ndcg(trade_off(weight)(one), one.ratings, FITTED_AT) for one in training]) for weight in WEIGHTS]
+    means = [np.mean([ndcg(trade_off(weight)(rated), rated.ratings, FITTED_AT) for rated in training]) for weight in WEIGHTS]
     return trade_off(float(WEIGHTS[int(np.argmax(means))]))
 
 
@@ -68,7 +68,7 @@ def fit_least_regret(lost: str) -> Fit:
 
     def fit(training: Lists, validation: Lists, columns: Columns) -> Scores:
         del validation, columns
-        means = [np.mean([regret(1)(trade_off(weight, lost)(one), one) for one in training]) for weight in WEIGHTS]
+        means = [np.mean([regret(1)(trade_off(weight, lost)(rated), rated) for rated in training]) for weight in WEIGHTS]
         return trade_off(float(WEIGHTS[int(np.argmin(means))]), lost)
 
     return fit
@@ -81,10 +81,10 @@ def fit_xgboost(objective: str) -> Fit:
         del validation
         import xgboost
 
-        rows = xgboost.DMatrix(np.vstack([_scaled(one, columns) for one in training]), label=_joined(training, _ratings))
-        rows.set_group([len(one.ratings) for one in training])
+        rows = xgboost.DMatrix(np.vstack([_scaled(rated, columns) for rated in training]), label=_joined(training, _ratings))
+        rows.set_group([len(rated.ratings) for rated in training])
         booster = xgboost.train({**XGBOOST, **XGBOOST_PAIRS, "objective": objective}, rows, XGBOOST_ROUNDS)
-        return lambda one: booster.inplace_predict(_scaled(one, columns)).astype(np.float64)
+        return lambda rated: booster.inplace_predict(_scaled(rated, columns)).astype(np.float64)
 
     return fit
 
@@ -96,8 +96,8 @@ def fit_lambdamart(labels: Callable[[RatedList], Ints]) -> Fit:
         import lightgbm
 
         def rows(lists: Lists, reference: object = None) -> object:
-            table = np.vstack([_scaled_and_raw(one, columns) for one in lists])
-            groups = [len(one.ratings) for one in lists]
+            table = np.vstack([_scaled_and_raw(rated, columns) for rated in lists])
+            groups = [len(rated.ratings) for rated in lists]
             return lightgbm.Dataset(table, label=_joined(lists, labels), group=groups, reference=reference)
 
         train = rows(training)
@@ -108,31 +108,31 @@ def fit_lambdamart(labels: Callable[[RatedList], Ints]) -> Fit:
             valid_sets=[rows(validation, train)],
             callbacks=[lightgbm.early_stopping(LIGHTGBM_PATIENCE, verbose=False)],
         )
-        return lambda one: np.asarray(booster.predict(_scaled_and_raw(one, columns), num_threads=1), dtype=np.float64)
+        return lambda rated: np.asarray(booster.predict(_scaled_and_raw(rated, columns), num_threads=1), dtype=np.float64)
 
     return fit
 
 
-def grades(one: RatedList) -> Ints:
+def grades(rated: RatedList) -> Ints:
     """(n,) 5 for the best candidates, less for more regret, as GRADES says."""
-    grade: Ints = (one.regrets[:, np.newaxis] <= GRADES).sum(axis=1).astype(np.int32)
+    grade: Ints = (rated.regrets[:, np.newaxis] <= GRADES).sum(axis=1).astype(np.int32)
     return grade
 
 
-def _ratings(one: RatedList) -> Ints:
-    return one.ratings
+def _ratings(rated: RatedList) -> Ints:
+    return rated.ratings
 
 
 def _joined(lists: Lists, labels: Callable[[RatedList], Ints]) -> Ints:
-    return np.concatenate([labels(one) for one in lists])
+    return np.concatenate([labels(rated) for rated in lists])
 
 
-def _scaled(one: RatedList, columns: Columns) -> Singles:
-    return scale(one.table(columns))
+def _scaled(rated: RatedList, columns: Columns) -> Singles:
+    return scale(rated.table(columns))
 
 
-def _scaled_and_raw(one: RatedList, columns: Columns) -> Singles:
-    return np.hstack([_scaled(one, columns), one.table(columns)])
+def _scaled_and_raw(rated: RatedList, columns: Columns) -> Singles:
+    return np.hstack([_scaled(rated, columns), rated.table(columns)])
 
 
 def fit_ranknet(training: Lists, validation: Lists, columns: Columns) -> Scores:

@@ -33,13 +33,13 @@ def read_ranker(file: Path) -> Exported:
         raise LearningError(f"ranker {file}: cannot be read ({error.strerror})") from None
     except Exception as error:  # noqa: BLE001 - onnx and protobuf have errors of many kinds
         raise LearningError(f"ranker {file}: is no ONNX file ({str(error).splitlines()[0]})") from None
-    about = {one.key: one.value for one in model.metadata_props}
-    if "features" not in about or [one.name for one in model.graph.input] != [INPUT] or OUTPUT not in graph.output_names:
+    about = {entry.key: entry.value for entry in model.metadata_props}
+    if "features" not in about or [entry.name for entry in model.graph.input] != [INPUT] or OUTPUT not in graph.output_names:
         raise LearningError(f"ranker {file}: is an ONNX file of something else; input {INPUT!r}, output {OUTPUT!r} are needed")
     columns = tuple(about["features"].split(","))
 
-    def scores(one: RatedList) -> Floats:
-        (given,) = graph.run([OUTPUT], {INPUT: one.table(columns)})
+    def scores(rated: RatedList) -> Floats:
+        (given,) = graph.run([OUTPUT], {INPUT: rated.table(columns)})
         return np.asarray(given, dtype=np.float64)
 
     return Exported(columns, about.get("kind", file.stem), scores)

@@ -74,13 +74,13 @@ class Objective:
 
     def pad(self, lists: Sequence[RatedList], columns: Sequence[str]) -> Padded:
         """Lists side by side."""
-        targets = [self.targets(one) for one in lists]
+        targets = [self.targets(rated) for rated in lists]
         return Padded(
-            _beside([self.given(one, columns) for one in lists]),
+            _beside([self.given(rated, columns) for rated in lists]),
             _beside(targets),
-            pad_sequence([torch.ones(len(each), dtype=torch.bool) for each in targets], batch_first=True),
+            pad_sequence([torch.ones(len(array), dtype=torch.bool) for array in targets], batch_first=True),
         )
 
 
 def _beside(arrays: Sequence[NDArray[Any]]) -> torch.Tensor:
-    return pad_sequence([torch.from_numpy(each) for each in arrays], batch_first=True)
+    return pad_sequence([torch.from_numpy(array) for array in arrays], batch_first=True)

@@ -99,8 +99,8 @@ def contrasts(columns: Sequence[str]) -> Singles:
 def scores(networks: Sequence[Network], columns: Sequence[str]) -> Scores:
     """The mean of what networks give the candidates of a list."""
 
-    def of_list(one: RatedList) -> Floats:
-        features = torch.from_numpy(one.table(columns)).unsqueeze(0)
+    def of_list(rated: RatedList) -> Floats:
+        features = torch.from_numpy(rated.table(columns)).unsqueeze(0)
         present = torch.ones(features.shape[:2], dtype=torch.bool)
         with torch.no_grad():
             given = torch.stack([network(features, present)[0] for network in networks])
@@ -144,8 +144,8 @@ def _figures(given: Floats, regrets: Targets) -> Figures:
 
 
 OBJECTIVE = Objective(
-    given=lambda one, columns: one.table(columns),
-    targets=lambda one: one.regrets,
+    given=lambda rated, columns: rated.table(columns),
+    targets=lambda rated: rated.regrets,
     loss=regret_loss,
     figures=_figures,
     measures=tuple(f"1 - regret@{first}" for first in FIRST),

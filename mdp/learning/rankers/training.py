@@ -87,7 +87,7 @@ def train(
     LearningError for no lists, and for a checkpoint of another training or one that cannot be written.
     """
     torch.set_num_threads(1)
-    training, validation = ([one for one in side if one.teaches] for side in lists)
+    training, validation = ([rated for rated in side if rated.teaches] for side in lists)
     for side, name in ((training, "train"), (validation, "validate")):
         if not side:
             raise LearningError(f"no list to {name} with: record more models, of more repositories and folders")
@@ -133,14 +133,15 @@ def _validate(network: torch.nn.Module, lists: Padded, objective: Objective) -> 
     with torch.no_grad():
         scores = objective.score(network, lists.features, lists.present).double().numpy()
     targets, present = lists.targets.numpy(), lists.present.numpy()
-    each = [objective.figures(scores[row][here], targets[row][here]) for row, here in enumerate(present)]
-    return tuple(sum(values) / len(each) for values in zip(*each, strict=True))
+    figures = [objective.figures(scores[row][here], targets[row][here]) for row, here in enumerate(present)]
+    return tuple(sum(values) / len(figures) for values in zip(*figures, strict=True))
 
 
 def _key(network: torch.nn.Module, schedule: Schedule, *lists: Padded) -> str:
     """What tells a training from others: its network as it starts, its schedule but for the end, its lists."""
     digest = sha256(repr((schedule.loss, schedule.batch, schedule.rate, schedule.clip, schedule.decay, schedule.seed)).encode())
-    tensors = [*network.state_dict().values(), *(tensor for one in lists for tensor in (one.features, one.targets, one.present))]
+    of_lists = (tensor for padded in lists for tensor in (padded.features, padded.targets, padded.present))
+    tensors = [*network.state_dict().values(), *of_lists]
     for tensor in tensors:
         digest.update(repr(tensor.shape).encode() + tensor.numpy().tobytes())
     return digest.hexdigest()

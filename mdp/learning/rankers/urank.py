@@ -78,7 +78,7 @@ def _figures(scores: Floats, ratings: Targets) -> Figures:
 
 def _objective(loss: Loss) -> Objective:
     measures = tuple(f"NDCG@{cut}" for cut in CUTS)
-    return Objective(lambda one, columns: scale(one.table(columns)), lambda one: one.ratings, loss, _figures, measures)
+    return Objective(lambda rated, columns: scale(rated.table(columns)), lambda rated: rated.ratings, loss, _figures, measures)
 
 
 OBJECTIVES = {"urank": _objective(urank_loss), "ranknet": _objective(ranknet_loss)}
@@ -87,9 +87,9 @@ OBJECTIVES = {"urank": _objective(urank_loss), "ranknet": _objective(ranknet_los
 def scores(network: torch.nn.Module, columns: Sequence[str]) -> Scores:
     """What a network gives the candidates of a list from the named features."""
 
-    def of_list(one: RatedList) -> Floats:
+    def of_list(rated: RatedList) -> Floats:
         with torch.no_grad():
-            given: Floats = network(torch.from_numpy(scale(one.table(columns)))).numpy().astype(np.float64)
+            given: Floats = network(torch.from_numpy(scale(rated.table(columns)))).numpy().astype(np.float64)
         return given
 
     return of_list

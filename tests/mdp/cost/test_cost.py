@@ -6,7 +6,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.cost.cost import CostTerms, Seam, SeamPlaces, measure_seam
+from mdp.cost.cost import CostTerms, SeamPlaces, measure_seam
 from mdp.cost.forecast import Surface
 from mdp.cost.model_surface import ModelSurface
 from mdp.cut import Solid, below, mesh_of, solid_of
@@ -15,6 +15,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
 from mdp.plane import Plane
 from mdp.search.search import decompose
+from mdp.sweep.rims import Rim
 from mdp.sweep.sweep import Gains, Remainder, gains
 from profiles.profile import load
 from tests import shapes
@@ -43,8 +44,8 @@ def _places(mesh: Mesh, hidden_share: float = 1.0) -> tuple[SeamPlaces, Solid]:
     return SeamPlaces.of(ModelSurface.of(mesh, solid), solid, hidden_share), solid
 
 
-def _seam(places: SeamPlaces, solid: Solid, plane: Plane, feather: float = 0.0) -> Seam:
-    return measure_seam(mesh_of(solid), places.weights(solid), plane, feather)
+def _seam(places: SeamPlaces, solid: Solid, plane: Plane, feather: float = 0.0) -> Rim:
+    return measure_seam(mesh_of(solid), places.weights(places.surface.piece(solid)), plane, feather)
 
 
 def _section_mm(mesh: Mesh, plane: Plane) -> float:
@@ -99,7 +100,7 @@ def test_a_seam_along_a_crease_counts_less_than_beside_it() -> None:
 def test_the_seam_of_one_plane_is_the_sweep_s_rim(seed: int, lean: tuple[float, float], offset_mm: float) -> None:
     mesh, plane = random_solid(seed), Plane(_direction(lean), offset_mm)
     places, solid = _places(mesh, hidden_share=0.4)
-    remainder = _remainder(mesh_of(solid), places.weights(solid), 0.5)
+    remainder = _remainder(mesh_of(solid), places.weights(places.surface.piece(solid)), 0.5)
     swept = gains(remainder, plane.normal[None], offset_mm, threshold(ANGLE_DEG))
     column = 1 - int(swept.first[0])
     if 0 <= column < swept.columns[0]:
@@ -112,7 +113,7 @@ def test_the_forecast_counts_every_seam_as_it_is_after_cutting(leans: list[tuple
     places, rest = _places(shapes.branch(), hidden_share=0.4)
     mesh, terms = mesh_of(rest), CostTerms(ANGLE_DEG, False, seam_mm=0.6, feather=0.5)
     planes = [Plane(_direction(lean), offset_mm) for lean, offset_mm in leans]
-    with_seams = Surface.of(_remainder(mesh, places.weights(rest), 0.5), terms).left_mm2(planes)
+    with_seams = Surface.of(_remainder(mesh, places.weights(places.surface.piece(rest)), 0.5), terms).left_mm2(planes)
     without = Surface.of(Remainder(mesh, risky_upright(mesh, ANGLE_DEG)), CostTerms(ANGLE_DEG, False)).left_mm2(planes)
     seams_mm = 0.0
     for plane in planes:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from mdp.cost.forecast import Surface
 from mdp.cost.model_need import needing_upright
-from mdp.cut import above, mesh_of, solid_of
+from mdp.cut import above
 from mdp.mesh import Mesh
 from mdp.overhang import facing_down, risky_upright, threshold
 from mdp.plane import Plane
@@ -16,7 +16,7 @@ from mdp.search.front import front_row
 from mdp.search.parts import make_parts
 from mdp.search.problem import Problem
 from mdp.support_need.need import ModelPieces, SupportNeed
-from mdp.support_need.patches import CARRIES_ITSELF, UNSUPPORTABLE
+from mdp.support_need.patches import UNSUPPORTABLE
 from mdp.sweep.sweep import Remainder, gains
 from profiles.profile import load
 from tests.mdp.solids import area_vectors_above, random_direction, random_solid
@@ -54,26 +54,28 @@ def test_forecast_front_and_parts_agree_on_what_a_cut_leaves(lean: float) -> Non
     plane = Plane(np.array([lean, 0.0, np.sqrt(1 - lean * lean)]), 18.4)
     node = problem.cut(problem.root, plane)
     assert node is not None
-    row, parts = front_row(node, problem.terms), make_parts(node, problem.machine, PROFILE)
+    row, parts = front_row(node), make_parts(problem, node)
     assert row.support_area_mm2 == pytest.approx(sum(part.risky_area_mm2 for part in parts), rel=1e-6)
     upright_mm2 = sum(part.mesh.areas_mm2[part.needing_upright].sum() for part in parts if part.needing_upright is not None)
     assert upright_mm2 == pytest.approx(problem.root.risky_mm2, rel=1e-6)
     assert Surface.of(problem.root.remainder, problem.terms).left_mm2([plane]) == pytest.approx(node.cost_mm2, rel=1e-6)
 
 
-def test_what_is_over_air_costs_more_than_its_area() -> None:
-    problem = Problem(cap_on_a_stem(), PROFILE)
+def test_what_is_over_air_costs_so_many_times_its_area_and_counts_once_in_what_needs_support() -> None:
     plane = Plane(np.array([0.5, 0.0, np.sqrt(0.75)]), 12.4)
-    node = problem.cut(problem.root, plane)
-    assert node is not None
-    part, pieces = mesh_of(above(solid_of(cap_on_a_stem()), plane)), problem.terms.need.pieces(node.cuts[0].solid)
-    risky, classes = facing_down(part, plane.normal, 45.0), pieces.along(plane.normal)
-    over_air_mm2 = part.areas_mm2[risky & (classes == UNSUPPORTABLE)].sum()
-    needing_mm2 = part.areas_mm2[risky & (classes != CARRIES_ITSELF) & (pieces.sources >= 0)].sum()
-    row = front_row(node, problem.terms)
-    seams_mm2 = row.cost_mm2 - row.support_area_mm2 - (WEIGHT - 1.0) * over_air_mm2
-    assert 0.0 < over_air_mm2 < needing_mm2
-    assert seams_mm2 == pytest.approx(problem.terms.seam_mm * row.seam_mm, rel=0.5)
+    rows = []
+    for weight in (1.0, 5.0):
+        problem = Problem(cap_on_a_stem(), load(settings=["search.clearance=false", f"search.unsupportable_weight={weight}"]))
+        node = problem.cut(problem.root, plane)
+        assert node is not None
+        assert problem.terms.need is not None
+        rows.append(front_row(node))
+    part = node.places.surface.piece(above(node.cuts[0].whole, plane))
+    classes = problem.terms.need.pieces(part).along(plane.normal)
+    over_air_mm2 = part.mesh.areas_mm2[facing_down(part.mesh, plane.normal, 45.0) & (classes == UNSUPPORTABLE)].sum()
+    assert over_air_mm2 > 50.0
+    assert rows[1].cost_mm2 - rows[0].cost_mm2 == pytest.approx(4.0 * over_air_mm2)
+    assert rows[1].support_area_mm2 == pytest.approx(rows[0].support_area_mm2)
 
 
 def test_the_paper_s_terms_count_every_face() -> None:

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface
-from mdp.cut import above, below, mesh_of, solid_of
+from mdp.cut import above, below, solid_of
 from mdp.plane import Plane
 from tests import shapes
 
@@ -22,7 +22,8 @@ def test_a_piece_lies_on_its_source_and_what_has_none_lies_in_a_cut(turn: float,
     piece = above(below(solid, planes[0]), planes[1])
     if piece.is_empty():
         return
-    sources, left = surface.sources(piece), mesh_of(piece)
+    traced = surface.piece(piece)
+    sources, left = traced.sources, traced.mesh
     of_model = sources != MADE_BY_A_CUT
     assert np.einsum("ij,ij->i", left.normals[of_model], mesh.normals[sources[of_model]]).min() > 1.0 - 1e-9
     corners = left.vertices[left.faces]
@@ -35,7 +36,7 @@ def test_a_piece_lies_on_its_source_and_what_has_none_lies_in_a_cut(turn: float,
 def test_the_whole_model_is_its_own_source() -> None:
     mesh = shapes.box()
     surface = ModelSurface.of(mesh, solid_of(mesh))
-    sources = surface.sources(solid_of(mesh))
-    assert (sources == MADE_BY_A_CUT).all()  # another solid of the same mesh is another model
+    other = surface.piece(solid_of(mesh))
+    assert (other.sources == MADE_BY_A_CUT).all()  # another solid of the same mesh is another model
     own = solid_of(mesh)
-    assert (ModelSurface.of(mesh, own).sources(own) >= 0).all()
+    assert (ModelSurface.of(mesh, own).piece(own).sources >= 0).all()

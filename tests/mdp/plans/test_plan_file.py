@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.grown import Grown
 from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow, mesh_sha256
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
-from mdp.zone import Painted, Zone, Zones
+from mdp.zone import Grown, Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.part_settings import PartSettings

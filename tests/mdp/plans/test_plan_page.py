@@ -3,10 +3,9 @@
 import re
 from pathlib import Path
 
-from mdp.grown import Grown
 from mdp.plans.plan_file import KEYS, PlannedPart
 from mdp.plans.reading import read_plan
-from mdp.zone import Painted, Zone, Zones
+from mdp.zone import Grown, Painted, Zone, Zones
 
 PAGE = Path(__file__).parents[3] / "docs" / "plan.md"
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from mdp.mesh import Floats
+from mdp.ranking.candidate_table import CandidateTable
 from mdp.ranking.features import CHECKED, COLUMNS, features
 from mdp.ranking.network import Network
 from mdp.ranking.ranker import ByReduction, ranker_named, shipped
-from mdp.ranking.ranking import CandidateTable, RankedCandidate, rank_classic
-from mdp.ranking.shortlist import EACH, LISTED, shortlist
+from mdp.ranking.ranking import EACH, LISTED, RankedCandidate, rank_classic, shortlist
 from mdp.search.beam import Beam
 from mdp.search.problem import Problem
 from mdp.search.published import _fill
@@ -97,7 +97,7 @@ def test_one_and_two_threads_give_the_same_search() -> None:
         "import sys, mdp.kernels.threads as t; t.use_threads(int(sys.argv[1]));"
         "from mdp.search.search import decompose; from profiles.profile import load; from tests import shapes;"
         f"p = load(settings={(*SETTINGS, 'search.beam_width=2')!r});"
-        "print([(x.base.normal.tolist(), x.base.offset_mm) for x in decompose(shapes.branch(), 'b', p, 'learned').parts])"
+        "print([(x.base.normal.tolist(), x.base.offset_mm) for x in decompose(shapes.branch(), 'b', p, ranker='learned').parts])"
     )
     one, two = (subprocess.run([sys.executable, "-c", code, threads], capture_output=True, check=True).stdout for threads in "12")
     assert one == two
@@ -208,6 +208,6 @@ def test_a_network_with_other_names_or_another_shape_is_a_sentence(
 
 
 def test_a_decomposition_names_its_ranker_and_a_learned_one_is_not_worse_than_the_uncut_model() -> None:
-    found = decompose(shapes.branch(), "branch", load(settings=(*SETTINGS, "search.beam_width=1")), "learned")
+    found = decompose(shapes.branch(), "branch", load(settings=(*SETTINGS, "search.beam_width=1")), ranker="learned")
     assert found.ranker == "learned"
     assert found.reduction > 0.5

@@ -6,7 +6,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mdp.plane import Plane
-from mdp.ranking.features import COLUMNS, Model
+from mdp.ranking.candidate_table import Model
+from mdp.ranking.features import COLUMNS
 from mdp.ranking.record import Child, Offer, Trace, npz
 
 MODEL = Model(risky_mm2=200.0, volume_mm3=1000.0, radius_mm=10.0)

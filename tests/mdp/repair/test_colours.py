@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdp.colour import NO_COLOUR, colour_text, parse_colour
 from mdp.formats.surface import Surface
-from mdp.mesh import Mesh
+from mdp.mesh import NO_COLOUR, Mesh, colour_text, parse_colour
 from mdp.read import read_mesh
 from mdp.repair.colours import carry_colours
 from mdp.repair.repair import repair

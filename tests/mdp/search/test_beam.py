@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from mdp.ranking.candidate_table import CandidateTable, nearly_equal, relaxation_round
 from mdp.ranking.ranker import ByReduction
-from mdp.ranking.ranking import CandidateTable, nearly_equal, rank_by_trade_off, rank_classic, relaxation_round
+from mdp.ranking.ranking import rank_by_trade_off, rank_classic
 from mdp.search.beam import Beam
 from mdp.search.problem import Problem
 from profiles.profile import load

@@ -16,7 +16,8 @@ from mdp.plans.plan_file import PlanFile, PlannedPart, plan_of
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.save import stl
-from mdp.search.search import cut_by_plan, decompose
+from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import decompose
 from mdp.zone import Painted, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector

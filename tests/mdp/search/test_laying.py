@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from mdp.decomposition import Part
+from mdp.directions.orientation import measure_upright, side_in_words
 from mdp.mesh import Mesh
 from mdp.search.front import Price, Pricing
 from mdp.search.laying import Lying, distinct_orientations, find_better_way, lay_down, total_mm2
-from mdp.search.orientation import measure_upright, side_in_words
 from mdp.search.search import decompose
 from profiles.profile import Profile, load
 from tests.shapes import box, branch, tee

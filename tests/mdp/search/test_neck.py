@@ -45,7 +45,8 @@ def hourglass(wide: float = 1.0) -> Mesh:
 
 def rim_mm(mesh: Mesh, plane: Plane) -> float:
     heights = plane.heights_mm(mesh.vertices) + 1e-7
-    return measure_rim(mesh.faces, heights, dot(mesh.normals, plane.normal), mesh.areas_mm2, np.ones(len(mesh.faces)), 0.0).length
+    seen = np.ones(len(mesh.faces))
+    return measure_rim(mesh.faces, heights, dot(mesh.normals, plane.normal), mesh.areas_mm2, seen, 0.0).length_mm
 
 
 def neck(mesh: Mesh, plane: Plane, reach_mm: float = 12.0) -> Plane | None:

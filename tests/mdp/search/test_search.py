@@ -269,7 +269,8 @@ def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best() -> No
     twin, front = replace(first), Front(problem.start)
     front.offer(first)
     front.offer(twin)
-    assert _take(problem, front, twin, profile, None, None).node.cost_mm2 == first.cost_mm2
+    (chosen,) = (row for row in _take(problem, front, twin, None, None).front if row.chosen)
+    assert chosen.cost_mm2 == first.cost_mm2
 
 
 def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_needs_support_tells_nothing() -> None:

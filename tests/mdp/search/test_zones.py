@@ -3,11 +3,11 @@
 import pytest
 
 from mdp.decomposition import Decomposition
-from mdp.grown import Grown
 from mdp.mesh import Mesh
 from mdp.plans.plan_file import PlanFile, PlannedPart
-from mdp.search.search import cut_by_plan, decompose
-from mdp.zone import AnyZone, Zone, Zones
+from mdp.search.by_plan import cut_by_plan
+from mdp.search.search import decompose
+from mdp.zone import AnyZone, Grown, Zone, Zones
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests import shapes

@@ -2,7 +2,8 @@ import manifold3d as m3
 import numpy as np
 
 from mdp.mesh import Floats, Mesh
-from mdp.sweep.facets import Facets, lay_out
+from mdp.sweep.facets import Facets
+from mdp.sweep.sweep import Remainder
 from tests import shapes
 
 
@@ -14,7 +15,7 @@ def _bumpy_ball(seed: int) -> Mesh:
 
 
 def _facets(mesh: Mesh) -> Facets:
-    return lay_out(mesh, np.zeros(len(mesh.faces), bool))
+    return Remainder(mesh, np.zeros(len(mesh.faces), bool)).facets
 
 
 def _turns(facets: Facets, heights: Floats) -> list[int]:
@@ -47,6 +48,6 @@ def test_neighbours_lie_in_a_ring_each_joined_to_the_next_by_a_face() -> None:
 def test_laying_out_moves_vertices_and_faces_but_not_the_surface() -> None:
     mesh = shapes.tee()
     risky = np.arange(len(mesh.faces)) < 5
-    facets = lay_out(mesh, risky)
+    facets = Remainder(mesh, risky).facets
     assert facets.mesh.volume_mm3 == mesh.volume_mm3
     assert sorted(facets.mesh.areas_mm2[facets.risky]) == sorted(mesh.areas_mm2[risky])

@@ -5,9 +5,8 @@ import pytest
 from mdp.cost.cost import CostTerms
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
+from mdp.ranking.candidate_table import CandidateTable, Model, Situation
 from mdp.ranking.candidates import Reason, bounds_of, check, platform_disc, score_candidates
-from mdp.ranking.features import Model, Situation
-from mdp.ranking.ranking import CandidateTable
 from mdp.sweep.sweep import Remainder
 from profiles.profile import load
 from tests import shapes
@@ -71,7 +70,16 @@ def _table(mesh: Mesh, fragile_mm: float = 1.0) -> CandidateTable:
     """All candidates of a solid along the upright direction."""
     words = ("clearance=false", "least_interface_mm2=0", "least_volume_share=0", f"fragile_mm={fragile_mm}")
     profile = load(settings=[f"search.{word}" for word in words])
-    limits = bounds_of(UP[None], platform_disc(mesh, profile.search), mesh.volume_mm3, profile.machine, profile.search)
-    scored = score_candidates(_remainder(mesh), limits, profile.search.offset_step_mm, CostTerms(45.0, False), -np.inf)
+    limits = bounds_of(
+        UP[None],
+        disc=platform_disc(mesh, profile.search),
+        volume_mm3=mesh.volume_mm3,
+        machine=profile.machine,
+        search=profile.search,
+    )
+    step_mm, terms = profile.search.offset_step_mm, CostTerms(45.0, False)
+    scored = score_candidates(_remainder(mesh), limits, terms, step_mm=step_mm, least_gain_mm2=-np.inf)
     situation = Situation(Model(1.0, mesh.volume_mm3, 1.0), 0.0, 0.0, 1.0, 0.0, mesh.volume_mm3, 0, UP)
-    return CandidateTable(scored, limits, situation, lambda *planes: check(scored.remainder, limits, profile.search, *planes))
+    return CandidateTable(
+        scored, limits, situation, check=lambda *planes: check(scored.remainder, limits, profile.search, *planes)
+    )

@@ -15,8 +15,9 @@ from machine.app.workbench.bench.part_settings import following, option
 from machine.app.workbench.bench.settings import USUAL
 from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
+from mdp.directions.orientation import risky_areas
 from mdp.mesh import Floats, Mesh
-from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
+from mdp.overhang import UP
 from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow
 from mdp.search.front import choose, pays, price_of_second_mm2
 from mdp.zone import NO_ZONES, Zones
@@ -312,11 +313,8 @@ def overhang_mm2(bench: Bench) -> float:
     """Area that overhangs too far and does not stand on the platform, as the model is turned now; 0 without a model."""
     if bench.model is None:
         return 0.0
-    mesh, up = bench.model.mesh, np.array(bench.rotation[2])
-    down = mesh.normals @ up < threshold(bench.profile.process.self_supporting_angle_deg)
-    heights = mesh.vertices @ up
-    low = heights <= heights.min() + PLATFORM_TOLERANCE_MM
-    return float(mesh.areas_mm2[down & ~low[mesh.faces].all(axis=1)].sum())
+    up, angle_deg = np.array(bench.rotation[2]), bench.profile.process.self_supporting_angle_deg
+    return float(risky_areas(bench.model.mesh, up[None], angle_deg)[0])
 
 
 def laid_down(bench: Bench, normal: Floats) -> Floats:

@@ -4,11 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mdp.grown import Grown
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import ZONE_KINDS, PlannedPart
 from mdp.plans.reading import MOST_MM
-from mdp.zone import AnyZone, Zone, Zones
+from mdp.zone import AnyZone, Grown, Zone, Zones
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 

@@ -7,13 +7,12 @@ import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.planes import MOST_MM, is_number, rotation_rows
-from mdp.grown import FARTHEST_MM, MOST_GROWN_DEG, Grown
+from mdp.directions.orientation import standing_still
 from mdp.mesh import Mesh
 from mdp.overhang import Mask
 from mdp.plans.plan_file import ZONE_KINDS
 from mdp.plans.reading import MOST_ZONES
-from mdp.search.orientation import standing_still
-from mdp.zone import AnyZone, Zone, Zones, faces_of
+from mdp.zone import FARTHEST_MM, MOST_GROWN_DEG, AnyZone, Grown, Zone, Zones, faces_of
 from profiles.errors import PlanError
 from profiles.frozen import Vector
 
@@ -75,7 +74,7 @@ def _vector(asked: dict[str, Any], key: str) -> Vector:
 def standing_mesh(bench: Bench) -> Mesh:
     """The model as it stands on the platform or a pedestal, in the workpiece frame."""
     assert bench.model is not None
-    standing = bench.model.mesh if bench.turned is None else standing_still(bench.model.mesh, bench.turned)
+    standing = standing_still(bench.model.mesh, bench.turned)
     lift_mm = bench.profile.search.pedestal_mm
     return standing.transform(np.eye(3), (0.0, 0.0, lift_mm)) if lift_mm > 0.0 else standing
 

@@ -12,16 +12,17 @@ from machine.app.pipeline import compilers
 from machine.app.pipeline.pricing import pricing
 from machine.app.terminal.advice import better_in_words, laid_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
-from machine.app.workbench.work.worker import Tell
+from machine.app.workbench.work.tell import Tell
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.directions.orientation import standing_still
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.save import FOLDER_FILES, part_file, stl, threemf
+from mdp.search.by_plan import cut_by_plan
 from mdp.search.laying import find_better_way, lay_down
-from mdp.search.orientation import standing_still
-from mdp.search.search import Progress, cut_by_plan, decompose
+from mdp.search.search import Progress, decompose
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
 
@@ -83,7 +84,7 @@ def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
             otherwise = "" if lying is mesh else "laid down otherwise: "
             tell(Searched(f"{otherwise}stage {progress.stage}, {progress.beam} in the beam, {left}", best))
 
-        return decompose(lying, name, profile, way.ranker, show, by_hand=locked, price=price)
+        return decompose(lying, name, profile, ranker=way.ranker, on_stage=show, by_hand=locked, price=price)
 
     if way.orient:
         lying = lay_down(mesh, profile, pricing, search)
@@ -139,7 +140,7 @@ def standing_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
     """The mesh as it is cut, turned as the plan says or else as the bench does."""
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
-    return bench.model.mesh if turned is None else standing_still(bench.model.mesh, turned)
+    return standing_still(bench.model.mesh, turned)
 
 
 def _name(bench: Bench) -> str:

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Model
-from machine.app.workbench.work.worker import Tell
+from machine.app.workbench.work.tell import Tell
+from mdp.directions.orientation import in_words, side_in_words
 from mdp.mesh import Mesh
 from mdp.read import read_mesh
 from mdp.search.laying import distinct_orientations
-from mdp.search.orientation import in_words, side_in_words
 from profiles.errors import MeshError
 from profiles.profile import Profile
 

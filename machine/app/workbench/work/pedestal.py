@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.fit import out_of_reach
 from machine.app.workbench.work.cutting import standing_mesh
-from machine.app.workbench.work.worker import Tell
+from machine.app.workbench.work.tell import Tell
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.pedestal import on_pedestal, pedestal_under

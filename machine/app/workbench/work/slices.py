@@ -10,8 +10,8 @@ from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
+from machine.app.workbench.work.tell import Tell
 from machine.app.workbench.work.walls import walls
-from machine.app.workbench.work.worker import Tell
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
 from machine.program import Alternative

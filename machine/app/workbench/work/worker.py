@@ -8,7 +8,6 @@ import pickle
 import signal
 import struct
 import sys
-from collections.abc import Callable
 from contextlib import suppress
 from queue import SimpleQueue
 from threading import Thread
@@ -16,7 +15,6 @@ from typing import Any, BinaryIO
 
 LENGTH = struct.Struct("<Q")
 TELLS, DONE, REFUSED = "tells", "done", "refused"
-Tell = Callable[[Any], None]  # what a task says meanwhile
 
 
 def frame(value: Any) -> bytes:

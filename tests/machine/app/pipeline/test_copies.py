@@ -10,9 +10,8 @@ from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
 from machine.planning.arrange import places_on_plate
 from mdp.decomposition import Decomposition, Part
-from mdp.grown import Grown
 from mdp.mesh import Mesh
-from mdp.zone import Marked, Zone
+from mdp.zone import Grown, Marked, Zone
 from profiles.errors import PlanError
 from profiles.profile import Profile, load
 from tests.shapes import box, standing, tee

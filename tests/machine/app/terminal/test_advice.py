@@ -6,9 +6,9 @@ import numpy as np
 
 from machine.app.terminal.advice import advice
 from mdp.decomposition import FrontRow
+from mdp.directions.orientation import best_orientation
 from mdp.plane import Plane
 from mdp.search.laying import OtherWay
-from mdp.search.orientation import best_orientation
 from profiles.profile import load
 from tests.machine.app.terminal.test_report import alone, tee_in_parts
 from tests.shapes import box, hollow, tee

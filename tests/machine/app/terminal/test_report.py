@@ -7,10 +7,10 @@ from machine.app.terminal.report import front_table, interfaces_line, parts_tabl
 from machine.dryrun.dryrun import dry_run
 from mdp.cut import cut, mesh_of, solid_of
 from mdp.decomposition import Decomposition, FrontRow, Part
+from mdp.directions.orientation import best_orientation, in_words
 from mdp.mesh import Mesh
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import Pose, about
-from mdp.search.orientation import best_orientation, in_words
 from profiles.profile import load, load_one
 from tests.shapes import box, hollow, tee
 

@@ -9,9 +9,9 @@ import pytest
 from machine.app.workbench.bench.bench import STANDING, Bench, History, Model, Step, overhang_mm2, plan_of_bench, with_front
 from machine.app.workbench.bench.commands import obey
 from mdp.decomposition import FrontRow
+from mdp.directions.orientation import standing_still
 from mdp.overhang import risky_upright
 from mdp.plane import Plane
-from mdp.search.orientation import standing_still
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.shapes import branch, tee

@@ -17,13 +17,12 @@ from machine.app.workbench.bench.bench import (
 )
 from machine.app.workbench.bench.command_line import turned_by
 from machine.app.workbench.bench.marks import named_faces, standing_mesh
-from mdp.grown import Grown
+from mdp.directions.orientation import standing_still
 from mdp.plans.plan_file import PlannedPart
 from mdp.plans.reading import read_plan
 from mdp.plans.writing import plan_text
 from mdp.pose import about, unit
-from mdp.search.orientation import standing_still
-from mdp.zone import Zone, Zones
+from mdp.zone import Grown, Zone, Zones
 from profiles.errors import PlanError
 from profiles.profile import load
 from tests.shapes import tee

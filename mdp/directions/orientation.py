@@ -8,12 +8,13 @@ unless it is asked for the other.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import atan2, cos, degrees, hypot, pi, radians, sin, sqrt, tan
+from math import atan2, cos, degrees, hypot, pi, radians, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdp.cut import convex_hull
+from mdp.directions.spread import spread
 from mdp.mesh import Floats, Mesh, dot
 from mdp.overhang import PLATFORM_TOLERANCE_MM, UP, threshold
 
@@ -67,21 +68,14 @@ def measure_upright(mesh: Mesh, angle_deg: float) -> Orientation:
     return _measure(mesh, angle_deg, UP[None])[0]
 
 
-def standing_still(mesh: Mesh, rotation: Floats) -> Mesh:
-    """The mesh turned, then set on z = 0 and centred about the turn axis."""
+def standing_still(mesh: Mesh, rotation: Floats | None) -> Mesh:
+    """The mesh turned, then set on z = 0 and centred about the turn axis; None: as it stands."""
+    if rotation is None:
+        return mesh
     turned = mesh.transform(rotation)
     low, high = turned.bounds_mm
     middle = 0.5 * (low + high)
     return turned.transform(np.eye(3), (-middle[0], -middle[1], -low[2]))
-
-
-def spread(count: int) -> Floats:
-    """(count, 3) unit directions spread evenly over the whole sphere (a Fibonacci lattice)."""
-    index = np.arange(count) + 0.5
-    z = 1.0 - 2.0 * index / count
-    angle = index * pi * (3.0 - sqrt(5.0))
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
 
 
 def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:

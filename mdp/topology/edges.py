@@ -1,4 +1,4 @@
-"""Edges of a surface: half-edges, what they share, and what hangs together over them.
+"""Edges of a surface: half-edges, and what they share.
 
 Half-edge 3 f + k runs from corner k of face f to the next corner.
 """
@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.formats.surface import Indices
-from mdp.mesh import Floats
+from mdp.mesh import Indices
 
 Flags = NDArray[np.bool_]
 
@@ -58,34 +57,3 @@ def edges_of(faces: Indices) -> Edges:
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     _, edge = np.unique(low * (int(faces.max(initial=0)) + 1) + high, return_inverse=True)
     return Edges(starts, ends, edge)
-
-
-def connected_components(count: int, a: Indices, b: Indices) -> Indices:
-    """(count,) the least member of the connected component of every node, for edges from a to b.
-
-    Labels hook onto the least label next to them and jump to its root until nothing changes: a few vectorised rounds.
-    """
-    label = np.arange(count)
-    while True:
-        here, there = label[a], label[b]
-        differ = here != there
-        if not differ.any():
-            return label
-        a, b, here, there = a[differ], b[differ], here[differ], there[differ]
-        low = np.minimum(here, there)
-        np.minimum.at(label, here, low)
-        np.minimum.at(label, there, low)
-        while not np.array_equal(root := label[label], label):
-            label = root
-
-
-def normals_of(vertices: Floats, faces: Indices) -> Floats:
-    """(m, 3) normals of the faces, as long as twice their areas."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)
-
-
-def areas_of(vertices: Floats, faces: Indices) -> Floats:
-    """(m,) areas of the faces."""
-    areas: Floats = 0.5 * np.linalg.norm(normals_of(vertices, faces), axis=1)
-    return areas

@@ -1,22 +1,21 @@
-"""Beneath: which faces have, along a direction, nothing of the solid beneath them, only air (a numba kernel).
+"""Over air: which faces have, along a direction, nothing of the solid beneath them (a numba kernel).
 
 Support leans, so a few directions spread evenly stand for those between them. For each a grid of cells across it keeps the lowest
 surface that looks up; a place is over air where none in its cell lies lower than itself. Flat places are asked as a whole, at the
 places of a raster, and look up as a whole, so that it does not matter how they are cut into triangles.
 """
 
-from math import pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
+from mdp.directions.frame import FramedDirections
 from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints
-from mdp.support_need.linked_faces import LinkedFaces
-from mdp.support_need.patches import Classes, frame_across
+from mdp.support_need.patches import Classes
+from mdp.topology.linked_faces import LinkedFaces
 
-COUNT = 37  # directions over the half sphere, some 24 degrees apart
 CELLS = 96  # of a grid along its longer side
 LEAST_COSINE = 0.05  # of a surface that looks up and the direction
 RASTER = 0.5  # cells between two places of flat places that are looked at
@@ -24,14 +23,6 @@ ASIDE = 0.29  # of the raster's step: where in it these places lie, so that they
 FEW_SAMPLES = 8.0  # on a flat place that is too small for the raster
 MOST = 0.55  # share of a flat place over air that makes all of it; half of it often is, up to rounding
 TINY = 1e-9  # twice the area of a face seen edge-on, in cells
-
-
-def coarse_directions() -> Floats:
-    """(COUNT, 3) unit directions over the upper half sphere (a Fibonacci lattice)."""
-    index = np.arange(COUNT) + 0.5
-    z, angle = 1.0 - index / COUNT, index * pi * (3.0 - sqrt(5.0))
-    across = np.sqrt(1.0 - z * z)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
 
 
 class Counts(NamedTuple):
@@ -47,15 +38,17 @@ class Counts(NamedTuple):
 
 
 @kernel
-def find_over_air(begin_row: int, end_row: int, surface: LinkedFaces, places: Ints, directions: Floats, out: Classes) -> None:
-    """For each of (k, 3) directions which faces (k, m) that look down are over air, 0 or 1. places: (m,) from flat_places; each
-    is one or the other as a whole."""
+def find_over_air(
+    begin_row: int, end_row: int, surface: LinkedFaces, places: Ints, along: FramedDirections, out: Classes
+) -> None:
+    """Which faces that look down are over air, 0 or 1, for each direction (k, m). places: (m,) from flat_places; each is one or
+    the other as a whole."""
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     seen, count = table(vertices.shape[1], 3), len(faces)
     facing = floats(count, 0.0)
     for row in range(begin_row, end_row):
-        d = directions[row]
-        cell = _see(vertices, d, seen)
+        d = along.directions[row]
+        cell = _see(vertices, d, along.frames[row], seen)
         counts = _no_counts(count)
         _find_extents(seen, faces, places, counts)
         lowest = floats((CELLS + 2) * (CELLS + 2), np.inf)
@@ -140,9 +133,8 @@ def _share_over_air(seen: Floats, face: Ints, lowest: Floats, slack_mm: float) -
 
 
 @part
-def _see(vertices: Floats, d: Floats, seen: Floats) -> float:
+def _see(vertices: Floats, d: Floats, frame: Floats, seen: Floats) -> float:
     """Fill the places of the vertices in cells across the direction and their heights in mm; the size of a cell, mm."""
-    frame = frame_across(d)
     low, high = floats(2, np.inf), floats(2, -np.inf)
     for v in range(len(seen)):
         x, y, z = vertices[0, v], vertices[1, v], vertices[2, v]

@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdp.mesh import Floats
-from mdp.pose import Pose, poses
-from mdp.pose_sequence import least_rotation, rotation_deg
+from mdp.pose import Pose, least_rotation, poses, rotation_deg
 from profiles.machine import Machine
 from profiles.profile import load
 from tests.checks import assert_same_direction

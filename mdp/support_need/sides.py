@@ -1,7 +1,7 @@
-"""Banks: the sides of a hanging place from which a line over it may spring (numba kernels).
+"""Sides: the rim of a hanging place, and which of its sides anchor a line over it (numba kernels).
 
-A side is banked where the solid goes down beside it, far enough to hold a line, or less far to the underside of something that is
-itself held by a bank: a ledge beneath the end of a deck hides no pillar.
+A side is anchored where the solid goes down beside it, far enough to hold a line, or less far to the underside of something that
+is itself held by an anchor: a ledge beneath the end of a deck hides no pillar.
 """
 
 from typing import NamedTuple
@@ -11,19 +11,19 @@ import numpy as np
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import part
 from mdp.mesh import Floats, Ints
-from mdp.support_need.descent import BANKED, LOOSE, SAFE, View, corner_of, descend, flows_out
+from mdp.support_need.descent import ANCHORED, LOOSE, SAFE, View, corner_of, descend, outflow
 from mdp.support_need.spans import Sides
 
 STEP_MM = 0.5  # between the places of a side at which one looks down
 END_MM = 0.01  # of a side, within which the first and the last of them lie
 SHORT_MM = 0.1  # a side no longer has only one
-HALVINGS = 6  # until the end of a bank between two of them is found
+HALVINGS = 6  # until the end of an anchor between two of them is found
 UNKNOWN, HELD, UNHELD = 0, 1, 2
 
 
 class Patches(NamedTuple):
     """All patches of a direction, numbered from 1: the faces of patch p are faces[starts[p] : starts[p + 1]]; held (k,): whether
-    a bank holds it, UNKNOWN until it is asked for; waiting (k,): room for patches to look at."""
+    an anchor holds it, UNKNOWN until it is asked for; waiting (k,): room for patches to look at."""
 
     faces: Ints
     starts: Ints
@@ -47,49 +47,35 @@ def place_across(vertices: Floats, v: int, frame: Floats) -> tuple[float, float]
 
 
 @part
-def hoped_sides(view: View, patches: Patches, own: int, frame: Floats) -> Sides:
-    """The sides of a patch seen along the direction, banked wherever the solid goes down beside them at all: found at once, and
-    most patches cannot do with these either."""
+def find_sides(view: View, patches: Patches, own: int, frame: Floats, at_best: bool) -> Sides:
+    """The sides of a patch seen along the direction, cut where anchors end. at_best: anchored wherever the solid goes down beside
+    them at all: found at once, and most patches cannot do with these either."""
     faces, neighbours, count = patches.faces[patches.starts[own] : patches.starts[own + 1]], view.surface.neighbours, 0
     for f in faces:
         for corner in range(3):
-            count += int(is_rim(neighbours, view.number, f, corner))
-    ends, banked, line, count = table(count, 4), ints(count, 0), floats(4, 0.0), 0
-    whole = (0.0, 1.0)
-    for f in faces:
-        for corner in range(3):
             if is_rim(neighbours, view.number, f, corner):
-                _see_edge(view, f, corner, frame, line)
-                banked[count] = int(_may_be_bank(view, f, corner))
-                count = _add(ends, count, line, whole[0], whole[1])
-    return Sides(ends, banked)
-
-
-@part
-def find_sides(view: View, patches: Patches, own: int, frame: Floats) -> Sides:
-    """The sides of a patch seen along the direction, cut where banks end."""
-    faces, neighbours, count = patches.faces[patches.starts[own] : patches.starts[own + 1]], view.surface.neighbours, 0
+                count += 1 if at_best else _count_places(view, f, corner)
+    ends, anchored, line, count = table(count, 4), ints(count, 0), floats(4, 0.0), 0
     for f in faces:
         for corner in range(3):
-            count += _count_places(view, f, corner) if is_rim(neighbours, view.number, f, corner) else 0
-    ends, banked, line, count = table(count, 4), ints(count, 0), floats(4, 0.0), 0
-    for f in faces:
-        for corner in range(3):
-            if is_rim(neighbours, view.number, f, corner):
-                _see_edge(view, f, corner, frame, line)
+            if not is_rim(neighbours, view.number, f, corner):
+                continue
+            _see_edge(view, f, corner, frame, line)
+            begin, places, state = 0.0, 1, at_best and _may_anchor(view, f, corner)
+            if not at_best:
                 places = _count_places(view, f, corner)
-                begin, state = 0.0, _is_banked(view, patches, f, corner, _share(view, f, corner, 0, places))
-                for k in range(1, places):
-                    share = _share(view, f, corner, k, places)
-                    after = _is_banked(view, patches, f, corner, share)
-                    if after != state:
-                        end = _find_change(view, patches, f, corner, _share(view, f, corner, k - 1, places), share)
-                        banked[count] = int(state)
-                        count = _add(ends, count, line, begin, end)
-                        begin, state = end, after
-                banked[count], end = int(state), 1.0
-                count = _add(ends, count, line, begin, end)
-    return Sides(ends[:count], banked[:count])
+                state = _is_anchored(view, patches, f, corner, _share(view, f, corner, 0, places))
+            for k in range(1, places):
+                share = _share(view, f, corner, k, places)
+                after = _is_anchored(view, patches, f, corner, share)
+                if after != state:
+                    end = _find_change(view, patches, f, corner, _share(view, f, corner, k - 1, places), share)
+                    anchored[count] = int(state)
+                    count = _add(ends, count, line, begin, end)
+                    begin, state = end, after
+            anchored[count], end = int(state), 1.0
+            count = _add(ends, count, line, begin, end)
+    return Sides(ends[:count], anchored[:count])
 
 
 @part
@@ -122,7 +108,7 @@ def _length(view: View, f: int, corner: int) -> float:
 def _count_places(view: View, f: int, corner: int) -> int:
     """At how many places of an edge of the rim one looks down: both its ends and no further than STEP_MM apart."""
     g = view.surface.neighbours[f, corner]
-    if not _may_be_bank(view, f, corner) or rests(view.surface.faces, view.heights, g, view.ground_mm):
+    if not _may_anchor(view, f, corner) or rests(view.surface.faces, view.heights, g, view.base_mm):
         return 1
     length_mm = _length(view, f, corner)
     return 1 if length_mm <= SHORT_MM else int(np.ceil(length_mm / STEP_MM)) + 1
@@ -138,28 +124,28 @@ def _share(view: View, f: int, corner: int, k: int, places: int) -> float:
 
 
 @part
-def rests(faces: Ints, heights: Floats, f: int, ground_mm: float) -> bool:
-    """Whether all of a face lies on the ground."""
-    return bool(max(heights[faces[f, 0]], heights[faces[f, 1]], heights[faces[f, 2]]) <= ground_mm)
+def rests(faces: Ints, heights: Floats, f: int, base_mm: float) -> bool:
+    """Whether all of a face lies on the base."""
+    return bool(max(heights[faces[f, 0]], heights[faces[f, 1]], heights[faces[f, 2]]) <= base_mm)
 
 
 @part
-def _may_be_bank(view: View, f: int, corner: int) -> bool:
-    """Whether the surface beyond an edge of a patch's rim goes down from it or rests on the ground."""
+def _may_anchor(view: View, f: int, corner: int) -> bool:
+    """Whether the surface beyond an edge of a patch's rim goes down from it or rests on the base."""
     surface, g = view.surface, view.surface.neighbours[f, corner]
     if g < 0:
         return False
-    down = flows_out(view, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3])) < 0.0
-    return bool(down or rests(surface.faces, view.heights, g, view.ground_mm))
+    down = outflow(view, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3])) < 0.0
+    return bool(down or rests(surface.faces, view.heights, g, view.base_mm))
 
 
 @part
 def _find_change(view: View, patches: Patches, f: int, corner: int, low: float, high: float) -> float:
-    """Where between two places of an edge a bank ends or begins."""
-    first = _is_banked(view, patches, f, corner, low)
+    """Where between two places of an edge an anchor ends or begins."""
+    first = _is_anchored(view, patches, f, corner, low)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if _is_banked(view, patches, f, corner, middle) == first:
+        if _is_anchored(view, patches, f, corner, middle) == first:
             low = middle
         else:
             high = middle
@@ -167,26 +153,26 @@ def _find_change(view: View, patches: Patches, f: int, corner: int, low: float, 
 
 
 @part
-def _is_banked(view: View, patches: Patches, f: int, corner: int, share: float) -> bool:
-    """Whether a place of a patch's rim is a bank."""
+def _is_anchored(view: View, patches: Patches, f: int, corner: int, share: float) -> bool:
+    """Whether a place of a patch's rim is an anchor."""
     end = _look_down(view, f, corner, share)
-    return end == BANKED or (end > 0 and _is_held(view, patches, end))
+    return end == ANCHORED or (end > 0 and _is_held(view, patches, end))
 
 
 @part
 def _look_down(view: View, f: int, corner: int, share: float) -> int:
     """What the way down beyond a place of a patch's rim comes to."""
-    if not _may_be_bank(view, f, corner):
+    if not _may_anchor(view, f, corner):
         return LOOSE
     surface, g = view.surface, view.surface.neighbours[f, corner]
-    if rests(surface.faces, view.heights, g, view.ground_mm):
-        return BANKED
+    if rests(surface.faces, view.heights, g, view.base_mm):
+        return ANCHORED
     return descend(view, g, corner_of(surface, g, surface.faces[f, (corner + 1) % 3]), 1.0 - share, view.number[f])
 
 
 @part
 def _is_held(view: View, patches: Patches, asked: int) -> bool:
-    """Whether a patch has a bank somewhere, or rests on another one that has."""
+    """Whether a patch has an anchor somewhere, or rests on another one that has."""
     if patches.held[asked] == UNKNOWN:
         patches.waiting[0], patches.held[asked] = asked, UNHELD
         at, count, held, neighbours = 0, 1, False, view.surface.neighbours
@@ -198,7 +184,7 @@ def _is_held(view: View, patches: Patches, asked: int) -> bool:
                     places = _count_places(view, f, corner) if is_rim(neighbours, view.number, f, corner) and not held else 0
                     for place in range(places):
                         end = _look_down(view, f, corner, _share(view, f, corner, place, places))
-                        if end == BANKED or (end > 0 and patches.held[end] == HELD):
+                        if end == ANCHORED or (end > 0 and patches.held[end] == HELD):
                             held = True
                             break
                         if end > 0 and patches.held[end] == UNKNOWN:

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mdp.directions.orientation import best_orientation, resting_orientations, risky_areas
 from mdp.mesh import Mesh
 from mdp.overhang import risky_upright
 from mdp.pose import about, unit
-from mdp.search.orientation import best_orientation, resting_orientations, risky_areas, spread
 from tests.shapes import ball, box, branch, hollow, standing, tee
 
 ANGLE_DEG = 45.0
@@ -108,9 +108,3 @@ def test_one_direction_is_what_brute_force_gives(vector: tuple[float, float, flo
         if normal @ up < -(np.sin(np.radians(ANGLE_DEG)) + 1e-4) and max(heights[k] for k in face) > 0.3
     )
     assert risky_areas(mesh, up[None], ANGLE_DEG)[0] == pytest.approx(risky, abs=1e-9)
-
-
-def test_the_spread_directions_are_unit_and_have_no_bias() -> None:
-    directions = spread(1000)
-    assert np.linalg.norm(directions, axis=1) == pytest.approx(np.ones(1000))
-    assert np.abs(directions.mean(axis=0)).max() < 1e-3

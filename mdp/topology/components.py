@@ -1,0 +1,32 @@
+"""Components: what hangs together, of nodes and edges between them, and of a surface over its vertices."""
+
+import numpy as np
+
+from mdp.mesh import Indices, Ints
+
+
+def connected_components(count: int, a: Ints | Indices, b: Ints | Indices) -> Indices:
+    """(count,) the least member of the connected component of every node, for edges from a to b.
+
+    Labels hook onto the least label next to them and jump to its root until nothing changes: a few vectorised rounds.
+
+    >>> connected_components(5, np.array([0, 3]), np.array([2, 4]))
+    array([0, 1, 0, 3, 3])
+    """
+    label = np.arange(count)
+    while True:
+        here, there = label[a], label[b]
+        differ = here != there
+        if not differ.any():
+            return label
+        a, b, here, there = a[differ], b[differ], here[differ], there[differ]
+        low = np.minimum(here, there)
+        np.minimum.at(label, here, low)
+        np.minimum.at(label, there, low)
+        while not np.array_equal(root := label[label], label):
+            label = root
+
+
+def vertex_components(count: int, faces: Ints | Indices) -> Indices:
+    """(count,) the least vertex that hangs together with each over (m, 3) faces."""
+    return connected_components(count, faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())
