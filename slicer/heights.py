@@ -1,6 +1,7 @@
 """Heights: where the layers of a part lie and where its mesh is cut for them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil, floor
 
 import numpy as np
@@ -23,10 +24,17 @@ class Heights:
     height_mm: Floats
     cut_mm: Floats
 
-    @property
+    @cached_property
     def bottom_mm(self) -> Floats:
         """(n,) lower sides of the layers."""
         return self.tip_mm - self.height_mm
+
+    def __getitem__(self, layers: slice) -> "Heights":
+        return Heights(self.tip_mm[layers], self.height_mm[layers], self.cut_mm[layers])
+
+    def __add__(self, above: "Heights") -> "Heights":
+        pairs = ((self.tip_mm, above.tip_mm), (self.height_mm, above.height_mm), (self.cut_mm, above.cut_mm))
+        return Heights(*(np.concatenate(pair) for pair in pairs))
 
 
 def layer_heights(mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: float = 0.0) -> Heights:
@@ -37,10 +45,8 @@ def layer_heights(mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: 
     process, nozzle_mm, top = profile.process, profile.machine.head.nozzle_mm, float(mesh.bounds_mm[1, 2])
     roof_mm = pedestal_mm - process.pedestal_gap_mm
     if pedestal_mm < top and roof_mm >= process.least_layer_height_mm:
-        low = equal_heights(roof_mm, process, True, nozzle_mm)
-        high = _heights_from(mesh, process, nozzle_mm, pedestal_mm, pedestal_mm, process.first_layer_height_mm)
-        both = ((low.tip_mm, high.tip_mm), (low.height_mm, high.height_mm), (low.cut_mm, high.cut_mm))
-        return Heights(*(np.concatenate(two) for two in both))
+        pedestal = equal_heights(roof_mm, process, True, nozzle_mm)
+        return pedestal + _heights_from(mesh, process, nozzle_mm, pedestal_mm, pedestal_mm, process.first_layer_height_mm)
     overlap, first = _first(process, on_platform)
     return _heights_from(mesh, process, nozzle_mm, -overlap, 0.0, first)
 

@@ -20,17 +20,18 @@ from typing import Any
 
 from mdp.decomposition import Part
 from profiles.profile import Profile
-from slicer.demand.plan import plan_supports
-from slicer.demand.site import Site, survey
 from slicer.finish.vase import check_vase
+from slicer.overhangs import Overhang, find_overhangs
 from slicer.paths import SlicedPart
-from slicer.slice import slice_site
-from slicer.support.support import Supports
+from slicer.sectioning import section_part
+from slicer.slice import slice_supported
+from slicer.support.handed_down.plan import plan_supports
+from slicer.support.support import Supports, own_supports
 
 FEWEST_LAYERS = 250  # fewer are sliced sooner than processes are forked and their paths brought back
 LOOK_S = 0.2
 
-Planned = Sequence[tuple[Site, Supports]]
+Planned = Sequence[tuple[Supports, Sequence[Overhang]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +65,11 @@ def slice_parts(
     Raises SliceError as slice_part does, for the first part in print order that has a reason.
     """
     check_vase(parts, profile)
-    planned = plan_supports([survey(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)])
-    expected = [len(site.outlines) for site, _ in planned]
+    sections = [section_part(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
+    overhangs = [find_overhangs(layers) for layers in sections]
+    supports = plan_supports([own_supports(*pair) for pair in zip(sections, overhangs, strict=True)])
+    planned = list(zip(supports, overhangs, strict=True))
+    expected = [len(support.areas) for support in supports]
     if processes is None:
         processes = _process_count(len(parts), sum(expected))
     if processes < 2:
@@ -92,8 +96,8 @@ def _slice_in_turn(planned: Planned, expected: Sequence[int], on_progress: OnPro
             layers = (*(len(piece.layers) for piece in sliced), layer, *[0] * left)[: len(planned)]
             on_progress(SlicingProgress(layers, tuple(expected), (*sliced, *[None] * left)))
 
-    for site, supports in planned:
-        sliced.append(slice_site(site, supports, show))
+    for supports, overhangs in planned:
+        sliced.append(slice_supported(supports, overhangs, show))
     show(0, 0)
     return tuple(sliced)
 
@@ -123,7 +127,7 @@ def _slice_forked(k: int) -> SlicedPart:
     def on_layer(layer: int, of: int) -> None:
         counts[k] = layer
 
-    return slice_site(*planned[k], on_layer)
+    return slice_supported(*planned[k], on_layer)
 
 
 def _slice_side_by_side(

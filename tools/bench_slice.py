@@ -28,9 +28,9 @@ from mdp.plane import PLATFORM
 from mdp.pose import level
 from mdp.save import stl
 from profiles.profile import Profile, load
+from slicer.geometry.cross_section import cross_sections
 from slicer.heights import layer_heights
 from slicer.paths import Kind, SlicedPart
-from slicer.section import sections
 from slicer.slice import slice_part
 
 RUNS = 3
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for model in options.models:
         mesh = standing(model, options.height)
         cuts = layer_heights(mesh, profile, True).cut_mm
-        section_s = min(core_seconds(lambda: sections(mesh, cuts)) for _ in range(RUNS + 1))  # noqa: B023
+        section_s = min(core_seconds(lambda: cross_sections(mesh, cuts)) for _ in range(RUNS + 1))  # noqa: B023
         print(f"\n{Path(model).name}: {len(mesh.faces)} faces, {len(cuts)} layers, sections {section_s:.3f} core s")
         words = (options.rival, *(SNUG if options.support else ()))
         print_table(ours(mesh, profile), rival(mesh, words) if shutil.which(options.rival) else None)

@@ -22,9 +22,9 @@ from mdp.plane import PLATFORM
 from mdp.pose import level
 from mdp.read import read_mesh
 from profiles.profile import Profile, load
+from slicer.geometry.cross_section import cross_sections
 from slicer.heights import layer_heights
 from slicer.paths import Layer
-from slicer.section import sections
 from slicer.slice import slice_part
 
 SUFFIXES = {".stl", ".obj", ".off", ".ply", ".3mf", ".glb"}
@@ -67,7 +67,7 @@ def row(file: Path, every: int, profile: Profile) -> str:
     spots, over, looked = [(0.0, 0)], [(0.0, 0)], 0
     for k in range(0, len(at.cut_mm), every):
         layer = by_height.get(round(float(at.tip_mm[k]), 6))
-        loops = sections(mesh, at.cut_mm[k : k + 1])[0]
+        loops = cross_sections(mesh, at.cut_mm[k : k + 1])[0]
         if layer is None or not loops:
             continue
         areas, farthest = looked_at(layer, section_of(loops), width)

@@ -12,14 +12,14 @@ from pathlib import Path
 from time import process_time
 
 from compare_prints import files, mesh_of
+from slicer.demand.plan import plan_supports
+from slicer.demand.reason import explain
+from slicer.demand.site import survey
 
 from machine.app.pipeline.pricing import pricing
 from mdp.search.search import decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
-from slicer.demand.plan import plan_supports
-from slicer.demand.reason import explain
-from slicer.demand.site import survey
 from slicer.support.support import Supports
 
 HEAD = (

@@ -33,7 +33,7 @@ from mdp.pose import level
 from mdp.read import locate, read_mesh
 from mdp.save import stl
 from profiles.profile import Profile, load
-from slicer.section import sections
+from slicer.geometry.cross_section import cross_sections
 
 BARE = (
     *SAME,
@@ -114,7 +114,7 @@ def figures(laid: Print, mesh: Mesh, profile: Profile, layers: int) -> Sequence[
     count = int(np.ceil(mesh.bounds_mm[1, 2] / height - 1e-6))
     outside = unfilled = band_mm2 = 0.0
     for k in np.unique(np.linspace(2, count - 1, layers).astype(int)):
-        loops = sections(mesh, np.array([(k - 0.5) * height]))[0]
+        loops = cross_sections(mesh, np.array([(k - 0.5) * height]))[0]
         if not loops:
             continue
         section, here = section_of(loops), number == k

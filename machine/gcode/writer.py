@@ -16,13 +16,13 @@ from machine.gcode.pen import UNKNOWN, Pen, angle, number, thousandths, write_pa
 from machine.gcode.placeholders import fill_block, placeholders
 from machine.gcode.turning import turn
 from machine.gcode.words import PAUSE_REMARK
-from machine.planning.acceleration import travel_mm_s2
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Pause, Reorient, Retract, Stroke, Travel, Wipe, rows
 from machine.planning.timing import move_times
 from mdp.mesh import Floats
 from mdp.pose import level
 from profiles.profile import Profile
 from slicer.paths import Kind
+from slicer.speed import travel_mm_s2
 
 ROUNDING_MM = 0.0015  # an arc's centre is written in thousandths
 BLOCKS = ("start", "before_part", "after_part", "end")

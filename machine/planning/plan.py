@@ -8,7 +8,6 @@ import numpy as np
 from machine.kinematics.collision import Printed, hull, join_hulls
 from machine.kinematics.table import part_shift, workpiece_points
 from machine.planning import limits
-from machine.planning.acceleration import stroke_accelerations
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Pause, Reorient, Stroke, Travel, rows
 from machine.planning.priming import run_in
 from machine.planning.purge import purge_lanes, purge_width_mm
@@ -20,6 +19,7 @@ from mdp.mesh import Floats
 from mdp.pose import Pose, level
 from profiles.profile import Profile
 from slicer.paths import Kind, Layer, Path, SlicedPart, bead_area_mm2
+from slicer.speed import stroke_accelerations
 
 MOST_COASTED = 0.25  # a path coasts over this share of its length at most
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machine.planning import limits
-from machine.planning.acceleration import travel_mm_s2
 from machine.planning.moves import Move, Retract, Travel, Wipe
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.profile import Profile
 from slicer.bead import length_mm
 from slicer.paths import Path
+from slicer.speed import travel_mm_s2
 
 STANDING_MM = 1e-6
 TO_AND_FRO = 4  # times at most that a wipe turns round on a lone stroke shorter than it

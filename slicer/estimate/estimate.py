@@ -101,7 +101,7 @@ def _auxiliary_strokes(part: SampledPart, layer: int, pace: Pace, top_mm: float)
         strokes += _pedestal_strokes(part, layer, pace)
     if on_plate:
         outline = part.sections[0]
-        beads = brim(outline + part.support.foot, outline, part.floor, top_mm, process, pace.height_mm)
+        beads = brim(outline + part.support.foot, outline, part.plate, process, top_mm=top_mm, height_mm=pace.height_mm)
         loops = [bead.points[:-1] for bead in beads]
         strokes += loop_strokes(Kind.SKIRT, loops, bead_area_mm2(process.line_width_mm, pace.height_mm), 0.0, pace)
     return strokes

@@ -9,14 +9,14 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, Mask, threshold
 from mdp.support_need.need import needs_support
 from profiles.process import Process
-from slicer.bead import with_line_width
+from profiles.profile import Profile
 from slicer.estimate.shell import NOTHING, Extent, extent_of
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, contours, offset
 from slicer.heights import Heights
-from slicer.section import sections
-from slicer.support.overhang import detect_overhangs
-from slicer.support.support import generate_supports
-from slicer.support.unwanted import shut_areas, without_unwanted
+from slicer.overhangs import find_overhangs
+from slicer.sections import Sections
+from slicer.support.support import own_supports
 
 LAYERS = 50  # thick layers at most: on thin limbs 40 lost up to 0.3 of the support that 60 find
 COARSE_MM = 0.05  # sections are simplified by this
@@ -45,26 +45,34 @@ class ThickSupport:
 NONE = ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons())
 
 
-def thick_support(part: Part, heights: Heights, process: Process, floor: Polygons) -> ThickSupport:
+def thick_support(part: Part, heights: Heights, profile: Profile, plate: Polygons) -> ThickSupport:
     """The support of a part; parts printed later are not looked at."""
-    mesh, on_platform = part.in_part_frame(), part.index == 1
+    process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     risky = _hanging(mesh, process, on_platform)
     hanging_mm2 = -float((mesh.normals[risky, 2] * mesh.areas_mm2[risky]).sum())
     if process.support == "none" or hanging_mm2 <= process.support_least_mm2:
         return NONE
     top_mm = float(mesh.vertices[mesh.faces[risky], 2].max())
     thick = _thick_layers(float(heights.tip_mm[0]), min(top_mm + LEAST_MM, float(heights.tip_mm[-1])))
-    outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in sections(mesh, thick.cut_mm)]
-    below = None if on_platform else outlines[0]
-    overhangs = without_unwanted(detect_overhangs(mesh, outlines, thick.cut_mm, process, below), part, thick.cut_mm)
-    hanging = [overhang.hanging for overhang in overhangs]
-    shut = shut_areas(part, thick, process) if part.no_support.anywhere else [Polygons()] * len(outlines)
-    single = with_line_width(process, process.support_line_width_mm).model_copy(
-        update={"support_interface_layers": 1, "support_bottom_interface_layers": 1}
+    outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in cross_sections(mesh, thick.cut_mm)]
+    single = process.model_copy(update={"support_interface_layers": 1, "support_bottom_interface_layers": 1})
+    sections = Sections(
+        part=part,
+        earlier=(),
+        later=(),
+        profile=profile.model_copy(update={"process": single}),
+        mesh=mesh,
+        heights=thick,
+        outlines=outlines,
+        own=outlines,
+        ungrooved=outlines,
+        plastic_below=None if on_platform else outlines[0],
+        plate=plate,
     )
-    supports = generate_supports(hanging, outlines, thick, single, below, shut, floor)
+    supports = own_supports(sections, find_overhangs(sections))
     areas, contacts = tuple(map(extent_of, supports.areas)), tuple(map(extent_of, supports.dense))
-    walls = tuple(tuple(contours(offset(area, -0.5 * single.line_width_mm))) for area in supports.areas)
+    half_mm = 0.5 * sections.support_process.line_width_mm
+    walls = tuple(tuple(contours(offset(area, -half_mm))) for area in supports.areas)
     return ThickSupport(thick.tip_mm, thick.height_mm, areas, contacts, walls, supports.areas[0])
 
 

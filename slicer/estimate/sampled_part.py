@@ -9,18 +9,18 @@ from mdp.decomposition import Part
 from mdp.mesh import Mesh
 from profiles.process import Process
 from profiles.profile import Profile
-from slicer.bead import first_layer_process
 from slicer.estimate.choice import Choice, choose_layers
 from slicer.estimate.hanging import ThickSupport, thick_support
 from slicer.estimate.shell import Shell, shell_of
+from slicer.fill.region import shell_layers, solid_bottom_layers
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, union
 from slicer.heights import Heights, layer_heights
-from slicer.interface.interface import sections_of, strengthen_interface, touching
+from slicer.interface.interface import sections_of, touching
 from slicer.interface.model import joined
-from slicer.plate import plate_outline
-from slicer.region import shell_layers, solid_bottom_layers
-from slicer.section import sections
+from slicer.shells import layer_processes
 from slicer.support.pedestal import pedestal_layers
+from slicer.walls.brim import plate_outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class SampledPart:
     """A part in its own frame.
 
     processes: of every layer; sections: of the layers that were looked at; others: of them and of those over the last one, what
-    parts printed later take; pedestal: how many of the lowest layers lift the model; floor: the plate's outline.
+    parts printed later take; pedestal: how many of the lowest layers lift the model; plate: its outline.
     """
 
     mesh: Mesh
@@ -40,7 +40,7 @@ class SampledPart:
     others: Mapping[int, Polygons]
     support: ThickSupport
     pedestal: int
-    floor: Polygons
+    plate: Polygons
 
     def shell(self, layer: int) -> Shell:
         """What a chosen layer prints of the part itself."""
@@ -89,17 +89,14 @@ def sample_part(part: Part, profile: Profile, later: Sequence[Part] = ()) -> Sam
     count = len(heights.tip_mm)
     pedestal = pedestal_layers(heights.tip_mm, pedestal_mm)
     choice = choose_layers(mesh, heights, process, max(1 if on_platform else process.interface_layers, pedestal))
-    processes = strengthen_interface(process, not on_platform, count)
-    if on_platform:
-        processes[0] = first_layer_process(process)
-    floor = plate_outline(profile.machine.table)
-    support = thick_support(part, heights, process, floor)
+    processes, plate = layer_processes(process, on_platform, count), plate_outline(profile.machine.table)
+    support = thick_support(part, heights, profile, plate)
     looked_at = _with_neighbours(choice, process)
     own = [layer for layer in looked_at if layer < count]
-    loops = sections(mesh, heights.cut_mm[own])
+    loops = cross_sections(mesh, heights.cut_mm[own])
     outlines = {layer: clean(several, 0.0) for layer, several in zip(own, loops, strict=True)}
     others = _others(part, later, heights, looked_at, process)
-    return SampledPart(mesh, on_platform, heights, processes, choice, outlines, others, support, pedestal, floor)
+    return SampledPart(mesh, on_platform, heights, processes, choice, outlines, others, support, pedestal, plate)
 
 
 def _others(part: Part, later: Sequence[Part], heights: Heights, layers: Sequence[int], process: Process) -> dict[int, Polygons]:

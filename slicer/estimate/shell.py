@@ -7,8 +7,8 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import PATH_RESOLUTION_MM, outer_wall_width_mm, spacing_mm
+from slicer.fill.region import sparse_area
 from slicer.geometry.polygons import Polygons, contours, edges, islands, offset, opening
-from slicer.region import sparse_area
 from slicer.walls.gap import LEAST_GAP, LEAST_LINE
 
 LEAST_REST_MM2 = 0.3  # smaller places between the walls hardly ever get a bead

@@ -30,8 +30,9 @@ class _Pieces(NamedTuple):
     group: Indices
 
 
-class _Limits(NamedTuple):
-    """hook_mm: length of a hook; most_mm: longest joint; apart_mm: what a hook keeps from the next end or hook."""
+class Limits(NamedTuple):
+    """hook_mm: length of a hook; most_mm: longest joint along the border; apart_mm: what a hook keeps from the next end or hook,
+    else it is shorter."""
 
     hook_mm: float
     most_mm: float
@@ -54,13 +55,10 @@ class _BorderPoint(NamedTuple):
     place_mm: float
 
 
-def anchor_lines(
-    pieces: Pieces, border: Border, hook_mm: float, most_mm: float, apart_mm: float, group: Indices | None = None
-) -> list[Floats]:
-    """Pieces as long lines (n, 2): joined where ends are at most most_mm apart along the border, else with hooks.
+def anchor_lines(pieces: Pieces, border: Border, limits: Limits, group: Indices | None = None) -> list[Floats]:
+    """Pieces as long lines (n, 2): joined where ends are near enough along the border, else with hooks.
 
-    A hook is hook_mm long, less where it would come nearer than apart_mm to another end or hook. group: (k,) only pieces
-    of one group are joined.
+    group: (k,) only pieces of one group are joined.
     """
     if not len(pieces.starts):
         return []
@@ -72,7 +70,7 @@ def anchor_lines(
     n, count = _lay_lines(
         _Pieces(pieces.points, bounds, pieces.ends, contour, own),
         _Border(border.edges, border.offsets, _way(border.edges)),
-        _Limits(hook_mm, most_mm, apart_mm),
+        limits,
         out,
         starts,
     )
@@ -148,7 +146,7 @@ def _join_ends(after: Indices, gap: Floats, group: Indices, most_mm: float) -> t
 
 
 @part
-def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, limits: _Limits) -> Floats:
+def _hooks(partner: Indices, sense: Indices, after: Indices, gap: Floats, limits: Limits) -> Floats:
     """Of each end the length of its hook, negative for a way back along the border."""
     hooks: Floats = floats(len(after), 0.0)
     free, before = floats(len(after), 0.0), longs(len(after), 0)
@@ -223,7 +221,7 @@ def _reverse(out: Floats, first: int, end: int) -> None:
 
 
 @kernel
-def _lay_lines(pieces: _Pieces, border: _Border, limits: _Limits, out: Floats, starts: Indices) -> tuple[int, int]:
+def _lay_lines(pieces: _Pieces, border: _Border, limits: Limits, out: Floats, starts: Indices) -> tuple[int, int]:
     """Fills in the lines and where each begins; returns the number of points and of lines."""
     place = _places(pieces, border)
     after, gap = _next_ends(place, pieces.contour, border)

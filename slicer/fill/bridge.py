@@ -8,9 +8,8 @@ from mdp.kernels.arrays import floats, table
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 from mdp.support_need.spans import ROUNDING_MM
-from profiles.process import Process
 from slicer.bead import Bead
-from slicer.fill.skin import skin_beads
+from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, strips
 from slicer.geometry.scanlines import scan_lines
 from slicer.geometry.segments import inside as is_inside
@@ -182,11 +181,9 @@ def bridge_area(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:
     return open_place if open_place.is_empty() else offset(open_place, ANCHOR * width_mm) ^ inside
 
 
-def bridge_beads(area: Polygons, angle_deg: float, flow: float, width_mm: float, height_mm: float, overlap: float) -> list[Bead]:
+def bridge_beads(area: Polygons, lines: SolidLines, flow: float) -> list[Bead]:
     """The lines of a bridge with its own flow."""
-    return [
-        replace(bead, flow=bead.flow * flow) for bead in skin_beads(area, Kind.BRIDGE, angle_deg, width_mm, height_mm, overlap)
-    ]
+    return [replace(bead, flow=bead.flow * flow) for bead in skin_beads(area, Kind.BRIDGE, lines)]
 
 
 def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float) -> Polygons:
@@ -203,8 +200,6 @@ def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float)
     return open_place if open_place.is_empty() else offset(open_place, ANCHOR * width_mm) ^ solid
 
 
-def infill_bridge_beads(area: Polygons, angle_deg: float, process: Process, height_mm: float) -> list[Bead]:
+def infill_bridge_beads(area: Polygons, lines: SolidLines, flow: float) -> list[Bead]:
     """The first solid lines over sparse infill, across the lines below wherever those have one direction."""
-    overlap, width = process.infill_overlap if process.walls else 0.0, process.line_width_mm
-    beads = bridge_beads(area, angle_deg, process.infill_bridge_flow, width, height_mm, overlap)
-    return [replace(bead, over_infill=True) for bead in beads]
+    return [replace(bead, over_infill=True) for bead in bridge_beads(area, lines, flow)]

@@ -9,20 +9,19 @@ from math import cos, pi, sin
 import numpy as np
 
 from mdp.mesh import Floats
-from slicer.fill.pattern import Box, LinePattern, Lines
+from slicer.fill.pattern import Box, LinePattern, Lines, PatternLayer
 
-LENGTH = (
-    2.454  # of the lines in a period squared, in periods, mean over all heights, chords instead of arcs: integrated numerically
-)
+# Of the lines in a period squared, in periods, mean over all heights, chords instead of arcs: integrated numerically.
+LENGTH = 2.454
 STEPS = 20  # a period: the chords stay within 0.01 mm at a period of 5 mm
 
 
-def gyroid(angle_deg: float, z_mm: float, spacing_mm: float, density: float) -> LinePattern:
-    """Waves whose plastic is the density on average over the layers; spacing: of solid lines."""
-    period = LENGTH * spacing_mm / density
-    height = 2.0 * pi * z_mm / period
+def gyroid(layer: PatternLayer) -> LinePattern:
+    """Waves whose plastic is the density on average over the layers."""
+    period = LENGTH * layer.spacing_mm / layer.density
+    height = 2.0 * pi * layer.z_mm / period
     along_x = abs(cos(height)) > abs(sin(height))
-    return LinePattern(angle_deg + (0.0 if along_x else 90.0), lambda box: _waves(box, period, height, along_x))
+    return LinePattern(layer.angle_deg + (0.0 if along_x else 90.0), lambda box: _waves(box, period, height, along_x))
 
 
 def _waves(box: Box, period: float, height: float, along_x: bool) -> Lines:

@@ -8,15 +8,15 @@ from math import sqrt
 
 import numpy as np
 
-from slicer.fill.pattern import Box, LinePattern, Lines, grid_numbers
+from slicer.fill.pattern import Box, LinePattern, Lines, PatternLayer, grid_numbers
 
 TURN_DEG = 60.0
 
 
-def honeycomb(angle_deg: float, layer: int, spacing_mm: float, density: float) -> LinePattern:
-    """Zigzags of the density; spacing: of solid lines."""
-    side = side_mm(spacing_mm, min(density, 1.0))
-    return LinePattern(angle_deg + TURN_DEG * (layer % 3), lambda box: _zigzags(box, side, spacing_mm))
+def honeycomb(layer: PatternLayer) -> LinePattern:
+    """Zigzags of the density."""
+    side = side_mm(layer.spacing_mm, min(layer.density, 1.0))
+    return LinePattern(layer.angle_deg + TURN_DEG * (layer.number % 3), lambda box: _zigzags(box, side, layer.spacing_mm))
 
 
 def side_mm(spacing_mm: float, density: float) -> float:

@@ -6,10 +6,10 @@ from math import sqrt
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead, length_mm, spacing_mm
-from slicer.fill.anchor import anchor_lines
+from slicer.fill.anchor import Limits, anchor_lines
 from slicer.fill.gyroid import LENGTH, gyroid
 from slicer.fill.honeycomb import honeycomb
-from slicer.fill.pattern import LinePattern, clip_pattern, parallel_lines
+from slicer.fill.pattern import LinePattern, PatternLayer, clip_pattern, parallel_lines
 from slicer.geometry.clip import border_of, merge_pieces
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.paths import Kind
@@ -27,8 +27,8 @@ def infill_cell_mm(process: Process) -> float:
     return FAMILIES.get(process.infill_pattern, 1) * spacing / density if density > 0.0 else 0.0
 
 
-def infill_beads(area: Polygons, process: Process, density: float, layer: int, z_mm: float, height_mm: float) -> list[Bead]:
-    """Beads of the process's pattern in an area; density (0..1) of the pattern as pattern_density() gives it."""
+def infill_beads(area: Polygons, process: Process, *, density: float, layer: int, z_mm: float, height_mm: float) -> list[Bead]:
+    """Beads of the process's pattern in an area of a layer; density (0..1) of the pattern as pattern_density() gives it."""
     width, spacing = process.line_width_mm, spacing_mm(process.line_width_mm, height_mm)
     overlap = process.infill_overlap if process.walls else 0.0
     inner = area if area.is_empty() else offset(area, -(0.5 * spacing - overlap * width))
@@ -37,10 +37,10 @@ def infill_beads(area: Polygons, process: Process, density: float, layer: int, z
     if process.infill_pattern == "concentric":
         lines = _concentric(inner, spacing, density)
     else:
-        patterns = PATTERNS[process.infill_pattern](process.infill_angle_deg, layer, z_mm, spacing, density)
+        drawn = PatternLayer(layer, z_mm, process.infill_angle_deg, spacing, density)
         border = border_of(inner)
-        pieces = merge_pieces([clip_pattern(border, pattern) for pattern in patterns])
-        lines = anchor_lines(pieces, border, process.infill_anchor_mm, process.infill_joint_mm, width)
+        pieces = merge_pieces([clip_pattern(border, pattern) for pattern in PATTERNS[process.infill_pattern](drawn)])
+        lines = anchor_lines(pieces, border, Limits(process.infill_anchor_mm, process.infill_joint_mm, width))
     return [Bead(Kind.INFILL, line, width, RANK) for line in lines if length_mm(line) > width]
 
 
@@ -58,7 +58,10 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     drawn = asked
     for _ in range(2):
         step = 0.25 * LENGTH * spacing / drawn / len(chosen)  # a gyroid's layers differ over a quarter of its period
-        samples = [infill_beads(areas[i], process, drawn, i, (k + 0.5) * step, height_mm) for k, i in enumerate(chosen)]
+        samples = [
+            infill_beads(areas[i], process, density=drawn, layer=i, z_mm=(k + 0.5) * step, height_mm=height_mm)
+            for k, i in enumerate(chosen)
+        ]
         drawn_mm = sum(bead.length_mm for beads in samples for bead in beads)
         got = drawn_mm * spacing / sum(areas[i].area() for i in chosen)
         if got <= 0.0:
@@ -67,32 +70,25 @@ def pattern_density(areas: Sequence[Polygons], process: Process, height_mm: floa
     return drawn
 
 
-def _rectilinear(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:
+def _rectilinear(layer: PatternLayer) -> list[LinePattern]:
     """Lines in one direction, turned by 90 degrees from layer to layer."""
-    return [parallel_lines(angle_deg + 90.0 * (layer % 2), spacing_mm / density)]
+    return [parallel_lines(layer.angle_deg + 90.0 * (layer.number % 2), layer.spacing_mm / layer.density)]
 
 
-def _grid(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:
+def _grid(layer: PatternLayer) -> list[LinePattern]:
     """Two crossing directions in every layer."""
-    return [parallel_lines(angle_deg + 90.0 * k, 2.0 * spacing_mm / density) for k in range(2)]
+    return [parallel_lines(layer.angle_deg + 90.0 * k, 2.0 * layer.spacing_mm / layer.density) for k in range(2)]
 
 
-def _triangles(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:
+def _triangles(layer: PatternLayer) -> list[LinePattern]:
     """Three directions in every layer."""
-    return [parallel_lines(angle_deg + 60.0 * k, 3.0 * spacing_mm / density) for k in range(3)]
+    return [parallel_lines(layer.angle_deg + 60.0 * k, 3.0 * layer.spacing_mm / layer.density) for k in range(3)]
 
 
-def _cubic(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:
+def _cubic(layer: PatternLayer) -> list[LinePattern]:
     """Cubes that stand on a corner: their faces, three families of planes, move sideways by z / sqrt(2)."""
-    return [parallel_lines(angle_deg + 120.0 * k, 3.0 * spacing_mm / density, z_mm / sqrt(2.0)) for k in range(3)]
-
-
-def _gyroid(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:
-    return [gyroid(angle_deg, z_mm, spacing_mm, density)]
-
-
-def _honeycomb(angle_deg: float, layer: int, z_mm: float, spacing_mm: float, density: float) -> list[LinePattern]:
-    return [honeycomb(angle_deg, layer, spacing_mm, density)]
+    apart_mm, shift_mm = 3.0 * layer.spacing_mm / layer.density, layer.z_mm / sqrt(2.0)
+    return [parallel_lines(layer.angle_deg + 120.0 * k, apart_mm, shift_mm) for k in range(3)]
 
 
 def _concentric(inner: Polygons, spacing_mm: float, density: float) -> list[Floats]:
@@ -104,11 +100,11 @@ def _concentric(inner: Polygons, spacing_mm: float, density: float) -> list[Floa
     return lines
 
 
-PATTERNS: dict[str, Callable[[float, int, float, float, float], list[LinePattern]]] = {
+PATTERNS: dict[str, Callable[[PatternLayer], list[LinePattern]]] = {
     "rectilinear": _rectilinear,
     "grid": _grid,
     "triangles": _triangles,
     "cubic": _cubic,
-    "gyroid": _gyroid,
-    "honeycomb": _honeycomb,
+    "gyroid": lambda layer: [gyroid(layer)],
+    "honeycomb": lambda layer: [honeycomb(layer)],
 }

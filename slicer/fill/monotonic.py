@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.mesh import Floats
-from slicer.fill.anchor import anchor_lines
+from slicer.fill.anchor import Limits, anchor_lines
 from slicer.geometry.clip import Border, Indices, Pieces, rotation_2d
 
 LEVEL = 0.1  # of a spacing: heights nearer to each other are one row
@@ -30,7 +30,7 @@ def monotonic_lines(pieces: Pieces, border: Border, angle_deg: float, spacing_mm
     if not len(pieces.starts):
         return []
     cells = find_cells(pieces, angle_deg, spacing_mm)
-    lines = anchor_lines(pieces, border, 0.0, most_mm, 0.0, cells.of)
+    lines = anchor_lines(pieces, border, Limits(0.0, most_mm, 0.0), cells.of)
     return lines if len(lines) < 2 else _order_lines(_by_cell(lines, cells, pieces), cells, rotation_2d(angle_deg))
 
 
@@ -49,7 +49,7 @@ def find_cells(pieces: Pieces, angle_deg: float, spacing_mm: float) -> Cells:
     for k, (first, last) in enumerate(zip(*(side.tolist() for side in above), strict=True)):
         if of[k] < 0:
             of[k] = len(before)
-            before.append({int(of[each]) for each in range(below[0][k], below[1][k])})
+            before.append({int(of[j]) for j in range(below[0][k], below[1][k])})
         if last - first == 1 and alone_below[first]:
             of[first] = of[k]
     out = np.empty_like(of)
@@ -80,21 +80,21 @@ def _by_cell(lines: Sequence[Floats], cells: Cells, pieces: Pieces) -> list[list
 
 def _order_lines(by_cell: Sequence[list[Floats]], cells: Cells, turned: Floats) -> list[Floats]:
     """Cell after cell, of those that wait for none the nearest; upward inside each."""
-    rising, waits = [_rising(each, turned) for each in by_cell], [len(each) for each in cells.before]
+    rising, waits = [_rising(lines, turned) for lines in by_cell], [len(earlier) for earlier in cells.before]
     after: list[list[int]] = [[] for _ in rising]
     for cell, earlier in enumerate(cells.before):
-        for each in earlier:
-            after[each].append(cell)
+        for first in earlier:
+            after[first].append(cell)
     ready, out = [cell for cell, count in enumerate(waits) if not count], list[Floats]()
     while ready:
-        cell = min(ready, key=lambda each: _travel_mm(out, rising[each])) if out else ready[0]
+        cell = min(ready, key=lambda cell: _travel_mm(out, rising[cell])) if out else ready[0]
         ready.remove(cell)
         for line in rising[cell]:
             out.append(_nearer_end_first(line, out, turned))
-        for each in after[cell]:
-            waits[each] -= 1
-            if not waits[each]:
-                ready.append(each)
+        for later in after[cell]:
+            waits[later] -= 1
+            if not waits[later]:
+                ready.append(later)
     return out
 
 

@@ -14,6 +14,17 @@ Lines = tuple[Floats, Indices]
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
 
 
+@dataclass(frozen=True)
+class PatternLayer:
+    """The layer that a pattern is drawn in, by its number and height; spacing_mm: of lines that fill an area completely."""
+
+    number: int
+    z_mm: float
+    angle_deg: float
+    spacing_mm: float
+    density: float
+
+
 @dataclass(frozen=True, eq=False)
 class LinePattern:
     """draw gives, for a box x0 y0 x1 y1 of the turned frame, points (n, 2) and the start of each line, mm."""

@@ -1,13 +1,14 @@
 """Skin: solid fill by lines at alternating +-45 degrees, and by short beads where no such line fits."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
 from mdp.mesh import Floats
 from slicer.bead import Bead, length_mm, spacing_mm
-from slicer.fill.anchor import anchor_lines
+from slicer.fill.anchor import Limits, anchor_lines
 from slicer.fill.monotonic import monotonic_lines
 from slicer.fill.pattern import MARGIN_MM, Box, LinePattern, Lines, clip_pattern, horizontal_lines
 from slicer.geometry.clip import border_of
@@ -22,32 +23,48 @@ FEW_MM2 = 0.6  # of the line width squared: a smaller place beside the lines sta
 LEAST_FLOW, MOST_FLOW = 0.85, 1.15
 
 
-def skin_beads(
-    area: Polygons, kind: Kind, angle_deg: float, width_mm: float, height_mm: float, overlap: float, in_order: bool = False
-) -> list[Bead]:
-    """Beads that fill an area completely; `overlap` is the reach into the walls around, share of a line width.
+@dataclass(frozen=True)
+class SolidLines:
+    """How an area is filled completely: direction, width and height of the lines, and how they meet what is around.
 
-    in_order: every line is printed on the same side of its neighbour.
+    overlap: their reach into the walls around, share of a line width. in_order: every line is printed on the same side of its
+    neighbour.
+    """
+
+    angle_deg: float
+    width_mm: float
+    height_mm: float
+    overlap: float = 0.0
+    in_order: bool = False
+
+    @property
+    def spacing_mm(self) -> float:
+        """Distance of neighbouring lines."""
+        return spacing_mm(self.width_mm, self.height_mm)
+
+
+def skin_beads(area: Polygons, kind: Kind, solid: SolidLines) -> list[Bead]:
+    """Beads that fill an area completely.
 
     The lines of each connected piece are spread evenly; places they leave get beads of their own. The flow makes the
     plastic equal to area times height, so that neither the joints at the line ends nor the overlap over-fill it.
     """
-    spacing = spacing_mm(width_mm, height_mm)
+    spacing, width_mm = solid.spacing_mm, solid.width_mm
     beads: list[Bead] = []
     for island in islands(area):
-        border = border_of(offset(island, -(0.5 * spacing - overlap * width_mm)))
-        pieces = clip_pattern(border, _even(angle_deg, spacing))
-        if in_order:
-            lines = monotonic_lines(pieces, border, angle_deg, spacing, JOIN * spacing)
+        border = border_of(offset(island, -(0.5 * spacing - solid.overlap * width_mm)))
+        pieces = clip_pattern(border, _even(solid.angle_deg, spacing))
+        if solid.in_order:
+            lines = monotonic_lines(pieces, border, solid.angle_deg, spacing, JOIN * spacing)
         else:
-            lines = anchor_lines(pieces, border, 0.0, JOIN * spacing, 0.0)
+            lines = anchor_lines(pieces, border, Limits(0.0, JOIN * spacing, 0.0))
         lines = [line for line in lines if length_mm(line) > 0.5 * width_mm]
         rest = uncovered_area(island, lines, width_mm)
-        beads += gaps(rest, width_mm, height_mm)
+        beads += gaps(rest, width_mm, solid.height_mm)
         total = sum(length_mm(line) for line in lines)
         if total > 0:
             flow = min(max((island.area() - rest.area()) / (total * spacing), LEAST_FLOW), MOST_FLOW)
-            beads += [Bead(kind, line, width_mm, RANK, flow, follows=in_order and k > 0) for k, line in enumerate(lines)]
+            beads += [Bead(kind, line, width_mm, RANK, flow, follows=solid.in_order and k > 0) for k, line in enumerate(lines)]
     return beads
 
 

@@ -48,3 +48,12 @@ def _resized(whole: Polygons, process: Process) -> Polygons:
         outside, holes = offset(filled, process.outline_compensation_mm), filled - island
         resized.append(outside if holes.is_empty() else outside - offset(holes, process.hole_compensation_mm))
     return union(resized)
+
+
+def compensate_elephant_foot(outline: Polygons, elephant_foot_mm: float, width_mm: float) -> Polygons:
+    """The outline less what the first layer is squeezed out by; places that would shrink below a line keep their width."""
+    if elephant_foot_mm <= 0.0:
+        return outline
+    deep = elephant_foot_mm + 0.5 * width_mm
+    narrow = outline - offset(offset(outline, -deep), deep + 0.01)
+    return offset(outline, -elephant_foot_mm) + narrow

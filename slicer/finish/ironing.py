@@ -5,32 +5,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from mdp.decomposition import Part
 from profiles.process import Process
 from slicer.bead import Bead, width_for_mm
-from slicer.fill.skin import skin_beads
+from slicer.fill.region import Region
+from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, islands, offset, opening
-from slicer.heights import Heights
 from slicer.interface.interface import sections_of
 from slicer.paths import Kind, bead_area_mm2
-from slicer.region import Region
+from slicer.sections import Sections
 
 RANK = 100  # after all else of an island
 LEAST_MM2 = 2.0
 
 
-def ironed_areas(
-    regions: Sequence[Region], part: Part, later: Sequence[Part], heights: Heights, process: Process
-) -> list[Polygons]:
+def ironed_areas(sections: Sections, regions: Sequence[Region]) -> list[Polygons]:
     """Of every layer the skin with nothing above it, a line's width away from where a later part will stand."""
+    process, heights, later = sections.process, sections.heights, sections.later
     if not process.ironing:
         return [Polygons()] * len(regions)
     above_mm = np.asarray(heights.tip_mm + 0.5 * heights.height_mm)
-    above = sections_of(later, part, above_mm) if later else [Polygons()] * len(regions)
+    above = sections_of(later, sections.part, above_mm) if later else [Polygons()] * len(regions)
     width = process.line_width_mm
     tops = [
-        region.bare if other.is_empty() else region.bare - offset(other, width)
-        for region, other in zip(regions, above, strict=True)
+        region.bare if area.is_empty() else region.bare - offset(area, width) for region, area in zip(regions, above, strict=True)
     ]
     return [_worth_it(opening(top, 0.5 * width)) for top in tops]
 
@@ -41,11 +38,12 @@ def _worth_it(area: Polygons) -> Polygons:
     return Polygons.compose(pieces) if pieces else Polygons()
 
 
-def ironing_beads(area: Polygons, angle_deg: float, process: Process, height_mm: float) -> list[Bead]:
-    """Lines across those of the skin, which run along angle_deg; their flow is counted on a bead of the line's width."""
+def ironing_beads(area: Polygons, skin: SolidLines, process: Process) -> list[Bead]:
+    """Lines across those of the skin; their flow is counted on a bead of the line's width."""
     if area.is_empty():
         return []
-    spacing, width = process.ironing_spacing_mm, process.line_width_mm
+    spacing, width, height_mm = process.ironing_spacing_mm, process.line_width_mm, skin.height_mm
     flow = process.ironing_flow * spacing * height_mm / bead_area_mm2(width, height_mm)
-    beads = skin_beads(area, Kind.IRONING, angle_deg + 90.0, width_for_mm(spacing, height_mm), height_mm, 0.0, True)
+    dense = SolidLines(skin.angle_deg + 90.0, width_for_mm(spacing, height_mm), height_mm, in_order=True)
+    beads = skin_beads(area, Kind.IRONING, dense)
     return [replace(bead, width_mm=width, flow=flow, rank=RANK) for bead in beads if bead.kind is Kind.IRONING]

@@ -16,10 +16,11 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import length_mm
 from slicer.cooling import fan_share, rising_fan
+from slicer.fill.region import shell_layers
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset
 from slicer.heights import Heights
 from slicer.paths import Kind, Layer, Path, bead_area_mm2
-from slicer.region import shell_layers
+from slicer.sections import Sections
 
 PIECES = 16  # of the first and the last turn, each with a flow of its own
 NO_APPROACH = np.zeros((0, 2))
@@ -46,15 +47,14 @@ def bottom_layers(process: Process) -> int:
     return max(1, shell_layers(process)[1])
 
 
-def vase_layers(
-    outlines: Sequence[Polygons], supports: Sequence[Polygons], heights: Heights, profile: Profile, tip: Floats
-) -> list[Layer]:
-    """The layers above the bottom; outlines, supports: of all layers; tip: (2,) where the bottom ends.
+def vase_layers(sections: Sections, supported: Sequence[Polygons], tip: Floats) -> list[Layer]:
+    """The layers above the bottom; supported: where each layer's support is; tip: (2,) where the bottom ends.
 
     Raises SliceError where the model needs support or one of its layers is not one area without holes.
     """
+    profile, heights, outlines = sections.profile, sections.heights, sections.outlines
     first = bottom_layers(profile.process)
-    hanging = next((k for k, area in enumerate(supports) if not area.is_empty()), None)
+    hanging = next((k for k, area in enumerate(supported) if not area.is_empty()), None)
     if hanging is not None:
         raise SliceError(
             f"process.spiral_vase prints no support, and at {heights.tip_mm[hanging]:.2f} mm some is needed: "
@@ -74,10 +74,12 @@ def vase_layers(
 def _loop(outline: Polygons, z_mm: float, process: Process) -> Floats:
     """(n, 2) the wall's centreline, closed."""
     width = process.outer_wall_line_width_mm or process.line_width_mm
-    loops, holes = contours(offset(outline, -0.5 * width)), sum(len(each) > 2 for each in outline.to_polygons())
+    loops, holes = contours(offset(outline, -0.5 * width)), sum(len(loop) > 2 for loop in outline.to_polygons())
     if holes != 1 or len(loops) != 1:
-        found = f"{holes} outlines" if holes != 1 else "a place too narrow for a wall"
-        raise SliceError(f"process.spiral_vase needs one outline without holes in every layer: at {z_mm:.2f} mm there is {found}")
+        instead = f"{holes} outlines" if holes != 1 else "a place too narrow for a wall"
+        raise SliceError(
+            f"process.spiral_vase needs one outline without holes in every layer: at {z_mm:.2f} mm there is {instead}"
+        )
     return close_loop(loops[0])
 
 

@@ -102,11 +102,15 @@ def bounding_box(polygons: Polygons, reach_mm: float) -> Polygons:
 
 
 def half_plane(polygons: Polygons, a: float, b: float, c: float) -> Polygons:
-    """What of polygons lies where a x + b y + c > 0; nothing changes where neither x nor y decides and c is 0 or more."""
-    across = float(np.hypot(a, b))
-    if across < 1e-9 or polygons.is_empty():
-        return polygons if c >= 0.0 else Polygons()
+    """What of polygons lies where a x + b y + c > 0; all of them where it is nowhere less than 0."""
+    if polygons.is_empty():
+        return polygons
     x0, y0, x1, y1 = polygons.bounds()
+    if c + min(a * x0, a * x1) + min(b * y0, b * y1) >= 0.0:
+        return polygons
+    if c + max(a * x0, a * x1) + max(b * y0, b * y1) <= 0.0:
+        return Polygons()
+    across = float(np.hypot(a, b))
     far = abs(c) / across + abs(x0) + abs(x1) + abs(y0) + abs(y1) + 1.0
     along = np.array([a, b]) / across
     aside = np.array([-along[1], along[0]]) * 2.0 * far

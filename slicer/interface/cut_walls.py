@@ -9,11 +9,11 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead, length_mm, spacing_mm
+from slicer.fill.region import Cover
 from slicer.fill.skin import uncovered_area
 from slicer.geometry.polygons import Polygons, close_loop, edges, offset
 from slicer.interface.model import Model
 from slicer.paths import Kind
-from slicer.region import Cover
 from slicer.travel.split import cut_line
 from slicer.walls.layer_walls import layer_walls
 from slicer.walls.walls import Walls, wall_rank, walls
@@ -34,7 +34,7 @@ class CutWalls:
 
 
 def cut_walls(
-    section: Polygons, model: Polygons | None, process: Process, height_mm: float, nozzle_mm: float, usual: int
+    section: Polygons, model: Polygons | None, process: Process, *, height_mm: float, nozzle_mm: float, usual: int
 ) -> CutWalls:
     """The walls of a part's section in its island of the model; None: no other part touches it.
 
@@ -89,4 +89,4 @@ def cover(model: Model, own: Sequence[Polygons], walled: Sequence[CutWalls]) -> 
     """What lies around the layers of a part, for its regions. own: its sections."""
     sections = [mine if whole is None else whole for whole, mine in zip(model.sections, own, strict=True)]
     later = model.others if model.is_cut else ()
-    return Cover(sections, [each.model_inside for each in walled], model.below, model.above, later)
+    return Cover(sections, [layer.model_inside for layer in walled], model.below, model.above, later)

@@ -7,28 +7,28 @@ import numpy as np
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
-from profiles.process import Process
 from slicer.bead import Bead
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, contours, union
 from slicer.paths import Kind
-from slicer.section import sections
+from slicer.sections import Sections
 from slicer.travel.islands import OUTSIDE
 
-BENEATH_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
+BELOW_MM = 0.02  # the section of earlier parts is taken this far below the base plane, where their cut faces lie
 
 
-def plastic_beneath(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons | None:
+def plastic_below(part: Part, earlier: Sequence[Part], section: Polygons) -> Polygons | None:
     """Plastic just below the base plane; None on the platform. Parts not handed over are taken to fill the section."""
     if part.index == 1:
         return None
     if not earlier:
         return section
-    return sections_of(earlier, part, np.array([-BENEATH_MM]))[0]
+    return sections_of(earlier, part, np.array([-BELOW_MM]))[0]
 
 
 def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Polygons]:
     """For every height in the part's frame the sections of other parts together."""
-    layers = [[clean(loops) for loops in sections(_mesh_in_frame_of(part, other), cuts_mm)] for other in others]
+    layers = [[clean(loops) for loops in cross_sections(_mesh_in_frame_of(part, other), cuts_mm)] for other in others]
     return [union(layer) for layer in zip(*layers, strict=True)] if layers else [Polygons()] * len(cuts_mm)
 
 
@@ -44,11 +44,16 @@ def _mesh_in_frame_of(part: Part, other: Part) -> Mesh:
     return other.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
 
 
-def strengthen_interface(process: Process, on_plastic: bool, layers: int) -> list[Process]:
-    """The process of every layer: a part on plastic has more walls in its first one, if it has walls at all."""
-    extra = process.interface_extra_walls if on_plastic and process.walls else 0
-    first = process.model_copy(update={"walls": process.walls + extra}) if extra else process
-    return [first if i == 0 else process for i in range(layers)]
+def frame_change(part: Part, other: Part) -> tuple[Floats, Floats]:
+    """turn (3, 3) and shift (3,) that carry a point of a part's frame into the frame of another part: turn @ x + shift."""
+    turn = other.rotation @ part.rotation.T
+    return turn, turn[:, 2] * part.base.offset_mm - np.array([0.0, 0.0, other.base.offset_mm])
+
+
+def plane_in_frame_of(part: Part, normal: Floats, offset_mm: float) -> Floats:
+    """(4,) normal and offset of a plane of the workpiece frame in the frame of a part."""
+    turned = part.rotation @ normal
+    return np.array([*turned, offset_mm - turned[2] * part.base.offset_mm])
 
 
 def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
@@ -66,19 +71,13 @@ def begin_inside(beads: Sequence[Bead]) -> list[Bead]:
     return list(beads)
 
 
-def interface_edges(part: Part, first: Polygons, below: Polygons | None, later: Sequence[Part]) -> Floats:
-    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface.
-
-    first: section of its first layer, below: plastic under its base plane.
-    """
-    segments = [] if below is None else [_segments(np.insert(loop, 2, 0.0, axis=1)) for loop in contours(first ^ below)]
-    for other in later:
-        for loop in contours(clean(sections(other.in_part_frame(), np.array([BENEATH_MM]))[0])):
+def interface_edges(sections: Sections) -> Floats:
+    """(n, 6) segments, in the part's frame, of the lines where it meets the parts before and after it on the surface."""
+    part, below = sections.part, sections.plastic_below
+    rims = [] if below is None else [np.insert(loop, 2, 0.0, axis=1) for loop in contours(sections.outlines[0] ^ below)]
+    for other in sections.later:
+        for loop in contours(clean(cross_sections(other.in_part_frame(), np.array([BELOW_MM]))[0])):
             placed = np.insert(loop, 2, other.base.offset_mm, axis=1) @ other.rotation
-            segments.append(_segments(placed @ part.rotation.T - np.array([0.0, 0.0, part.base.offset_mm])))
+            rims.append(placed @ part.rotation.T - np.array([0.0, 0.0, part.base.offset_mm]))
+    segments = [np.hstack([rim, np.roll(rim, -1, axis=0)]) for rim in rims]
     return np.concatenate(segments) if segments else np.zeros((0, 6))
-
-
-def _segments(loop: Floats) -> Floats:
-    """(n, 6) sides of a loop (n, 3) in space."""
-    return np.hstack([loop, np.roll(loop, -1, axis=0)])

@@ -14,10 +14,10 @@ from mdp.cut import mesh_of
 from mdp.decomposition import Part
 from mdp.mesh import Floats
 from profiles.process import Process
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, offset
-from slicer.interface.interface import BENEATH_MM
+from slicer.interface.interface import BELOW_MM, frame_change
 from slicer.paths import Kind
-from slicer.section import sections
 from slicer.travel.order import Placed
 from slicer.travel.split import split
 
@@ -27,7 +27,7 @@ SKINS = (Kind.SKIN, Kind.TOP_SKIN, Kind.BRIDGE)
 
 def grooves(part: Part, process: Process) -> Polygons:
     """Grooves under a part's base, in its frame: stripes along x that end before the walls, so that none is seen."""
-    base = clean(sections(part.in_part_frame(), np.array([BENEATH_MM]))[0])
+    base = clean(cross_sections(part.in_part_frame(), np.array([BELOW_MM]))[0])
     walls = process.walls + process.interface_extra_walls
     inside = offset(base, -(walls + 1) * process.line_width_mm) if not base.is_empty() else base
     if inside.is_empty():
@@ -49,9 +49,7 @@ def cut_grooves(
         if area.is_empty():
             continue
         solid = m3.Manifold.extrude(area, 2.0 * process.interlock_mm).translate((0.0, 0.0, -process.interlock_mm))
-        turn = part.rotation @ other.rotation.T
-        shift = turn[:, 2] * other.base.offset_mm - np.array([0.0, 0.0, part.base.offset_mm])
-        loops = sections(mesh_of(solid).transform(turn, shift), cuts_mm)
+        loops = cross_sections(mesh_of(solid).transform(*frame_change(other, part)), cuts_mm)
         left = [o - Polygons(cut) if cut else o for o, cut in zip(left, loops, strict=True)]
     return left
 

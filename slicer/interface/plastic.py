@@ -4,46 +4,37 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mdp.decomposition import Part
 from mdp.mesh import Floats
-from profiles.process import Process
+from slicer.fill.region import Region
 from slicer.geometry.polygons import Polygons, half_plane
-from slicer.heights import Heights
-from slicer.region import Region
+from slicer.interface.interface import plane_in_frame_of
+from slicer.sections import Sections
 
 LEAST_MM2 = 0.01  # a smaller difference of areas in a layer is rounding
 
 
-def interface_mm3(
-    part: Part, own: Sequence[Polygons], regions: Sequence[Region], heights: Heights, later: Sequence[Part], process: Process
-) -> dict[int, float]:
+def interface_mm3(sections: Sections, regions: Sequence[Region]) -> dict[int, float]:
     """Plastic, mm3, that a part has more of than the uncut model in its place, by the part whose base plane is nearest.
 
     Walls and skins on the faces of cuts where there would be sparse infill, and what its first layer on plastic carries beyond
     the room that it has.
     """
-    planes = [np.array([0.0, 0.0, -1.0, 0.0])] if part.index > 1 else []
-    planes += [_plane_in_frame_of(part, other) for other in later]
-    indices = [part.index, *(other.index for other in later)] if part.index > 1 else [other.index for other in later]
-    more = dict.fromkeys(indices, 0.0)
-    for section, region, height_mm, z_mm in zip(own, regions, heights.height_mm, heights.cut_mm, strict=True):
-        if not indices or region.uncut.is_empty():
+    part, process, heights = sections.part, sections.process, sections.heights
+    planes = {} if sections.on_platform else {part.index: np.array([0.0, 0.0, -1.0, 0.0])}
+    planes |= {other.index: plane_in_frame_of(part, other.base.normal, other.base.offset_mm) for other in sections.later}
+    more = dict.fromkeys(planes, 0.0)
+    for section, region, height_mm, z_mm in zip(sections.own, regions, heights.height_mm, heights.cut_mm, strict=True):
+        if not planes or region.uncut.is_empty():
             continue
         closed = (region.uncut ^ section) - region.sparse
         if closed.area() > LEAST_MM2:
-            distances = [np.array([-plane[0], -plane[1], plane[3] - plane[2] * z_mm]) for plane in planes]
-            for index, area in zip(indices, _nearest_areas(closed, distances), strict=True):
+            distances = [np.array([-plane[0], -plane[1], plane[3] - plane[2] * z_mm]) for plane in planes.values()]
+            for index, area in zip(planes, _nearest_areas(closed, distances), strict=True):
                 more[index] += (1.0 - process.infill_density) * float(height_mm) * area
-    if part.index > 1:
-        filled = own[0].area() - (1.0 - process.infill_density) * regions[0].sparse.area()
+    if not sections.on_platform:
+        filled = sections.own[0].area() - (1.0 - process.infill_density) * regions[0].sparse.area()
         more[part.index] += filled * (process.interface_flow * float(heights.height_mm[0]) - float(heights.tip_mm[0]))
     return more
-
-
-def _plane_in_frame_of(part: Part, other: Part) -> Floats:
-    """(4,) normal and offset of the base plane of another part in the frame of a part."""
-    normal = part.rotation @ other.base.normal
-    return np.array([*normal, other.base.offset_mm - normal[2] * part.base.offset_mm])
 
 
 def _nearest_areas(place: Polygons, distances: Sequence[Floats]) -> list[float]:

@@ -1,58 +1,72 @@
-"""Blocker: where support would be in the way of parts printed later, or the head in that of the table."""
+"""Blocker: where support would be in the way of parts printed later, or the head in that of the table, or a person wants none."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from mdp.clearance import least_tip_height_mm
 from mdp.decomposition import Part
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Floats
 from mdp.pose import UP
-from slicer.geometry.polygons import Polygons, union
+from slicer.geometry.polygons import Polygons, half_plane, union
 from slicer.heights import Heights
+from slicer.interface.interface import plane_in_frame_of
+from slicer.sections import Sections
+from slicer.support.reachable import EVEN_MM
+from slicer.zones import no_support_areas
 
 AROUND_MM = 20.0  # support needs no more space around a part than its lean and this
 LEVEL = 1e-9  # a plane whose normal is nearer to upright than this forbids all of a layer or nothing
 
 
-def far_mm(mesh: Mesh) -> float:
-    """A distance from the origin that no support of a part ever reaches; mesh: part frame."""
-    low, high = mesh.bounds_mm
+def support_reach_mm(sections: Sections) -> float:
+    """A distance from the origin that no support of a part ever reaches."""
+    low, high = sections.mesh.bounds_mm
     return float(np.hypot(*np.maximum(np.abs(low), np.abs(high))[:2]) + 2.0 * high[2]) + AROUND_MM
 
 
-def blocked_areas(part: Part, later: Sequence[Part], heights: Heights, gap_mm: float, far_mm: float) -> list[Polygons]:
-    """For each layer what lies above the base plane of any later part.
+def blocked_areas(sections: Sections, heights: Heights, gap_mm: float, far_mm: float) -> list[Polygons]:
+    """For each layer where support cannot be, or where a person wants none.
+
+    heights: of the lowest layers; gap_mm: what it keeps from later parts' base planes; far_mm: how far from the origin all ends.
+    """
+    blocked = above_base_planes(sections.part, sections.later, heights, gap_mm, far_mm)
+    if not sections.part.no_support.anywhere:
+        return blocked
+    return [union(areas) for areas in zip(blocked, shut_areas(sections, heights), strict=True)]
+
+
+def shut_areas(sections: Sections, heights: Heights) -> list[Polygons]:
+    """For each layer where a person wants no support: in the boxes, and over the faces as far as what would stand on them."""
+    unwanted = no_support_areas(sections.part, sections.mesh, heights.cut_mm)
+    gap_mm = sections.process.support_bottom_gap_mm
+    near = np.searchsorted(heights.tip_mm, heights.bottom_mm - gap_mm + EVEN_MM, side="right")
+    return [union(unwanted[max(lowest - 1, 0) : k + 1]) for k, lowest in enumerate(near.tolist())]
+
+
+def above_base_planes(part: Part, later: Sequence[Part], heights: Heights, gap_mm: float, far_mm: float) -> list[Polygons]:
+    """For each layer what lies above the base plane of any later part, taken as lower by gap_mm.
 
     While a part is printed the head moves above its base plane, so nothing may stand there, be it near that part or not.
-    Planes count as lower by gap_mm. The half-planes end far_mm from the origin of the part's frame.
     """
-    return _above_planes(part, [(other.base.normal, other.base.offset_mm - gap_mm) for other in later], heights, far_mm)
+    planes = [plane_in_frame_of(part, other.base.normal, other.base.offset_mm - gap_mm) for other in later]
+    return _above_planes(planes, heights, far_mm)
 
 
-def low_areas(part: Part, least_mm: float, heights: Heights, far_mm: float) -> list[Polygons]:
-    """For each layer what lies nearer to the table than that: there the head would meet it."""
-    return _above_planes(part, [(-UP, -least_mm)], heights, far_mm)
+def near_table(sections: Sections, heights: Heights, far_mm: float) -> list[Polygons]:
+    """For each layer what lies so near to the table that the head would meet it."""
+    least_mm = least_tip_height_mm(sections.profile.machine, sections.part.pose)
+    return _above_planes([plane_in_frame_of(sections.part, -UP, -least_mm)], heights, far_mm)
 
 
-def _above_planes(part: Part, planes: Sequence[tuple[Floats, float]], heights: Heights, far_mm: float) -> list[Polygons]:
-    """For each layer what of it lies above any plane: unit normal and offset in the workpiece frame."""
+def _above_planes(planes: Sequence[Floats], heights: Heights, far_mm: float) -> list[Polygons]:
+    """For each layer what of it lies above any plane: (4,) unit normal and offset."""
     layers: list[list[Polygons]] = [[] for _ in heights.tip_mm]
-    for upward, offset_mm in planes:
-        normal = part.rotation @ upward
-        offset = offset_mm - normal[2] * part.base.offset_mm
-        below_mm = offset - np.maximum(normal[2] * heights.bottom_mm, normal[2] * heights.tip_mm)
-        across = float(np.hypot(normal[0], normal[1]))
+    everywhere = Polygons.square((2.0 * far_mm, 2.0 * far_mm), True)
+    for x, y, z, offset in planes:
+        below_mm = offset - np.maximum(z * heights.bottom_mm, z * heights.tip_mm)
+        level = np.hypot(x, y) < LEVEL
         for layer, rest in zip(layers, below_mm.tolist(), strict=True):
-            if across < LEVEL:
-                if rest < 0.0:
-                    layer.append(_beyond(np.array([1.0, 0.0]), -far_mm, far_mm))
-            elif rest < across * far_mm:
-                layer.append(_beyond(normal[:2] / across, rest / across, far_mm))
+            if rest < 0.0 or not level:
+                layer.append(half_plane(everywhere, x, y, -rest))
     return [union(layer) for layer in layers]
-
-
-def _beyond(direction: Floats, distance_mm: float, far_mm: float) -> Polygons:
-    """The points farther along a unit direction than the distance, up to far_mm."""
-    aside = np.array([-direction[1], direction[0]]) * 2.0 * far_mm
-    near, far = direction * max(distance_mm, -2.0 * far_mm), direction * 2.0 * far_mm
-    return Polygons([np.array([near - aside, far - aside, far + aside, near + aside])])

@@ -110,7 +110,7 @@ def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int
         narrow = _narrow(old, reachable, borders, float(depth), lean)
         if narrow is not None:
             low.append(narrow)
-        elif not old.full or not _stands_on(old, areas.ground[layer]):
+        elif not old.full or not _stands_on(old, areas.placeable[layer]):
             left.append(old)
     return _drop_enclosed(low + _move_aside(left, areas, layer))
 
@@ -173,9 +173,9 @@ def _narrow(branch: Branch, reachable: Polygons, borders: Floats, depth_mm: floa
     return thin if (thin.area - reachable).area() < LEAST_MM2 else None
 
 
-def _stands_on(branch: Branch, ground: Polygons) -> bool:
+def _stands_on(branch: Branch, placeable: Polygons) -> bool:
     """Whether most of a branch has come to ground."""
-    return bool(2.0 * (branch.area - ground).area() < branch.area.area())
+    return bool(2.0 * (branch.area - placeable).area() < branch.area.area())
 
 
 def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -> list[Branch]:
@@ -186,7 +186,7 @@ def _move_aside(branches: Sequence[Branch], areas: ReachableAreas, layer: int) -
     area = union([branch.area for branch in branches])
     tidy = layer % TIDY_EVERY == 0
     area = closing(area, SMOOTH_MM) if tidy else area
-    carrying = carrying_area(area, reachable, areas.ground[layer], lean)
+    carrying = carrying_area(area, reachable, areas.placeable[layer], lean)
     carrying = _draw_in(carrying, lean) if tidy and (area - reachable).is_empty() else carrying
     below = islands(_tidy(carrying, reachable)) if tidy else _islands_below(carrying, reachable)
     top = max(branch.top_mm for branch in branches)

@@ -22,5 +22,5 @@ class Columns:
         """What carries a layer's support in the layer below."""
         if (self.area - areas.reachable[layer - 1]).is_empty():
             return self
-        lower = carrying_area(self.area, areas.reachable[layer - 1], areas.ground[layer], float(areas.lean_mm[layer]))
+        lower = carrying_area(self.area, areas.reachable[layer - 1], areas.placeable[layer], float(areas.lean_mm[layer]))
         return Columns(lower.simplify(SLIVER_MM))

@@ -12,11 +12,11 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
-from slicer.fill.skin import skin_beads
+from slicer.fill.skin import SolidLines, skin_beads
 from slicer.fill.zigzag import zigzag_lines
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, close_loop, contours, offset
 from slicer.paths import Kind
-from slicer.section import sections
 from slicer.travel.islands import OUTSIDE
 
 ROOF_LAYERS = 3  # the first of them sags between the sparse lines, the last one is even
@@ -34,7 +34,7 @@ def without_pedestal(
 ) -> list[Polygons]:
     """Outlines of the model alone: empty in the pedestal, and its own foot where it is sunk into the pedestal's top."""
     sunk_mm = pedestal_mm + PLATFORM_TOLERANCE_MM
-    foot = clean(sections(mesh, np.array([sunk_mm + ABOVE_MM]))[0])
+    foot = clean(cross_sections(mesh, np.array([sunk_mm + ABOVE_MM]))[0])
     if foot.is_empty():
         foot = outlines[-1]
     above = [o ^ foot if cut < sunk_mm else o for o, cut in zip(outlines[layers:], cuts_mm[layers:].tolist(), strict=True)]
@@ -49,7 +49,7 @@ def pedestal_beads(outline: Polygons, layer: int, layers: int, process: Process,
     angle = process.infill_angle_deg + 90.0 * (layer % 2)
     if layer == 0 or layer >= layers - ROOF_LAYERS:
         kind = Kind.SUPPORT if layer == 0 else Kind.SUPPORT_INTERFACE
-        lines = skin_beads(inside, kind, angle, width, height_mm, process.infill_overlap)
+        lines = skin_beads(inside, kind, SolidLines(angle, width, height_mm, process.infill_overlap))
         return beads + [Bead(kind, line.points, width, OUTSIDE, line.flow) for line in lines]
     inner = offset(inside, -0.5 * spacing)
     return beads + [

@@ -2,11 +2,11 @@
 
 Everything here is about the middle of a branch: a place is free when a disc of the branch's least radius around it keeps
 all gaps, and reachable when a chain of such places, each within the lean of the one below, leads down to ground. (Cura's tree
-support has the complement, avoidance areas, and calls ground placeable.)
+support has the complement, avoidance areas, and its word for what one may stand on, placeable.)
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians, tan
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, offset, offset_round, union
-from slicer.heights import Heights
+from slicer.sections import Sections
 
 COARSE_MM = 0.03  # sections are simplified by this before they are grown
 MARGIN_MM = 0.08  # and grown by this more, which leaves space for simplified support
@@ -33,17 +33,56 @@ SEGMENTS = 12  # of a full turn in round corners; corners lie on the circle, so 
 
 @dataclass(frozen=True, eq=False)
 class ReachableAreas:
-    """Per layer: ground to stand on, what is reachable, and the lean from the layer below, mm.
+    """Where support of a part may stand; per layer, of as many of its lowest ones as are of use: the lean from the layer below,
+    mm, what is placeable, and what is reachable.
 
-    bottom_mm and top_mm: of all layers of the part. ground: what is solid, grown by BEYOND of the radius.
+    placeable: places of the ground beneath that a branch may end on: what is solid, grown by BEYOND of the radius.
     """
 
-    radius_mm: float
-    bottom_mm: Floats
-    top_mm: Floats
+    sections: Sections
     lean_mm: Floats
-    ground: tuple[Polygons, ...]
+    placeable: tuple[Polygons, ...]
     reachable: tuple[Polygons, ...]
+
+    @property
+    def process(self) -> Process:
+        """The settings of support, with the width of its lines."""
+        return self.sections.support_process
+
+    @property
+    def radius_mm(self) -> float:
+        """How far the beads of a branch reach round each place."""
+        return self.process.line_width_mm
+
+    @property
+    def top_mm(self) -> Floats:
+        """(n,) upper sides of all layers of the part."""
+        return self.sections.heights.tip_mm
+
+    @property
+    def bottom_mm(self) -> Floats:
+        """(n,) lower sides of all layers of the part."""
+        return self.sections.heights.bottom_mm
+
+    def carrying_layers(self, layer: int) -> range:
+        """The layers, from the highest down, on which what hangs in a layer may rest.
+
+        The distance across keeps support as much lower under a slope that is just too flat.
+        """
+        process, drop_mm = self.process, float(self.bottom_mm[layer]) - self.process.support_gap_mm
+        slack_mm = process.support_distance_mm / max(tan(radians(process.self_supporting_angle_deg)), 0.5)
+        highest = int(np.searchsorted(self.top_mm, drop_mm + EVEN_MM, side="right")) - 1
+        lowest = int(np.searchsorted(self.top_mm, drop_mm - slack_mm - EVEN_MM))
+        return range(highest, min(lowest, highest) - 1, -1) if highest >= 0 else range(0)
+
+    def next_above(self, layer: int) -> int:
+        """The first layer over one that support in it keeps no gap to."""
+        return int(np.searchsorted(self.bottom_mm, self.top_mm[layer] + self.process.support_gap_mm - EVEN_MM))
+
+    def next_below(self, layer: int) -> int:
+        """How many layers lie so far under one that support in it may stand on them."""
+        drop_mm = self.bottom_mm[layer] - self.process.support_bottom_gap_mm
+        return min(int(np.searchsorted(self.top_mm, drop_mm + EVEN_MM, side="right")), layer)
 
 
 def dilate(area: Polygons, distance_mm: float) -> Polygons:
@@ -70,14 +109,14 @@ def drop_slivers(places: Polygons) -> Polygons:
     return core if core.is_empty() else offset(core, 1.5 * SLIVER_MM) ^ places
 
 
-def carrying_area(places: Polygons, reachable: Polygons, ground: Polygons, lean_mm: float) -> Polygons:
+def carrying_area(places: Polygons, reachable: Polygons, placeable: Polygons, lean_mm: float) -> Polygons:
     """Reachable places of a layer that carry places of the layer above: straight below where that can be, aside where it
-    must. Places on ground need nothing.
+    must. What is placeable needs nothing.
     """
     straight = places ^ reachable
     rest = places - reachable
     if rest.area() >= LEAST_MM2:
-        rest = rest - ground
+        rest = rest - placeable
     if rest.area() >= LEAST_MM2:
         rest = rest - dilate(offset(straight, -SLIVER_MM), lean_mm)
     if rest.area() < LEAST_MM2:
@@ -89,46 +128,38 @@ def carrying_area(places: Polygons, reachable: Polygons, ground: Polygons, lean_
     return straight + aside
 
 
-def reachable_areas(
-    outlines: Sequence[Polygons],
-    heights: Heights,
-    process: Process,
-    below: Polygons | None,
-    blocked: Sequence[Polygons],
-    floor: Polygons,
-    handed: Polygons | None = None,
-) -> ReachableAreas:
-    """The areas of as many layers as there are `blocked`, for the part with these outlines.
+def reachable_areas(sections: Sections, blocked: Sequence[Polygons], handed: Polygons | None = None) -> ReachableAreas:
+    """The areas of as many layers of a part as there are `blocked`; all of the plate is placeable on the platform.
 
-    below: plastic just under the base plane, None: the platform, all of whose floor is ground. handed: places on the base
-    plane that support of an earlier part can reach.
+    handed: places on the base plane that support of an earlier part can reach.
     """
-    count, radius = len(blocked), process.line_width_mm
-    top, bottom = heights.tip_mm, heights.bottom_mm
-    angle = min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
-    lean = heights.height_mm[:count] * tan(radians(angle))
-    plain = [s if s.is_empty() else s.simplify(COARSE_MM) for s in outlines]
+    process, count = sections.support_process, len(blocked)
+    radius, angle = process.line_width_mm, min(process.support_branch_angle_deg, process.self_supporting_angle_deg)
+    lean_mm = sections.heights.height_mm[:count] * tan(radians(angle))
+    areas = ReachableAreas(sections, lean_mm, (), ())
+    highest = max(areas.next_above(count - 1), count)
+    plain = [s if s.is_empty() else s.simplify(COARSE_MM) for s in sections.outlines[:highest]]
     wide = [s if s.is_empty() else offset(s, radius + MARGIN_MM) for s in plain]
     tall = [s if s.is_empty() else offset(s, radius + process.support_distance_mm + MARGIN_MM) for s in plain[:count]]
-    root = int(np.searchsorted(np.maximum(bottom, 0.0), process.support_bottom_gap_mm - EVEN_MM))
-    ground: list[Polygons] = []
+    root = int(np.searchsorted(np.maximum(areas.bottom_mm, 0.0), process.support_bottom_gap_mm - EVEN_MM))
+    placeable: list[Polygons] = []
     reachable: list[Polygons] = []
     for m in range(count):
-        near = min(int(np.searchsorted(top, bottom[m] - process.support_bottom_gap_mm + EVEN_MM, side="right")), m)
-        over = int(np.searchsorted(bottom, top[m] + process.support_gap_mm - EVEN_MM))
+        near = areas.next_below(m)
         shut = blocked[m] if blocked[m].is_empty() else offset(blocked[m], radius + MARGIN_MM)
-        obstacles = union([o for o in (tall[m], *wide[near:m], *wide[m + 1 : over], shut) if not o.is_empty()])
+        close = (tall[m], *wide[near:m], *wide[m + 1 : areas.next_above(m)], shut)
+        obstacles = union([obstacle for obstacle in close if not obstacle.is_empty()])
         stands = [offset(plain[near - 1], BEYOND * radius)] if near > 0 and process.support_on_part else []
-        if below is not None and m == root:
-            stands.append(offset(below, BEYOND * radius))
+        if sections.plastic_below is not None and m == root:
+            stands.append(offset(sections.plastic_below, BEYOND * radius))
         if handed is not None and m == 0:
             stands.append(handed)
-        ground.append(union(stands))
-        if m == 0 and below is None:
-            start = offset(floor, -radius)
+        placeable.append(union(stands))
+        if m == 0 and sections.on_platform:
+            start = offset(sections.plate, -radius)
         else:
-            start = ground[m]
+            start = placeable[m]
             if m and not reachable[-1].is_empty():
-                start = dilate(reachable[-1], (1.0 - SPARE) * float(lean[m])) + start
+                start = dilate(reachable[-1], (1.0 - SPARE) * float(lean_mm[m])) + start
         reachable.append(start if start.is_empty() else (start - obstacles).simplify(FINE_MM))
-    return ReachableAreas(radius, bottom, top, lean, tuple(ground), tuple(reachable))
+    return replace(areas, placeable=tuple(placeable), reachable=tuple(reachable))

@@ -1,23 +1,28 @@
-"""Brim and skirt: beads around part 1's first layer."""
+"""Brim and skirt: beads around part 1's first layer on the plate, and how well it holds there."""
 
 from math import ceil
 
+from mdp.sweep.section_moments import greatest_stress_per_moment
+from profiles.machine import Table
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
-from slicer.geometry.polygons import Polygons, area_mm2, contours, offset, offset_round
+from slicer.geometry.polygons import Polygons, area_mm2, contours, edges, offset, offset_round
 from slicer.paths import Kind
-from slicer.plate import tips_over
 from slicer.walls.seam import start_at_rear
 
 RANK = -2000
 LEAST_MM2 = 1e-3  # areas smaller than this are rounding
+PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
+ADHESION_N_MM2 = 0.2  # of plastic to a clean warm plate, a few times less than published peel tests of PLA and PETG give
 
 
-def brim(footprint: Polygons, base: Polygons, floor: Polygons, top_mm: float, process: Process, height_mm: float) -> list[Bead]:
+def brim(
+    footprint: Polygons, base: Polygons, plate: Polygons, process: Process, *, top_mm: float, height_mm: float
+) -> list[Bead]:
     """The brim, outermost bead first so that it ends at the part; without a brim the skirt's loops.
 
-    footprint: all that the first layer prints; base: what of it the print stands on; floor: the plate, which no loop leaves;
-    top_mm: how high the print will be. A base that would tip over gets a brim of process.small_base_brim_mm.
+    footprint: all that the first layer prints; base: what of it the print stands on; plate: its outline, which no loop
+    leaves; top_mm: how high the print will be. A base that would tip over gets a brim of process.small_base_brim_mm.
     """
     spacing = spacing_mm(process.line_width_mm, height_mm)
     width = process.brim_mm
@@ -31,7 +36,7 @@ def brim(footprint: Polygons, base: Polygons, floor: Polygons, top_mm: float, pr
     beads: list[Bead] = []
     for k in reversed(range(count)):
         # Along the plate's edge the loops lie beside each other as they do elsewhere; one that finds no room is left out.
-        around = offset_round(outside, nearest + k * spacing) ^ offset(floor, -half - (count - 1 - k) * spacing)
+        around = offset_round(outside, nearest + k * spacing) ^ offset(plate, -half - (count - 1 - k) * spacing)
         if (offset_round(outside, min(half, nearest)) - around).area() > LEAST_MM2:
             continue
         loops = [loop for loop in contours(around) if area_mm2(loop) > 0]
@@ -43,3 +48,25 @@ def _outside(polygons: Polygons) -> Polygons:
     """Without holes."""
     outer = [loop for loop in contours(polygons) if area_mm2(loop) > 0]
     return Polygons(outer) if outer else Polygons()
+
+
+def plate_outline(table: Table) -> Polygons:
+    """The plate's outline in the frame of a part that is printed with the table level, part 1's."""
+    if table.size_mm is not None:
+        return Polygons.square(table.size_mm, True)
+    return Polygons.circle(table.radius_mm, 180)
+
+
+def tips_over(base: Polygons, height_mm: float) -> bool:
+    """Whether a push at that height would tear the base off the plate.
+
+    The plate holds the base like glue an upright beam: the greatest tension is push times height over the least section
+    modulus of the base.
+    """
+    modulus = section_modulus_mm3(base)
+    return modulus <= 0.0 or PUSH_N * height_mm / modulus > ADHESION_N_MM2
+
+
+def section_modulus_mm3(base: Polygons) -> float:
+    """Least section modulus of an area over all directions of bending, 0 of an empty one."""
+    return 1.0 / greatest_stress_per_moment(edges(base))

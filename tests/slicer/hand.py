@@ -13,10 +13,12 @@ from mdp.mesh import Floats, Mesh
 from mdp.plane import PLATFORM, Plane
 from mdp.pose import level, poses, rotation, unit
 from profiles.profile import Profile, load
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean
+from slicer.heights import Heights
 from slicer.paths import Kind, SlicedPart
 from slicer.paths import Path as Stroke
-from slicer.section import sections
+from slicer.sections import Sections
 from tests.shapes import from_manifold
 
 BARE = ("process.skirt_loops=0", "process.small_base_brim_mm=0", "process.support=none")
@@ -49,9 +51,17 @@ def cut(mesh: Mesh, *planes: tuple[Sequence[float], float]) -> list[Part]:
     return parts
 
 
+def sections_at(mesh: Mesh, cuts_mm: Floats, *settings: str) -> Sections:
+    """A mesh on the platform cut at heights, with layers of 0.2 mm around them."""
+    outlines = [clean(loops, 0.0) for loops in cross_sections(mesh, cuts_mm)]
+    heights = Heights(cuts_mm + 0.1, np.full(len(cuts_mm), 0.2), cuts_mm)
+    plate = Polygons.square((400.0, 400.0), True)
+    return Sections(whole(mesh), (), (), profile(*settings), mesh, heights, outlines, outlines, outlines, None, plate)
+
+
 def section_at(mesh: Mesh, z_mm: float) -> Polygons:
     """The cleaned section at a height."""
-    return clean(sections(mesh, np.array([z_mm]))[0])
+    return clean(cross_sections(mesh, np.array([z_mm]))[0])
 
 
 def of_kind(sliced: SlicedPart, *kinds: Kind) -> list[Stroke]:

@@ -6,10 +6,12 @@ import pytest
 
 from mdp.decomposition import Part
 from mdp.mesh import Mesh
+from slicer.finish.compensation import compensate_elephant_foot
+from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, SlicedPart
 from slicer.slice import slice_part
 from tests.shapes import box, standing
-from tests.slicer.hand import BARE, cut, of_kind, profile, whole
+from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
 
 LEANING = (0.6, 0.0, 0.8)
 
@@ -108,3 +110,23 @@ def test_skin_of_the_first_layer_may_be_faster_than_its_walls() -> None:
     paths = slice_part(whole(box(10, 10, 1)), profile(*BARE, "process.first_layer_infill_speed_mm_s=35")).layers[0].paths
     speeds = {path.kind: path.speed_mm_s for path in paths}
     assert (speeds[Kind.OUTER_WALL], speeds[Kind.SKIN]) == (20.0, 35.0)
+
+
+def test_only_the_first_layer_is_smaller_against_the_elephants_foot() -> None:
+    layers = slice_part(whole(box(20, 20, 2)), profile(*BARE, "process.elephant_foot_mm=0.2")).layers
+    edges = [max(np.abs(p.points).max() for p in layer.paths) for layer in layers[:3]]
+    assert edges == pytest.approx([10 - 0.2 - 0.225, 10 - 0.225, 10 - 0.225])
+
+
+def test_a_part_on_plastic_has_no_elephants_foot() -> None:
+    base, top = cut(box(20, 20, 20), ((0, 0, 1), 10.0))
+    first = slice_part(top, profile(*BARE, "process.elephant_foot_mm=0.2", "process.interface_seam_mm=0"), [base]).layers[0]
+    assert max(np.abs(p.points).max() for p in first.paths) == pytest.approx(10 - 0.225)
+
+
+def test_thin_places_keep_their_width() -> None:
+    shape = Polygons.square((20, 20)) + Polygons.square((10, 0.6)).translate((20, 10))
+    less = as_shapely(compensate_elephant_foot(shape, 0.2, 0.45))
+    assert less.area == pytest.approx(19.6**2 + 10 * 0.6, abs=0.3)
+    assert less.bounds == pytest.approx((0.2, 0.2, 30, 19.8), abs=1e-6)
+    assert len(getattr(less, "geoms", [less])) == 1

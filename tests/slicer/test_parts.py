@@ -57,12 +57,12 @@ import slicer.parts
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
 
-def slice_site(*_):
+def slice_supported(*_):
     os.write(1, f"{os.getpid()}\\n".encode())  # in one piece, so that two processes' lines do not mix
     while True:
         pass
 
-slicer.parts.slice_site = slice_site
+slicer.parts.slice_supported = slice_supported
 slicer.parts.slice_parts(cut(box(10, 10, 24), ((0.0, 0.0, 1.0), 12.0)), profile(), processes=2)
 """
 

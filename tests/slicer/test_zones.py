@@ -15,10 +15,10 @@ from slicer.heights import Heights
 from slicer.parts import slice_parts
 from slicer.paths import Kind, SlicedPart
 from slicer.slice import slice_part
-from slicer.support.unwanted import shut_areas
-from slicer.walls.unwanted_seam import unwanted_segments
+from slicer.support.blocker import shut_areas
+from slicer.zones import no_seam_segments, no_support_areas
 from tests.shapes import box, tee
-from tests.slicer.hand import BARE, cut, of_kind, profile, volume_mm3, whole
+from tests.slicer.hand import BARE, cut, of_kind, profile, sections_at, volume_mm3, whole
 
 BACK = Grown((0.0, 10.0, 5.0), 1.0)
 BACK_BOX = Zone((-20.0, 8.0, -1.0), (20.0, 12.0, 30.0))
@@ -61,12 +61,13 @@ def test_boxes_that_share_a_leaning_part_share_its_walls(axes: tuple[Vector, Vec
 
     def wall_mm(zone: Marked) -> Floats:
         """Of every layer; all of it in the zone's box, if it has one."""
-        layers = [each.reshape(-1, 2, 3) for each in unwanted_segments(replace(leaning, no_seam=zone), cuts_mm)]
+        segments = no_seam_segments(replace(leaning, no_seam=zone), leaning.in_part_frame(), cuts_mm)
+        layers = [chords.reshape(-1, 2, 3) for chords in segments]
         for within in zone.boxes:
             spots = (np.concatenate(layers) + np.array([0.0, 0.0, leaning.base.offset_mm])) @ leaning.rotation
             assert (within.along(spots) >= np.array(within.min_mm) - 1e-9).all()
             assert (within.along(spots) <= np.array(within.max_mm) + 1e-9).all()
-        return np.array([np.linalg.norm(each[:, 1] - each[:, 0], axis=1).sum() for each in layers])
+        return np.array([np.linalg.norm(chords[:, 1] - chords[:, 0], axis=1).sum() for chords in layers])
 
     left, right = Zone((-50.0, -50.0, -50.0), (50.0, 1.0, 50.0), axes), Zone((-50.0, 1.0, -50.0), (50.0, 50.0, 50.0), axes)
     whole_mm = wall_mm(Marked(faces=np.ones(len(leaning.mesh.faces), dtype=np.bool_)))
@@ -98,10 +99,10 @@ def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zon
 def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> None:
     block, tips_mm = whole(box(20.0, 20.0, 4.0)), 0.08 * np.arange(1, 101)
     marked = replace(block, no_support=Marked.of(block.mesh, [Grown((0.0, 0.0, 4.0), 1.0)]))
-    process = profile("process.layer_height_mm=0.3", "process.support_bottom_gap_mm=0.3").process
     heights = Heights(tips_mm, np.full(100, 0.08), tips_mm - 0.04)
+    sections = sections_at(block.mesh, heights.cut_mm, "process.layer_height_mm=0.3", "process.support_bottom_gap_mm=0.3")
     stands = int(np.searchsorted(heights.bottom_mm, 4.3))  # the first layer that support on it would have
-    shut = shut_areas(marked, heights, process)
+    shut = shut_areas(replace(sections, part=marked), heights)
     assert (shut[stands].area(), shut[-1].area()) == (pytest.approx(400.0, rel=0.01), 0.0)
 
 
@@ -110,7 +111,5 @@ def test_a_box_that_leans_shuts_of_each_layer_what_lies_in_it() -> None:
     leaning = Zone((-5.0, -10.0, -5.0), (5.0, 10.0, 5.0), ((half, 0.0, -half), (0.0, 1.0, 0.0), (half, 0.0, half))).moved(
         (0, 0, 10)
     )
-    tips_mm = np.array([3.0, 7.0, 11.0])
-    heights = Heights(tips_mm, np.full(3, 1e-9), np.array([2.0, 6.0, 10.0]))
-    shut = shut_areas(replace(part, no_support=Marked((leaning,))), heights, SUPPORTED.process)
+    shut = no_support_areas(replace(part, no_support=Marked((leaning,))), part.mesh, np.array([2.0, 6.0, 10.0]))
     assert shut[-1].area() == pytest.approx(20.0 * 10.0 * 2.0**0.5)  # as wide as its side's diagonal half way up

@@ -10,9 +10,9 @@ from mdp.mesh import Mesh
 from mdp.overhang import Mask
 from profiles.errors import PlanError
 from profiles.profile import Profile
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import clean
-from slicer.plate import tips_over
-from slicer.section import sections
+from slicer.walls.brim import tips_over
 
 GAP_MM = 5.0  # between copies, or between their brims
 MOST = 1000
@@ -67,7 +67,7 @@ def in_copies(decomposition: Decomposition, count: int, profile: Profile) -> tup
 
 def _tips_over(mesh: Mesh, profile: Profile) -> bool:
     """Whether one copy would tip off the plate."""
-    base = sections(mesh, np.array([0.5 * profile.process.first_layer_height_mm]))[0]
+    base = cross_sections(mesh, np.array([0.5 * profile.process.first_layer_height_mm]))[0]
     return tips_over(clean(base), float(mesh.bounds_mm[1, 2]))
 
 

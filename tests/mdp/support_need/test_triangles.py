@@ -14,11 +14,10 @@ from mdp.support_need.need import ModelPieces, SupportNeed, needs_support
 from mdp.support_need.patches import CARRIES_ITSELF, UNSUPPORTABLE
 from mdp.sweep.sweep import Remainder, gains
 from profiles.profile import load
-from slicer.geometry.polygons import clean
-from slicer.section import sections
-from slicer.support.overhang import detect_overhangs
+from slicer.overhangs import find_overhangs
 from tests.retriangulated import edited, refined
 from tests.shapes import standing
+from tests.slicer.hand import sections_at
 
 PROFILE = load()
 UP_DEG = PROFILE.process.self_supporting_angle_deg
@@ -122,9 +121,8 @@ def test_a_search_counts_the_same_however_a_shape_is_cut_into_triangles(mesh: Me
 
 def hanging_mm2(mesh: Mesh) -> list[float]:
     """What of every layer the slicer supports."""
-    cuts = np.arange(0.13, float(mesh.bounds_mm[1, 2]), 0.2)
-    outlines = [clean(loops, 0.0) for loops in sections(mesh, cuts)]
-    return [overhang.hanging.area() for overhang in detect_overhangs(mesh, outlines, cuts, PROFILE.process, None)]
+    sections = sections_at(mesh, np.arange(0.13, float(mesh.bounds_mm[1, 2]), 0.2))
+    return [overhang.hanging.area() for overhang in find_overhangs(sections)]
 
 
 @settings(max_examples=10)

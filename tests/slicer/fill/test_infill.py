@@ -13,7 +13,7 @@ from slicer.bead import Bead, length_mm
 from slicer.fill.gyroid import LENGTH, gyroid
 from slicer.fill.honeycomb import honeycomb, side_mm
 from slicer.fill.infill import PATTERNS, infill_beads, pattern_density
-from slicer.fill.pattern import clip_pattern
+from slicer.fill.pattern import PatternLayer, clip_pattern
 from slicer.geometry.clip import border_of, rotation_2d
 from slicer.geometry.polygons import Polygons, offset
 from tests.slicer.fill.areas import HEIGHT, OVERLAP, STARS, WIDTH, plastic_mm2, ring, square
@@ -33,7 +33,7 @@ def filled(
 ) -> list[Bead]:
     keys = {"pattern": pattern, "density": density, "angle_deg": angle, "anchor_mm": anchor, "joint_mm": joint}
     process = profile(*(f"process.infill_{key}={value}" for key, value in keys.items())).process
-    return infill_beads(area, process, density, layer, (layer + 1) * HEIGHT, HEIGHT)
+    return infill_beads(area, process, density=density, layer=layer, z_mm=(layer + 1) * HEIGHT, height_mm=HEIGHT)
 
 
 @pytest.mark.parametrize("pattern", PATTERN_NAMES)
@@ -42,7 +42,9 @@ def test_sparse_infill_of_a_block_meets_its_density_anchors_and_all(pattern: str
     block, layers = Polygons.square((60, 60)), range(0, 150, 3)
     keys = profile(f"process.infill_pattern={pattern}", f"process.infill_density={density}").process
     drawn = pattern_density([block] * 150, keys, HEIGHT)
-    plastic = [plastic_mm2(infill_beads(block, keys, drawn, k, (k + 1) * HEIGHT, HEIGHT)) for k in layers]
+    plastic = [
+        plastic_mm2(infill_beads(block, keys, density=drawn, layer=k, z_mm=(k + 1) * HEIGHT, height_mm=HEIGHT)) for k in layers
+    ]
     assert np.mean(plastic) / block.area() == pytest.approx(density, rel=0.02)
 
 
@@ -86,7 +88,7 @@ def test_grid_lines_lie_on_each_other_in_all_layers() -> None:
 @pytest.mark.parametrize("height", [0.4, 3.0, 7.7, 12.1])
 def test_gyroid_lines_lie_on_the_minimal_surface(height: float) -> None:
     unit = LENGTH * 0.4 / 0.2 / (2 * np.pi)
-    pattern = gyroid(0.0, height, 0.4, 0.2)
+    pattern = gyroid(PatternLayer(0, height, 0.0, 0.4, 0.2))
     x, y = (pattern.draw((-20, -20, 20, 20))[0] @ rotation_2d(pattern.angle_deg).T / unit).T
     z = height / unit
     assert np.abs(np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)).max() < 1e-9
@@ -106,7 +108,7 @@ def test_cubic_lines_lie_on_planes_at_right_angles() -> None:
 
 
 def test_honeycomb_cells_are_regular_hexagons_of_the_density() -> None:
-    points, starts = honeycomb(0.0, 0, 0.4, 0.1).draw((0, 0, 40, 40))
+    points, starts = honeycomb(PatternLayer(0, 0.0, 0.0, 0.4, 0.1)).draw((0, 0, 40, 40))
     line = points[: starts[1]]
     steps = np.diff(line, axis=0)
     flat, slanted = steps[0::2], steps[1::2]
@@ -125,7 +127,7 @@ def test_clipping_agrees_with_shapely(points: list[tuple[float, float]], angle: 
     hull = m3.CrossSection.hull_points(np.array(points))
     assume(hull.area() > 1.0)
     area = hull - Polygons.circle(4.0, 20).translate((3, 1)) - Polygons.square((30, 1.5)).rotate(33)
-    waves = gyroid(angle, 1.7, 0.4, 0.4 / apart)
+    waves = gyroid(PatternLayer(0, 1.7, angle, 0.4, 0.4 / apart))
     pieces = clip_pattern(border_of(area), waves)
     bounds = np.append(pieces.starts, len(pieces.points))
     found = sum(length_mm(pieces.points[a:b]) for a, b in pairwise(bounds))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats
 from slicer.bead import Bead
-from slicer.fill.skin import skin_beads
+from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, clean
 from slicer.paths import Kind
 from slicer.travel.order import order_beads
@@ -56,7 +56,11 @@ HOLES = st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(0.6, 4.
 
 @given(HOLES, st.sampled_from([0.0, 45.0, 135.0, 77.0]))
 def test_no_line_is_printed_after_its_upper_neighbour(holes: list[tuple[float, float, float]], angle_deg: float) -> None:
-    beads = [b for b in skin_beads(plate(holes), Kind.TOP_SKIN, angle_deg, WIDTH, HEIGHT, 0.0, True) if b.kind is Kind.TOP_SKIN]
+    beads = [
+        b
+        for b in skin_beads(plate(holes), Kind.TOP_SKIN, SolidLines(angle_deg, WIDTH, HEIGHT, in_order=True))
+        if b.kind is Kind.TOP_SKIN
+    ]
     for island in range(sum(not bead.follows for bead in beads)):
         firsts = [k for k, bead in enumerate(beads) if not bead.follows] + [len(beads)]
         assert out_of_order(lines_of(beads[firsts[island] : firsts[island + 1]], angle_deg)) == 0
@@ -66,7 +70,12 @@ def test_no_line_is_printed_after_its_upper_neighbour(holes: list[tuple[float, f
 def test_order_loses_no_line(holes: list[tuple[float, float, float]]) -> None:
     told = [
         lines_of(
-            [b for b in skin_beads(plate(holes), Kind.TOP_SKIN, 45.0, WIDTH, HEIGHT, 0.0, mode) if b.kind is Kind.TOP_SKIN], 45.0
+            [
+                b
+                for b in skin_beads(plate(holes), Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT, in_order=mode))
+                if b.kind is Kind.TOP_SKIN
+            ],
+            45.0,
         )
         for mode in (True, False)
     ]
@@ -74,13 +83,13 @@ def test_order_loses_no_line(holes: list[tuple[float, float, float]]) -> None:
 
 
 def test_without_it_lines_meet_from_both_sides_of_a_hole() -> None:
-    beads = skin_beads(plate([(0, 0, 4)]), Kind.TOP_SKIN, 45.0, WIDTH, HEIGHT, 0.0)
+    beads = skin_beads(plate([(0, 0, 4)]), Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT))
     assert out_of_order(lines_of(beads, 45.0)) > 0
 
 
 def test_the_order_of_a_layer_keeps_it() -> None:
     area = plate([(3, 2, 3), (-5, -3, 2)])
-    beads = skin_beads(area, Kind.TOP_SKIN, 45.0, WIDTH, HEIGHT, 0.0, True)
+    beads = skin_beads(area, Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT, in_order=True))
     placed = order_beads(beads, area, profile().process, np.array([20.0, 20.0]))
     printed = [Bead(each.bead.kind, each.points, WIDTH, 2) for each in placed if each.bead.kind is Kind.TOP_SKIN]
     assert out_of_order(lines_of(printed, 45.0)) == 0

@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slicer.fill.skin import skin_beads
+from slicer.fill.skin import SolidLines, skin_beads
 from slicer.geometry.polygons import Polygons, offset
 from slicer.paths import Kind
 from tests.slicer.fill.areas import HEIGHT, OVERLAP, STARS, WIDTH, plastic_mm2, ring, square, strip
@@ -20,20 +20,21 @@ from tests.slicer.hand import as_shapely, distances_mm
 @pytest.mark.parametrize("area", [square, ring, strip])
 @pytest.mark.parametrize("angle", [45.0, 135.0, 20.0])
 def test_a_skin_extrudes_its_area(area: Callable[[], Polygons], angle: float) -> None:
-    beads = skin_beads(area(), Kind.SKIN, angle, WIDTH, HEIGHT, OVERLAP)
+    beads = skin_beads(area(), Kind.SKIN, SolidLines(angle, WIDTH, HEIGHT, OVERLAP))
     assert plastic_mm2(beads) == pytest.approx(area().area(), rel=0.003)
     assert all(0.9 < bead.flow < 1.1 for bead in beads if bead.kind is Kind.SKIN)
 
 
 def test_a_skin_covers_its_area_everywhere() -> None:
     lines = [
-        shapely.LineString(b.points).buffer(b.width_mm / 2) for b in skin_beads(ring(), Kind.SKIN, 45.0, WIDTH, HEIGHT, OVERLAP)
+        shapely.LineString(b.points).buffer(b.width_mm / 2)
+        for b in skin_beads(ring(), Kind.SKIN, SolidLines(45.0, WIDTH, HEIGHT, OVERLAP))
     ]
     assert as_shapely(ring()).difference(shapely.union_all(lines)).area < 0.01 * ring().area()
 
 
 def test_a_skin_of_a_square_is_one_zigzag() -> None:
-    assert len(skin_beads(square(), Kind.SKIN, 45.0, WIDTH, HEIGHT, OVERLAP)) == 1
+    assert len(skin_beads(square(), Kind.SKIN, SolidLines(45.0, WIDTH, HEIGHT, OVERLAP))) == 1
 
 
 @settings(max_examples=30, deadline=None)
@@ -41,10 +42,10 @@ def test_a_skin_of_a_square_is_one_zigzag() -> None:
 def test_joints_of_a_skin_never_leave_its_area(points: list[tuple[float, float]], angle: float) -> None:
     hull = m3.CrossSection.hull_points(np.array(points))
     star = hull - Polygons.circle(5.0, 20).translate((4, 4)) - Polygons.square((30, 1.5)).rotate(33)
-    for bead in skin_beads(star, Kind.SKIN, angle, WIDTH, HEIGHT, OVERLAP):
+    for bead in skin_beads(star, Kind.SKIN, SolidLines(angle, WIDTH, HEIGHT, OVERLAP)):
         middles = np.array([(a + b) / 2 for a, b in pairwise(bead.points)])
         assert distances_mm(star, middles).min() > 0.0
 
 
 def test_shrinking_an_empty_area_gives_nothing() -> None:
-    assert skin_beads(offset(Polygons.square((0.2, 0.2)), -0.2), Kind.SKIN, 0.0, WIDTH, HEIGHT, OVERLAP) == []
+    assert skin_beads(offset(Polygons.square((0.2, 0.2)), -0.2), Kind.SKIN, SolidLines(0.0, WIDTH, HEIGHT, OVERLAP)) == []

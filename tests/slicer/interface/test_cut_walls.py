@@ -8,11 +8,15 @@ import pytest
 
 from mdp.decomposition import Part
 from mdp.mesh import Floats
-from slicer.demand.site import survey
 from slicer.geometry.polygons import Polygons, contours, offset, strips
+from slicer.interface.plastic import interface_mm3
+from slicer.overhangs import find_overhangs
 from slicer.paths import Kind
+from slicer.sectioning import section_part
+from slicer.sections import Sections
+from slicer.shells import Shells, build_shells
 from slicer.slice import slice_part
-from slicer.stack import Stack, build_stack
+from slicer.support.support import own_supports
 from tests.shapes import from_manifold
 from tests.slicer.hand import BARE, cut, of_kind, profile
 
@@ -43,10 +47,14 @@ def parts(shape: str, normal: tuple[float, ...]) -> list[Part]:
 
 
 @cache
-def stacks(shape: str, normal: tuple[float, ...], *settings: str) -> list[Stack]:
+def shells(shape: str, normal: tuple[float, ...], *settings: str) -> list[Shells]:
     both, keys = parts(shape, normal), profile(*PLAIN, *settings)
-    sites = [survey(part, keys, both[:k], both[k + 1 :]) for k, part in enumerate(both)]
-    return [build_stack(site, site.supports) for site in sites]
+    return [shells_of(section_part(part, keys, both[:k], both[k + 1 :])) for k, part in enumerate(both)]
+
+
+def shells_of(sections: Sections) -> Shells:
+    overhangs = find_overhangs(sections)
+    return build_shells(own_supports(sections, overhangs), overhangs)
 
 
 def in_model(part: Part, points: Floats, z_mm: float) -> Floats:
@@ -61,8 +69,8 @@ CASES = [(shape, normal) for shape in ("cube", "cylinder") for normal in (STRAIG
 @pytest.mark.parametrize(("shape", "normal"), CASES)
 def test_no_infill_is_sparse_within_the_shell_s_thickness_of_the_surface(shape: str, normal: tuple[float, ...]) -> None:
     seen = 0.0
-    for part, stack in zip(parts(shape, normal), stacks(shape, normal), strict=True):
-        for region, z_mm in zip(stack.regions, stack.heights.cut_mm, strict=True):
+    for part, layers in zip(parts(shape, normal), shells(shape, normal), strict=True):
+        for region, z_mm in zip(layers.regions, layers.sections.heights.cut_mm, strict=True):
             seen += region.sparse.area()
             for loop in contours(region.sparse):  # in a convex model the least depth of a polygon is a corner's
                 assert depth_mm(shape, in_model(part, loop, z_mm)).min() > SHELL_MM
@@ -73,31 +81,32 @@ def test_no_infill_is_sparse_within_the_shell_s_thickness_of_the_surface(shape: 
 def test_all_of_a_layer_is_covered_by_beads_but_for_the_infill(shape: str, normal: tuple[float, ...]) -> None:
     settings = profile(*PLAIN)
     both = parts(shape, normal)
-    for k, stack in enumerate(stacks(shape, normal)):
+    for k, layers in enumerate(shells(shape, normal)):
         sliced = slice_part(both[k], settings, both[:k], both[k + 1 :])
         for at in range(1, len(sliced.layers) - 1, 6):
             lines = [path for path in sliced.layers[at].paths if path.kind is not Kind.INFILL]
             covered = Polygons()
             for path in lines:
                 covered = covered + strips([path.points], 0.5 * path.width_mm)
-            bare = stack.own[at] - covered - stack.regions[at].sparse
-            assert offset(bare, -0.12).area() < 0.002 * stack.own[at].area()
+            section = layers.sections.own[at]
+            bare = section - covered - layers.layers[at].region.sparse
+            assert offset(bare, -0.12).area() < 0.002 * section.area()
 
 
 @pytest.mark.parametrize(("shape", "normal"), CASES)
 def test_a_later_part_s_first_layer_lies_on_solid_plastic(shape: str, normal: tuple[float, ...]) -> None:
-    (lower, upper), (under, over) = parts(shape, normal), stacks(shape, normal)
-    first = offset(over.own[0], -0.1)
+    (lower, upper), (under, over) = parts(shape, normal), shells(shape, normal)
+    first = offset(over.sections.own[0], -0.1)
     x0, y0, x1, y1 = first.bounds()
     lattice = np.stack(np.meshgrid(np.arange(x0, x1, 0.7), np.arange(y0, y1, 0.7)), axis=-1).reshape(-1, 2)
     on_base = np.array([p for p in lattice if not (first ^ Polygons.square((0.01, 0.01)).translate(tuple(p))).is_empty()])
     assert len(on_base) > 400
     placed = in_model(upper, on_base, -0.12) @ lower.rotation.T - [0, 0, lower.base.offset_mm]
-    layers = np.searchsorted(under.heights.tip_mm, placed[:, 2])
+    layers = np.searchsorted(under.sections.heights.tip_mm, placed[:, 2])
     for layer, point in zip(layers.tolist(), placed, strict=True):
-        if layer < len(under.regions):
+        if layer < len(under.layers):
             dot = Polygons.square((0.01, 0.01), True).translate((point[0], point[1]))
-            assert (dot ^ under.regions[layer].sparse).is_empty()
+            assert (dot ^ under.layers[layer].region.sparse).is_empty()
 
 
 def test_inner_walls_end_on_the_one_along_the_face_of_a_cut() -> None:
@@ -117,21 +126,21 @@ def test_with_as_many_walls_on_a_cut_as_outside_all_run_round() -> None:
     lower, upper = parts("cube", STEEP)
     settings = profile(*PLAIN, "process.interface_walls=3")
     assert len(of_kind(slice_part(lower, settings, (), [upper]), Kind.INNER_WALL)) > 0
-    assert all(not ending for ending in stacks("cube", STEEP, "process.interface_walls=3")[0].ending)
+    assert all(not shell.ending for shell in shells("cube", STEEP, "process.interface_walls=3")[0].layers)
 
 
 def test_the_plastic_of_a_straight_cut_is_a_floor_and_a_rim() -> None:
     """A floor of two layers where the walls leave room, three more walls in a layer pressed half into it."""
-    under, over = stacks("cube", STRAIGHT)
+    under, over = (interface_mm3(both.sections, both.regions) for both in shells("cube", STRAIGHT))
     inside = (SIDE - 2 * 1.243) ** 2
     floor = 0.8 * 0.4 * inside
     ring = inside - (SIDE - 2 * 2.464) ** 2
     spare = (SIDE**2 - 0.8 * (inside - ring)) * (1.05 * 0.2 - 0.1)
-    assert under.interface_mm3 == {2: pytest.approx(floor, rel=0.03)}
-    assert over.interface_mm3 == {2: pytest.approx(0.8 * 0.2 * ring + spare, rel=0.03)}
+    assert under == {2: pytest.approx(floor, rel=0.03)}
+    assert over == {2: pytest.approx(0.8 * 0.2 * ring + spare, rel=0.03)}
 
 
 def test_a_model_in_one_part_has_no_interface() -> None:
     (lower, _) = parts("cube", STRAIGHT)
-    site = survey(lower, profile(*PLAIN), (), ())
-    assert build_stack(site, site.supports).interface_mm3 == {}
+    alone = shells_of(section_part(lower, profile(*PLAIN)))
+    assert interface_mm3(alone.sections, alone.regions) == {}

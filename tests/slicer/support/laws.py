@@ -8,13 +8,9 @@ import numpy as np
 import shapely
 
 from mdp.decomposition import Part
-from slicer.geometry.polygons import Polygons, clean
-from slicer.heights import layer_heights
-from slicer.interface.interface import plastic_beneath
-from slicer.section import sections
-from slicer.support.blocker import blocked_areas, far_mm
-from slicer.support.overhang import detect_overhangs
-from slicer.support.support import Supports, generate_supports
+from slicer.overhangs import Overhang, find_overhangs
+from slicer.sectioning import section_part
+from slicer.support.support import Supports, own_supports
 from tests.slicer.hand import as_shapely, profile
 
 ROUNDING_MM = 0.03
@@ -22,51 +18,32 @@ SPECK_MM2 = 0.02
 LEDGE = 2.0  # line widths that carry themselves
 
 
-def supported(part: Part, *settings: str, earlier: Sequence[Part] = (), later: Sequence[Part] = ()) -> tuple[Any, Supports]:
-    """What the support of a part is made from, and the support."""
-    given, mesh = profile(*settings), part.in_part_frame()
-    process, heights = given.process, layer_heights(mesh, given, part.index == 1)
-    outlines = [clean(loops) for loops in sections(mesh, heights.cut_mm)]
-    below = plastic_beneath(part, earlier, outlines[0])
-    blocked = blocked_areas(part, later, heights, process.support_distance_mm, far_mm(mesh))
-    hanging = [overhang.hanging for overhang in detect_overhangs(mesh, outlines, heights.cut_mm, process, below)]
-    values: dict[str, Any] = {
-        "hanging": hanging,
-        "outlines": outlines,
-        "heights": heights,
-        "process": process,
-        "below": below,
-        "blocked": blocked,
-    }
-    return values, generate_supports(**values, floor=Polygons.square((400.0, 400.0), True))
+def supported(part: Part, *settings: str, earlier: Sequence[Part] = ()) -> tuple[list[Overhang], Supports]:
+    """What overhangs of a part, and its own support."""
+    sections = section_part(part, profile(*settings), earlier)
+    overhangs = find_overhangs(sections)
+    return overhangs, own_supports(sections, overhangs)
 
 
-def assert_sound(values: Any, found: Supports) -> None:
-    """Gaps are kept, everything stands within the lean, every hanging place is held or told."""
-    process, heights = values["process"], values["heights"]
+def assert_sound(overhangs: Sequence[Overhang], supports: Supports) -> None:
+    """Gaps are kept, everything stands within the lean, every hanging place is held or reported as missed."""
+    sections, process = supports.sections, supports.sections.process
     solid, printed, missed, hanging = (
         [shapely.make_valid(as_shapely(place)) for place in places]
-        for places in (values["outlines"], found.areas, found.missed, values["hanging"])
+        for places in (sections.outlines, supports.areas, supports.missed, [overhang.hanging for overhang in overhangs])
     )
-    top = heights.tip_mm
-    bottom = top - heights.height_mm
+    top, bottom = sections.heights.tip_mm, sections.heights.bottom_mm
     slope = tan(radians(min(process.support_branch_angle_deg, process.self_supporting_angle_deg)))
     width = process.line_width_mm
+    below = [] if sections.plastic_below is None else [_standing_room(as_shapely(sections.plastic_below), width)]
     for m in np.flatnonzero([not place.is_empty for place in printed]).tolist():
         _keeps_gaps(m, printed[m], solid, bottom, top, process)
-        if m or values["below"] is not None:
-            carried = [printed[m - 1].buffer(slope * heights.height_mm[m] + ROUNDING_MM)] if m else []
-            stands = [
-                solid[j].buffer(width + 4 * ROUNDING_MM, join_style="mitre") for j in range(m) if top[j] <= bottom[m] + 1e-6
-            ]
-            base = (
-                [as_shapely(values["below"]).buffer(width + 4 * ROUNDING_MM, join_style="mitre")]
-                if values["below"] is not None
-                else []
-            )
-            loose = printed[m] - shapely.union_all([*carried, *stands[-6:], *base])
+        if m or below:
+            carried = [printed[m - 1].buffer(slope * sections.heights.height_mm[m] + ROUNDING_MM)] if m else []
+            stands = [_standing_room(solid[j], width) for j in range(m) if top[j] <= bottom[m] + 1e-6]
+            loose = printed[m] - shapely.union_all([*carried, *stands[-6:], *below])
             assert loose.buffer(-ROUNDING_MM).area < SPECK_MM2, f"layer {m} hangs in the air: {loose.bounds}"
-    untold = {}
+    unheld = {}
     for k in np.flatnonzero([not place.is_empty for place in hanging]).tolist():
         rest = hanging[k] - missed[k].buffer(0.02)
         deep = process.support_gap_mm + process.support_distance_mm + 2 * process.layer_height_mm
@@ -79,12 +56,17 @@ def assert_sound(values: Any, found: Supports) -> None:
         spanned = shapely.union_all([held, wall]).buffer(reach, join_style="mitre").buffer(-reach, join_style="mitre")
         bare = rest - shapely.union_all([held, spanned.buffer(0.02)])
         bare = bare.buffer(-ROUNDING_MM) if bottom[k] > sags else shapely.Polygon()
-        untold[k] = (bare, shapely.union_all([held, wall]))
-    above = shapely.union_all([bare for bare, _ in untold.values()]).buffer(2 * ROUNDING_MM)
-    for k, (bare, carrying) in untold.items():
+        unheld[k] = (bare, shapely.union_all([held, wall]))
+    above = shapely.union_all([bare for bare, _ in unheld.values()]).buffer(2 * ROUNDING_MM)
+    for k, (bare, carrying) in unheld.items():
         wide = bare - (carrying - above).buffer(LEDGE * width + ROUNDING_MM, join_style="mitre")
         most = max((piece.area for piece in getattr(wide, "geoms", [wide])), default=0.0)
-        assert most <= process.support_least_mm2, f"layer {k}: {most} mm2 are neither held nor told {wide.bounds}"
+        assert most <= process.support_least_mm2, f"layer {k}: {most} mm2 are neither held nor missed {wide.bounds}"
+
+
+def _standing_room(solid: Any, width_mm: float) -> Any:
+    """Where support may stand on plastic."""
+    return solid.buffer(width_mm + 4 * ROUNDING_MM, join_style="mitre")
 
 
 def _keeps_gaps(m: int, area: Any, solid: list[Any], bottom: Any, top: Any, process: Any) -> None:

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from mdp.decomposition import Part
 from mdp.mesh import Floats, Mesh
 from mdp.pose import UP, about
-from slicer.demand.site import survey
 from slicer.geometry.polygons import Polygons
+from slicer.overhangs import find_overhangs
 from slicer.paths import Kind, Layer, SlicedPart
+from slicer.sectioning import section_part
 from slicer.slice import slice_part
 from tests.shapes import branch, from_manifold, standing, tee
 from tests.slicer.hand import cut, distances_mm, of_kind, profile, section_at, volume_mm3, whole
@@ -129,11 +130,11 @@ def test_a_part_begins_with_its_support_and_higher_up_takes_what_is_near() -> No
 
 def test_a_rim_that_gets_thick_enough_for_a_line_in_mid_air_hangs_there() -> None:
     bell = m3.Manifold.revolve(m3.CrossSection([[(8, 6), (8.8, 20), (8.8, 22), (0, 22), (0, 20), (8, 20)]]), 64)
-    site = survey(whole(standing(bell + m3.Manifold.cylinder(22, 3, 3, 64))), profile(), (), ())
-    first = next(i for i, outline in enumerate(site.outlines) if outline.bounds()[2] > 5.0)
-    ring = site.outlines[first] - Polygons.circle(4.0, 32)
+    sections = section_part(whole(standing(bell + m3.Manifold.cylinder(22, 3, 3, 64))), profile())
+    first = next(i for i, outline in enumerate(sections.outlines) if outline.bounds()[2] > 5.0)
+    ring = sections.outlines[first] - Polygons.circle(4.0, 32)
     assert 0.16 < ring.area() / (2.0 * np.pi * 8.0) < 0.18  # as thick as the thinnest that gets a line all along
-    assert site.overhangs[first].hanging.area() == pytest.approx(ring.area(), rel=0.01)
+    assert find_overhangs(sections)[first].hanging.area() == pytest.approx(ring.area(), rel=0.01)
 
 
 def test_none_means_none() -> None:
@@ -159,16 +160,16 @@ def test_a_short_bridge_needs_no_support_and_a_long_one_does() -> None:
 @pytest.mark.parametrize(("diameter", "hangs"), [(4.0, False), (8.0, False), (12.0, True)])
 def test_the_crown_of_a_level_hole_is_supported_only_where_the_search_counts_it(diameter: float, hangs: bool) -> None:
     drill = m3.Manifold.cylinder(30, diameter / 2, -1, 64, True).rotate((90, 0, 0)).translate((10, 10, 10))
-    values, supports = supported(whole(standing(m3.Manifold.cube((20, 20, 20)) - drill)))
-    assert (sum(place.area() for place in values["hanging"]) > 1.0) == hangs
+    overhangs, supports = supported(whole(standing(m3.Manifold.cube((20, 20, 20)) - drill)))
+    assert (sum(overhang.hanging.area() for overhang in overhangs) > 1.0) == hangs
     assert any(not area.is_empty() for area in supports.areas) == hangs
 
 
 @pytest.mark.parametrize(("depth", "hangs"), [(0.8, False), (5.0, True), (10.0, True)])
 def test_a_ledge_is_supported_unless_it_is_narrow(depth: float, hangs: bool) -> None:
     ledge = m3.Manifold.cube((10, 20, 20)) + m3.Manifold.cube((depth, 20, 3)).translate((10, 0, 12))
-    values, _ = supported(whole(standing(ledge)), "process.support_least_mm2=0")
-    assert sum(place.area() for place in values["hanging"]) == pytest.approx(20 * depth if hangs else 0.0, rel=0.02)
+    overhangs, _ = supported(whole(standing(ledge)), "process.support_least_mm2=0")
+    assert sum(overhang.hanging.area() for overhang in overhangs) == pytest.approx(20 * depth if hangs else 0.0, rel=0.02)
 
 
 def test_a_tiny_overhang_needs_no_support() -> None:

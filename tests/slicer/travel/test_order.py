@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from slicer.bead import Bead
+from slicer.cooling import _slow_down
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind
 from slicer.slice import slice_part
-from slicer.speed import _slow_down
 from slicer.travel.islands import OUTSIDE
 from slicer.travel.order import order_beads
 from tests.shapes import box, tee

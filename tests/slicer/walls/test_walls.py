@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import PATH_RESOLUTION_MM, Bead, length_mm, spacing_mm
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, close_loop, contours
 from slicer.paths import Kind, bead_area_mm2
-from slicer.section import sections
 from slicer.walls.centreline import centrelines
 from slicer.walls.gap import gaps
 from slicer.walls.thin import thin_walls
@@ -52,7 +52,7 @@ def test_a_hole_gets_walls_of_its_own_running_the_other_way() -> None:
 def test_outer_walls_of_a_real_model_keep_half_a_width_from_its_exact_outline() -> None:
     mesh, off = shared("org_kitten", 60.0), []
     for z in np.arange(0.5, 60, 2.7):
-        exact = shapely.MultiLineString([np.vstack([loop, loop[:1]]) for loop in sections(mesh, np.array([z]))[0]])
+        exact = shapely.MultiLineString([np.vstack([loop, loop[:1]]) for loop in cross_sections(mesh, np.array([z]))[0]])
         for loop in walls(section_at(mesh, z), 3, WIDTH, HEIGHT).loops[0]:
             line = shapely.LineString(np.vstack([loop, loop[:1]]))
             points = shapely.line_interpolate_point(line, np.arange(0, line.length, 0.1))

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from mdp.mesh import Floats, Mesh
 from profiles.errors import SliceError
+from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import CLOSING_MM, area_mm2, clean, contours
-from slicer.section import sections
 from tests.shapes import ball, bowl, box, from_manifold, hollow
 from tests.slicer.hand import profile, shared
 
@@ -22,40 +22,40 @@ def area(loops: Sequence[Floats]) -> float:
 
 
 def test_a_box_has_its_footprint_at_every_height() -> None:
-    assert [area(loops) for loops in sections(box(20, 10, 5), np.array([0.1, 2.5, 4.9]))] == pytest.approx([200.0] * 3)
+    assert [area(loops) for loops in cross_sections(box(20, 10, 5), np.array([0.1, 2.5, 4.9]))] == pytest.approx([200.0] * 3)
 
 
 def test_outer_loops_run_counter_clockwise_and_holes_clockwise() -> None:
-    (loops,) = sections(hollow(), np.array([10.2]))
+    (loops,) = cross_sections(hollow(), np.array([10.2]))
     assert sorted(area_mm2(loop) for loop in loops) == pytest.approx([-100.0, 400.0])
 
 
 def test_a_plane_in_a_flat_face_takes_the_solid_below() -> None:
-    assert [area(loops) for loops in sections(box(20, 10, 5), np.array([0.0, 5.0]))] == pytest.approx([0.0, 200.0])
+    assert [area(loops) for loops in cross_sections(box(20, 10, 5), np.array([0.0, 5.0]))] == pytest.approx([0.0, 200.0])
 
 
 def test_planes_through_vertices_and_edges_still_give_closed_loops() -> None:
     mesh = ball(10.0, 16)
     heights = np.unique(mesh.vertices[:, 2])[1:-1]
-    around = [area(loops) for loops in sections(mesh, heights)]
-    just_below = [area(loops) for loops in sections(mesh, heights - 1e-9)]
+    around = [area(loops) for loops in cross_sections(mesh, heights)]
+    just_below = [area(loops) for loops in cross_sections(mesh, heights - 1e-9)]
     assert around == pytest.approx(just_below, abs=1e-4)
 
 
 def test_above_and_below_the_part_there_is_nothing() -> None:
-    assert sections(box(), np.array([-1.0, 25.0])) == [[], []]
+    assert cross_sections(box(), np.array([-1.0, 25.0])) == [[], []]
 
 
 def test_a_ball_has_the_circles_of_its_formula() -> None:
     heights = np.array([2.0, 10.0, 17.0])
-    found = [area(loops) for loops in sections(ball(10.0, 512), heights)]
+    found = [area(loops) for loops in cross_sections(ball(10.0, 512), heights)]
     assert found == pytest.approx(np.pi * (100 - (heights - 10) ** 2), rel=2e-3)
 
 
 def test_middle_sections_times_height_add_up_to_the_volume() -> None:
     heights = np.arange(0.005, 20, 0.01)
     mesh = bowl()
-    assert sum(area(loops) for loops in sections(mesh, heights)) * 0.01 == pytest.approx(mesh.volume_mm3, rel=1e-3)
+    assert sum(area(loops) for loops in cross_sections(mesh, heights)) * 0.01 == pytest.approx(mesh.volume_mm3, rel=1e-3)
 
 
 def test_an_edge_of_four_faces_keeps_both_solids() -> None:
@@ -68,13 +68,13 @@ def test_an_edge_of_four_faces_keeps_both_solids() -> None:
         vertices += [point] * (renamed[-1] == len(vertices))
     mesh = Mesh(np.array(vertices), np.concatenate([two.faces, np.array(renamed)[two.faces]]))
     assert len(vertices) == 14
-    assert area(sections(mesh, np.array([2.5]))[0]) == pytest.approx(50.0)
+    assert area(cross_sections(mesh, np.array([2.5]))[0]) == pytest.approx(50.0)
 
 
 def test_an_open_mesh_is_refused_with_the_number_of_open_edges() -> None:
     mesh = box()
     with pytest.raises(SliceError, match="3 edges have a face on one side only"):
-        sections(Mesh(mesh.vertices, mesh.faces[1:]), np.array([1.0]))
+        cross_sections(Mesh(mesh.vertices, mesh.faces[1:]), np.array([1.0]))
 
 
 def brute_force_area(mesh: Mesh, z: float) -> float:
@@ -96,13 +96,13 @@ def brute_force_area(mesh: Mesh, z: float) -> float:
 def test_a_turned_tube_agrees_with_cutting_every_triangle_by_itself(z: float, around_x: float, around_y: float) -> None:
     tube = m3.Manifold.cylinder(30, 8, 6, 24, True) - m3.Manifold.cylinder(40, 4, 3, 24, True)
     mesh = from_manifold(tube.rotate((around_x, around_y, 0)).translate((0, 0, 10)))
-    assert area(sections(mesh, np.array([z]))[0]) == pytest.approx(brute_force_area(mesh, z), rel=1e-6, abs=1e-6)
+    assert area(cross_sections(mesh, np.array([z]))[0]) == pytest.approx(brute_force_area(mesh, z), rel=1e-6, abs=1e-6)
 
 
 def test_cleaning_keeps_the_area_of_a_real_model() -> None:
     mesh = shared("org_kitten", 40.0)
     heights = np.arange(0.1, 40.0, 0.4)
-    raw = sections(mesh, heights)
+    raw = cross_sections(mesh, heights)
     assert sum(area(loops) for loops in raw) * 0.4 == pytest.approx(mesh.volume_mm3, rel=1e-3)
     assert [clean(loops).area() for loops in raw] == pytest.approx([area(loops) for loops in raw], rel=2e-3, abs=0.05)
 
@@ -113,7 +113,7 @@ def test_every_layer_has_the_area_that_manifold_slices(name: str) -> None:
     solid = m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64)))
     cuts = np.arange(0.1, 40.0, 0.2)
     expected = np.array([solid.slice(z).area() for z in cuts])
-    exact, cleaned = ([f(loops) for loops in sections(mesh, cuts)] for f in (area, lambda loops: clean(loops).area()))
+    exact, cleaned = ([f(loops) for loops in cross_sections(mesh, cuts)] for f in (area, lambda loops: clean(loops).area()))
     assert np.abs(exact - expected).max() < 1e-3
     assert (np.abs(cleaned - expected) < 0.05 + 2e-4 * expected).all()
 

@@ -1,6 +1,5 @@
 """Brims, skirts and the base: closed formulas of the section modulus, who needs a brim, the first layer's outline."""
 
-import manifold3d as m3
 import numpy as np
 import pytest
 import shapely
@@ -10,10 +9,10 @@ from hypothesis import strategies as st
 from mdp.mesh import Mesh
 from slicer.geometry.polygons import Polygons
 from slicer.paths import Kind, Path
-from slicer.plate import compensate_elephant_foot, section_modulus_mm3, tips_over
 from slicer.slice import slice_part
-from tests.shapes import box, from_manifold, tee
-from tests.slicer.hand import BARE, SOLID, as_shapely, cut, of_kind, profile, whole
+from slicer.walls.brim import section_modulus_mm3, tips_over
+from tests.shapes import box, tee
+from tests.slicer.hand import BARE, as_shapely, cut, of_kind, profile, whole
 
 
 @given(st.floats(1, 50), st.floats(1, 50), st.floats(0, 180), st.floats(-90, 90))
@@ -70,26 +69,6 @@ def test_the_gap_of_a_brim() -> None:
     assert near == pytest.approx(5 + 0.15 + 0.5 * (0.45 - 0.2 * (1 - np.pi / 4)))
 
 
-def test_only_the_first_layer_is_smaller_against_the_elephants_foot() -> None:
-    layers = slice_part(whole(box(20, 20, 2)), profile(*BARE, "process.elephant_foot_mm=0.2")).layers
-    edges = [max(np.abs(p.points).max() for p in layer.paths) for layer in layers[:3]]
-    assert edges == pytest.approx([10 - 0.2 - 0.225, 10 - 0.225, 10 - 0.225])
-
-
-def test_a_part_on_plastic_has_no_elephants_foot() -> None:
-    base, top = cut(box(20, 20, 20), ((0, 0, 1), 10.0))
-    first = slice_part(top, profile(*BARE, "process.elephant_foot_mm=0.2", "process.interface_seam_mm=0"), [base]).layers[0]
-    assert max(np.abs(p.points).max() for p in first.paths) == pytest.approx(10 - 0.225)
-
-
-def test_thin_places_keep_their_width() -> None:
-    shape = Polygons.square((20, 20)) + Polygons.square((10, 0.6)).translate((20, 10))
-    less = as_shapely(compensate_elephant_foot(shape, 0.2, 0.45))
-    assert less.area == pytest.approx(19.6**2 + 10 * 0.6, abs=0.3)
-    assert less.bounds == pytest.approx((0.2, 0.2, 30, 19.8), abs=1e-6)
-    assert len(getattr(less, "geoms", [less])) == 1
-
-
 PLATE = "machine.table.radius_mm=14"
 
 
@@ -106,24 +85,3 @@ def test_support_stands_on_the_plate_only_and_leans_over_its_edge() -> None:
     reach = [np.hypot(*np.vstack([p.points for p in s.layers[0].paths]).T).max() for s in (near, far)]
     assert reach[0] > 13 > 12 >= reach[1]
     assert (near.unsupported_mm2, far.unsupported_mm2) == (0.0, 0.0)
-
-
-@pytest.mark.parametrize(("rise_mm", "share"), [(0.25, 1.0), (0.6, 0.5), (1.2, 0.25)])
-def test_a_base_that_is_not_quite_level_is_laid_on_the_plate_as_far_as_it_stands(rise_mm: float, share: float) -> None:
-    """A plate of 30 x 30 mm whose underside rises to one side: up to 0.3 mm it stands, beyond it hangs."""
-
-    def first_layer_mm3(rise_mm: float) -> float:
-        corners = [(x, y, z) for x in (0, 30) for y in (0, 30) for z in (rise_mm * x / 30, 5)]
-        layer = slice_part(whole(from_manifold(m3.Manifold.hull_points(corners))), profile(*SOLID)).layers[0]
-        return sum(layer.volume_mm3(path) for path in layer.paths)
-
-    assert first_layer_mm3(rise_mm) == pytest.approx(share * first_layer_mm3(0.0), rel=0.03)
-
-
-def test_a_fillet_at_the_plate_keeps_its_form() -> None:
-    rounded = m3.Manifold.sphere(3.0, 96).translate((0, 0, 3))
-    plate = m3.Manifold.batch_hull([rounded.translate((x, y, 0)) for x in (0, 20) for y in (0, 20)])
-    outline = slice_part(whole(from_manifold(plate)), profile(*BARE)).layers[0]
-    points = np.concatenate([path.points for path in outline.paths if path.kind is Kind.OUTER_WALL])
-    cut_mm = np.sqrt(3.0**2 - 2.9**2)  # the sphere's radius in the middle of the first layer
-    assert np.ptp(points[:, 0]) == pytest.approx(20 + 2 * cut_mm - 0.45, abs=0.25)

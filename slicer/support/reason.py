@@ -5,12 +5,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from mdp.clearance import least_tip_height_mm
-from slicer.demand.site import Site
 from slicer.geometry.polygons import Polygons, contours, islands, offset, union
-from slicer.heights import Heights
+from slicer.overhangs import seen_from_above
 from slicer.paths import Unsupported
-from slicer.support.blocker import blocked_areas
-from slicer.support.missed import seen_from_above
+from slicer.sections import Sections
+from slicer.support.blocker import above_base_planes, support_reach_mm
 from slicer.support.reachable import EVEN_MM
 from slicer.support.support import Supports
 
@@ -18,11 +17,12 @@ UNWANTED = "no support is wanted there"
 MOST = 0.5  # share of a place that one reason has to hold for
 
 
-def explain(site: Site, supports: Supports) -> tuple[Unsupported, ...]:
+def explain(supports: Supports) -> tuple[Unsupported, ...]:
     """Every place that got no support, the largest first; layers are counted from 0."""
-    told = [Unsupported(mm2, layer, _reason(layer, place, site)) for mm2, layer, place in _places(supports.missed)]
-    told += [Unsupported(mm2, layer, UNWANTED) for mm2, layer, _ in _places(site.left_out)]
-    return tuple(sorted(told, key=lambda place: (-place.mm2, place.layer)))
+    sections = supports.sections
+    reasons = [Unsupported(mm2, layer, _reason(layer, place, sections)) for mm2, layer, place in _places(supports.missed)]
+    reasons += [Unsupported(mm2, layer, UNWANTED) for mm2, layer, _ in _places(supports.unwanted)]
+    return tuple(sorted(reasons, key=lambda place: (-place.mm2, place.layer)))
 
 
 def _places(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, Polygons]]:
@@ -35,39 +35,40 @@ def _places(hanging: Sequence[Polygons]) -> Iterator[tuple[float, int, Polygons]
             yield sum(areas.values()), worst, places[worst]
 
 
-def _reason(layer: int, place: Polygons, site: Site) -> str:
+def _reason(layer: int, place: Polygons, sections: Sections) -> str:
     """Why none of the ways to hold a place of a layer was open."""
-    process, heights, least_mm2 = site.process, site.heights, MOST * place.area()
+    process, heights, least_mm2 = sections.support_process, sections.heights, MOST * place.area()
     drop = float(heights.bottom_mm[layer]) - process.support_gap_mm
     top = max(int(np.searchsorted(heights.tip_mm, drop + EVEN_MM, side="right")) - 1, 0)
-    if site.beneath is None and (place - offset(site.floor, -process.line_width_mm)).area() >= least_mm2:
+    if sections.on_platform and (place - offset(sections.plate, -process.line_width_mm)).area() >= least_mm2:
         return "the plate ends before"
-    under = Heights(heights.tip_mm[top : top + 1], heights.height_mm[top : top + 1], heights.cut_mm[top : top + 1])
-    for other in site.later:
-        if (place ^ blocked_areas(site.part, [other], under, process.support_distance_mm, site.far_mm)[0]).area() >= least_mm2:
+    under, far_mm = heights[top : top + 1], support_reach_mm(sections)
+    for other in sections.later:
+        above = above_base_planes(sections.part, [other], under, process.support_distance_mm, far_mm)[0]
+        if (place ^ above).area() >= least_mm2:
             return f"support would stand where the head prints part {other.index}"
     room_mm = process.support_gap_mm + process.support_bottom_gap_mm + process.layer_height_mm
     lowest = int(np.searchsorted(heights.tip_mm, drop - room_mm + EVEN_MM))
-    if (place ^ union(list(site.outlines[lowest : max(layer - 1, 0)]))).area() >= least_mm2:
+    if (place ^ union(list(sections.outlines[lowest : max(layer - 1, 0)]))).area() >= least_mm2:
         return "there is no room for support between it and the plastic below"
     aside_mm = process.support_distance_mm + process.line_width_mm
-    if layer and (place ^ offset(site.outlines[top], aside_mm)).area() >= least_mm2:
+    if layer and (place ^ offset(sections.outlines[top], aside_mm)).area() >= least_mm2:
         return "there is no room for support beside the walls"
-    met = _part_at_table(place, float(heights.bottom_mm[layer]), site)
+    met = _part_at_table(place, float(heights.bottom_mm[layer]), sections)
     if met is not None:
         return f"the head would meet the table if support were printed there with part {met}"
     return f"support would have to lean by more than {process.support_branch_angle_deg:g} deg to find ground"
 
 
-def _part_at_table(place: Polygons, z_mm: float, site: Site) -> int | None:
+def _part_at_table(place: Polygons, z_mm: float, sections: Sections) -> int | None:
     """The part with which support could be printed under a place if the table were not in the way of the head."""
     corners = np.concatenate(contours(place))
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    base_mm, machine = site.part.base.offset_mm, site.profile.machine
-    beneath, under = (np.append(middle, base_mm + z) @ site.part.rotation for z in (z_mm, 0.0))
-    if site.beneath is not None and beneath[2] < least_tip_height_mm(machine, site.part.pose):
-        return site.part.index
-    other = next((part for part in reversed(site.earlier) if part.base.heights_mm(under[None])[0] > 0.0), None)
+    base_mm, machine = sections.part.base.offset_mm, sections.profile.machine
+    beneath, under = (np.append(middle, base_mm + z) @ sections.part.rotation for z in (z_mm, 0.0))
+    if not sections.on_platform and beneath[2] < least_tip_height_mm(machine, sections.part.pose):
+        return sections.part.index
+    other = next((part for part in reversed(sections.earlier) if part.base.heights_mm(under[None])[0] > 0.0), None)
     if other is None or other.index == 1 or under[2] >= least_tip_height_mm(machine, other.pose):
         return None
     return other.index

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from profiles.process import Process
+from slicer.fill.region import Cover, Region, _common, regions, shell_layers
 from slicer.geometry.polygons import Polygons, offset, opening
-from slicer.region import Cover, Region, _common, regions, shell_layers
 from tests.slicer.hand import as_shapely, profile
 
 WIDTH = 0.45

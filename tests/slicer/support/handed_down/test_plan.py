@@ -12,12 +12,13 @@ from mdp.decomposition import Part
 from mdp.mesh import Floats
 from mdp.plane import Plane
 from mdp.pose import unit
-from slicer.demand.facing import Facing
-from slicer.demand.plan import plan_supports
-from slicer.demand.site import Site, survey
+from slicer.interface.interface import frame_change
+from slicer.overhangs import find_overhangs
 from slicer.parts import slice_parts
 from slicer.paths import Kind
-from slicer.support.support import Supports
+from slicer.sectioning import section_part
+from slicer.support.handed_down.plan import plan_supports
+from slicer.support.support import Supports, own_supports
 from tests.shapes import from_manifold, standing, tee
 from tests.slicer.hand import as_shapely, content, cut, of_kind, profile
 
@@ -43,19 +44,25 @@ CASES = {
 
 
 @cache
-def planned(name: str) -> list[tuple[Site, Supports]]:
+def own(name: str) -> list[Supports]:
     mesh, planes = CASES[name]
     parts = cut(mesh, *planes)
-    return plan_supports([survey(part, profile(), parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)])
+    sections = [section_part(part, profile(), parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
+    return [own_supports(layers, find_overhangs(layers)) for layers in sections]
+
+
+@cache
+def planned(name: str) -> list[Supports]:
+    return plan_supports(own(name))
 
 
 def own_missed_mm2(name: str) -> float:
-    return sum(site.supports.unsupported_mm2 for site, _ in planned(name))
+    return sum(supports.unsupported_mm2 for supports in own(name))
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_what_own_ground_does_not_hold_stands_on_support_of_the_parts_before(name: str) -> None:
-    assert sum(supports.unsupported_mm2 for _, supports in planned(name)) <= 0.02 * own_missed_mm2(name)
+    assert sum(supports.unsupported_mm2 for supports in planned(name)) <= 0.02 * own_missed_mm2(name)
 
 
 @pytest.mark.parametrize("name", ["level", "tilted", "through two parts", "two directions"])
@@ -65,43 +72,46 @@ def test_there_was_something_to_hand_down(name: str) -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_no_support_stands_above_a_later_base_plane(name: str) -> None:
-    for site, supports in planned(name):
-        for other in site.later:
-            facing = Facing.of(site.part, other)
-            for points in corners(site, supports):
-                assert (points @ facing.turn[2] + facing.shift[2]).max() < ROUNDING_MM
+    for supports in planned(name):
+        for later in supports.sections.later:
+            turn, shift = frame_change(supports.sections.part, later)
+            for points in corners(supports):
+                assert (points @ turn[2] + shift[2]).max() < ROUNDING_MM
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_support_keeps_its_distance_from_the_part_printed_with_it(name: str) -> None:
-    for site, supports in planned(name):
-        for area, outline in zip(supports.areas, site.outlines, strict=True):
+    for supports in planned(name):
+        for area, outline in zip(supports.areas, supports.sections.outlines, strict=True):
             if not area.is_empty() and not outline.is_empty():
-                assert as_shapely(area).distance(as_shapely(outline)) > site.process.support_distance_mm - ROUNDING_MM
+                gap_mm = supports.sections.process.support_distance_mm
+                assert as_shapely(area).distance(as_shapely(outline)) > gap_mm - ROUNDING_MM
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_every_support_on_a_base_plane_has_plastic_of_an_earlier_part_or_its_support_beneath(name: str) -> None:
     every = planned(name)
-    for k, (site, supports) in enumerate(every[1:], 1):
+    for k, supports in enumerate(every[1:], 1):
         foot = supports.areas[0]
         if foot.is_empty():
             continue
         points = np.array([(p.x, p.y) for p in lattice(as_shapely(foot).buffer(-0.3))])
         held = np.zeros(len(points), dtype=bool)
-        for below, its in every[:k]:
-            held |= [stands_on(place, below, its) for place in Facing.of(below.part, site.part).points_mm(points)]
+        for below in every[:k]:
+            turn, shift = frame_change(below.sections.part, supports.sections.part)
+            held |= [stands_on(place, below) for place in (np.insert(points, 2, 0.0, axis=1) - shift) @ turn]
         assert held.mean() > 0.97
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_every_layer_of_support_stands_on_the_one_below(name: str) -> None:
-    for site, supports in planned(name):
-        lean_mm = site.process.layer_height_mm + ROUNDING_MM
+    for supports in planned(name):
+        sections = supports.sections
+        lean_mm = sections.process.layer_height_mm + ROUNDING_MM
         for m in np.flatnonzero([not area.is_empty() for area in supports.areas]).tolist():
             ground = [as_shapely(supports.areas[m - 1]).buffer(lean_mm)] if m else []
-            ground += [as_shapely(site.outlines[j]).buffer(0.6) for j in range(max(m - 3, 0), m)]
-            beneath = as_shapely(site.beneath).buffer(0.6) if site.beneath is not None else None
+            ground += [as_shapely(sections.outlines[j]).buffer(0.6) for j in range(max(m - 3, 0), m)]
+            beneath = as_shapely(sections.plastic_below).buffer(0.6) if sections.plastic_below is not None else None
             if m and (m > 2 or beneath is None):
                 assert (as_shapely(supports.areas[m]) - shapely.union_all(ground)).buffer(-ROUNDING_MM).area < 0.02
 
@@ -131,14 +141,14 @@ def test_a_place_that_gets_none_is_told_with_the_part_that_is_in_the_way() -> No
     assert place.reason == "support would stand where the head prints part 2"
 
 
-def corners(site: Site, supports: Supports) -> list[Floats]:
+def corners(supports: Supports) -> list[Floats]:
     """(n, 3) corners of every layer's support, at its top and bottom."""
-    found = []
+    heights, points = supports.sections.heights, []
     for m, area in enumerate(supports.areas):
         for loop in area.to_polygons():
-            for z in (site.heights.tip_mm[m], site.heights.bottom_mm[m]):
-                found.append(np.column_stack([loop, np.full(len(loop), z)]))
-    return found
+            for z in (heights.tip_mm[m], heights.bottom_mm[m]):
+                points.append(np.column_stack([loop, np.full(len(loop), z)]))
+    return points
 
 
 def lattice(area: shapely.Geometry) -> Sequence[shapely.Point]:
@@ -147,14 +157,10 @@ def lattice(area: shapely.Geometry) -> Sequence[shapely.Point]:
     return [point for point in points if area.contains(point)]
 
 
-def stands_on(point: Floats, below: Site, its: Supports) -> bool:
+def stands_on(point: Floats, below: Supports) -> bool:
     """Whether a point of a part's frame has plastic of that part or its support nearly beneath it."""
     x, y, z = point
-    near = np.flatnonzero((below.heights.tip_mm > z - STANDS_MM) & (below.heights.bottom_mm < z + 0.2))
+    heights = below.sections.heights
+    near = np.flatnonzero((heights.tip_mm > z - STANDS_MM) & (heights.bottom_mm < z + 0.2))
     at = shapely.Point(x, y).buffer(0.4)
-    return any(as_shapely(layers[m]).intersects(at) for m in near for layers in (its.areas, below.outlines))
-
-
-def test_the_parts_of_the_cases_are_what_they_are_meant_to_be() -> None:
-    assert {name: len(planned(name)) for name in CASES if len(planned(name)) > 2} == {"through two parts": 3, "two directions": 3}
-    assert isinstance(planned("level")[0][0].part, Part)
+    return any(as_shapely(layers[m]).intersects(at) for m in near for layers in (below.areas, below.sections.outlines))

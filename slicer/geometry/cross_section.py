@@ -1,4 +1,4 @@
-"""Sections: the exact outlines of a closed mesh at many heights at once.
+"""Cross sections: the exact outlines of a closed mesh at many heights at once, and which faces belong to which layer.
 
 Each face that a plane crosses gives one segment, from the edge on which the face's boundary goes down through the plane
 to the edge on which it goes up; the neighbour over the upward edge gives the next segment, so chains close by topology alone.
@@ -14,14 +14,22 @@ from mdp.kernels.arrays import ints, longs, table
 from mdp.kernels.kernel import kernel, part
 from mdp.kernels.sorting import rank, sort_into_bins
 from mdp.mesh import Floats, Ints, Mesh
+from mdp.overhang import Mask
 from mdp.topology.linked_faces import opposites
 from profiles.errors import SliceError
 
+RIM_MM = 0.04  # the shadows of faces in neighbouring layers overlap by this so that they unite
 
-def sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
+
+def cross_sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
     """For each cutting height (rising, mm) the loops of the section, (n, 2) mm, solid on the left of every loop.
 
     Raises SliceError when the mesh is not closed.
+
+    >>> corners = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]])
+    >>> tetrahedron = Mesh(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    >>> [loop.tolist() for loop in cross_sections(tetrahedron, np.array([1.0]))[0]]
+    [[[0.0, 3.0], [0.0, 0.0], [3.0, 0.0]]]
     """
     across = opposites(mesh.faces)
     open_edges = int((across < 0).sum())
@@ -77,3 +85,16 @@ def _walk(vertices: Floats, faces: Ints, across: Ints, cuts: Floats) -> tuple[Fl
             loop += 1
             counts[layer] += 1
     return points, ends, counts
+
+
+def faces_by_layer(mesh: Mesh, cuts_mm: Floats, chosen: Mask) -> dict[int, list[Floats]]:
+    """Chosen faces seen from above, (3, 2) counter-clockwise where they look down, by the layers whose strip of the surface they
+    belong to."""
+    corners = mesh.vertices[mesh.faces[chosen]]
+    first = np.searchsorted(cuts_mm, corners[:, :, 2].min(axis=1))
+    last = np.minimum(np.searchsorted(cuts_mm, corners[:, :, 2].max(axis=1)), len(cuts_mm) - 1)
+    faces: dict[int, list[Floats]] = {}
+    for corner, a, b in zip(np.ascontiguousarray(corners[:, ::-1, :2]), first.tolist(), last.tolist(), strict=True):
+        for layer in range(a, b + 1):
+            faces.setdefault(layer, []).append(corner)
+    return faces

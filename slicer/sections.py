@@ -1,0 +1,70 @@
+"""Sections: a part's layers as outlines, the first value on the way from a mesh to paths."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mdp.decomposition import Part
+from mdp.mesh import Mesh
+from profiles.process import Process
+from profiles.profile import Profile
+from slicer.bead import with_line_width
+from slicer.geometry.polygons import Polygons
+from slicer.heights import Heights
+
+
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """A part's layers, one entry each, before anything is laid.
+
+    The part is printed after `earlier` and before `later` ones, with `profile`, its own; mesh: in its frame. outlines: all of a
+    layer; own: without the pedestal; ungrooved: own, before the grooves for later parts. plastic_below: just under the base
+    plane, None on the platform; plate: its outline, of use to part 1. pedestal_layers: how many of the lowest ones the pedestal
+    takes; too_thin: layers that hold something, but nothing that gets a line.
+    """
+
+    part: Part
+    earlier: Sequence[Part]
+    later: Sequence[Part]
+    profile: Profile
+    mesh: Mesh
+    heights: Heights
+    outlines: Sequence[Polygons]
+    own: Sequence[Polygons]
+    ungrooved: Sequence[Polygons]
+    plastic_below: Polygons | None
+    plate: Polygons
+    pedestal_layers: int = 0
+    too_thin: frozenset[int] = frozenset()
+
+    @property
+    def on_platform(self) -> bool:
+        """Whether the part is the first one."""
+        return self.part.index == 1
+
+    @property
+    def process(self) -> Process:
+        """The settings of the part."""
+        return self.profile.process
+
+    @cached_property
+    def support_process(self) -> Process:
+        """The settings of its support, with the width of its lines."""
+        return with_line_width(self.process, self.process.support_line_width_mm)
+
+    def below(self, layer: int) -> Polygons | None:
+        """The plastic that a layer lies on; None for the platform."""
+        return self.outlines[layer - 1] if layer else self.plastic_below
+
+    def up_to(self, top_mm: float) -> "Sections":
+        """The sections with empty layers on top as far as that height."""
+        tip_mm, height_mm = self.heights.tip_mm, self.process.layer_height_mm
+        count = int(np.ceil((top_mm - tip_mm[-1]) / height_mm - 1e-9))
+        if count <= 0:
+            return self
+        tips_mm = tip_mm[-1] + height_mm * np.arange(1, count + 1)
+        more = Heights(tips_mm, np.full(count, height_mm), tips_mm - 0.5 * height_mm)
+        outlines, own, ungrooved = ([*places, *[Polygons()] * count] for places in (self.outlines, self.own, self.ungrooved))
+        return replace(self, heights=self.heights + more, outlines=outlines, own=own, ungrooved=ungrooved)

@@ -1,0 +1,90 @@
+"""Base plane: that of a later part as the layers of an earlier part see it: places near it, places carried across."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdp.mesh import Floats
+from slicer.geometry.polygons import Polygons, contours
+from slicer.heights import Heights
+from slicer.interface.interface import frame_change
+from slicer.sections import Sections
+
+LEVEL = 1e-9  # a plane whose normal is nearer to upright than this meets a layer nowhere or everywhere
+LEAST_COSINE = 0.05  # a plane that stands steeper is taken to lean so much: shadows on it stay finite
+
+
+@dataclass(frozen=True, eq=False)
+class BasePlane:
+    """turn (3, 3) and shift (3,) carry a point of the earlier part's frame into the later part's: turn @ x + shift.
+
+    heights: of the earlier part's layers. Of a layer's two sides the one that comes nearer to the plane from below stands for it.
+    far_mm: how far from the origin of the earlier frame its layers reach.
+    """
+
+    turn: Floats
+    shift: Floats
+    heights: Heights
+    far_mm: float
+
+    @classmethod
+    def seen_from(cls, earlier: Sections, later: Sections, far_mm: float) -> "BasePlane":
+        """The base plane of a later part."""
+        return cls(*frame_change(earlier.part, later.part), earlier.heights, far_mm)
+
+    @property
+    def cosine(self) -> float:
+        """Of the angle between the two directions."""
+        return float(self.turn[2, 2])
+
+    def z_mm(self, layer: int) -> float:
+        """The height that stands for a layer."""
+        return float((self.heights.tip_mm if self.cosine >= 0.0 else self.heights.bottom_mm)[layer])
+
+    def points_mm(self, places: Floats) -> Floats:
+        """(n, 3) points of the earlier frame for (n, 2) places on the plane."""
+        on_plane = np.column_stack([places, np.zeros(len(places))])
+        points: Floats = (on_plane - self.shift) @ self.turn
+        return points
+
+    def layers_near(self, places: Polygons, deep_mm: float) -> range:
+        """The layers that come within deep_mm below places on the plane."""
+        if places.is_empty():
+            return range(0)
+        on_plane: Floats = self.points_mm(np.concatenate(contours(places)))[:, 2]
+        deeper = on_plane - deep_mm * self.cosine
+        low, high = min(on_plane.min(), deeper.min()), max(on_plane.max(), deeper.max())
+        return range(int(np.searchsorted(self.heights.tip_mm, low)), int(np.searchsorted(self.heights.bottom_mm, high)))
+
+    def band(self, layer: int, low_mm: float, high_mm: float) -> Polygons:
+        """What of a layer lies low_mm to high_mm above the plane (below it: negative)."""
+        normal, at = self.turn[2, :2], float(self.turn[2, 2] * self.z_mm(layer) + self.shift[2])
+        across, far_mm = float(np.hypot(*normal)), self.far_mm
+        if across < LEVEL:
+            return Polygons.square((2.0 * far_mm, 2.0 * far_mm), True) if low_mm <= at <= high_mm else Polygons()
+        near, far = np.clip((np.array([low_mm, high_mm]) - at) / across, -far_mm, far_mm)
+        if far <= near:
+            return Polygons()
+        along = normal / across
+        aside = np.array([-along[1], along[0]]) * far_mm
+        return Polygons([np.array([near * along - aside, far * along - aside, far * along + aside, near * along + aside])])
+
+    def project(self, places: Polygons, layer: int) -> Polygons:
+        """Places in a layer carried straight onto the plane, in the later part's frame."""
+        turn, shift = self._onto_plane(self.z_mm(layer))
+        return places.transform(np.column_stack([turn, shift]))
+
+    def shadow(self, places: Polygons, layer: int) -> Polygons:
+        """What of a layer lies straight over or under places on the plane."""
+        turn, shift = self._onto_plane(self.z_mm(layer))
+        back = np.linalg.inv(turn)
+        return places.transform(np.column_stack([back, -back @ shift]))
+
+    def _onto_plane(self, z_mm: float) -> tuple[Floats, Floats]:
+        """(2, 2) and (2,) that carry a height's places onto the plane, exact where the height meets the plane."""
+        u, s, vt = np.linalg.svd(self.turn[:2, :2])
+        turn: Floats = u @ np.diag(np.maximum(s, LEAST_COSINE)) @ vt
+        normal, at = self.turn[2, :2], float(self.turn[2, 2] * z_mm + self.shift[2])
+        meets = -at * normal / max(float(normal @ normal), LEVEL) if np.hypot(*normal) > LEVEL else np.zeros(2)
+        shift: Floats = (self.turn[:2, :2] - turn) @ meets + self.turn[:2, 2] * z_mm + self.shift[:2]
+        return turn, shift
