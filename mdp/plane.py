@@ -22,7 +22,11 @@ class Plane:
         object.__setattr__(self, "normal", normal)
 
     def heights_mm(self, points: Floats) -> Floats:
-        """(n,) signed distances of (n, 3) points, positive on the printed side."""
+        """(n,) signed distances of (n, 3) points, positive on the printed side.
+
+        >>> Plane(UP, 2.0).heights_mm(np.array([[5.0, 0.0, 3.0]]))
+        array([1.])
+        """
         return dot(points, self.normal) - self.offset_mm
 
 

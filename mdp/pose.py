@@ -72,6 +72,10 @@ def poses(machine: Machine, direction: Floats, near_turn_deg: float | None = Non
 
     Both branches, each with the turn equivalent nearest to `near_turn_deg` (default: the turn's zero) inside the
     limits. At a level table any turn serves and the one nearest to `near_turn_deg` is given. Empty: out of reach.
+
+    >>> from profiles.profile import load
+    >>> [(round(pose.tilt_deg), round(pose.turn_deg)) for pose in poses(load().machine, unit([0.0, 1.0, 1.0]))]
+    [(45, 0), (-45, 180)]
     """
     near = machine.turn.zero_deg if near_turn_deg is None else near_turn_deg
     reachable = []

@@ -1,1 +1,1 @@
-"""Formats: a reader for every kind of mesh file."""
+"""Formats: a reader for every kind of mesh file, all in `readers.READERS`."""

@@ -1,1 +1,1 @@
-"""Repair: surfaces as model files give them become one closed solid."""
+"""Repair: surfaces as model files give them become one closed solid: `repair.repair`."""

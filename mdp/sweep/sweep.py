@@ -191,7 +191,15 @@ class Sampling(NamedTuple):
 
 def gains(remainder: Remainder, directions: Floats, step_mm: float, risky_below: float, hopeless: Mask | None = None) -> Gains:
     """What all offsets of (k, 3) unit directions would make safe; risky_below is overhang.threshold of the angle; hopeless: (m,)
-    the faces, as remainder.facets orders them, that no cut can save."""
+    the faces, as remainder.facets orders them, that no cut can save.
+
+    >>> from mdp.cut import convex_hull
+    >>> from mdp.overhang import risky_upright, threshold
+    >>> pyramid = convex_hull(np.array([[0.0, 0, 0], [10, 10, 4], [-10, 10, 4], [-10, -10, 4], [10, -10, 4]]))  # on its tip
+    >>> swept = gains(Remainder(pyramid, risky_upright(pyramid, 45.0)), np.array([[0.0, 0, 1], [0, 1, 0]]), 1.0, threshold(45.0))
+    >>> swept.offsets_mm(1.0)[0, :3].tolist(), swept.up_mm2[0, :3].round().tolist()
+    ([1.0, 2.0, 3.0], [404.0, 323.0, 188.0])
+    """
     facets, lost = remainder.facets, np.zeros(0, np.bool_) if hopeless is None else hopeless
     surface = Overhangs(facets.points, facets.corners, facets.normals, facets.counted_mm2, facets.risky, risky_below, lost)
     shape = (len(directions), remainder.most_columns(step_mm))
