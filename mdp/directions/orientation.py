@@ -6,9 +6,12 @@ risky face at all, so areas of the second kind are a lower bound rather than an 
 unless it is asked for the other.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import update_wrapper
 from math import atan2, cos, degrees, hypot, pi, radians, sin, tan
+from typing import Concatenate, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +46,26 @@ class Orientation:
         return _turns(self.rotation[2])
 
 
-@lru_cache(maxsize=2)
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def cached_with_mesh(measure: Callable[Concatenate[Mesh, P], T]) -> Callable[Concatenate[Mesh, P], T]:
+    """What is measured of a mesh is measured once, and known as long as the mesh is there."""
+    known: WeakKeyDictionary[Mesh, dict[object, T]] = WeakKeyDictionary()
+
+    def measured(mesh: Mesh, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        of_mesh = known.setdefault(mesh, {})
+        key = args, *sorted(kwargs.items())
+        if key not in of_mesh:
+            of_mesh[key] = measure(mesh, *args, **kwargs)
+        return of_mesh[key]
+
+    update_wrapper(measured, measure)
+    return measured
+
+
+@cached_with_mesh
 def best_orientation(mesh: Mesh, angle_deg: float, resting: bool = True) -> Orientation:
     """The orientation with the least risky area (mm2); resting=False: also those that only a raft could hold.
 
@@ -95,7 +117,7 @@ def risky_areas(mesh: Mesh, directions: Floats, angle_deg: float) -> Floats:
     return np.maximum(facing_down - standing, 0.0)
 
 
-@lru_cache(maxsize=4)
+@cached_with_mesh
 def _on_facets(mesh: Mesh, angle_deg: float) -> tuple[Orientation, ...]:
     """As the model stands, and on each facet of its hull."""
     return tuple(_measure(mesh, angle_deg, np.concatenate([UP[None], _facets(mesh)])))

@@ -12,6 +12,7 @@ from machine.app.terminal.progress import say
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.redirect import redirecting
 from machine.app.workbench.web.serve import serve_workbench
+from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.read import DEMO, check_file, locate
@@ -33,6 +34,9 @@ def edit(request: EditRequest) -> int:
     """Serve the page; a model that cannot be read is told in it, a file that is not there at once."""
     opened = None if request.model is None else _find(request.model)
 
+    def make(pools: WorkerPools) -> Session:
+        return Session(request.profile, request.given, pools)
+
     def begin(session: Session) -> None:
         if opened is not None:
             session.start(_open(session, opened))
@@ -44,7 +48,7 @@ def edit(request: EditRequest) -> int:
             _lead_browser(address, until_end)
 
     with ExitStack() as until_end:
-        serve_workbench(lambda: Session(request.profile, request.given), begin, announce, request.port, request.upload_mib)
+        serve_workbench(make, begin, announce, request.port, request.upload_mib)
     return 0
 
 

@@ -1,9 +1,7 @@
 """Bench: what lies on the workbench, as one value. Every command gives a new one, so undo and redo are values too."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from secrets import token_hex
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +9,12 @@ from machine.app.requests import Given
 from machine.app.workbench.bench.carried import Placing, carried_part, carried_zones
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.following import following_stops, gone_in_words, part_after
+from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.part_settings import following, option
 from machine.app.workbench.bench.settings import USUAL
 from machine.planning.stops import Stop
 from mdp.decomposition import FrontRow
-from mdp.directions.orientation import risky_areas
-from mdp.mesh import Floats, Mesh
+from mdp.mesh import Floats
 from mdp.overhang import UP
 from mdp.plans.plan_file import PlanFile, PlannedPart, PlannedRow
 from mdp.search.front import choose, pays, price_of_second_mm2
@@ -26,20 +24,8 @@ from profiles.part_settings import PartSettings
 from profiles.profile import Profile
 
 MOST_STEPS = 200  # that can be undone
-MOST_KEPT_FACES = 5_000_000  # of the models of these steps together, some 100 bytes each: every other scale is a model of its own
+MOST_KEPT_FACES = 5_000_000  # of the models of these steps together, some 25 bytes each: every other scale is a model of its own
 STANDING: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # as the model is read
-
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A model as it is read: its name, its file, its mesh in mm on z = 0, and a sentence for every repair. key: what tells it
-    from every other reading; a page asks for its triangles by it."""
-
-    name: str
-    path: Path
-    mesh: Mesh
-    notes: tuple[str, ...] = ()
-    key: str = field(default_factory=lambda: token_hex(8))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +133,7 @@ def _kept(steps: tuple[Step, ...]) -> tuple[Step, ...]:
         model = step.bench.model
         if model is not None and model not in models:
             models.add(model)
-            faces += len(model.mesh.faces)
+            faces += model.faces
         if faces > MOST_KEPT_FACES and back:
             return steps[-back:]
     return steps
@@ -209,9 +195,11 @@ def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floa
     as it is read. Raises PlanError where a box would leave what a plan may have."""
     if before.model is None or bench.model is None:
         return bench
+    if not before.cuts and before.zones == NO_ZONES:
+        return replace(bench, cuts=before.cuts)
     start = _placing(before)
     if turn is not None:
-        start = start.after(Placing.of(before.model.mesh, turn, 0.0))
+        start = start.after(Placing.of(before.model.mesh(), turn, 0.0))
     move = _placing(bench, factor).after(start)
     planes = {part: carried_part(part, move) for part in before.cuts or ()}
     cuts = None if before.cuts is None else tuple(planes[part] for part in before.cuts)
@@ -222,7 +210,7 @@ def _with_places_of(bench: Bench, before: Bench, factor: float = 1.0, turn: Floa
 def _placing(bench: Bench, factor: float = 1.0) -> Placing:
     """How the model on a bench stands on the platform."""
     assert bench.model is not None
-    return Placing.of(bench.model.mesh, bench.turned, bench.profile.search.pedestal_mm, factor)
+    return Placing.of(bench.model.mesh(), bench.turned, bench.profile.search.pedestal_mm, factor)
 
 
 def with_front(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
@@ -307,14 +295,6 @@ def locked_plan(bench: Bench) -> PlanFile:
     """What a search begins with: the locked planes, cut first, and the zones."""
     parts = tuple(part for part in bench.cuts or () if part in bench.locked)
     return PlanFile("the locked planes", parts=parts, zones=bench.zones)
-
-
-def overhang_mm2(bench: Bench) -> float:
-    """Area that overhangs too far and does not stand on the platform, as the model is turned now; 0 without a model."""
-    if bench.model is None:
-        return 0.0
-    up, angle_deg = np.array(bench.rotation[2]), bench.profile.process.self_supporting_angle_deg
-    return float(risky_areas(bench.model.mesh, up[None], angle_deg)[0])
 
 
 def laid_down(bench: Bench, normal: Floats) -> Floats:

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from machine.app.workbench.bench.bench import Bench, History, Model, laid_down, with_parts, with_rotation
+from machine.app.workbench.bench.bench import Bench, History, laid_down, with_parts, with_rotation
+from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.part_settings import check_part, with_part_setting, without_part_settings
 from machine.app.workbench.bench.planes import is_number, planned_part, rotation_rows
 from machine.app.workbench.bench.stops import add_stop, remove_stop, set_copies
-from mdp.mesh import Floats
+from mdp.mesh import Floats, Mesh
 from mdp.pose import about
 from profiles.errors import PlanError
 from profiles.profile import Profile
@@ -55,10 +56,11 @@ def _stand(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
 
 def _lay(bench: Bench, model: Model, asked: dict[str, Any]) -> Bench:
     """Lay the face of a number down on the platform."""
-    face, faces = asked.get("face"), len(model.mesh.faces)
-    if not isinstance(face, int) or isinstance(face, bool) or not 0 <= face < faces:
-        raise PlanError(f"face is {face!r}: 0 to {faces - 1} is allowed")
-    normal = model.mesh.normals[face]
+    face = asked.get("face")
+    if not isinstance(face, int) or isinstance(face, bool) or not 0 <= face < model.faces:
+        raise PlanError(f"face is {face!r}: 0 to {model.faces - 1} is allowed")
+    mesh = model.mesh()
+    (normal,) = Mesh(mesh.vertices[mesh.faces[face]], np.array([[0, 1, 2]])).normals
     if not normal.any():
         raise PlanError(f"face {face} has no area, so nothing can be laid on it")
     return with_rotation(bench, _rounded(laid_down(bench, normal)))

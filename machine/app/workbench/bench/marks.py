@@ -74,7 +74,7 @@ def _vector(asked: dict[str, Any], key: str) -> Vector:
 def standing_mesh(bench: Bench) -> Mesh:
     """The model as it stands on the platform or a pedestal, in the workpiece frame."""
     assert bench.model is not None
-    standing = standing_still(bench.model.mesh, bench.turned)
+    standing = standing_still(bench.model.mesh(), bench.turned)
     lift_mm = bench.profile.search.pedestal_mm
     return standing.transform(np.eye(3), (0.0, 0.0, lift_mm)) if lift_mm > 0.0 else standing
 

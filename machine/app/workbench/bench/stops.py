@@ -4,7 +4,8 @@ from dataclasses import replace
 from typing import Any
 
 from machine.app.pipeline.copies import MOST, check_copies
-from machine.app.workbench.bench.bench import Bench, Model
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.model import Model
 from machine.planning.stops import parse_stops
 from profiles.errors import PlanError
 

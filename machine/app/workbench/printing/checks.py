@@ -9,6 +9,7 @@ from machine.app.workbench.printing.order import PrintOrder, State
 from machine.app.workbench.printing.teller import Said, Teller
 from machine.dryrun.dryrun import dry_run, summary
 from machine.program import Program
+from profiles.errors import PlanError
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"
@@ -40,9 +41,13 @@ class Checks:
 
 def program_of(order: PrintOrder) -> Program:
     """The order's very lines, dry-run; what the dry run of the very same has found for the very same profile is not looked for
-    again."""
+    again. Raises PlanError where they are not there any more."""
+    try:
+        text = order.gcode.read_bytes().decode()
+    except FileNotFoundError:
+        raise PlanError("these slices are not there any more: slice what is to be printed again") from None
     compilers.wait_for(compilers.DRY_RUN)
-    lines = tuple(order.gcode.decode().removesuffix("\n").split("\n"))
+    lines = tuple(text.removesuffix("\n").split("\n"))
     found = None if order.known is None else order.known.of(lines, order.profile)
     return Program(lines, dry_run(lines, order.profile, found), None)
 

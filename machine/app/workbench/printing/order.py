@@ -17,11 +17,11 @@ State = dict[str, Any]  # of a print, as JSON: order, phase and all that process
 
 @dataclass(frozen=True, eq=False)
 class PrintOrder:
-    """gcode: the file that `export` writes of the same parts; force: go on as `print --force` does; key: of the slices; starts:
+    """gcode: a file as `export` writes it of the same parts; force: go on as `print --force` does; key: of the slices; starts:
     False where a print server is only to keep the file, as of `send`; known: what has been found of a dry run already."""
 
     name: str
-    gcode: bytes
+    gcode: Path
     profile: Profile
     printing: PrintRequest
     force: bool = False

@@ -3,7 +3,7 @@
 import asyncio
 
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.desk import WAITING, Desk
 from machine.app.workbench.session.slicing import Slicing
 from machine.program import Alternative
 
@@ -28,7 +28,7 @@ class Comparing:
         """Compare, if that is not done yet. Raises PlanError where what lies on the bench is not sliced."""
         self._slicing.needed()
         if not self.text and not self.rows():
-            self.text = "comparing"
+            self.text = WAITING if self._desk.long.pool.full else "comparing"
             self._task = self._desk.start(self._compare(self._desk.bench))
 
     def stop(self) -> None:

@@ -4,15 +4,18 @@ import asyncio
 import sys
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
 from typing import Any
 
 from machine.app.crash import log_bug
 from machine.app.workbench.bench.bench import Bench, History, Step
-from machine.app.workbench.work.lane import Lane
 from machine.app.workbench.work.news import News
 from machine.app.workbench.work.received import Received
+from machine.app.workbench.work.worker_pool import TaskQueue, WorkerPools
 from profiles.errors import UserError
 
+WAITING = "waiting until the work of other benches is done"
 LONGEST_SENTENCE = 2000  # letters: a page may ask for a name as long as it likes
 LONGEST_ASK = 80  # letters of the name of a command
 MOST_ANSWERS = 20  # the pages are told what became of so many commands with a name, the last ones
@@ -22,20 +25,21 @@ class Desk(News):
     """All from the event loop; the pages wait for `changed`.
 
     problem: what could not be done last; answers: to the last commands that a page gave a name, by that: why they were refused,
-    "" for those that are done; busy: what the pages wait for. The lanes: quick for what a person waits for, long for searches and
-    slices, hand for planes in hand. received: the files of its pages. followers: called after every change of the bench.
+    "" for those that are done; busy: what the pages wait for; quick, long, hand: its tasks in the pools; received: the files of
+    its pages; followers: called after every change of the bench.
     """
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: Bench, pools: WorkerPools) -> None:
         super().__init__()
         self.history = History(Step("", bench))
         self.problem = ""
         self.answers: dict[str, str] = {}
         self.busy = ""
         self.closed = False
-        self.quick, self.long, self.hand = Lane(), Lane(), Lane()
+        self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
         self.followers: list[Callable[[], None]] = []
         self.received = Received()
+        self._files = count(1)
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
@@ -48,10 +52,14 @@ class Desk(News):
         self.closed = True
         for task in self._tasks:
             task.cancel()
-        for lane in (self.quick, self.long, self.hand):
-            lane.close()
+        for tasks in (self.quick, self.long, self.hand):
+            tasks.close()
         self.received.remove()
         self.tell()
+
+    def new_file(self) -> Path:
+        """A place for what a task makes, which goes with the session at the latest."""
+        return self.received.path / f"made-{next(self._files)}"
 
     def start(self, work: Coroutine[Any, Any, None], ask: object = None) -> "asyncio.Task[None]":
         """Have work done beside the pages; what it is refused becomes the sentence that they show. ask: name of its command."""

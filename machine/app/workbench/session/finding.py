@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from machine.app.workbench.bench.bench import Bench, locked_plan, plan_of_bench, with_front, with_rotation
-from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.desk import WAITING, Desk
 from machine.app.workbench.work.cutting import LAY_TOO, Found, Searched, SearchWay
 from mdp.zone import NO_ZONES
 from profiles.errors import PlanError
@@ -56,7 +56,7 @@ class Finding:
         if self.search is None:
             if self._pricing is not None:
                 self._pricing.cancel()
-            self.search = Search(bench, Searched("beginning"))
+            self.search = Search(bench, Searched(WAITING if self._desk.long.pool.full else "beginning"))
             self._task = self._desk.start(self._find(bench, way))
 
     def stop(self) -> None:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from machine.app.workbench.bench.bench import with_cuts, with_zones
-from machine.app.workbench.bench.marks import marked
 from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.trying import Trying
 from profiles.errors import PlanError
@@ -27,7 +26,7 @@ class Marking:
 
     async def _taken(self, asked: dict[str, Any]) -> bool:
         before = self._desk.bench
-        word, zones = marked(before, asked)
+        word, zones = await self._desk.quick.run("mark_bench", before, asked)
         bench, gone = with_zones(before, zones), list[str]()
         while bench.cuts:
             trial = await self._trying.attempt(bench, bench.cuts)

@@ -1,5 +1,7 @@
 """Pieces: the parts on the bench as bodies of their own for the page, cut once for all that ask."""
 
+from pathlib import Path
+
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.session.desk import Desk
 from profiles.errors import PlanError
@@ -10,13 +12,17 @@ class Pieces:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._drawn: tuple[Bench, bytes] | None = None
+        self._drawn: tuple[Bench, Path] | None = None
 
-    async def block(self) -> bytes:
+    async def file(self) -> Path:
         """Those of what lies on the bench, as `work.pieces` packs them. Raises PlanError where there are none."""
         bench = self._desk.bench
         if bench.model is None or bench.cuts is None:
             raise PlanError("there are no parts to look at yet: find them first")
         if self._drawn is None or self._drawn[0].shaped != bench.shaped:
-            self._drawn = bench, await self._desk.quick.run("draw_pieces", bench)
+            out = self._desk.new_file()
+            await self._desk.quick.run("draw_pieces", bench, out)
+            if self._drawn is not None:
+                self._drawn[1].unlink(missing_ok=True)
+            self._drawn = bench, out
         return self._drawn[1]

@@ -1,20 +1,22 @@
 """Readiness: what planes on a bench need, worked out in a process of its own as soon as there is a model."""
 
 import asyncio
+from itertools import count
 from typing import Any
 
-from machine.app.workbench.bench.bench import Bench, Model
+from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.session.desk import Desk
 from mdp.read import MANY_FACES
 from profiles.profile import Profile
 
 CHANGING_S = 0.2  # of a bench, until it is made ready as it is
+_numbers = count(1)  # of the benches of all sessions, whose processes may be the same
 
 
 class Readiness:
-    """preparing: how many benches are made ready now; very large models wait for the first plane. A bench
-    has a number for the process, which it goes to once."""
+    """preparing: how many benches are made ready now; very large models wait for the first plane. A process knows by its number
+    what it has worked out already."""
 
     def __init__(self, desk: Desk) -> None:
         self.preparing = 0
@@ -22,7 +24,7 @@ class Readiness:
         self._made_of: tuple[object, ...] = (None, None, None)  # the bench of the last number
         self._profile: Profile | None = None
         self._number = self._wanted = 0
-        self._model: Model | None = None  # of the bench that was made ready last
+        self._model = ""  # key of that of the bench that was made ready last
         self._task: asyncio.Task[None] | None = None
         desk.followers.append(self._follow)
 
@@ -37,18 +39,13 @@ class Readiness:
             await asyncio.wait((self._task,))
 
     async def ask(self, task: str, bench: Bench, *given: Any) -> Any:
-        """What a task of work.trials says of a bench, made ready for it where it is not."""
-        number = self._number_of(bench)
-        answer = await self._desk.hand.run(task, number, *given)
-        while answer is None:  # or another bench was made ready in between
-            await self._desk.hand.run("make_ready", number, bench)
-            answer = await self._desk.hand.run(task, number, *given)
-        return answer
+        """What a task of work.trials says of a bench."""
+        return await self._desk.hand.run(task, self._number_of(bench), bench, *given)
 
     def _number_of(self, bench: Bench) -> int:
-        made_of = (bench.model, bench.rotation, bench.zones)
+        made_of = (bench.model and bench.model.key, bench.rotation, bench.zones)
         if any(one is not other for one, other in zip(made_of, self._made_of, strict=True)) or not self._serves(bench.profile):
-            self._made_of, self._profile, self._number = made_of, bench.profile, self._number + 1
+            self._made_of, self._profile, self._number = made_of, bench.profile, next(_numbers)
         return self._number
 
     def _serves(self, profile: Profile) -> bool:
@@ -62,10 +59,10 @@ class Readiness:
 
     def _follow(self) -> None:
         bench = self._desk.bench
-        if bench.model is None or len(bench.model.mesh.faces) > MANY_FACES or self._number_of(bench) == self._wanted:
+        if bench.model is None or bench.model.faces > MANY_FACES or self._number_of(bench) == self._wanted:
             return
-        wait_s = CHANGING_S if bench.model is self._model else 0.0
-        self._wanted, self._model = self._number_of(bench), bench.model
+        wait_s = CHANGING_S if bench.model.key == self._model else 0.0
+        self._wanted, self._model = self._number_of(bench), bench.model.key
         self._task = self._desk.start(self._prepare(bench, self._wanted, wait_s))
 
     async def _prepare(self, bench: Bench, number: int, wait_s: float) -> None:

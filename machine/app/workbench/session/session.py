@@ -5,12 +5,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from weakref import finalize
 
 from machine.app.pipeline.given_plan import with_plan_settings
 from machine.app.requests import Given
 from machine.app.workbench.bench.bench import (
     Bench,
-    Model,
     with_cuts,
     with_model,
     with_model_turned_as_read,
@@ -22,6 +22,7 @@ from machine.app.workbench.bench.command_line import turned_by
 from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.effect import Effect, effect_of_change
 from machine.app.workbench.bench.marks import MARKS
+from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.planes import EDITS, edited, instead_of
 from machine.app.workbench.bench.settings import check_block, profile_as_given, with_name, with_typed
 from machine.app.workbench.session.comparing import Comparing
@@ -29,14 +30,14 @@ from machine.app.workbench.session.desk import Desk
 from machine.app.workbench.session.finding import Finding, search_way
 from machine.app.workbench.session.marking import Marking
 from machine.app.workbench.session.open_bench import OpenBench
-from machine.app.workbench.session.pedestal import Pedestal
 from machine.app.workbench.session.pieces import Pieces
 from machine.app.workbench.session.pricing import Pricing
 from machine.app.workbench.session.readiness import Readiness
 from machine.app.workbench.session.slicing import Slicing
+from machine.app.workbench.session.standing import StandingModel
 from machine.app.workbench.session.trying import Trying
-from machine.app.workbench.work.cutting import Files
 from machine.app.workbench.work.models import Resting
+from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.plans.plan_file import PlanFile
 from mdp.plans.reading import read_plan
 from mdp.read import MANY_FACES, locate
@@ -45,36 +46,37 @@ from profiles.profile import Profile
 
 
 class Session(Desk):
-    """A desk with all that is done on it. resting: the ways in which a model rests; benches: all that are open, this one too."""
+    """A desk with all that is done on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
+    this one too."""
 
-    def __init__(self, profile: Profile, given: Given) -> None:
-        super().__init__(Bench(profile, given=given))
+    def __init__(self, profile: Profile, given: Given, pools: WorkerPools) -> None:
+        super().__init__(Bench(profile, given=given), pools)
         self.slicing, self.readiness = Slicing(self), Readiness(self)
         self.trying = Trying(self, self.readiness)
         self.finding = Finding(self)
         self.comparing = Comparing(self, self.slicing)
-        self.pieces, self._pricing, self.pedestal = Pieces(self), Pricing(self), Pedestal(self)
+        self.pieces, self._pricing, self.standing = Pieces(self), Pricing(self), StandingModel(self)
         self._settling = asyncio.Lock()
         self.marking = Marking(self, self.trying)
         self._ranking: asyncio.Task[None] | None = None
-        self.resting: tuple[Model, tuple[Resting, ...]] | None = None
+        self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
         self.benches: tuple[OpenBench, ...] = ()
 
     def warm(self) -> None:
         """Load the program's heavy parts while nobody waits."""
-        for lane in (self.quick, self.hand, self.long):
-            self.start(lane.warm())
+        for tasks in (self.quick, self.hand, self.long):
+            self.start(tasks.warm())
 
     async def open_model(self, path: Path, name: str) -> None:
         """Put the model of a file on the bench. Raises UserError as the command line tells it."""
         self.readiness.load()
-        if self._ranking is not None and self.bench.model is not None and len(self.bench.model.mesh.faces) > MANY_FACES:
+        if self._ranking is not None and self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self._ranking.cancel()  # it would be waited for
         with self.waiting(f"reading {name}"):
             read_for, model = None, None
             while model is None or _reads(self.bench.profile) != read_for:  # another scale may be set meanwhile
                 read_for = _reads(self.bench.profile)
-                model = await self.quick.run("read_model", path, name, self.bench.profile.of_all_parts)
+                model = await self._read(path, name, self.bench.profile)
             self.do(f"open {name}", with_model(self.bench, model))
         self._begin_ranking(model)
 
@@ -146,21 +148,12 @@ class Session(Desk):
                 self.answer(ask)
         self.tell()
 
-    async def files(self) -> Files:
-        """What can be saved of the parts on the bench. Raises UserError where they cannot be cut."""
-        files: Files = await self._made("cutting the parts", "make_files")
-        return files
-
-    async def pictures(self) -> bytes:
-        """A zip of their drawings. Raises the same."""
-        drawn: bytes = await self._made("drawing the parts", "make_pictures")
-        return drawn
-
-    async def _made(self, word: str, task: str) -> Any:
+    async def made(self, word: str, task: str, *given: Any) -> Any:
+        """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""
         if self.bench.model is None or not self.bench.planned:
             raise PlanError("there are no parts to save yet: find them first")
         with self.waiting(word):
-            return await self.quick.run(task, self.bench)
+            return await self.quick.run(task, self.bench, *given)
 
     def take_given(self, word: str, change: Callable[[Given], Given], key: str = "", ask: object = None) -> None:
         """Take other names and settings; those of the bench by then, for several may be asked for at once. key: the one that is
@@ -185,7 +178,7 @@ class Session(Desk):
         new, old = bench.profile.process, before.profile.process
         if model is not None and _reads(bench.profile) != _reads(before.profile):
             with self.waiting(f"reading {model.name}"):
-                model = await self.quick.run("read_model", model.path, model.name, bench.profile.of_all_parts)
+                model = await self._read(model.path, model.name, bench.profile)
             self._begin_ranking(model)
             if new.rotate_deg != old.rotate_deg:
                 turn = turned_by(new.rotate_deg) @ turned_by(old.rotate_deg).T
@@ -198,14 +191,20 @@ class Session(Desk):
                 return replace(with_cuts(bench, ()), cuts=None), why
         return bench, ""
 
+    async def _read(self, path: Path, name: str, profile: Profile) -> Model:
+        """The model of a file, whose mesh stays as long as anybody has it."""
+        model: Model = await self.quick.run("read_model", path, name, profile.of_all_parts, self.new_file())
+        finalize(model, model.mesh_file.unlink, missing_ok=True)
+        return model
+
     def _begin_ranking(self, model: Model) -> None:
         """Rank the ways in which a model rests."""
         self._ranking = self.start(self._rank(model))
 
     async def _rank(self, model: Model) -> None:
         await self.readiness.wait()
-        resting = await self.quick.run("rank_resting", model.mesh, self.bench.profile.of_all_parts)
-        self.resting = model, resting
+        resting = await self.quick.run("rank_resting", model, self.bench.profile.of_all_parts)
+        self.resting = model.key, resting
 
 
 def _reads(profile: Profile) -> tuple[object, ...]:

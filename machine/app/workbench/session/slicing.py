@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from machine.app.workbench.bench.bench import Bench
-from machine.app.workbench.session.desk import Desk
+from machine.app.workbench.session.desk import WAITING, Desk
 from machine.app.workbench.work.slices import Sliced, SlicesSoFar
 from profiles.errors import PlanError
 
@@ -80,7 +80,8 @@ class Slicing:
             raise PlanError("there is no model on the workbench yet: choose a file first")
         if self.under_way is None:
             self._count += 1
-            self.under_way = SlicingUnderWay(bench, self._count, "cutting the parts")
+            begins = WAITING if self._desk.long.pool.full else "cutting the parts"
+            self.under_way = SlicingUnderWay(bench, self._count, begins)
             self._task = self._desk.start(self._slice(self.under_way))
 
     def stop(self) -> None:
@@ -100,7 +101,11 @@ class Slicing:
             self._desk.tell()
 
         try:
-            sliced = await self._desk.long.run("slice_bench", begun.bench, tell=follow)
+            files = self._desk.new_file(), self._desk.new_file()
+            sliced: Sliced = await self._desk.long.run("slice_bench", begun.bench, *files, tell=follow)
+            if self.done is not None:
+                self.done.sliced.page.unlink(missing_ok=True)
+                self.done.sliced.gcode.unlink(missing_ok=True)
             self.done = Slices(begun.bench, begun.number, sliced, walls)
         finally:
             if self.under_way is not None and self.under_way.number == begun.number:

@@ -58,11 +58,10 @@ class Trying:
         bench = self._desk.bench
         free_place(bench, number)
         assert bench.model is not None
-        low, high = bench.model.mesh.bounds_mm
-        reach_mm = REACH_SHARE * hypot(*(high - low))
+        reach_mm = REACH_SHARE * hypot(*bench.model.size_mm)
         with self._desk.waiting(f"looking for a neck near the plane of part {number}"):
             async with self._one:
-                neck: Plane | None = (await self._readiness.ask("near_neck", bench, bench.cuts, number, reach_mm))[0]
+                neck: Plane | None = await self._readiness.ask("near_neck", bench, bench.cuts, number, reach_mm)
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
             raise PlanError(f"there is no neck near the plane of part {number}: {where}")

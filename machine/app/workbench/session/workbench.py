@@ -5,16 +5,19 @@ from collections.abc import Callable
 from machine.app.workbench.bench.bench import History, Step, emptied
 from machine.app.workbench.session.open_bench import OpenBench
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.work.worker_pool import WorkerPools
 from profiles.errors import PlanError
 
 MOST_SESSIONS = 20
 
 
 class Workbench:
-    """sessions: by number, from 1 on; a number is not given again. Each is told what the others are, as soon as that changes."""
+    """sessions: by number, from 1 on; a number is not given again. Each is told what the others are, as soon as that changes.
+    pools: of the processes that they share."""
 
-    def __init__(self, make: Callable[[], Session]) -> None:
+    def __init__(self, make: Callable[[WorkerPools], Session]) -> None:
         self.sessions: dict[int, Session] = {}
+        self.pools = WorkerPools()
         self._make = make
         self._last = 0
 
@@ -24,7 +27,7 @@ class Workbench:
         if len(self.sessions) >= MOST_SESSIONS:
             raise PlanError(f"{MOST_SESSIONS} benches are open, which is the most: close one first")
         self._last += 1
-        self.sessions[self._last] = session = self._make()
+        self.sessions[self._last] = session = self._make(self.pools)
         if like is not None:
             session.history = History(Step("", emptied(like.bench)))
         session.listeners.append(self._list_again)
@@ -40,9 +43,10 @@ class Workbench:
             self._list_again()
 
     def close_all(self) -> None:
-        """End all of them."""
+        """End all of them, and all processes."""
         for number in list(self.sessions):
             self.close(number)
+        self.pools.end()
 
     def _list_again(self) -> None:
         benches = tuple(_described(number, session) for number, session in self.sessions.items())

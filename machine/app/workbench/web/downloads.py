@@ -1,17 +1,16 @@
 """Downloads: what a page saves and looks at: profiles, the plan, the parts, the G-code and the page of the print."""
 
-import asyncio
 from pathlib import Path
 
+from starlette.background import BackgroundTask
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import FileResponse, Response
 
 from machine.app.profile_file import profile_text
 from machine.app.workbench.bench.command_line import file_stem, plain_name
 from machine.app.workbench.bench.settings import settings_of
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.slicing import Slices
-from machine.view.page import with_comparison
 from profiles.errors import PlanError
 from profiles.places import KINDS
 
@@ -23,36 +22,40 @@ async def profile(session: Session, request: Request) -> Response:
         return Response("there is no such profile\n", 404)
     name = getattr(given, kind)
     text = profile_text(kind, name, settings_of(given, kind))
-    return _download(text.encode(), "application/toml", f"{plain_name(Path(name).stem) or kind}-own.toml")
+    own = _saved_as(f"{plain_name(Path(name).stem) or kind}-own.toml")
+    return Response(text, headers=own, media_type="application/toml")
 
 
 async def plan(session: Session, request: Request) -> Response:
     """The plan's file."""
-    files = await session.files()
-    return _download(files.plan.encode(), "application/toml", f"{file_stem(session.bench)}-plan.toml")
+    text: str = await session.made("cutting the parts", "make_plan")
+    return Response(text, headers=_saved_as(f"{file_stem(session.bench)}-plan.toml"), media_type="application/toml")
 
 
 async def folder(session: Session, request: Request) -> Response:
     """The folder of the parts as a zip."""
-    files = await session.files()
-    return _download(files.folder, "application/zip", f"{file_stem(session.bench)}-parts.zip")
+    out = session.new_file()
+    await session.made("cutting the parts", "make_folder", out)
+    return _once(out, "application/zip", f"{file_stem(session.bench)}-parts.zip")
 
 
 async def pictures(session: Session, request: Request) -> Response:
     """The drawings of the parts as a zip."""
-    return _download(await session.pictures(), "application/zip", f"{file_stem(session.bench)}-pictures.zip")
+    out = session.new_file()
+    await session.made("drawing the parts", "make_pictures", out)
+    return _once(out, "application/zip", f"{file_stem(session.bench)}-pictures.zip")
 
 
 async def print_page(session: Session, request: Request) -> Response:
     """The page of the last slices as `view` writes it, with its own content security policy in it."""
     slices = _slices(session, request)
-    return _gone() if slices is None else Response(slices.sliced.page, media_type="text/html")
+    return _gone() if slices is None else FileResponse(slices.sliced.page, media_type="text/html")
 
 
 async def print_text(session: Session, request: Request) -> Response:
     """The G-code of the last slices to look at, whatever the dry run found."""
     slices = _slices(session, request)
-    return _gone() if slices is None else Response(slices.sliced.gcode, media_type="text/plain")
+    return _gone() if slices is None else FileResponse(slices.sliced.gcode, media_type="text/plain")
 
 
 async def print_walls(session: Session, request: Request) -> Response:
@@ -63,10 +66,12 @@ async def print_walls(session: Session, request: Request) -> Response:
 
 async def shared_page(session: Session, request: Request) -> Response:
     """The same as a file to save, with the comparison with one piece where that has been worked out."""
-    content, alternatives = session.slicing.needed().page, session.comparing.rows()
-    if alternatives:
-        content = await asyncio.to_thread(with_comparison, content, alternatives)
-    return _download(content, "text/html", f"{file_stem(session.bench)}.html")
+    page, alternatives, name = session.slicing.needed().page, session.comparing.rows(), f"{file_stem(session.bench)}.html"
+    if not alternatives:
+        return FileResponse(page, headers=_saved_as(name), media_type="text/html")
+    out = session.new_file()
+    await session.quick.run("share_page", page, alternatives, out)
+    return _once(out, "text/html", name)
 
 
 async def gcode(session: Session, request: Request) -> Response:
@@ -77,7 +82,7 @@ async def gcode(session: Session, request: Request) -> Response:
             f"the dry run found {len(errors)} errors, the first: {errors[0].message}: no G-code is saved unless you say that you"
             " want it all the same (--force)"
         )
-    return _download(sliced.gcode, "text/plain", f"{file_stem(session.bench)}.gcode")
+    return FileResponse(sliced.gcode, headers=_saved_as(f"{file_stem(session.bench)}.gcode"), media_type="text/plain")
 
 
 def _slices(session: Session, request: Request) -> Slices | None:
@@ -90,5 +95,11 @@ def _gone() -> Response:
     return Response("these slices are not there any more\n", 404)
 
 
-def _download(content: bytes, kind: str, name: str) -> Response:
-    return Response(content, media_type=kind, headers={"content-disposition": f'attachment; filename="{name}"'})
+def _once(file: Path, kind: str, name: str) -> Response:
+    """A file that goes when it has been sent."""
+    remove = BackgroundTask(file.unlink, missing_ok=True)
+    return FileResponse(file, headers=_saved_as(name), media_type=kind, background=remove)
+
+
+def _saved_as(name: str) -> dict[str, str]:
+    return {"content-disposition": f'attachment; filename="{name}"'}

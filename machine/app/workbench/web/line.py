@@ -25,6 +25,12 @@ async def talk(session: Session, socket: WebSocket) -> None:
     await until_either_ends(_tell(session, socket), _hear(session, socket))
 
 
+async def refuse_closed(socket: WebSocket) -> None:
+    """A line to a bench that is not there."""
+    await socket.accept()
+    await socket.close(CLOSED_CODE, CLOSED)
+
+
 async def until_either_ends(tell: Coroutine[Any, Any, None], hear: Coroutine[Any, Any, None]) -> None:
     """The two directions of a line beside each other, of which neither outlives the other; that a page has gone is no fault."""
     try:

@@ -18,7 +18,8 @@ from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder
 from machine.app.workbench.printing.ordering import order_of
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.session import Session
-from machine.app.workbench.web.line import parsed, receive, send, until_either_ends
+from machine.app.workbench.session.workbench import Workbench
+from machine.app.workbench.web.line import parsed, receive, refuse_closed, send, until_either_ends
 from machine.network.address import is_server_address, parse_server_address
 from profiles.errors import JournalError, PrinterError, UserError
 
@@ -26,18 +27,26 @@ MOST_COMMAND = 10_000  # characters
 LONGEST_PORT = 300
 
 
-def prints_line(prints: Prints) -> Callable[[Session, WebSocket], Awaitable[None]]:
+def prints_line(prints: Prints, workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
     """What answers the websocket of a page of a session: state out, commands in. `?page=` names the page, so that a line that
     comes back is known.
 
-    Each line has a task of its own that sends the newest state: one that reads nothing holds up itself alone.
+    Each line has a task of its own that sends the newest state: one that reads nothing holds up itself alone. The session lives
+    in another event loop: of it only what lies there finished is read.
     """
 
-    async def talk(session: Session, socket: WebSocket) -> None:
+    async def talk(socket: WebSocket) -> None:
+        session = workbench.sessions.get(socket.path_params["session"])
+        if session is None:
+            await refuse_closed(socket)
+            return
         page = socket.query_params.get("page", "")[:40] or secrets.token_urlsafe(9)
         await socket.accept()
         with prints.page(page):
-            await until_either_ends(_tell(prints, socket), _hear(prints, session, socket, page))
+            try:
+                await until_either_ends(_tell(prints, socket), _hear(prints, session, socket, page))
+            except ExceptionGroup as bugs:
+                log_bug(bugs.exceptions[0], ())
 
     return talk
 

@@ -1,11 +1,13 @@
 """Serve: the workbench run from its address to Ctrl-C: nothing of it goes on afterwards."""
 
 import asyncio
+import gc
 import os
 import secrets
 import socket
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import uvicorn
 
@@ -17,12 +19,15 @@ from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.guard import HOST
 from machine.app.workbench.web.server import application
+from machine.app.workbench.web.sessions_thread import SessionsThread
 from machine.app.workbench.web.uploads import Uploads
 from machine.app.workbench.work.processes import hear_the_ends
 from machine.app.workbench.work.received import files_in, tidy_left
+from machine.app.workbench.work.worker_pool import WorkerPools
 from profiles.errors import OutputError
 
 GRACE_S = 1  # for answers under way when it ends, and for its processes
+SWITCH_S = 0.0005  # between threads: usual are 5 ms, and a stop is waited for several times
 MOST_SENT = 1 << 20  # bytes of one message of a page; files come by another way
 
 
@@ -58,14 +63,14 @@ def listen(port: int) -> socket.socket:
 
 
 def serve_workbench(
-    make: Callable[[], Session],
+    make: Callable[[WorkerPools], Session],
     begin: Callable[[Session], None],
     announce: Callable[[str], None],
     port: int = 0,
     upload_mib: int = UPLOAD_MIB,
 ) -> None:
-    """Serve until Ctrl-C. make: a session, made in the event loop; begin: given the first one when it is there; announce: given
-    its address when it answers; upload_mib: the largest file that is taken from a page."""
+    """Serve until Ctrl-C. make: a session; begin: given the first one when it is there, both in the event loop of the sessions;
+    announce: given its address when it answers; upload_mib: the largest file that is taken from a page."""
     own = listen(port)
     with own:
         folders = tidy_left()
@@ -76,7 +81,7 @@ def serve_workbench(
 
 
 async def _serve(
-    make: Callable[[], Session],
+    make: Callable[[WorkerPools], Session],
     begin: Callable[[Session], None],
     announce: Callable[[str], None],
     own: socket.socket,
@@ -84,9 +89,15 @@ async def _serve(
 ) -> None:
     number, token = own.getsockname()[1], secrets.token_urlsafe(24)
     workbench, prints, loop = Workbench(make), Prints(), asyncio.get_running_loop()
-    first = workbench.open()
+    sessions = SessionsThread()
+
+    async def open_first() -> int:
+        first = workbench.open()
+        begin(workbench.sessions[first])
+        return first
+
     settings = uvicorn.Config(
-        application(workbench, prints, token, number, uploads),
+        application(workbench, sessions, prints, token, number, uploads),
         log_config=None,
         lifespan="off",
         ws="websockets-sansio",
@@ -109,7 +120,8 @@ async def _serve(
         loop.call_soon_threadsafe(end)
 
     try:
-        begin(workbench.sessions[first])
+        first = await sessions.run(open_first())
+        keep_stops_quick()
         with calling(interrupt):
             answering = asyncio.create_task(server.serve(sockets=[own]))
             while not server.started and not answering.done():
@@ -117,9 +129,24 @@ async def _serve(
             announce(f"http://{HOST}:{number}/{token}/{first}/")
             await answering
     finally:
-        workbench.close_all()
         prints.close()
+        with suppress(TimeoutError):  # what hangs there ends with the program
+            async with asyncio.timeout(2.0 * GRACE_S):
+                await sessions.run(_close(workbench))
         await hear_the_ends(GRACE_S)
+        await sessions.end(GRACE_S)
+
+
+async def _close(workbench: Workbench) -> None:
+    workbench.close_all()
+    await hear_the_ends(GRACE_S)
+
+
+def keep_stops_quick() -> None:
+    """No thread holds up that of the prints for long: a full collection of all that is loaded does so for a tenth of a second, so
+    that is left out of it, and the interpreter changes from one thread to another more often than usual."""
+    gc.freeze()
+    sys.setswitchinterval(SWITCH_S)
 
 
 async def _end_prints(prints: Prints, then: Callable[[], None]) -> None:

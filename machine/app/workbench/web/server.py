@@ -1,13 +1,12 @@
 """Server: the addresses of the workbench: its page, its sessions' models, files and lines."""
 
-import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import JSONResponse, Response
-from starlette.routing import Route, WebSocketRoute
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Route, Router, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
@@ -29,23 +28,38 @@ from machine.app.workbench.web.downloads import (
     shared_page,
 )
 from machine.app.workbench.web.guard import Guard
-from machine.app.workbench.web.line import CLOSED, CLOSED_CODE, talk
+from machine.app.workbench.web.line import CLOSED, refuse_closed, talk
 from machine.app.workbench.web.page import workbench_page
 from machine.app.workbench.web.prints_line import print_log, prints_line
 from machine.app.workbench.web.profile_files import ProfileFiles
-from machine.app.workbench.web.snapshot import marks, marks_key, triangles
+from machine.app.workbench.web.sessions_thread import SessionsThread
+from machine.app.workbench.web.snapshot import marks_key
 from machine.app.workbench.web.uploads import Uploads
 from profiles.places import KINDS, known
 
 Answer = Callable[[Request], Awaitable[Response]]
 
 
-def application(workbench: Workbench, prints: Prints, token: str, port: int, uploads: Uploads) -> ASGIApp:
-    """The whole server, below `/TOKEN/`; the number of a session follows."""
-    below = "/{token}/{session:int}/"
+BELOW = "/{token}/{session:int}/"
+
+
+def application(
+    workbench: Workbench, sessions: SessionsThread, prints: Prints, token: str, port: int, uploads: Uploads
+) -> ASGIApp:
+    """The whole server, below `/TOKEN/`; the number of a session follows. What is of the prints is answered in the server's own
+    event loop, all else in that of the sessions."""
+    of_prints = [
+        Route(BELOW + "prints/{print:int}/log", print_log(prints)),
+        WebSocketRoute(BELOW + "prints", prints_line(prints, workbench)),
+    ]
+    others = sessions.application(_of_sessions(workbench, port, uploads))
+    return Guard(Router(of_prints, redirect_slashes=False, default=others), token, port)
+
+
+def _of_sessions(workbench: Workbench, port: int, uploads: Uploads) -> ASGIApp:
 
     def route(path: str, act: Callable[[Session, Request], Awaitable[Response]], method: str = "GET") -> Route:
-        return Route(below + path, _answering(workbench, act), methods=[method])
+        return Route(BELOW + path, _answering(workbench, act), methods=[method])
 
     routes = [
         route("", _page(port)),
@@ -66,11 +80,9 @@ def application(workbench: Workbench, prints: Prints, token: str, port: int, upl
         route("print.html", shared_page),
         route("print.gcode", gcode),
         route("settings.json", _settings(uploads.profiles)),
-        Route(below + "prints/{print:int}/log", print_log(prints)),
-        WebSocketRoute(below + "line", _connecting(workbench, talk)),
-        WebSocketRoute(below + "prints", _connecting(workbench, prints_line(prints))),
+        WebSocketRoute(BELOW + "line", _line(workbench)),
     ]
-    return Guard(Starlette(routes=[*bench_routes(workbench), *routes]), token, port)
+    return Starlette(routes=[*bench_routes(workbench), *routes])
 
 
 def _page(port: int) -> Callable[[Session, Request], Awaitable[Response]]:
@@ -97,19 +109,16 @@ def _answering(workbench: Workbench, act: Callable[[Session, Request], Awaitable
     return answer
 
 
-def _connecting(
-    workbench: Workbench, talk: Callable[[Session, WebSocket], Awaitable[None]]
-) -> Callable[[WebSocket], Awaitable[None]]:
+def _line(workbench: Workbench) -> Callable[[WebSocket], Awaitable[None]]:
     async def connect(socket: WebSocket) -> None:
         session = workbench.sessions.get(socket.path_params["session"])
         if session is None:
-            await socket.accept()
-            await socket.close(CLOSED_CODE, CLOSED)
-        else:
-            try:
-                await talk(session, socket)
-            except ExceptionGroup as bugs:  # each becomes a sentence for the other lines, and a log
-                session.refuse(bugs.exceptions[0])
+            await refuse_closed(socket)
+            return
+        try:
+            await talk(session, socket)
+        except ExceptionGroup as bugs:  # each becomes a sentence for the other lines, and a log
+            session.refuse(bugs.exceptions[0])
 
     return connect
 
@@ -118,25 +127,25 @@ async def _model(session: Session, request: Request) -> Response:
     model = session.bench.model
     if model is None or model.key != request.path_params["key"]:
         return Response("this model is not on the workbench any more\n", 404)
-    return Response(await asyncio.to_thread(triangles, model.mesh), media_type="application/octet-stream")
+    return FileResponse(model.mesh_file, media_type="application/octet-stream")
 
 
 async def _pedestal(session: Session, request: Request) -> Response:
-    pedestal = session.pedestal.now
-    if pedestal is None or session.pedestal.key != request.path_params["key"]:
+    standing = session.standing.now
+    if standing is None or session.standing.pedestal_key != request.path_params["key"]:
         return Response(status_code=204)
-    return Response(triangles(pedestal.body), media_type="application/octet-stream")
+    return Response(standing.pedestal, media_type="application/octet-stream")
 
 
 async def _pieces(session: Session, request: Request) -> Response:
-    return Response(await session.pieces.block(), media_type="application/octet-stream")
+    return FileResponse(await session.pieces.file(), media_type="application/octet-stream")
 
 
 async def _marks(session: Session, request: Request) -> Response:
     bench = session.bench
     if not request.path_params["key"] or marks_key(bench) != request.path_params["key"]:
         return Response(status_code=204)  # there are others by now, which the page asks for next
-    return Response(await asyncio.to_thread(marks, bench), media_type="application/octet-stream")
+    return Response(await session.quick.run("mark_faces", bench), media_type="application/octet-stream")
 
 
 def _settings(files: ProfileFiles) -> Callable[[Session, Request], Awaitable[Response]]:

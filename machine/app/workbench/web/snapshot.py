@@ -1,22 +1,17 @@
-"""Snapshot: what a page is told of the session, as JSON; the model's triangles as bytes of their own."""
+"""Snapshot: what a page is told of the session, as JSON."""
 
 from dataclasses import asdict
-from functools import lru_cache
 from hashlib import sha256
 from typing import Any
 
-import numpy as np
-
-from machine.app.workbench.bench.bench import Bench, Model, overhang_mm2
-from machine.app.workbench.bench.fit import standing
-from machine.app.workbench.bench.marks import named_faces
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.planes import Cuts
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.slices import slices_told
 from machine.view.front import front_record
 from machine.view.parts import page_colours
 from machine.view.scene import machine_bodies
-from mdp.mesh import Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM, threshold
 from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS
@@ -28,8 +23,8 @@ MOST_FACES = 2_000_000  # that a page draws
 def snapshot(session: Session) -> dict[str, Any]:
     """Everything but the triangles; small enough to be told whole whenever anything changes."""
     bench, history, search = session.bench, session.history, session.finding.search
-    lifted = session.pedestal.now
-    resting = session.resting[1] if session.resting is not None and session.resting[0] is bench.model else ()
+    standing = session.standing.now
+    resting = session.resting[1] if bench.model is not None and session.resting[0] == bench.model.key else ()
     best = None if search is None else search.searched.best
     planes = [] if best is None else [_plane(plane) for plane in reversed(best.planes)]
     return {
@@ -43,14 +38,12 @@ def snapshot(session: Session) -> dict[str, Any]:
         "model": None if bench.model is None else _model(bench.model),
         "rotation": bench.rotation,
         "scale": bench.profile.process.scale,
-        "standing": None
-        if (stands := standing(bench)) is None
-        else asdict(stands) | ({"problem": lifted.problem} if lifted else {}),
+        "standing": standing and {"size_mm": standing.size_mm, "problem": standing.problem},
+        "overhang_mm2": standing and standing.overhang_mm2,
         "pedestal_mm": bench.profile.search.pedestal_mm,
-        "pedestal": session.pedestal.key,
+        "pedestal": session.standing.pedestal_key,
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATFORM_TOLERANCE_MM,
-        "overhang_mm2": lifted.overhang_mm2 if lifted else _overhang_mm2(bench),
         "resting": [
             {"rotation": each.rotation, "words": each.words, "overhang_mm2": each.overhang_mm2, "height_mm": each.height_mm}
             for each in resting
@@ -88,12 +81,6 @@ def marks_key(bench: Bench) -> str:
     return sha256(repr((bench.model.key, bench.rotation, kinds)).encode()).hexdigest()[:16]
 
 
-def marks(bench: Bench) -> bytes:
-    """(m,) of each face of the model in which kinds of zones that are no boxes it is: a bit each, in their order."""
-    bits = np.packbits(named_faces(bench), axis=0, bitorder="little")[0]
-    return bytes(bits)
-
-
 def _zones(bench: Bench) -> list[dict[str, Any]]:
     return [
         {"kind": kind, "number": number, **asdict(zone)}
@@ -102,22 +89,15 @@ def _zones(bench: Bench) -> list[dict[str, Any]]:
     ]
 
 
-def triangles(mesh: Mesh) -> bytes:
-    """Two counts as uint32, then vertices (n, 3) float32 in mm and faces (m, 3) uint32, all little-endian."""
-    vertices, faces = mesh.vertices.astype("<f4"), mesh.faces.astype("<u4")
-    return np.array([len(vertices), len(faces)], "<u4").tobytes() + vertices.tobytes() + faces.tobytes()
-
-
 def _model(model: Model) -> dict[str, Any]:
-    low, high = model.mesh.bounds_mm
     return {
         "key": model.key,
         "name": model.name,
-        "faces": len(model.mesh.faces),
-        "size_mm": (high - low).tolist(),
-        "volume_mm3": model.mesh.volume_mm3,
+        "faces": model.faces,
+        "size_mm": model.size_mm,
+        "volume_mm3": model.volume_mm3,
         "notes": model.notes,
-        "drawn": len(model.mesh.faces) <= MOST_FACES,
+        "drawn": model.faces <= MOST_FACES,
     }
 
 
@@ -135,8 +115,3 @@ def _cuts(cuts: Cuts) -> list[dict[str, Any]]:
 
 def _plane(plane: Plane) -> dict[str, Any]:
     return {"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm}
-
-
-@lru_cache(maxsize=4)
-def _overhang_mm2(bench: Bench) -> float:
-    return overhang_mm2(bench)

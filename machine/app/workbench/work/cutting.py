@@ -1,10 +1,10 @@
 """Cutting: finding parts, cutting by planes and making the parts' files, as tasks of the workbench."""
 
-import io
 import zipfile
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -57,14 +57,6 @@ class Found:
     turn: Floats | None = None
 
 
-@dataclass(frozen=True)
-class Files:
-    """What is saved: the plan's text, and the folder of `decompose -o` as a zip."""
-
-    plan: str
-    folder: bytes
-
-
 def find_parts(tell: Tell, bench: Bench, way: SearchWay) -> Found:
     """What a search as `decompose` makes it has found, or one as `decompose --orient` does. Raises RankerError."""
     ranker_named(way.ranker)
@@ -110,23 +102,29 @@ def price_row(tell: Tell, bench: Bench, place: int) -> FrontRow:
     return row
 
 
-def make_files(tell: Tell, bench: Bench) -> Files:
-    """The files of the parts as the bench has them."""
+def make_plan(tell: Tell, bench: Bench) -> str:
+    """The plan of the parts as the bench has them, as text."""
+    return _plan_text(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench)
+
+
+def make_folder(tell: Tell, bench: Bench, out: Path) -> None:
+    """The folder of `decompose -o` with the parts as the bench has them, as a zip."""
     made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
-    plan = plan_text(plan_of(made, bench.zones, bench.turned, bench.profile.parts))
     parts = [(part_file(part.index), stl(part.mesh)) for part in made.parts]
-    return Files(plan, zipped([*parts, (FOLDER_FILES[0], threemf(made)), (PLAN_NAME, plan.encode())]))
+    write_zip(out, [*parts, (FOLDER_FILES[0], threemf(made)), (PLAN_NAME, _plan_text(made, bench).encode())])
 
 
-def zipped(files: Sequence[tuple[str, bytes]]) -> bytes:
+def _plan_text(made: Decomposition, bench: Bench) -> str:
+    return plan_text(plan_of(made, bench.zones, bench.turned, bench.profile.parts))
+
+
+def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:
     """Files by their names as a zip, the same bytes whenever it is made."""
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w") as archive:
+    with zipfile.ZipFile(out, "w") as archive:
         for name, text in files:
             entry = zipfile.ZipInfo(name, ZIP_DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, text)
-    return content.getvalue()
 
 
 def cut_bench(bench: Bench, plan: PlanFile, prices: bool = False) -> Decomposition:
@@ -140,7 +138,7 @@ def standing_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
     """The mesh as it is cut, turned as the plan says or else as the bench does."""
     assert bench.model is not None
     turned = bench.turned if plan is None else None if plan.orientation is None else np.array(plan.orientation)
-    return standing_still(bench.model.mesh, turned)
+    return standing_still(bench.model.mesh(), turned)
 
 
 def _name(bench: Bench) -> str:

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from machine.app.pipeline import compilers
-from machine.app.workbench.bench.bench import Model
+from machine.app.workbench.bench.model import Model
 from machine.app.workbench.work.tell import Tell
 from mdp.directions.orientation import in_words, side_in_words
-from mdp.mesh import Mesh
 from mdp.read import read_mesh
 from mdp.search.laying import distinct_orientations
 from profiles.errors import MeshError
@@ -24,16 +23,16 @@ class Resting:
     height_mm: float
 
 
-def read_model(tell: Tell, path: Path, name: str, profile: Profile) -> Model:
+def read_model(tell: Tell, path: Path, name: str, profile: Profile, mesh_file: Path) -> Model:
     """The model of a file, with the sentences of the command line; a file from the page has the name it had there."""
     try:
         mesh, notes = read_mesh(path, profile.process.scale, profile.process.rotate_deg)
     except MeshError as error:
         raise MeshError(str(error).replace(str(path), name)) from None
-    return Model(name, path, mesh, notes)
+    return Model.stored(name, path, mesh, mesh_file, notes)
 
 
-def rank_resting(tell: Tell, mesh: Mesh, profile: Profile) -> tuple[Resting, ...]:
+def rank_resting(tell: Tell, model: Model, profile: Profile) -> tuple[Resting, ...]:
     """The orientations in which a model rests, the most promising first."""
     compilers.wait_for(compilers.JUDGE)
     return tuple(
@@ -43,5 +42,5 @@ def rank_resting(tell: Tell, mesh: Mesh, profile: Profile) -> tuple[Resting, ...
             each.risky_mm2,
             each.height_mm,
         )
-        for each in distinct_orientations(mesh, profile)
+        for each in distinct_orientations(model.mesh(), profile)
     )

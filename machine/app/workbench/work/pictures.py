@@ -1,15 +1,17 @@
 """Pictures: the drawings that `decompose` makes of the parts, as a task of the workbench."""
 
+from pathlib import Path
+
 from machine.app.pictures.front_picture import front_picture
 from machine.app.pictures.picture import contact_sheet, parts_picture
 from machine.app.pictures.png import png_bytes
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
-from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench, zipped
+from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench, write_zip
 from machine.app.workbench.work.tell import Tell
 
 
-def make_pictures(tell: Tell, bench: Bench) -> bytes:
+def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
     """A zip of what `--png`, `--sheet` and `--front` draw of the parts as the bench has them."""
     made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME), prices=True)
     compilers.wait_for(compilers.PICTURES)
@@ -18,4 +20,4 @@ def make_pictures(tell: Tell, bench: Bench) -> bytes:
         "order.png": contact_sheet(made, bench.profile.machine),
         "front.png": front_picture(made, bench.profile),
     }
-    return zipped([(name, png_bytes(image)) for name, image in images.items()])
+    write_zip(out, [(name, png_bytes(image)) for name, image in images.items()])

@@ -1,5 +1,8 @@
 """Pieces: the parts as bodies of their own for the page, as a block like the one of `view`, with what of them needs support."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
 from machine.app.workbench.work.tell import Tell
@@ -7,14 +10,14 @@ from machine.planning.fit import check_parts
 from machine.view.encoding import pack
 from machine.view.parts import page_colours
 from machine.view.scene import solids, surfaces
-from mdp.decomposition import Decomposition
+from mdp.decomposition import Decomposition, Part
 from profiles.errors import MoveError
 from profiles.profile import Profile
 
 
-def draw_pieces(tell: Tell, bench: Bench) -> bytes:
+def draw_pieces(tell: Tell, bench: Bench, out: Path) -> None:
     """The parts as the bench has them, for the page to draw apart."""
-    return pieces_block(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.profile)
+    out.write_bytes(pieces_block(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.profile))
 
 
 def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
@@ -22,13 +25,13 @@ def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
     `export`."""
     colours = page_colours(len(decomposition.parts))
     parts = [part | {"colour": colour} for part, colour in zip(solids(decomposition, profile), colours, strict=True)]
-    return pack({"parts": parts, "fit": out_of_reach(decomposition, profile)}, surfaces(decomposition, profile))
+    return pack({"parts": parts, "fit": out_of_reach(decomposition.parts, profile)}, surfaces(decomposition, profile))
 
 
-def out_of_reach(decomposition: Decomposition, profile: Profile) -> str:
-    """What the machine does not reach of the parts in their poses; "" where it reaches all."""
+def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:
+    """What the machine does not reach of parts in their poses; "" where it reaches all."""
     try:
-        check_parts(decomposition.parts, profile)
+        check_parts(parts, profile)
     except MoveError as error:
         return str(error)
     return ""

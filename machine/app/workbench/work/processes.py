@@ -5,17 +5,32 @@ import asyncio
 import os
 import signal
 from contextlib import suppress
+from weakref import WeakKeyDictionary
 
 Process = asyncio.subprocess.Process
-_starting: set[asyncio.Task[Process]] = set()
-_started: set[Process] = set()  # whoever has ended one need not hold it: its pipes are still open
+
+
+class _Here:
+    """Those of one event loop that start, and that have started: whoever has ended one need not hold it, its pipes are still
+    open."""
+
+    def __init__(self) -> None:
+        self.starting: set[asyncio.Task[Process]] = set()
+        self.started: set[Process] = set()
+
+
+_of_loops: WeakKeyDictionary[asyncio.AbstractEventLoop, _Here] = WeakKeyDictionary()
+
+
+def _here() -> _Here:
+    return _of_loops.setdefault(asyncio.get_running_loop(), _Here())
 
 
 async def start_process(command: tuple[str, ...]) -> Process:
     """A process that hears and answers through pipes. Whoever is cancelled while it starts need not end it."""
-    starting = asyncio.create_task(_start(command))
-    _starting.add(starting)
-    starting.add_done_callback(_starting.discard)
+    starting, here = asyncio.create_task(_start(command)), _here()
+    here.starting.add(starting)
+    starting.add_done_callback(here.starting.discard)
     try:
         return await asyncio.shield(starting)
     except asyncio.CancelledError:
@@ -35,19 +50,20 @@ def end_process(process: Process | None) -> None:
 
 
 async def hear_the_ends(within_s: float) -> None:
-    """Wait until all that have been started are gone and their pipes closed, at most so long: an event loop that closes before
+    """Wait until all that this event loop has started are gone and their pipes closed, at most so long: a loop that closes before
     leaves them to the interpreter, whose complaint would be the program's last words."""
     with suppress(TimeoutError):
         async with asyncio.timeout(within_s):
-            await asyncio.gather(*_starting, return_exceptions=True)
-            await asyncio.gather(*(_hear_the_end(each) for each in _started))
+            await asyncio.gather(*_here().starting, return_exceptions=True)
+            await asyncio.gather(*(_hear_the_end(each) for each in _here().started))
 
 
 async def _start(command: tuple[str, ...]) -> Process:
     pipe, nowhere = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
     process = await asyncio.create_subprocess_exec(*command, stdin=pipe, stdout=pipe, stderr=nowhere, start_new_session=True)
-    _started.difference_update([each for each in _started if _is_heard(each)])
-    _started.add(process)
+    started = _here().started
+    started.difference_update([each for each in started if _is_heard(each)])
+    started.add(process)
     return process
 
 

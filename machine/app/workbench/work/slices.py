@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from hashlib import sha256
+from pathlib import Path
 
 from machine.app.pipeline.comparison import in_one_part, in_parts
 from machine.app.pipeline.copies import in_copies
@@ -15,7 +15,7 @@ from machine.app.workbench.work.walls import walls
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
 from machine.program import Alternative
-from machine.view.page import print_page
+from machine.view.page import print_page, with_comparison
 from mdp.decomposition import Decomposition
 from profiles.profile import Profile
 from slicer.parts import SlicingProgress
@@ -33,11 +33,12 @@ class SlicesSoFar:
 
 @dataclass(frozen=True, eq=False)
 class Sliced:
-    """A sliced bench: the page of the print and its G-code, what it takes, what its dry run for a profile complains of, and what
-    it costs."""
+    """A sliced bench: the files with the page of the print and its G-code, what tells these slices from others, what they take,
+    what their dry run for a profile complains of, and what they cost."""
 
-    page: bytes
-    gcode: bytes
+    page: Path
+    gcode: Path
+    key: str
     time_s: float
     filament_mm: float
     known: KnownFindings
@@ -53,15 +54,10 @@ class Sliced:
         """Those that are errors, with which the command line writes no file and prints nothing without --force."""
         return tuple(each for each in self.findings if each.severity == "error")
 
-    @cached_property
-    def key(self) -> str:
-        """What tells these slices from others."""
-        return sha256(self.page + self.gcode).hexdigest()[:16]
 
-
-def slice_bench(tell: Tell, bench: Bench) -> Sliced:
-    """The parts on the bench sliced, planned, written and dry-run, as `export --plan` does with its pauses and copies; uncut, the
-    model in one piece."""
+def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
+    """The parts on the bench sliced, planned, written to these files and dry-run, as `export --plan` does with its pauses and
+    copies; uncut, the model in one piece."""
     made, profile = _plated(bench)
     shares: tuple[float, ...] = ()
     ready: set[int] = set()
@@ -88,9 +84,13 @@ def slice_bench(tell: Tell, bench: Bench) -> Sliced:
     program = build(made, profile, pictures=True, stops=bench.stops, report=report, on_slices=follow)
     report("drawing the page")
     values = summary(program.run)
+    contents = print_page(made.name, program, profile), ("\n".join(program.lines) + "\n").encode()
+    for file, content in zip((page, gcode), contents, strict=True):
+        file.write_bytes(content)
     return Sliced(
-        print_page(made.name, program, profile),
-        ("\n".join(program.lines) + "\n").encode(),
+        page,
+        gcode,
+        sha256(b"".join(contents)).hexdigest()[:16],
         values["time_s"],
         values["filament_mm"],
         known_findings(program.lines, profile, program.run.findings),
@@ -102,6 +102,11 @@ def compare_bench(tell: Tell, bench: Bench) -> tuple[Alternative, ...]:
     """What the model on the bench costs in one piece, as it stands and laid down, as `export --compare` tells it."""
     made, profile = _plated(bench)
     return in_one_part(made, profile, lambda text, share=None: tell(text))
+
+
+def share_page(tell: Tell, page: Path, alternatives: tuple[Alternative, ...], out: Path) -> None:
+    """The page of slices with what else its model costs."""
+    out.write_bytes(with_comparison(page.read_bytes(), alternatives))
 
 
 def _plated(bench: Bench) -> tuple[Decomposition, Profile]:

@@ -4,12 +4,13 @@ pickled."""
 from collections.abc import Callable
 from typing import Any
 
-from machine.app.workbench.work.cutting import find_parts, make_files, measure_plan, price_row
+from machine.app.workbench.work.cutting import find_parts, make_folder, make_plan, measure_plan, price_row
+from machine.app.workbench.work.marks import mark_bench, mark_faces
 from machine.app.workbench.work.models import rank_resting, read_model
-from machine.app.workbench.work.pedestal import stand_on_pedestal
 from machine.app.workbench.work.pictures import make_pictures
 from machine.app.workbench.work.pieces import draw_pieces
-from machine.app.workbench.work.slices import compare_bench, slice_bench
+from machine.app.workbench.work.slices import compare_bench, share_page, slice_bench
+from machine.app.workbench.work.standing import stand
 from machine.app.workbench.work.trials import load_kernels, make_ready, near_neck, try_cuts
 
 TASKS: dict[str, Callable[..., Any]] = {
@@ -20,12 +21,16 @@ TASKS: dict[str, Callable[..., Any]] = {
         find_parts,
         measure_plan,
         price_row,
-        make_files,
+        make_plan,
+        make_folder,
         make_pictures,
         draw_pieces,
-        stand_on_pedestal,
+        stand,
+        mark_bench,
+        mark_faces,
         slice_bench,
         compare_bench,
+        share_page,
         load_kernels,
         make_ready,
         try_cuts,

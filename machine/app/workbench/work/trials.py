@@ -1,6 +1,7 @@
-"""Trials: a person's planes tried on a bench, as tasks of a process that keeps what it has worked out for them.
+"""Trials: a person's planes tried on a bench, as tasks of a process that keeps what it has worked out for the last one.
 
-A bench has a number and is sent once. A task of a bench that the process has not heard of gives None: have it made ready first.
+A bench has a number, which no other one of this run of the program has. It goes along with every task, for the process may have
+worked for another bench meanwhile.
 """
 
 from itertools import product
@@ -22,13 +23,7 @@ _ready: tuple[int, Trials] | None = None  # of the bench that this process has h
 
 def make_ready(tell: Tell, number: int, bench: Bench) -> None:
     """Work out once what planes on a bench of this number need."""
-    global _ready
-    if _ready is not None and _ready[0] == number:
-        return
-    compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
-    trials = Trials(standing_mesh(bench), bench.profile, bench.zones)
-    trials.warm()
-    _ready = number, trials
+    _trials(number, bench)
 
 
 def load_kernels(tell: Tell) -> None:
@@ -38,20 +33,25 @@ def load_kernels(tell: Tell) -> None:
     Trials(convex_hull(corners), load()).warm()
 
 
-def try_cuts(tell: Tell, number: int, cuts: tuple[PlannedPart, ...], most_cuts: float) -> Trial | None:
+def try_cuts(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], most_cuts: float) -> Trial:
     """Planes tried; most_cuts: see mdp.search.trial."""
-    trials = _trials(number)
-    return None if trials is None else trials.attempt(_planes(cuts), most_cuts)
+    return _trials(number, bench).attempt(_planes(cuts), most_cuts)
 
 
-def near_neck(tell: Tell, number: int, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float) -> tuple[Plane | None] | None:
+def near_neck(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float) -> Plane | None:
     """The neck near the plane of a part, as `Trials.neck` finds it."""
-    trials = _trials(number)
-    return None if trials is None else (trials.neck(_planes(cuts), part, reach_mm),)
+    return _trials(number, bench).neck(_planes(cuts), part, reach_mm)
 
 
-def _trials(number: int) -> Trials | None:
-    return _ready[1] if _ready is not None and _ready[0] == number else None
+def _trials(number: int, bench: Bench) -> Trials:
+    global _ready
+    if _ready is None or _ready[0] != number:
+        _ready = None  # two at once would be too much for the memory
+        compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
+        trials = Trials(standing_mesh(bench), bench.profile, bench.zones)
+        trials.warm()
+        _ready = number, trials
+    return _ready[1]
 
 
 def _planes(cuts: tuple[PlannedPart, ...]) -> list[Plane]:

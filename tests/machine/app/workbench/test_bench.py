@@ -1,20 +1,18 @@
-"""The bench as a value: turning, laying down, taking a row, undo and redo, and what of it overhangs."""
+"""The bench as a value: turning, laying down, taking a row, undo and redo."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from machine.app.workbench.bench.bench import STANDING, Bench, History, Model, Step, overhang_mm2, plan_of_bench, with_front
+from machine.app.workbench.bench.bench import STANDING, Bench, History, Step, plan_of_bench, with_front
 from machine.app.workbench.bench.commands import obey
 from mdp.decomposition import FrontRow
-from mdp.directions.orientation import standing_still
-from mdp.overhang import risky_upright
 from mdp.plane import Plane
 from profiles.errors import PlanError
 from profiles.profile import load
-from tests.shapes import branch, tee
+from tests.machine.app.workbench.models import model
+from tests.shapes import branch
 
 PROFILE = load()
 LOW, HIGH = Plane(np.array([0.0, 0.0, 1.0]), 10.0), Plane(np.array([0.0, 0.0, 1.0]), 30.0)
@@ -26,7 +24,7 @@ FRONT = (
 
 
 def history(bench: Bench | None = None) -> History:
-    return History(Step("", bench or Bench(PROFILE, Model("tee.stl", Path("tee.stl"), tee()))))
+    return History(Step("", bench or Bench(PROFILE, model())))
 
 
 def test_a_quarter_turn_is_exact_and_four_of_them_are_none() -> None:
@@ -39,7 +37,7 @@ def test_a_quarter_turn_is_exact_and_four_of_them_are_none() -> None:
 
 def test_a_face_that_is_laid_down_looks_down() -> None:
     mesh = branch()
-    start = history(Bench(PROFILE, Model("branch.stl", Path("branch.stl"), mesh)))
+    start = history(Bench(PROFILE, model("branch.stl", mesh)))
     for face in (0, 40, 200):
         rotation = np.array(obey(start, {"do": "lay", "face": face}).now.bench.rotation)
         assert rotation @ mesh.normals[face] == pytest.approx([0, 0, -1], abs=1e-12)
@@ -62,7 +60,7 @@ def test_steps_back_end_where_their_models_would_fill_the_memory(monkeypatch: py
     monkeypatch.setattr("machine.app.workbench.bench.bench.MOST_KEPT_FACES", 3 * 28)  # a tee has 28 faces
     now = history(Bench(PROFILE))
     for name in "abcdef":
-        now = now.do(f"open {name}", Bench(PROFILE, Model(name, Path(name), tee())))
+        now = now.do(f"open {name}", Bench(PROFILE, model(name)))
         now = now.do(f"find parts of {name}", replace(now.now.bench, cuts=()))
     assert [step.word for step in now.before][:2] == ["open d", "find parts of d"]
 
@@ -78,15 +76,6 @@ def test_a_plan_has_the_planes_in_print_order() -> None:
     assert [part.offset_mm for part in plan.parts] == [10.0, 30.0]
     assert [len(row.parts) for row in plan.front] == [0, 1, 2]
     assert (plan.model, plan.orientation, plan.sha256) == ("tee.stl", None, "")
-
-
-def test_what_overhangs_is_what_the_search_takes_for_it_however_the_model_is_turned() -> None:
-    steps = history()
-    for turn in ({"axis": "x", "deg": 0.0}, {"axis": "x", "deg": 90.0}, {"axis": "y", "deg": 37.0}, {"axis": "z", "deg": 11.0}):
-        steps = obey(steps, {"do": "turn", **turn})
-        turned = standing_still(tee(), np.array(steps.now.bench.rotation))
-        expected = turned.areas_mm2[risky_upright(turned, PROFILE.process.self_supporting_angle_deg)].sum()
-        assert overhang_mm2(steps.now.bench) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import pytest
 
 from machine.app.workbench.bench.bench import (
     Bench,
-    Model,
     plan_of_bench,
     with_model_turned_as_read,
     with_profile,
@@ -25,13 +24,14 @@ from mdp.pose import about, unit
 from mdp.zone import Grown, Zone, Zones
 from profiles.errors import PlanError
 from profiles.profile import load
+from tests.machine.app.workbench.models import model
 from tests.shapes import tee
 
 ARM = Grown((-12.0, 1.0, 30.0), 1.0)
 BOX = Zone((1.0, 2.0, 3.0), (9.0, 9.0, 9.0))
 LIFTED = load(settings=["search.pedestal_mm=10"])
 BENCH = replace(
-    Bench(load(), Model("tee.stl", Path("tee.stl"), tee())),
+    Bench(load(), model()),
     zones=Zones(keep=(BOX,), no_support=(ARM,)),
 )
 
@@ -72,8 +72,7 @@ def test_a_plan_of_boxes_without_end_on_a_model_turned_by_rounded_numbers_is_rea
 
 def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> None:
     cut = replace(BENCH, cuts=(PlannedPart((0.6, 0.0, 0.8), 20.0),))
-    assert cut.model is not None
-    larger = with_scaled_model(cut, replace(cut.model, mesh=tee().transform(2.0 * np.eye(3))), 2.0)
+    larger = with_scaled_model(cut, model(mesh=tee().transform(2.0 * np.eye(3))), 2.0)
     lifted = with_profile(larger, larger.given, load(settings=["search.pedestal_mm=10"]))
     assert lifted.cuts == (PlannedPart((0.6, 0.0, 0.8), 48.0),)
     assert lifted.zones == Zones(keep=(Zone((2.0, 4.0, 16.0), (18.0, 18.0, 28.0)),), no_support=(Grown((-24.0, 2.0, 70.0), 1.0),))
@@ -81,8 +80,7 @@ def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> N
 
 def test_marks_go_along_with_a_model_that_is_read_turned_otherwise_and_larger() -> None:
     turn = turned_by((0.0, 90.0, 0.0))
-    assert BENCH.model is not None
-    again = replace(BENCH.model, mesh=standing_still(tee(), turn).transform(2.0 * np.eye(3)))
+    again = model(mesh=standing_still(tee(), turn).transform(2.0 * np.eye(3)))
     cut = with_profile(replace(BENCH, cuts=(PlannedPart((0.6, 0.0, 0.8), 20.0),)), BENCH.given, LIFTED)
     turned = with_model_turned_as_read(with_rotation(cut, about(unit([1.0, 2.0, 0.5]), 0.7).tolist()), again, turn, 2.0)
     stood = with_model_turned_as_read(cut, again, turn, 2.0)

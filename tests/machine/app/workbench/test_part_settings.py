@@ -4,13 +4,12 @@ import json
 import shlex
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from machine.app.requests import Given
-from machine.app.workbench.bench.bench import Bench, History, Model, Step, with_cuts, with_model_turned_as_read
+from machine.app.workbench.bench.bench import Bench, History, Step, with_cuts, with_model_turned_as_read
 from machine.app.workbench.bench.command_line import export_command, turned_by, turns_deg
 from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.settings import settings_list, with_setting
@@ -19,10 +18,10 @@ from mdp.plans.plan_file import PlannedPart
 from mdp.pose import UP, about
 from profiles.errors import PlanError, ProfileError
 from profiles.profile import load
-from tests.shapes import tee
+from tests.machine.app.workbench.models import model
 
 LOW, MIDDLE, HIGH = (PlannedPart((0.0, 0.0, 1.0), offset) for offset in (10.0, 20.0, 30.0))
-BENCH = Bench(load(), Model("tee.stl", Path("tee.stl"), tee()), cuts=(LOW, MIDDLE))
+BENCH = Bench(load(), model(), cuts=(LOW, MIDDLE))
 
 
 def obeyed(bench: Bench, **asked: object) -> Bench:

@@ -1,21 +1,20 @@
 """Planes moved, added, taken away, put into another order and locked, as values."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from machine.app.workbench.bench.bench import Bench, History, Model, Step, locked_plan, with_cuts
+from machine.app.workbench.bench.bench import Bench, History, Step, locked_plan, with_cuts
 from machine.app.workbench.bench.commands import obey
 from machine.app.workbench.bench.planes import edited
 from mdp.plans.plan_file import PlannedPart
 from profiles.errors import PlanError
 from profiles.profile import load
-from tests.shapes import tee
+from tests.machine.app.workbench.models import model
 
 A, B, C = (PlannedPart((0.0, 0.0, 1.0), offset_mm) for offset_mm in (10.0, 20.0, 30.0))
-BENCH = replace(Bench(load(), Model("tee.stl", Path("tee.stl"), tee())), cuts=(A, B, C))
+BENCH = replace(Bench(load(), model()), cuts=(A, B, C))
 NEW = {"normal": [0, 3, 4], "offset_mm": 7}
 PUT = PlannedPart((0.0, 0.6, 0.8), 7.0)
 

@@ -15,7 +15,10 @@ from machine.app.workbench.bench.bench import Bench, plan_of_bench, with_front, 
 from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import named
 from machine.app.workbench.session.session import Session
+from machine.app.workbench.work.marks import mark_bench
 from machine.app.workbench.work.models import read_model
+from machine.app.workbench.work.standing import Standing
+from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.plans.plan_file import ZONE_KINDS
@@ -117,9 +120,9 @@ class Tried:
 
     def __init__(self, seed: int, folder: Path) -> None:
         self.asked, self.folder, self.plan = Anything(seed), folder, folder / "plan.toml"
-        self.session = Session(load(), Given())
-        for lane in (self.session.quick, self.session.long, self.session.hand):
-            lane.run = self._run  # type: ignore[method-assign]
+        self.session = Session(load(), Given(), WorkerPools())
+        for tasks in (self.session.quick, self.session.long, self.session.hand):
+            tasks.run = self._run  # type: ignore[method-assign]
         self.session.refuse = self._refuse  # type: ignore[method-assign]
 
     async def _run(self, task: str, *given: Any, **more: Any) -> Any:
@@ -128,6 +131,10 @@ class Tried:
                 return Trial(())
             case "read_model":
                 return read_model(lambda told: None, *given)
+            case "mark_bench":
+                return mark_bench(lambda told: None, *given)
+            case "stand":
+                return Standing((40.0, 8.0, 40.0), 0.0, "")
             case "price_row":
                 return given[0].rows[given[1]]
             case _:

@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 
 from machine.app.requests import Given
-from machine.app.workbench.bench.bench import Model, with_profile
+from machine.app.workbench.bench.bench import with_profile
 from machine.app.workbench.session.finding import Search
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.work.cutting import Searched
+from machine.app.workbench.work.standing import Standing
+from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart
 from mdp.search.trial import Trial
 from profiles.profile import Profile, load
-from tests.shapes import tee
+from tests.machine.app.workbench.models import model
 
 UP = (0.0, 0.0, 1.0)
 
@@ -27,14 +29,14 @@ def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
     """A session with a model on its bench after some work; its processes answer what the work has them answer."""
 
     async def run() -> Session:
-        session = Session(load(), Given())
+        session = Session(load(), Given(), WorkerPools())
 
         async def nothing(task: str, *given: Any, **more: Any) -> Any:
             await asyncio.sleep(0.01)
-            return Trial(()) if task == "try_cuts" else None
+            return {"try_cuts": Trial(()), "stand": Standing((40.0, 8.0, 40.0), 0.0, "")}.get(task)
 
-        for lane in (session.quick, session.long, session.hand):
-            lane.run = nothing  # type: ignore[method-assign]
+        for tasks in (session.quick, session.long, session.hand):
+            tasks.run = nothing  # type: ignore[method-assign]
         session.do("open a", replace(session.bench, model=model("a")))
         await work(session)
         while session._tasks:
@@ -42,10 +44,6 @@ def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
         return session
 
     return asyncio.run(asyncio.wait_for(run(), 20.0))
-
-
-def model(name: str) -> Model:
-    return Model(name, Path(name), tee())
 
 
 def test_of_edits_that_follow_each_other_quickly_none_is_lost() -> None:

@@ -1,12 +1,14 @@
 """What the workbench makes of slices: what is seen of a part, and G-code with errors."""
 
 import asyncio
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from starlette.requests import Request
+from starlette.responses import FileResponse
 
 from machine.app.workbench.web.downloads import gcode
 from machine.app.workbench.work.slices import Sliced
@@ -40,14 +42,16 @@ def test_the_walls_of_a_part_lie_on_its_surface_wherever_it_is_printed_to(most: 
     assert (np.median(from_middle_mm) < 4.6) == (most != 100)  # inner walls where there is room for them
 
 
-def test_g_code_with_errors_is_saved_only_for_who_wants_it_all_the_same() -> None:
+def test_g_code_with_errors_is_saved_only_for_who_wants_it_all_the_same(tmp_path: Path) -> None:
     error = Finding("error", "contact", 12, 1, 3, "the nozzle touches the part")
     cost = Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
     known = known_findings(["G28"], profile(), [error])
-    session: Any = SimpleNamespace(slicing=SimpleNamespace(needed=lambda: Sliced(b"", b"G28\n", 60.0, 1.0, known, cost)))
+    sliced = Sliced(tmp_path / "page", tmp_path / "gcode", "key", 60.0, 1.0, known, cost)
+    session: Any = SimpleNamespace(slicing=SimpleNamespace(needed=lambda: sliced))
     session.bench = SimpleNamespace(model=SimpleNamespace(name="demo:tree"))
     refused, forced = (Request({"type": "http", "query_string": query}) for query in (b"", b"force=yes"))
     with pytest.raises(PlanError, match="found 1 errors, the first: the nozzle touches the part: no G-code is saved unless"):
         asyncio.run(gcode(session, refused))
     answer = asyncio.run(gcode(session, forced))
-    assert (answer.body, answer.headers["content-disposition"]) == (b"G28\n", 'attachment; filename="tree.gcode"')
+    assert isinstance(answer, FileResponse)
+    assert (answer.path, answer.headers["content-disposition"]) == (sliced.gcode, 'attachment; filename="tree.gcode"')

@@ -3,7 +3,7 @@
 /** {vertices, faces, corners: places of the triangles' corners, normals, areas} of the server's bytes. */
 function trianglesFrom(buffer) {
   const [points, count] = new Uint32Array(buffer, 0, 2);
-  const vertices = new Float32Array(buffer, 8, 3 * points), faces = new Uint32Array(buffer, 8 + 12 * points, 3 * count);
+  const vertices = new Float32Array(new Float64Array(buffer, 8, 3 * points)), faces = new Uint32Array(buffer, 8 + 24 * points, 3 * count);
   const corners = new Float32Array(9 * count), normals = new Float32Array(3 * count), areas = new Float32Array(count);
   for (let i = 0; i < 3 * count; i++) for (let k = 0; k < 3; k++) corners[3 * i + k] = vertices[3 * faces[i] + k];
   for (let face = 0; face < count; face++) {

@@ -33,7 +33,7 @@ function modelPanel(bench) {
         ["size", `${model.size_mm.map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
       ]);
       listIn("model-notes", model.notes);
-      $("overhang").textContent = mm2(area);
+      if (area !== null) $("overhang").textContent = mm2(area);
       if (JSON.stringify(resting) !== JSON.stringify(before?.resting)) showResting(resting, bench);
     },
   };

@@ -102,7 +102,7 @@ function leaned(bench, normal) {
 
 /** A level plane half way up, for a part printed after the one that is chosen. */
 function addPlane(bench) {
-  const low = bench.state.pedestal_mm, [least, most] = bench.picture ? bench.picture.box() : [[0, 0, low], add(bench.state.standing.size_mm, [0, 0, low])], after = bench.selected || Math.max(bench.state.parts, 1);
+  const low = bench.state.pedestal_mm, [least, most] = bench.picture ? bench.picture.box() : [[0, 0, low], add(sizeOf(bench.state), [0, 0, low])], after = bench.selected || Math.max(bench.state.parts, 1);
   bench.wanted = after + 1;
   bench.send({ do: "add", after, normal: [0, 0, 1], offset_mm: Math.round((least[2] + most[2]) * 5) / 10 });
 }

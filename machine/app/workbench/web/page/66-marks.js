@@ -83,7 +83,7 @@ function marksPanel(bench) {
   $("mark-kind").addEventListener("change", () => bench.mark(bench.marking || ""));
   $("mark-middle").addEventListener("click", () => {
     bench.mark("");
-    const [x, y, z] = bench.state.standing.size_mm, low = bench.state.pedestal_mm;
+    const [x, y, z] = sizeOf(bench.state), low = bench.state.pedestal_mm;
     addBox([-x / 6, -y / 6, low + z / 3], [x / 6, y / 6, low + (2 * z) / 3]);
   });
   const knobs = BOX_SIDES.map((side) => {

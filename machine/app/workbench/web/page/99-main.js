@@ -26,7 +26,7 @@ function main() {
     const found = overhanging(bench.triangles, rotation[2], limit, platform);
     bench.red = found.red;
     stood = standingOf(rotation);
-    if (live) $("overhang").textContent = mm2(found.area);
+    if (live || bench.state.overhang_mm2 === null) $("overhang").textContent = mm2(found.area);
     if (picture) {
       picture.stand(standingBy(rotation, bench.triangles.vertices, bench.state.pedestal_mm));
       showPedestal(bench, stood !== standingOf(bench.state.rotation));

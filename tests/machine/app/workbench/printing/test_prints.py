@@ -4,10 +4,12 @@ import asyncio
 import os
 import signal
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +33,22 @@ from profiles.profile import Profile, load
 from tests.machine.network.stand_ins import KEY, OctoPrintStandIn, stand_in
 
 PROFILE = load()
+_folder = tempfile.TemporaryDirectory()
 HEAT = ["G21", "G90", "M83", "G28", "G92 A0 C0", "M140 S60", "M104 S210", "M109 S210", "G0 Z0.2 F600"]
 STROKES = [f"G1 X{x} Y{y} E1.0 F60" for y in range(50) for x in (20, -20)]  # for an hour
 HOUR = "\n".join([*HEAT, *STROKES, "M104 S0", "M140 S0"]) + "\n"
 
 
 def order(port: str, gcode: str = HOUR, force: bool = True) -> PrintOrder:
-    return PrintOrder("hour", gcode.encode(), PROFILE, PrintRequest(port), force)
+    return PrintOrder("hour", written(gcode), PROFILE, PrintRequest(port), force)
+
+
+@cache
+def written(gcode: str) -> Path:
+    """A file with G-code, which is there as long as the tests run."""
+    file = Path(_folder.name) / f"{len(gcode)}.gcode"
+    file.write_text(gcode)
+    return file
 
 
 def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable[[Prints, RunningPrint], None]) -> dict[str, Any]:
@@ -237,6 +248,7 @@ class Heard:
     (FollowOrder(PrintRequest("duet:127.0.0.1:9")), "duet:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9", False),
     (order("octoprint:127.0.0.1:9"), "octoprint:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9: is OctoPrint", False),
     (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 errors, the first: X goes to 500 mm", True),
+    (replace(order("sim"), gcode=Path("gone.gcode")), "these slices are not there any more: slice what is to be printed", False),
 ])  # fmt: skip
 def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence: str, forcible: bool) -> None:
     heard = Heard()
@@ -296,7 +308,7 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
     left = "hour goes on printing on {0}: this page follows it no more"
     with stand_in("duet") as (job, address):
         job.steps = 10_000
-        wanted = PrintOrder("hour", HOUR.encode(), load("gen5x"), PrintRequest(address), force=True)
+        wanted = PrintOrder("hour", written(HOUR), load("gen5x"), PrintRequest(address), force=True)
         one = Attended(wanted)
         assert job.files["hour.gcode"].decode() == HOUR
         one.person.hear("feed", 150.0)

@@ -1,0 +1,58 @@
+"""Model: a model as it is read. Its triangles are in a file, so that they go through no pipe and lie in no memory for longer than
+they are worked with."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from secrets import token_hex
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdp.mesh import Mesh
+from profiles.frozen import Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A model as it is read: its name, its own file, the file of its mesh in mm on z = 0, and a sentence for every repair. key:
+    what tells it from every other reading; a page asks for its triangles by it."""
+
+    name: str
+    path: Path
+    mesh_file: Path
+    faces: int
+    size_mm: Vector
+    volume_mm3: float
+    notes: tuple[str, ...] = ()
+    key: str = field(default_factory=lambda: token_hex(8))
+
+    @classmethod
+    def stored(cls, name: str, path: Path, mesh: Mesh, mesh_file: Path, notes: tuple[str, ...] = ()) -> "Model":
+        """One whose mesh is written to a file first."""
+        with mesh_file.open("wb") as file:
+            file.writelines(mesh_blocks(mesh))
+        x, y, z = (float(side) for side in np.ptp(mesh.bounds_mm, axis=0))
+        return cls(name, path, mesh_file, len(mesh.faces), (x, y, z), mesh.volume_mm3, notes)
+
+    def mesh(self) -> Mesh:
+        """Its triangles, read anew."""
+        with self.mesh_file.open("rb") as file:
+            points, count = np.fromfile(file, "<u4", 2)
+            vertices = np.fromfile(file, "<f8", 3 * points).reshape(-1, 3)
+            faces = np.fromfile(file, "<i4", 3 * count).reshape(-1, 3)
+            colours = np.fromfile(file, "<i4", count)
+        return Mesh(vertices, faces, colours if len(colours) else None)
+
+
+def mesh_blocks(mesh: Mesh) -> Iterator[memoryview]:
+    """A mesh as its file and the page have it: two counts as uint32, vertices (n, 3) float64 in mm, faces (m, 3) int32, and what
+    the model's file paints each face with, (m,) int32, if anything; all little-endian."""
+    blocks: list[NDArray[np.generic]] = [
+        np.array([len(mesh.vertices), len(mesh.faces)], "<u4"),
+        mesh.vertices.astype("<f8", copy=False),
+        mesh.faces.astype("<i4", copy=False),
+    ]
+    if mesh.colours is not None:
+        blocks.append(mesh.colours.astype("<i4", copy=False))
+    return (block.data.cast("B") for block in blocks)

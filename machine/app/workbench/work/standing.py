@@ -1,0 +1,45 @@
+"""Standing: how the model on the bench stands as it is turned, on its pedestal where it has one, as a task of the workbench."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machine.app.workbench.bench.bench import Bench
+from machine.app.workbench.bench.model import mesh_blocks
+from machine.app.workbench.work.cutting import standing_mesh
+from machine.app.workbench.work.pieces import out_of_reach
+from machine.app.workbench.work.tell import Tell
+from mdp.overhang import risky_upright
+from mdp.pedestal import on_pedestal, pedestal_under
+from mdp.search.parts import one_piece
+from profiles.errors import MeshError
+from profiles.frozen import Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """size_mm: along the platform's axes, without the pedestal; overhang_mm2: area that overhangs too far and does not stand on
+    the platform; problem: what the machine does not reach in one piece, in the sentence of `export`, "" where it reaches all;
+    pedestal: as `mesh_blocks` puts it for the page, b"": there is none; refusal: why there is none although one is wanted."""
+
+    size_mm: Vector
+    overhang_mm2: float
+    problem: str
+    pedestal: bytes = b""
+    refusal: str = ""
+
+
+def stand(tell: Tell, bench: Bench) -> Standing:
+    """How the model on the bench stands."""
+    mesh, profile, pedestal, refusal = standing_mesh(bench), bench.profile, b"", ""
+    x, y, z = (float(side) for side in np.ptp(mesh.bounds_mm, axis=0))
+    height_mm = profile.search.pedestal_mm
+    if height_mm > 0.0:
+        try:
+            pedestal = b"".join(mesh_blocks(pedestal_under(mesh, height_mm)))
+            mesh = on_pedestal(mesh, height_mm)
+        except MeshError as error:
+            pedestal, refusal = b"", str(error)
+    risky = risky_upright(mesh, profile.process.self_supporting_angle_deg)
+    problem = out_of_reach((one_piece(mesh, profile.machine),), profile)
+    return Standing((x, y, z), float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal)

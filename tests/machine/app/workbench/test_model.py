@@ -1,0 +1,105 @@
+"""A model's mesh in a file: it is what was read, goes through no pipe, and lasts as long as somebody has the model."""
+
+import asyncio
+import gc
+import pickle
+import weakref
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from machine.app.requests import Given
+from machine.app.workbench.bench.model import Model
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.web.snapshot import snapshot
+from machine.app.workbench.work.models import read_model
+from machine.app.workbench.work.standing import stand
+from machine.app.workbench.work.worker_pool import WorkerPools
+from mdp.mesh import Mesh
+from mdp.save import stl
+from profiles.profile import load
+from tests.machine.app.workbench.models import model
+from tests.shapes import ball, tee
+
+
+@pytest.mark.parametrize("colours", [None, np.arange(28, dtype=np.int32)])
+def test_a_mesh_comes_back_from_its_file_as_it_was(colours: Any) -> None:
+    mesh = Mesh(tee().vertices / 3.0, tee().faces, colours)
+    stored = model(mesh=mesh)
+    again = stored.mesh()
+    assert (again.vertices == mesh.vertices).all()
+    assert (again.faces == mesh.faces).all()
+    assert (again.colours is None) if colours is None else (again.colours == colours).all()
+    assert (stored.faces, stored.size_mm) == (28, pytest.approx((40.0 / 3.0, 10.0 / 3.0, 40.0 / 3.0)))
+    assert stored.volume_mm3 == pytest.approx(7000.0 / 27.0)
+
+
+def test_what_goes_through_a_pipe_of_a_model_is_as_short_for_many_faces_as_for_few() -> None:
+    few, many = model("a", tee()), model("a", ball(10.0, 480))
+    assert many.faces > 100_000
+    assert len(pickle.dumps(many)) < len(pickle.dumps(few)) + 100 < 1000
+
+
+def read(work: Any, path: Path) -> Any:
+    """What work gives with a session in which a model has been opened, whose tasks are done in this process."""
+
+    async def run() -> Any:
+        session = Session(load(), Given(), WorkerPools())
+        tasks = {"read_model": read_model, "stand": stand}
+
+        async def here(task: str, *given: Any, **more: Any) -> Any:
+            return tasks[task](lambda told: None, *given) if task in tasks else ()
+
+        for queue in (session.quick, session.long, session.hand):
+            queue.run = here  # type: ignore[method-assign]
+        await session.open_model(path, path.name)
+        await until_idle(session)
+        return await work(session)
+
+    return asyncio.run(run())
+
+
+async def until_idle(session: Session) -> None:
+    while session._tasks:
+        await asyncio.gather(*session._tasks)
+
+
+def the_model(session: Session) -> Model:
+    assert session.bench.model is not None
+    return session.bench.model
+
+
+def test_a_closed_bench_leaves_no_model_and_no_file(tmp_path: Path) -> None:
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+
+    async def close(session: Session) -> tuple[weakref.ref[Model], Path]:
+        assert snapshot(session)["overhang_mm2"] == pytest.approx(300.0)
+        left = weakref.ref(the_model(session)), session.received.path
+        assert the_model(session).mesh_file.is_file()
+        session.close()
+        return left
+
+    left, folder = read(close, tmp_path / "tee.stl")
+    gc.collect()
+    assert left() is None
+    assert not folder.exists()
+
+
+def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more(tmp_path: Path) -> None:
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+
+    async def forget(session: Session) -> tuple[bool, bool]:
+        file = the_model(session).mesh_file
+        session.command({"do": "undo"})
+        gc.collect()
+        undone = file.is_file()
+        session.command({"do": "redo"})
+        session.command({"do": "undo"})
+        session.do("something else", session.bench)
+        await until_idle(session)
+        gc.collect()
+        return undone, file.is_file()
+
+    assert read(forget, tmp_path / "tee.stl") == (True, False)

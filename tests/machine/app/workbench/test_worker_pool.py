@@ -1,0 +1,174 @@
+"""The processes that all benches share: how many there are, whose turn it is, who is stopped, and whose work they hold."""
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Any
+
+import pytest
+
+from machine.app.requests import Given
+from machine.app.workbench.bench.bench import Bench, with_model
+from machine.app.workbench.session.session import Session
+from machine.app.workbench.work import worker_pool
+from machine.app.workbench.work.cutting import SearchWay
+from machine.app.workbench.work.processes import Process, hear_the_ends, start_process
+from machine.app.workbench.work.worker_pool import TaskQueue, WorkerPool, WorkerPools
+from mdp.plane import Plane
+from mdp.plans.plan_file import PlannedPart
+from mdp.read import locate, read_mesh
+from mdp.search.trial import Trials
+from profiles.errors import UserError
+from profiles.profile import load
+from tests.machine.app.workbench.models import model
+from tests.machine.workbench import is_there
+from tests.shapes import box, tee
+
+PROFILE = load()
+LEVEL = PlannedPart((0.0, 0.0, 1.0), 12.0)
+
+
+class Started:
+    """The processes that a pool starts, in order."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.processes: list[Process] = []
+        monkeypatch.setattr(worker_pool, "start_process", self._start)
+
+    async def _start(self, command: tuple[str, ...]) -> Process:
+        self.processes.append(await start_process(command))
+        return self.processes[-1]
+
+
+def run(work: Coroutine[Any, Any, Any], *pools: WorkerPool) -> Any:
+    """What work gives; the processes of its pools are ended."""
+
+    async def whole() -> Any:
+        try:
+            return await asyncio.wait_for(work, 120.0)
+        finally:
+            for pool in pools:
+                pool.end()
+            await hear_the_ends(30.0)
+
+    return asyncio.run(whole())
+
+
+async def rank(tasks: TaskQueue) -> float:
+    """The height of the best orientation of a tee: 10 mm, as it lies on its face."""
+    resting = await tasks.run("rank_resting", model(), PROFILE)
+    height_mm: float = resting[0].height_mm
+    return height_mm
+
+
+def test_many_benches_share_a_bounded_number_of_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    started, pool = Started(monkeypatch), WorkerPool(2)
+
+    async def work() -> list[float]:
+        return await asyncio.gather(*(rank(TaskQueue(pool)) for _ in range(6)))
+
+    assert run(work(), pool) == pytest.approx([10.0] * 6)
+    assert len(started.processes) == 2
+
+
+def test_one_bench_with_much_to_do_does_not_keep_another_one_waiting_for_all_of_it() -> None:
+    pool, done = WorkerPool(1), list[str]()
+
+    async def told(name: str, tasks: TaskQueue) -> None:
+        await rank(tasks)
+        done.append(name)
+
+    async def work() -> None:
+        busy, other = TaskQueue(pool), TaskQueue(pool)
+        waiting = [asyncio.create_task(told(f"busy {k}", busy)) for k in range(3)]
+        await asyncio.sleep(0)
+        await asyncio.gather(*waiting, asyncio.create_task(told("other", other)))
+
+    run(work(), pool)
+    assert done == ["busy 0", "other", "busy 1", "busy 2"]
+
+
+def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_ends_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    started, pool = Started(monkeypatch), WorkerPool(2)
+    tree = with_model(Bench(PROFILE), model("tree", read_mesh(locate("demo:tree"))[0]))
+
+    async def work() -> float:
+        begun = asyncio.Event()
+        search = TaskQueue(pool).run("find_parts", tree, SearchWay(), tell=lambda told: begun.set())
+        searching = asyncio.create_task(search)
+        await begun.wait()
+        ranking = asyncio.create_task(rank(TaskQueue(pool)))
+        while len(started.processes) < 2:
+            await asyncio.sleep(0.01)
+        waiting = asyncio.create_task(rank(TaskQueue(pool)))
+        await asyncio.sleep(0)
+        waiting.cancel()
+        searching.cancel()
+        await asyncio.wait((searching, waiting))
+        await asyncio.wait_for(started.processes[0].wait(), 30.0)
+        return await ranking
+
+    assert run(work(), pool) == pytest.approx(10.0)
+    assert len(started.processes) == 2
+
+
+def test_a_process_that_rests_goes_and_the_next_task_starts_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    started, pool = Started(monkeypatch), WorkerPool(1)
+    pool.rest_after_s = 0.05
+
+    async def work() -> None:
+        tasks = TaskQueue(pool)
+        for _ in range(2):
+            assert await rank(tasks) == pytest.approx(10.0)
+            await asyncio.wait_for(started.processes[-1].wait(), 30.0)
+
+    run(work(), pool)
+    assert not any(is_there(process.pid) for process in started.processes)
+    assert len(started.processes) == 2
+
+
+def test_a_bench_gets_the_process_that_it_had_and_its_end_is_that_of_this_process_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    started, pool = Started(monkeypatch), WorkerPool(2)
+
+    async def work() -> None:
+        first, second = TaskQueue(pool), TaskQueue(pool)
+        await rank(first)
+        await rank(second)
+        assert len(started.processes) == 2
+        for tasks in (second, first):
+            async with pool.worker(tasks) as process:
+                assert process is started.processes[[first, second].index(tasks)]
+        first.close()
+        await asyncio.wait_for(started.processes[0].wait(), 30.0)
+        assert await rank(second) == pytest.approx(10.0)
+        with pytest.raises(UserError, match="this bench is closed: nothing is worked out for it any more"):
+            await rank(first)
+
+    run(work(), pool)
+    assert len(started.processes) == 2
+
+
+def test_planes_are_tried_on_their_own_bench_whoever_had_the_process_in_between() -> None:
+    pools = WorkerPools()
+    pools.hand = WorkerPool(1)
+
+    def bench(mesh: Any) -> Bench:
+        return with_model(Bench(PROFILE), model(mesh=mesh))
+
+    async def work() -> list[Any]:
+        sessions = Session(PROFILE, Given(), pools), Session(PROFILE, Given(), pools)
+        benches = bench(tee()), bench(box(20.0, 20.0, 20.0))
+        tried = [await sessions[k].readiness.ask("try_cuts", benches[k], (LEVEL,), 0) for k in (0, 1, 0)]
+        for session in sessions:
+            session.close()
+        return tried
+
+    first, other, again = run(work(), pools.hand)
+    assert first == again == Trials(tee(), PROFILE).attempt([_plane(LEVEL)], 0)
+    assert other.seam_mm == pytest.approx(80.0, rel=0.01)  # around the box
+
+
+def _plane(part: PlannedPart) -> Plane:
+    assert part.plane is not None
+    return part.plane
