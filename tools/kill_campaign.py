@@ -307,9 +307,10 @@ def judged_cut(how: str, done: int, heights: int, moves: list[list[float]], whol
     tail = 0
     while tail < min(len(moves) - done, len(whole)) and flat[-1 - tail] == planned[-1 - tail]:
         tail += 1
+    pairs = zip(moves[len(moves) - tail :], whole[len(whole) - tail :], strict=True)
     off_mm = max(
-        (abs(a[2] - b[2]) for a, b in zip(moves[len(moves) - tail :], whole[len(whole) - tail :], strict=True)), default=0.0
-    )
+        (abs(made[2] - wanted[2]) for made, wanted in pairs if wanted[5] > 0), default=0.0
+    )  # the way there has heights, too
     whole_moves = done - 1 if moves[done - 1] != whole[done - 1] else done  # the one under way has to be made again
     return Cut(Result(how, whole_moves, len(whole) - tail, len(moves)), heights, off_mm)
 

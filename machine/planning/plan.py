@@ -9,6 +9,7 @@ from machine.kinematics.collision import Printed, hull, join_hulls
 from machine.kinematics.table import part_shift, workpiece_points
 from machine.planning import limits
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Pause, Reorient, Stroke, Travel, rows
+from machine.planning.park_position import find_park_position
 from machine.planning.priming import run_in
 from machine.planning.purge import purge_lanes, purge_width_mm
 from machine.planning.reorient import Route, Speeds, Turn, route, top_z
@@ -30,8 +31,8 @@ def plan(
     """The machine program of a decomposition's sliced parts, in print order; parts without a path are left out.
 
     stops: where the print waits for a person. After the last part the table goes back to level, so that the next print's homing
-    finds it level. Raises SliceError for a stop at a layer that is not there; MoveError: a point outside the axis limits, or no
-    safe place for the head while the table turns.
+    finds it level, and the tip aside. Raises SliceError for a stop at a layer that is not there; MoveError: a point outside the
+    axis limits, or no safe place for the head while the table turns.
     """
     parts = {part.index: part for part in decomposition.parts}
     pieces = [piece for piece in sliced if any(layer.paths for layer in piece.layers)]
@@ -190,16 +191,20 @@ def _coasted(points: Floats, length: Floats, coast_mm: float) -> tuple[Floats, F
 
 
 def _finish(tip: Tip, part: int, printed: Printed, profile: Profile) -> Iterator[Move]:
-    """Retract, lift, bring the table back to level."""
+    """Retract, bring the table back to level, and go aside: a hot tip drips where it stands, and the print is to be taken off."""
+    machine = profile.machine
     yield from retract(tip, profile)
-    home = level(profile.machine)
-    if tip.pose == home:
-        z = min(float(tip.at_mm[2]) + profile.machine.lift_mm, profile.machine.z.limits_mm[1])
-        yield from go(tip, [*tip.at_mm[:2], z], profile)
+    home = level(machine)
+    if tip.pose != home:
+        way = _route(Turn(tip.pose, home, tip.at_mm, None), part, printed, profile)
+        yield from _to_stand(tip, way, profile)
+        yield _reorient(tip, home, profile)
+    park = find_park_position(machine, printed, tip.at_mm, home)
+    if park is None:
+        yield from go(tip, [*tip.at_mm[:2], min(float(tip.at_mm[2]) + machine.lift_mm, machine.z.limits_mm[1])], profile)
         return
-    way = _route(Turn(tip.pose, home, tip.at_mm, None), part, printed, profile)
-    yield from _to_stand(tip, way, profile)
-    yield _reorient(tip, home, profile)
+    yield from go(tip, list(park.lift_mm), profile)
+    yield from go(tip, list(park.stand_mm), profile)
 
 
 def _first_point(piece: SlicedPart) -> Floats:

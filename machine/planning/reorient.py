@@ -13,6 +13,7 @@ from math import ceil, hypot, inf, radians
 import numpy as np
 
 from machine.kinematics.collision import Printed, solids, sweep_gaps, swing_mm
+from machine.planning.park_position import obstacle_top_mm
 from machine.planning.timing import move_times
 from mdp.directions.spread import spread
 from mdp.head import bodies, directions
@@ -205,4 +206,4 @@ def is_way_clear(machine: Machine, pose: Pose, start: Floats, end: Floats) -> bo
 
 def top_z(machine: Machine, pose: Pose) -> float:
     """Machine Z at which the tip is lift_mm above all of table and cradle at a pose, wherever it stands."""
-    return max(float(reach_of(UP[None])[0]) for _, reach_of in solids(machine, pose)) + machine.lift_mm
+    return obstacle_top_mm(machine, None, pose) + machine.lift_mm

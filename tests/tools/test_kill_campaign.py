@@ -2,7 +2,9 @@
 
 import pytest
 
-from tools.kill_campaign import campaign, judged
+from machine.simulator.board import BuildOptions
+from tools import kill_campaign
+from tools.kill_campaign import LIFT_MM, RING, campaign, cut_campaign, judged, judged_cut
 
 WHOLE = [[float(k), 0.0] for k in range(10)]
 
@@ -24,3 +26,32 @@ def test_missing_and_doubled_moves_are_counted(moves: list[list[float]], gap: in
 def test_three_killed_hosts_leave_no_gap_and_repeat_no_more_than_the_documented_lines() -> None:
     for result in campaign(3, 11):
         assert (result.gap, result.twice <= 48) == (0, True), result.how
+
+
+STROKES = [[float(k), 0.0, 1.0, 0.0, 0.0, 0.1] for k in range(10)]
+APPROACH = [[5.0, 0.0, 9.0, 0.0, 0.0, 0.0], [4.0, 0.0, 1.0, 0.0, 0.0, 0.8]]
+
+
+@pytest.mark.parametrize(("rest", "gap", "twice", "off_mm"), [
+    (STROKES[5:], 0, 0, 0.0),
+    (STROKES[3:], 0, 2, 0.0),
+    (STROKES[6:], 1, 0, 0.0),
+    ([[*move[:2], move[2] + 0.3, *move[3:]] for move in STROKES[5:]], 0, 0, 0.3),
+])  # fmt: skip
+def test_a_cut_is_judged_by_moves_missing_and_doubled_and_by_the_height(
+    rest: list[list[float]], gap: int, twice: int, off_mm: float
+) -> None:
+    begun = [[4.5, 0.0, 1.0, 0.0, 0.0, 0.05]]  # the move under way when the power went: it does not count
+    cut = judged_cut("any", 6, 1, [*STROKES[:5], *begun, *APPROACH, *rest], STROKES)
+    assert (cut.result.gap, cut.result.twice, cut.off_mm) == (gap, twice, pytest.approx(off_mm))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("advanced", "most"), [(False, 24), (True, 48)])
+def test_power_cuts_lose_no_stroke_and_no_height_that_was_not_asked_for(
+    monkeypatch: pytest.MonkeyPatch, advanced: bool, most: int
+) -> None:
+    monkeypatch.setattr(kill_campaign, "LAYERS", 4)
+    for cut in cut_campaign(6, 5, BuildOptions(advanced_ok=advanced, rx_ring=RING)):
+        assert (cut.result.gap, cut.result.twice <= most) == (0, True), cut.result.how
+        assert cut.off_mm < (0.005 if cut.heights == 1 else LIFT_MM / 2 + 0.005), cut.result.how

@@ -11,8 +11,11 @@ import numpy as np
 from machine.firmware import dialect_of
 from machine.gcode.modal_state import ModalState
 from machine.gcode.pen import number
-from machine.link.pause.park_position import Park, axis_position, find_park_position, lift_words, move_words
+from machine.kinematics.coordinates import axis_positions, followed_places
 from machine.link.pause.printed_bounds import PrintedBounds
+from machine.planning.park_position import Park, find_park_position
+from mdp.mesh import Floats
+from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
 from profiles.profile import Profile
 
@@ -119,3 +122,30 @@ def _moves(modal: ModalState, profile: Profile | None, bounds: PrintedBounds | N
 
 def _words(place: tuple[float, float, float]) -> str:
     return f"X{place[0]:.3f} Y{place[1]:.3f}"
+
+
+def move_words(machine: Machine, park: Park, pose: Pose, following: bool) -> list[str]:
+    """G0 words of the way up and aside, as the firmware calls the places now; following: it follows the table (TCP)."""
+    stops = [park.lift_mm] if park.stand_mm == park.lift_mm else [park.lift_mm, park.stand_mm]
+    places = np.array(stops)
+    if following:
+        places = followed_places(machine, pose, places)
+        return [f"X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in places]
+    first = f"Z{places[0][2]:.3f}"
+    return [first, *(f"X{x:.3f} Y{y:.3f}" for x, y, _ in places[1:])]
+
+
+def axis_position(machine: Machine, place: tuple[float | None, ...], following: bool) -> tuple[Floats, Pose] | None:
+    """(3,) axis positions and the pose of a place as the program calls it; None where a coordinate is not known."""
+    x, y, z, tilt, turn = place[:5]
+    if x is None or y is None or z is None:
+        return None
+    pose = Pose(machine.tilt.zero_deg if tilt is None else tilt, machine.turn.zero_deg if turn is None else turn)
+    at = np.array([[x, y, z, pose.tilt_deg, pose.turn_deg]])
+    return (axis_positions(machine, at)[0] if following else at[0, :3]), pose
+
+
+def lift_words(machine: Machine, pose: Pose, far_mm: float, following: bool) -> str:
+    """Words of a step along the nozzle, for G91."""
+    step = rotation(machine, pose).T @ (far_mm * UP) if following else far_mm * UP
+    return " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", step, strict=True) if abs(value) > 5e-4)

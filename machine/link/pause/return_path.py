@@ -12,7 +12,7 @@ from machine.gcode.placeholders import fill_block, resume_placeholders
 from machine.gcode.turning import turn
 from machine.kinematics.collision import Printed
 from machine.link.pause.park_moves import NEAR_MM, SLOWLY
-from machine.link.pause.park_position import obstacle_top_mm
+from machine.planning.park_position import obstacle_top_mm
 from machine.planning.reorient import Speeds, Turn, route
 from mdp.mesh import Floats
 from mdp.pose import Pose

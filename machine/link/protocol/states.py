@@ -1,45 +1,46 @@
 """The states of a conversation with a printer, and every transition between them in one table.
 
 All transitions live here; connection.py decides which signal an event amounts to, and what is done on entering a state.
-A signal that a state's row does not name leaves the state as it is.
+A signal that a state's row does not name leaves the state as it is. `python tools/draw_states.py` draws the table into
+docs/serial.md.
 """
 
-from enum import Enum, auto
+from enum import Enum
 
 
 class State(Enum):
     """Where the conversation stands."""
 
-    DRAIN = auto()  # port just opened, or the printer just started: old answers and the banner are listened to
-    SYNC = auto()  # M110 sent, the line numbers are not agreed yet
-    HELLO = auto()  # M115 and M105 sent: who is there, and how it answers
-    OPEN = auto()  # lines may be sent, as many as the window allows
-    PROBING = auto()  # an answer is missing or implausible: a new numbered M105 shows what arrived
-    QUIET = auto()  # a resend was asked: nothing is sent until late lines have run dry
-    REPEAT = auto()  # lines of the history are repeated one by one
-    RENUMBER = auto()  # M110 sent in mid-print: the numbers begin anew before they grow too long
-    HALTED = auto()  # the firmware reported an error
-    LOST = auto()  # silence, restart or nonsense: nothing more can be known
+    DRAIN = "port just opened, or the printer just started: old answers and the banner are listened to"
+    SYNC = "M110 sent, the line numbers are not agreed yet"
+    HELLO = "M115 and M105 sent: who is there, and how it answers"
+    OPEN = "lines may be sent, as many as the window allows"
+    PROBING = "an answer is missing or implausible: a new numbered M105 shows what arrived"
+    QUIET = "a resend was asked: nothing is sent until late lines have run dry"
+    REPEAT = "lines of the history are repeated one by one"
+    RENUMBER = "M110 sent in mid-print: the numbers begin anew before they grow too long"
+    HALTED = "the firmware reported an error"
+    LOST = "silence, restart or nonsense: nothing more can be known"
 
 
 class Signal(Enum):
     """What an event or the passing of time amounts to."""
 
-    HUSH = auto()  # nothing heard for a while
-    SYNCED = auto()  # M110 was answered
-    GREETED = auto()  # M115 and M105 were answered
-    RESEND = auto()  # a plausible line is asked for again
-    IMPLAUSIBLE = auto()  # a line that it cannot mean is asked for, for the first time
-    IMPOSSIBLE = auto()  # the printer insists on it, or asks for the same line for ever
-    STALL = auto()  # no acknowledgement in time
-    ANSWERED = auto()  # the probe or the repeated line was answered: all lines before it arrived
-    CAUGHT_UP = auto()  # the whole history was repeated and acknowledged
-    SILENT = auto()  # probes or handshakes remain without answer
-    START = auto()  # the printer started anew
-    FAULT = auto()  # the firmware reported an error
-    UNCHECKED = auto()  # what became of a line cannot be known: a torn one was run, or one without answer cannot be asked about
-    RECONNECTED = auto()  # the port was lost and is there again: what was on its way may have got lost
-    LAST_NUMBER = auto()  # it was used, and no line is in flight
+    HUSH = "nothing heard for a while"
+    SYNCED = "M110 was answered"
+    GREETED = "M115 and M105 were answered"
+    RESEND = "a plausible line is asked for again"
+    IMPLAUSIBLE = "a line that it cannot mean is asked for, for the first time"
+    IMPOSSIBLE = "the printer insists on it, or asks for the same line for ever"
+    STALL = "no acknowledgement in time"
+    ANSWERED = "the probe or the repeated line was answered: all lines before it arrived"
+    CAUGHT_UP = "the whole history was repeated and acknowledged"
+    SILENT = "probes or handshakes remain without answer"
+    START = "the printer started anew"
+    FAULT = "the firmware reported an error"
+    UNCHECKED = "what became of a line cannot be known: a torn one was run, or one without answer cannot be asked about"
+    RECONNECTED = "the port was lost and is there again: what was on its way may have got lost"
+    LAST_NUMBER = "the last line number was used, and no line is in flight"
 
 
 TABLE: dict[State, dict[Signal, State]] = {

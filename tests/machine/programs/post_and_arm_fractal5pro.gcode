@@ -38,7 +38,7 @@ EXCLUDE_OBJECT_START NAME=part_1
 ;Z:0.2
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=1
-M73 P8 R1
+M73 P6 R1
 ;TYPE:External perimeter
 ;WIDTH:0.45
 G1 X4.775 E0.32326 F2400
@@ -57,7 +57,7 @@ G1 Y-4.325 E0.29279
 SET_PRINT_STATS_INFO CURRENT_LAYER=2
 SET_HEATER_TEMPERATURE HEATER=extruder TARGET=210
 M106 S255
-M73 P13 R1
+M73 P9 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -80,7 +80,7 @@ G1 Y-4.325 E0.29280
 ;Z:0.6
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=3
-M73 P18 R1
+M73 P13 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -118,7 +118,7 @@ EXCLUDE_OBJECT_START NAME=part_2
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=4
 M107
-M73 P57 R1
+M73 P42 R1
 G1 E0.80000 F2100
 ;TYPE:External perimeter
 ;WIDTH:0.45
@@ -137,7 +137,7 @@ G1 Y-59.325 E0.29279
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=5
 M106 S255
-M73 P62 R1
+M73 P45 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -160,7 +160,7 @@ G1 Y-59.325 E0.29280
 ;Z:0.6
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=6
-M73 P68 R1
+M73 P49 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -187,6 +187,8 @@ G0 Z7.600 F300
 G0 X100.000 Y-147.050 F9000
 ;TYPE:Custom
 G0 B0.0000 A0.0000 F600
+G0 Z75.000 F300
+G0 X149.000 Y-296.050 F9000
 ;TYPE:Custom
 MANUAL_STEPPER STEPPER=stepper_b GCODE_AXIS=
 MANUAL_STEPPER STEPPER=stepper_a GCODE_AXIS=
@@ -198,7 +200,7 @@ M73 P100 R0
 ; filament used [mm] = 15.19
 ; filament used [cm3] = 0.04
 ; filament used [g] = 0.05
-; estimated printing time (normal mode) = 40s
+; estimated printing time (normal mode) = 54s
 ; tiltprint_config = begin
 ; machine.name = Fractal 5 Pro
 ; machine.shape = table
@@ -207,12 +209,15 @@ M73 P100 R0
 ; machine.x.limits_mm = [-150.0, 150.0]
 ; machine.x.speed_mm_s = 300.0
 ; machine.x.acceleration_mm_s2 = 3000.0
+; machine.x.home_mm = None
 ; machine.y.limits_mm = [-297.05, 152.95]
 ; machine.y.speed_mm_s = 300.0
 ; machine.y.acceleration_mm_s2 = 3000.0
+; machine.y.home_mm = None
 ; machine.z.limits_mm = [-150.0, 250.0]
 ; machine.z.speed_mm_s = 5.0
 ; machine.z.acceleration_mm_s2 = 100.0
+; machine.z.home_mm = None
 ; machine.tilt.letter = B
 ; machine.tilt.stepper = 
 ; machine.tilt.axis = [1.0, 0.0, 0.0]
@@ -223,6 +228,7 @@ M73 P100 R0
 ; machine.tilt.budget_deg = None
 ; machine.tilt.speed_deg_s = 20.0
 ; machine.tilt.acceleration_deg_s2 = 100.0
+; machine.tilt.home_deg = None
 ; machine.turn.letter = A
 ; machine.turn.stepper = 
 ; machine.turn.axis = [0.0, 0.0, 1.0]
@@ -233,6 +239,7 @@ M73 P100 R0
 ; machine.turn.budget_deg = None
 ; machine.turn.speed_deg_s = 10.0
 ; machine.turn.acceleration_deg_s2 = 100.0
+; machine.turn.home_deg = None
 ; machine.tool_mm = [0.0, 0.0, 0.0]
 ; machine.junction_speed_mm_s = 5.0
 ; machine.receive_bytes = 128
@@ -254,6 +261,7 @@ M73 P100 R0
 ; machine.head.boxes[0].max_mm = [30.0, 40.0, 110.0]
 ; machine.clearance_mm = 2.0
 ; machine.lift_mm = 15.0
+; machine.pause_cools_after_min = 10.0
 ; machine.purge_mm = 0.0
 ; machine.nozzle_limit_c = 260.0
 ; machine.bed_limit_c = 130.0
@@ -326,6 +334,7 @@ M73 P100 R0
 ; material.fan_off_layers = 1
 ; material.fan_full_layer = 0
 ; material.interlayer_strength_mpa = 20.0
+; material.bridge_longest_mm = 30.0
 ; material.flow = 1.0
 ; material.retract_mm = 0.8
 ; material.retract_speed_mm_s = 35.0
@@ -354,6 +363,7 @@ M73 P100 R0
 ; process.walls = 3
 ; process.overhang_extra_walls = 0
 ; process.wall_order = inner-first
+; process.wall_generator = variable
 ; process.outer_bulge = 0.04
 ; process.top_layers = 4
 ; process.bottom_layers = 4
@@ -376,7 +386,7 @@ M73 P100 R0
 ; process.infill_anchor_mm = 2.5
 ; process.infill_joint_mm = 12.0
 ; process.overhang_share = 0.5
-; process.bridge_longest_mm = 6.0
+; process.bridge_longest_mm = 30.0
 ; process.arch_longest_mm = 6.0
 ; process.first_layer_flow = 1.0
 ; process.bridge_flow = 1.0
@@ -397,7 +407,7 @@ M73 P100 R0
 ; process.support_bottom_gap_mm = 0.2
 ; process.support_distance_mm = 0.3
 ; process.support_foot_mm = 2.0
-; process.support_foot_density = 0.7
+; process.support_foot_density = 0.85
 ; process.support_least_mm2 = 1.0
 ; process.skirt_loops = 1
 ; process.skirt_distance_mm = 4.0

@@ -31,7 +31,7 @@ M486 S0
 ;LAYER_CHANGE
 ;Z:0.2
 ;HEIGHT:0.2
-M73 P4 R1
+M73 P3 R1
 ;TYPE:External perimeter
 ;WIDTH:0.45
 G1 X4.775 E0.32326 F2400
@@ -49,7 +49,7 @@ G1 Y-4.325 E0.29279
 ;HEIGHT:0.2
 M104 S210
 M106 S255
-M73 P12 R1
+M73 P9 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -71,7 +71,7 @@ G1 Y-4.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P22 R1
+M73 P16 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -108,7 +108,7 @@ M486 S1
 ;Z:0.2
 ;HEIGHT:0.2
 M107
-M73 P55 R1
+M73 P40 R1
 G1 E0.80000 F2100
 ;TYPE:External perimeter
 ;WIDTH:0.45
@@ -126,7 +126,7 @@ G1 Y-71.325 E0.29279
 ;Z:0.4
 ;HEIGHT:0.2
 M106 S255
-M73 P64 R1
+M73 P47 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -148,7 +148,7 @@ G1 Y-71.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P73 R1
+M73 P54 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -175,6 +175,8 @@ G0 Z-5.400 F600
 G0 X0.000 Y-160.000 F9000
 ;TYPE:Custom
 G0 A0.0000 C0.0000 F2546
+G0 Z70.000 F600
+G0 X-159.000 Y-159.000 F9000
 ;TYPE:Custom
 M104 S0
 M140 S0
@@ -184,7 +186,7 @@ M73 P100 R0
 ; filament used [mm] = 15.19
 ; filament used [cm3] = 0.04
 ; filament used [g] = 0.05
-; estimated printing time (normal mode) = 24s
+; estimated printing time (normal mode) = 33s
 ; tiltprint_config = begin
 ; machine.name = generic A/C table
 ; machine.shape = table
@@ -193,12 +195,15 @@ M73 P100 R0
 ; machine.x.limits_mm = [-160.0, 160.0]
 ; machine.x.speed_mm_s = 300.0
 ; machine.x.acceleration_mm_s2 = 1500.0
+; machine.x.home_mm = None
 ; machine.y.limits_mm = [-160.0, 160.0]
 ; machine.y.speed_mm_s = 300.0
 ; machine.y.acceleration_mm_s2 = 1500.0
+; machine.y.home_mm = None
 ; machine.z.limits_mm = [-80.0, 260.0]
 ; machine.z.speed_mm_s = 15.0
 ; machine.z.acceleration_mm_s2 = 200.0
+; machine.z.home_mm = None
 ; machine.tilt.letter = A
 ; machine.tilt.stepper = 
 ; machine.tilt.axis = [1.0, 0.0, 0.0]
@@ -209,6 +214,7 @@ M73 P100 R0
 ; machine.tilt.budget_deg = None
 ; machine.tilt.speed_deg_s = 30.0
 ; machine.tilt.acceleration_deg_s2 = 200.0
+; machine.tilt.home_deg = None
 ; machine.turn.letter = C
 ; machine.turn.stepper = 
 ; machine.turn.axis = [0.0, 0.0, 1.0]
@@ -219,6 +225,7 @@ M73 P100 R0
 ; machine.turn.budget_deg = None
 ; machine.turn.speed_deg_s = 60.0
 ; machine.turn.acceleration_deg_s2 = 400.0
+; machine.turn.home_deg = None
 ; machine.tool_mm = [0.0, 0.0, 0.0]
 ; machine.junction_speed_mm_s = 8.0
 ; machine.receive_bytes = 128
@@ -252,6 +259,7 @@ M73 P100 R0
 ; machine.head.boxes[1].max_mm = [250.0, 45.0, 90.0]
 ; machine.clearance_mm = 1.0
 ; machine.lift_mm = 10.0
+; machine.pause_cools_after_min = 10.0
 ; machine.purge_mm = 0.0
 ; machine.nozzle_limit_c = 300.0
 ; machine.bed_limit_c = 110.0
@@ -311,6 +319,7 @@ M73 P100 R0
 ; material.fan_off_layers = 1
 ; material.fan_full_layer = 0
 ; material.interlayer_strength_mpa = 20.0
+; material.bridge_longest_mm = 30.0
 ; material.flow = 1.0
 ; material.retract_mm = 0.8
 ; material.retract_speed_mm_s = 35.0
@@ -339,6 +348,7 @@ M73 P100 R0
 ; process.walls = 3
 ; process.overhang_extra_walls = 0
 ; process.wall_order = inner-first
+; process.wall_generator = variable
 ; process.outer_bulge = 0.04
 ; process.top_layers = 4
 ; process.bottom_layers = 4
@@ -361,7 +371,7 @@ M73 P100 R0
 ; process.infill_anchor_mm = 2.5
 ; process.infill_joint_mm = 12.0
 ; process.overhang_share = 0.5
-; process.bridge_longest_mm = 6.0
+; process.bridge_longest_mm = 30.0
 ; process.arch_longest_mm = 6.0
 ; process.first_layer_flow = 1.0
 ; process.bridge_flow = 1.0
@@ -382,7 +392,7 @@ M73 P100 R0
 ; process.support_bottom_gap_mm = 0.2
 ; process.support_distance_mm = 0.3
 ; process.support_foot_mm = 2.0
-; process.support_foot_density = 0.7
+; process.support_foot_density = 0.85
 ; process.support_least_mm2 = 1.0
 ; process.skirt_loops = 1
 ; process.skirt_distance_mm = 4.0

@@ -1,6 +1,7 @@
-"""Park position: where the tip waits during a pause, straight up along the nozzle and aside, clear of table, cradle and print.
+"""Park position: where the tip waits during a pause, and stays when the print is done: straight up along the nozzle and aside.
 
-The way: up at the place where the print stopped, across at a height above which nothing stands, and back the same way.
+The way is clear of table, cradle and print: up at the place where the print stopped, across at a height above which nothing
+stands, and back the same way.
 """
 
 from dataclasses import dataclass
@@ -8,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from machine.kinematics.collision import Printed, solids, sweep_gaps
-from machine.kinematics.coordinates import axis_positions, followed_places
 from mdp.head import bodies, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
@@ -47,34 +47,7 @@ def find_park_position(machine: Machine, printed: Printed, at_mm: Floats, pose: 
     return Park(lift, lift)
 
 
-def move_words(machine: Machine, park: Park, pose: Pose, following: bool) -> list[str]:
-    """G0 words of the way up and aside, as the firmware calls the places now; following: it follows the table (TCP)."""
-    stops = [park.lift_mm] if park.stand_mm == park.lift_mm else [park.lift_mm, park.stand_mm]
-    places = np.array(stops)
-    if following:
-        places = followed_places(machine, pose, places)
-        return [f"X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in places]
-    first = f"Z{places[0][2]:.3f}"
-    return [first, *(f"X{x:.3f} Y{y:.3f}" for x, y, _ in places[1:])]
-
-
-def axis_position(machine: Machine, place: tuple[float | None, ...], following: bool) -> tuple[Floats, Pose] | None:
-    """(3,) axis positions and the pose of a place as the program calls it; None where a coordinate is not known."""
-    x, y, z, tilt, turn = place[:5]
-    if x is None or y is None or z is None:
-        return None
-    pose = Pose(machine.tilt.zero_deg if tilt is None else tilt, machine.turn.zero_deg if turn is None else turn)
-    at = np.array([[x, y, z, pose.tilt_deg, pose.turn_deg]])
-    return (axis_positions(machine, at)[0] if following else at[0, :3]), pose
-
-
-def lift_words(machine: Machine, pose: Pose, far_mm: float, following: bool) -> str:
-    """Words of a step along the nozzle, for G91."""
-    step = rotation(machine, pose).T @ (far_mm * UP) if following else far_mm * UP
-    return " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", step, strict=True) if abs(value) > 5e-4)
-
-
-def obstacle_top_mm(machine: Machine, printed: Printed, pose: Pose) -> float:
+def obstacle_top_mm(machine: Machine, printed: Printed | None, pose: Pose) -> float:
     """Greatest Z of table, cradle and print at a pose."""
     return max(float(reach_of(UP[None])[0]) for _, reach_of in solids(machine, pose, printed))
 
