@@ -28,6 +28,11 @@ class UserError(Exception):
     """Something the person at the keyboard can fix; str() is the full sentence."""
 
 
+def reason(error: OSError) -> str:
+    """What the system says of it, as the end of a sentence."""
+    return (error.strerror or str(error)).lower()
+
+
 class ProfileError(UserError):
     """A profile or a --set option is wrong; the message lists every problem with its key."""
 

@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from profiles.errors import ProfileError
+from profiles.errors import ProfileError, reason
 from profiles.folders import settings_folder
 from profiles.toml_text import read_toml
 
@@ -145,7 +145,7 @@ def parse(path: Path, what: str = "profile") -> dict[str, Any]:
     try:
         return read_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ProfileError(f"{what} {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise ProfileError(f"{what} {path} cannot be read: {reason(error)}") from None
     except UnicodeDecodeError:
         raise ProfileError(f"{what} {path} is not a text file: TOML in UTF-8 is expected") from None
     except ValueError as error:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from machine.app.requests import STDOUT, Outputs
-from profiles.errors import OutputError
+from profiles.errors import OutputError, reason
 
 
 def check_writable(path: Path) -> None:
@@ -55,7 +55,7 @@ def _check_name(path: Path) -> None:
 
 
 def _not_written(path: Path, error: OSError) -> OutputError:
-    return OutputError(f"output {path} cannot be written: {(error.strerror or str(error)).lower()}")
+    return OutputError(f"output {path} cannot be written: {reason(error)}")
 
 
 def _check_parent(path: Path, folder: Path) -> None:
@@ -101,7 +101,7 @@ def delete(path: Path) -> None:
     try:
         path.unlink(missing_ok=True)
     except OSError as error:
-        raise OutputError(f"output {path} cannot be deleted: {(error.strerror or str(error)).lower()}") from None
+        raise OutputError(f"output {path} cannot be deleted: {reason(error)}") from None
 
 
 def write_lines(path: Path, lines: Iterable[str], private: bool = False) -> None:

@@ -12,7 +12,7 @@ import tomlkit
 from machine.calibration.fit import Touch
 from machine.calibration.program import TouchPlan
 from mdp.pose import Pose
-from profiles.errors import ProfileError
+from profiles.errors import ProfileError, reason
 from profiles.machine import Machine
 from profiles.places import parse
 
@@ -112,7 +112,7 @@ def _csv(path: Path) -> dict[str, Any]:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.DictReader(file))
     except OSError as error:
-        raise ProfileError(f"sheet {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise ProfileError(f"sheet {path} cannot be read: {reason(error)}") from None
     except (UnicodeDecodeError, csv.Error):
         raise ProfileError(f"sheet {path} is not a text file: CSV in UTF-8 is expected") from None
     missing = [name for name in COLUMNS[:5] if not rows or name not in rows[0]]

@@ -23,12 +23,8 @@ FAR_MM = 1e9
 REFINEMENTS = 40
 
 
-def table_reach(machine: Machine, pose: Pose, tried: Floats) -> Floats:
-    """(k,) greatest d . x over the table's plate at a pose, in the frame of X Y Z, for (k, 3) directions."""
-    return _reach_of_table(machine, pose)(tried)
-
-
-def _reach_of_table(machine: Machine, pose: Pose) -> "Reach":
+def table_reach(machine: Machine, pose: Pose) -> "Reach":
+    """(k,) greatest d . x over the table's plate at a pose, in the frame of X Y Z, asked for (k, 3) directions."""
     table = machine.table
     if table.size_mm is not None:
         x, y = (0.5 * size for size in table.size_mm)
@@ -89,7 +85,7 @@ Reach = Callable[[Floats], Floats]  # (k, 3) directions -> (k,) how far a solid 
 
 def solids(machine: Machine, pose: Pose, printed: Printed | None = None) -> list[tuple[str, Reach]]:
     """What the head can meet at a pose: the table, the cradle's bodies, what is printed; names for messages."""
-    bodies: list[tuple[str, Reach]] = [("the table", _reach_of_table(machine, pose))]
+    bodies: list[tuple[str, Reach]] = [("the table", table_reach(machine, pose))]
     bodies += [(f"the cradle's {box.name}", _reach_of_cradle(machine, box, pose)) for box in machine.cradle]
     if printed is not None and len(printed.points_mm):
         bodies.append(("the print", partial(printed.reach, machine, pose)))

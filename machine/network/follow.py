@@ -49,7 +49,7 @@ class _Heard:
 
 
 def follow_print(
-    server: PrintServer, file: str, size: int, on_status: OnStatus, control: Control, left: Callable[[], bool]
+    server: PrintServer, file: str, size: int, *, on_status: OnStatus, control: Control, left: Callable[[], bool]
 ) -> End:
     """Have a file printed that a server holds, and follow that to its end.
 
@@ -59,7 +59,9 @@ def follow_print(
     return _Follower(server, file, size, on_status, control, left).run()
 
 
-def follow_running(server: PrintServer, now: JobStatus, on_status: OnStatus, control: Control, left: Callable[[], bool]) -> End:
+def follow_running(
+    server: PrintServer, now: JobStatus, *, on_status: OnStatus, control: Control, left: Callable[[], bool]
+) -> End:
     """Follow the print that a server is at already to its end. now: an active status of it. Raises ServerError as above."""
     return _Follower(server, now.file, 0, on_status, control, left, now).run()
 
@@ -72,31 +74,23 @@ def _stop_at_once(server: PrintServer) -> None:
         raise ServerError(UNCONFIRMED.format(server=server.name, error=error)) from None
 
 
+@dataclass
 class _Follower:
-    def __init__(
-        self,
-        server: PrintServer,
-        file: str,
-        size: int,
-        on_status: OnStatus,
-        control: Control,
-        left: Callable[[], bool],
-        running: JobStatus | None = None,
-    ) -> None:
-        """running: of a print that is not to be started, for the server is at it."""
-        self._server, self._file, self._size, self._on_status, self._control, self._left = (
-            server,
-            file,
-            size,
-            on_status,
-            control,
-            left,
-        )
+    """running: what is not to be started, for the server is at it."""
+
+    server: PrintServer
+    file: str
+    size: int
+    on_status: OnStatus
+    control: Control
+    left: Callable[[], bool]
+    running: JobStatus | None = None
+
+    def __post_init__(self) -> None:
         self._heard, self._over = _Heard(), threading.Event()
         self._orders: deque[Callable[[], None]] = deque()
         self._message = ""
-        self._starts = running is None
-        self._last_active: Phase | None = running.phase if running else None
+        self._last_active: Phase | None = self.running.phase if self.running else None
         self._read, self._heat = 0, Temperature()
         self._cancels = False  # the server has the order, or may have it
         self._began_s: float | None = None  # since when the server has been told to start
@@ -127,7 +121,7 @@ class _Follower:
             while True:
                 if self._take_requests():
                     return End.STOPPED
-                if self._left():
+                if self.left():
                     return End.LEFT
                 end = self._look()
                 if end is not None:
@@ -152,7 +146,7 @@ class _Follower:
         heard = self._heard
         silent_s = time.monotonic() - heard.answered_s
         if silent_s > LOST_S:
-            where = heard.error or self._server.name
+            where = heard.error or self.server.name
             heat = last_known(self._heat, silent_s)
             raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer{heat}")
         if heard.status is None:
@@ -161,7 +155,7 @@ class _Follower:
         message = self._message or (f"no answer for {silent_s:.0f} s: {UNKNOWN}" if quiet else "")
         if heard.status is not self._shown[0] or message != self._shown[1] or time.monotonic() > self._shown_s + SHOW_S:
             self._shown, self._shown_s = (heard.status, message), time.monotonic()
-            self._on_status(heard.status, message)
+            self.on_status(heard.status, message)
         return None if quiet else self._end_of(heard.status)  # what was told last may be true no more
 
     def _end_of(self, status: JobStatus) -> End | None:
@@ -170,13 +164,13 @@ class _Follower:
         heat = status.temperature
         self._heat = heat if heat.words else self._heat
         if status.phase in ACTIVE:
-            if self._last_active is not None and status.file not in ("", self._file):
-                raise ServerError(f"{self._server.name} prints {status.file} now: what became of {self._file} is not known")
+            if self._last_active is not None and status.file not in ("", self.file):
+                raise ServerError(f"{self.server.name} prints {status.file} now: what became of {self.file} is not known")
             self._last_active, self._read = status.phase, max(self._read, status.bytes_read or 0)
             return None
         if status.phase is Phase.OFFLINE or (status.phase is Phase.FAILED and self._last_active is not None):
             where = f" at {self._reached}" if self._reached else ""
-            raise ServerError(f"{self._server.name}: the print has failed{where}: {status.message or status.phase.value}")
+            raise ServerError(f"{self.server.name}: the print has failed{where}: {status.message or status.phase.value}")
         if self._last_active is None:
             return self._end_unseen(status, time.monotonic() - self._began_s)
         if status.phase is not Phase.DONE and not self._cancels:
@@ -186,13 +180,13 @@ class _Follower:
     @property
     def _reached(self) -> str:
         """How far the server has read, in words; "" where it is not known."""
-        return f"{100 * self._read / self._size:.0f} %" if self._read and self._size else ""
+        return f"{100 * self._read / self.size:.0f} %" if self._read and self.size else ""
 
     def _ended_there(self, status: JobStatus) -> str:
         """A server that has died and come back, or somebody else who has cancelled: the heaters may still be on."""
         known = ", ".join(filter(None, (f"{self._reached} read" if self._reached else "", self._heat.words)))
         return (
-            f"{self._server.name} no longer prints {self._file or 'its file'} ({status.message or status.phase.value})"
+            f"{self.server.name} no longer prints {self.file or 'its file'} ({status.message or status.phase.value})"
             f"{f'; last known: {known}' if known else ''}: look at the printer"
         )
 
@@ -200,33 +194,33 @@ class _Follower:
         """A print that nobody has seen running: what is told may still be of the one before, or it was over at the first look."""
         if waited_s < BEGIN_S:
             return None
-        if status.phase is Phase.DONE and status.file in ("", self._file):
+        if status.phase is Phase.DONE and status.file in ("", self.file):
             return End.DONE
         raise ServerError(
-            f"{self._server.name} has not begun to print within {BEGIN_S:g} s: {status.message or 'no reason given'}"
+            f"{self.server.name} has not begun to print within {BEGIN_S:g} s: {status.message or 'no reason given'}"
         )
 
     def _poll(self) -> None:
         while not self._over.is_set():
             before = self._heard
             try:
-                self._heard = _Heard(self._with_percents(self._server.status()))
+                self._heard = _Heard(self._with_percents(self.server.status()))
             except ServerError as error:
                 self._heard = _Heard(before.status, error, before.answered_s)
             self._over.wait(POLL_S)
 
     def _take_requests(self) -> bool:
         """Hand on what a person has asked for; True after an emergency stop."""
-        while (request := self._control.take()) is not None:
+        while (request := self.control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
-                _stop_at_once(self._server)
+                _stop_at_once(self.server)
                 return True
             if order := self._order(request):
                 self._orders.append(order)
         return False
 
     def _order(self, request: PendingCommand) -> Callable[[], None] | None:
-        server, value = self._server, request.value
+        server, value = self.server, request.value
         if request.command in (Command.FEED, Command.FLOW):
             limits = FEED_PERCENT if request.command is Command.FEED else FLOW_PERCENT
             self._message = percent_refusal(value, limits) or ""
@@ -238,7 +232,7 @@ class _Follower:
         """What ends from now on was cancelled here, unless the order was refused."""
         self._cancels = True
         try:
-            self._server.cancel()
+            self.server.cancel()
         except NoAnswerError:
             raise
         except ServerError:
@@ -246,7 +240,7 @@ class _Follower:
             raise
 
     def _set_percent(self, command: Command, value: float) -> None:
-        self._server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
+        self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
         self._percents[command] = value
 
     def _with_percents(self, status: JobStatus) -> JobStatus:
@@ -262,9 +256,9 @@ class _Follower:
 
         A start without an answer may have been taken: whether it was is seen by the status.
         """
-        if self._starts:
+        if self.running is None:
             with suppress(NoAnswerError):
-                self._server.start(self._file)
+                self.server.start(self.file)
         self._began_s = time.monotonic()
         while not self._over.wait(TURN_S):
             while self._orders:

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from hashlib import file_digest
 from pathlib import Path
 
-from profiles.errors import GcodeError
+from profiles.errors import GcodeError, reason
 
 
 class GcodeFile:
@@ -29,7 +29,7 @@ class GcodeFile:
         try:
             yield
         except OSError as error:
-            raise GcodeError(f"G-code file {self.path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+            raise GcodeError(f"G-code file {self.path} cannot be read: {reason(error)}") from None
         except UnicodeDecodeError as error:
             byte = f"{error.object[error.start]:#04x}"
             raise GcodeError(f"G-code file {self.path} is not text: it holds the byte {byte}") from None

@@ -30,6 +30,8 @@ BYTE_KINDS: tuple[Kind, ...] = get_args(ByteKind)
 OK_KINDS: tuple[Kind, ...] = get_args(OkKind)
 MOMENT_KINDS: tuple[Kind, ...] = get_args(MomentKind)
 KINDS = BYTE_KINDS + OK_KINDS + MOMENT_KINDS
+LINE_BYTES = 36  # of a stroke on the wire, so that byte faults fall among the lines
+MOST_S = 3.0  # that random delays and stalls last
 HEALED: tuple[Kind, ...] = (*BYTE_KINDS[:3], *OK_KINDS, "spurious resend")  # what a sender can heal without stopping
 
 # Keys of a fault in a file beside kind, place and direction, with the kinds that know them.
@@ -98,23 +100,20 @@ def units_of(kind: Kind) -> tuple[Unit, ...]:
     return ("answer",) if kind in OK_KINDS else ("line", "byte", "answer")
 
 
-def random_script(
-    seed: int, count: int, lines: range, kinds: Sequence[Kind] = KINDS, line_bytes: int = 36, most_s: float = 3.0
-) -> FaultScript:
+def random_script(seed: int, count: int, lines: range, kinds: Sequence[Kind] = KINDS) -> FaultScript:
     """`count` faults of these kinds at random places of those lines, the same for the same seed.
 
-    line_bytes: how long a line is on the wire, so that byte faults fall among them (answers are taken to be half as long);
-    most_s: how long delays and stalls last at most; one in eight of stalls, blocks and disconnections lasts for ever.
+    Answers are taken to be half as long as lines. One in eight of stalls, blocks and disconnections lasts for ever.
     """
     rng = random.Random(seed)
-    return FaultScript(tuple(_random_fault(rng, rng.choice(kinds), lines, line_bytes, most_s) for _ in range(count)), seed)
+    return FaultScript(tuple(_random_fault(rng, rng.choice(kinds), lines) for _ in range(count)), seed)
 
 
-def _random_fault(rng: random.Random, kind: Kind, lines: range, line_bytes: int, most_s: float) -> Fault:
+def _random_fault(rng: random.Random, kind: Kind, lines: range) -> Fault:
     line, to_host = rng.choice(lines), rng.random() < 0.5
-    seconds = inf if rng.random() < 0.125 and kind != "delay" else rng.uniform(0.05, most_s)
+    seconds = inf if rng.random() < 0.125 and kind != "delay" else rng.uniform(0.05, MOST_S)
     if kind in BYTE_KINDS:
-        at = int((line + rng.random()) * line_bytes / (2 if to_host else 1))
+        at = int((line + rng.random()) * LINE_BYTES / (2 if to_host else 1))
         return Fault(kind, at, to_host, rng.randrange(8), seconds=seconds)
     value = max(1, line - rng.randint(-2, 12)) if kind == "spurious resend" else None
     return Fault(kind, line, value=value, seconds=seconds)

@@ -6,7 +6,7 @@ from collections import deque
 from contextlib import suppress
 from pathlib import Path
 
-from profiles.errors import PortError
+from profiles.errors import PortError, reason
 
 READ_BYTES = 4096
 TAKEN, MOST_OTHERS = b"echo:busy: another program talks to this simulated printer\n", 8
@@ -77,7 +77,7 @@ class Terminal:
             beside.replace(link)
         except OSError as error:
             self.close()
-            raise PortError(f"the link {link} cannot be made: {(error.strerror or str(error)).lower()}") from None
+            raise PortError(f"the link {link} cannot be made: {reason(error)}") from None
 
     def _unlink(self) -> None:
         """Remove the link, unless another simulated printer has taken it over."""
@@ -106,7 +106,7 @@ class Server:
         try:
             self._server = socket.create_server(("localhost", number))
         except OSError as error:
-            raise PortError(f"TCP port {number} cannot be listened on: {(error.strerror or str(error)).lower()}") from None
+            raise PortError(f"TCP port {number} cannot be listened on: {reason(error)}") from None
         self._server.setblocking(False)
         self._host: socket.socket | None = None
         self._others: deque[socket.socket] = deque()  # that are turned away

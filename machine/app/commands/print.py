@@ -34,7 +34,7 @@ def print_model(request: ModelRequest, printing: PrintRequest) -> int:
     loaded = load_program(request)
     if request.is_gcode:
         check_machine(answer, loaded.profile.machine, request.force)
-    program = ready_program(answer, loaded.program, loaded.profile, loaded.name, printing, request.force)
+    program = ready_program(answer, loaded.program, loaded.profile, name=loaded.name, printing=printing, force=request.force)
     show(print_table(program, loaded.profile))
     job = replace(loaded, program=program)
     with serve_watch_page(job, printing.watch_port) as watched:

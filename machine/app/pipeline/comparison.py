@@ -58,7 +58,7 @@ def in_parts(program: Program, profile: Profile) -> Alternative:
 
 def straight_up(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
     """The model of a decomposition in one part as it stands."""
-    return _in_one_part("straight up", "as it stands", ours.mesh, ours.risky_area_mm2, _with_support(profile), report)
+    return _in_one_part("straight up", "as it stands", ours.mesh, ours.risky_area_mm2, profile, report)
 
 
 def best_lying(mesh: Mesh, profile: Profile, report: Report | None = None) -> Alternative:
@@ -66,22 +66,19 @@ def best_lying(mesh: Mesh, profile: Profile, report: Report | None = None) -> Al
     best = _best(mesh, profile)
     turned = standing_still(mesh, best.rotation)
     risky = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
-    return _in_one_part(BEST, in_words(best), turned, risky, _with_support(profile), report)
+    return _in_one_part(BEST, in_words(best), turned, risky, profile, report)
 
 
 def _best(mesh: Mesh, profile: Profile) -> Orientation:
     return best_orientation(mesh, profile.process.self_supporting_angle_deg)
 
 
-def _with_support(profile: Profile) -> Profile:
-    bare = profile.of_all_parts
-    return bare.model_copy(update={"process": bare.process.model_copy(update={"support": "auto"})})
-
-
 def _in_one_part(
     name: str, orientation: str, mesh: Mesh, risky_mm2: float, profile: Profile, report: Report | None
 ) -> Alternative:
-    """A model in one part as it stands."""
+    """A model in one part as it stands, with support whatever the process says."""
+    bare = profile.of_all_parts
+    profile = bare.model_copy(update={"process": bare.process.model_copy(update={"support": "auto"})})
     pose = level(profile.machine)
     part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, risky_mm2)
     whole = Decomposition(name, mesh, (part,), 1, "classic", risky_mm2, risky_mm2, 0, 0, 0.0)

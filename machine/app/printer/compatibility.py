@@ -150,7 +150,7 @@ def check_program(answer: Answer | None, program: Program, profile: Profile, fil
 
 
 def ready_program(
-    answer: Answer | None, program: Program, profile: Profile, name: str, printing: PrintRequest, force: bool
+    answer: Answer | None, program: Program, profile: Profile, *, name: str, printing: PrintRequest, force: bool
 ) -> Program:
     """The program with what the dry run finds of this line's rate. Raises PrinterError, MoveError; force: only says so."""
     check_program(answer, program, profile, name, force)

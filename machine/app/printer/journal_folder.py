@@ -11,7 +11,7 @@ from machine.app.file_roles import PROGRAM, program_beside
 from machine.app.output import write_lines
 from machine.link.journal import LONGEST_BYTES, Checkpoint, Journal, JournalHeading, is_being_printed, read_journal
 from machine.reader.gcode_file import GcodeFile
-from profiles.errors import JournalError, OutputError
+from profiles.errors import JournalError, OutputError, reason
 from profiles.folders import state_folder
 from profiles.profile import Profile
 
@@ -97,7 +97,7 @@ def _new_path(name: str) -> Path:
         folder.mkdir(0o700, exist_ok=True)
         _thin(folder)
     except OSError as error:
-        raise OutputError(f"folder {folder} cannot be written: {(error.strerror or str(error)).lower()}") from None
+        raise OutputError(f"folder {folder} cannot be written: {reason(error)}") from None
     plain = "".join(c if c.isalnum() and c.isascii() else "-" for c in name)[:40].strip("-") or "print"
     return folder / f"{datetime.now():%Y%m%d-%H%M%S-%f}-{os.getpid()}-{plain}.journal"
 

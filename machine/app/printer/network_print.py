@@ -81,7 +81,7 @@ def print_there(server: PrintServer, job: LoadedProgram, observers: Observers, p
     timeline = Timeline(job.program.run)
     progress = ServerProgress(upload, job.program.lines, timeline.remaining_s)
     with _shown(person, observers, timeline, progress) as on_status:
-        end = follow_print(server, file, len(upload.content), on_status, person.control, person.gone)
+        end = follow_print(server, file, len(upload.content), on_status=on_status, control=person.control, left=person.gone)
     _report_end(end, file, server.name, progress)
     return end
 
@@ -103,7 +103,7 @@ def follow_there(server: PrintServer, now: JobStatus, observers: Observers, pers
     """
     progress = ProgressToldByServer()
     with _shown(person, observers, UnknownTimeline(), progress) as on_status:
-        end = follow_running(server, now, on_status, person.control, person.gone)
+        end = follow_running(server, now, on_status=on_status, control=person.control, left=person.gone)
     _report_end(end, file_name(now), server.name, progress)
     return end
 

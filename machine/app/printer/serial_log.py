@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from machine.link.medium import SERIAL, Medium, Traffic, Wire
+from profiles.errors import reason
 from profiles.folders import state_folder
 
 KEPT = 10  # logs of each kind
@@ -113,7 +114,7 @@ class SerialLog:
             return None
 
     def _fail(self, error: OSError) -> None:
-        self.trouble = (error.strerror or str(error)).lower()
+        self.trouble = reason(error)
         self._out = None
 
 

@@ -16,7 +16,7 @@ from machine.app.pipeline.programs import LoadedProgram
 from machine.app.terminal.progress import say
 from machine.link.progress import Progress
 from machine.view.page import print_page
-from profiles.errors import OutputError
+from profiles.errors import OutputError, reason
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
@@ -107,7 +107,7 @@ def serve(page: bytes, port: int = 0) -> Iterator[Watched]:
     try:
         own = socket.create_server((HOST, port))
     except OSError as error:
-        raise OutputError(f"--watch-port {port} cannot be used: {(error.strerror or str(error)).lower()}") from None
+        raise OutputError(f"--watch-port {port} cannot be used: {reason(error)}") from None
     watched.address = f"http://{HOST}:{own.getsockname()[1]}/{watched.token}/"
     config = Config(
         _application(watched), log_config=None, access_log=False, lifespan="off", ws="none", timeout_graceful_shutdown=GRACE_S

@@ -1,4 +1,3 @@
-from functools import partial
 from math import cos, pi, radians, sin
 
 import numpy as np
@@ -37,7 +36,7 @@ def _plate(machine: Machine, pose: Pose) -> np.ndarray:
 def test_the_reach_of_the_table_is_that_of_its_rims(tilt: float, turn: float) -> None:
     machine, pose = GENERIC.machine, Pose(tilt, turn)
     tried = spread(40)
-    assert table_reach(machine, pose, tried) == pytest.approx((_plate(machine, pose) @ tried.T).max(axis=0), abs=0.02)
+    assert table_reach(machine, pose)(tried) == pytest.approx((_plate(machine, pose) @ tried.T).max(axis=0), abs=0.02)
 
 
 @settings(deadline=None)  # the first call compiles
@@ -49,7 +48,7 @@ def test_a_gap_never_exceeds_the_distance_of_sampled_points(tilt: float, tip: tu
     distance = np.linalg.norm(corners[:, None] - _plate(machine, pose)[None], axis=2).min()
     tried = directions(rotation(machine, pose) @ UP)
     place = np.array([tip])
-    assert sweep_gaps(box, place, place, tried, table_reach(machine, pose, tried))[0] <= distance + 1e-9
+    assert sweep_gaps(box, place, place, tried, table_reach(machine, pose)(tried))[0] <= distance + 1e-9
 
 
 @settings(deadline=None)  # the first call compiles
@@ -117,9 +116,8 @@ def test_refining_never_loses_to_the_tried_directions(tilt: float, radius: float
     body = Ring("hot end", ((radius, height), (radius + 2, height + 5)), 1.0)
     tip = np.array([30.0, -20.0, 60.0])
     tried = directions(rotation(machine, pose) @ UP)
-    lower = sweep_gaps(body, tip[None], tip[None], tried, table_reach(machine, pose, tried))[0]
-    reach = partial(table_reach, machine, pose)
-    assert refined_gap(body, tip, tip, rotation(machine, pose) @ UP, reach) >= lower - 1e-9
+    lower = sweep_gaps(body, tip[None], tip[None], tried, table_reach(machine, pose)(tried))[0]
+    assert refined_gap(body, tip, tip, rotation(machine, pose) @ UP, table_reach(machine, pose)) >= lower - 1e-9
 
 
 def test_the_hull_of_beads_reaches_as_far_as_their_points() -> None:

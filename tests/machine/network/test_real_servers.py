@@ -142,7 +142,7 @@ def print_on(address: str, steps: Steps) -> tuple[End, list[Phase]]:
 
     with open_server(address) as server:
         file = server.upload(UPLOAD, lambda count: None)
-        return follow_print(server, file, len(UPLOAD.content), on_status, control, lambda: False), phases
+        return follow_print(server, file, len(UPLOAD.content), on_status=on_status, control=control, left=lambda: False), phases
 
 
 def pause_resume_cancel() -> Steps:

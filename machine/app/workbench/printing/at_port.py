@@ -30,7 +30,7 @@ def _checked(order: PrintOrder, checks: Checks) -> LoadedProgram:
     program = program_of(order)
     tell(figures=figures(program))
     with checks.that(CLEAN):
-        program = ready_program(answer, program, profile, order.name, printing, order.force)
+        program = ready_program(answer, program, profile, name=order.name, printing=printing, force=order.force)
     tell(figures=figures(program))  # with what the line's rate adds
     return LoadedProgram(order.name, program, profile)
 
