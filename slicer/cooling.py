@@ -12,7 +12,7 @@ from profiles.process import Process
 from profiles.profile import Profile
 from slicer.bead import Bead, length_mm
 from slicer.paths import Kind, bead_area_mm2
-from slicer.speed import of_kind_mm_s
+from slicer.speed import stroke_speeds
 from slicer.travel.order import Placed
 
 RINGS = (Kind.OUTER_WALL, Kind.INNER_WALL)
@@ -28,7 +28,7 @@ def speeds_mm_s(
     Bounded by what the hot end melts; a layer done before least_layer_time_s is slowed down to last as long, but not
     below least_speed_mm_s.
     """
-    process, table = profile.process, of_kind_mm_s(profile.process)
+    process, table = profile.process, stroke_speeds(profile.process)
     asked = np.array([_of_bead(p.bead, table, process) if fixed_mm_s is None else fixed_mm_s[p.bead.kind] for p in placed])
     areas = np.array([bead_area_mm2(p.bead.width_mm, height_mm) * p.bead.flow * flow for p in placed])
     speeds = np.minimum(asked, profile.material.volumetric_limit_mm3_s / areas)

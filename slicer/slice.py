@@ -27,7 +27,7 @@ from slicer.paths import ON_PLATE_MM, Kind, Layer, Path, SlicedPart, Unsupported
 from slicer.sectioning import section_part
 from slicer.sections import Sections
 from slicer.shells import Shells, build_shells
-from slicer.speed import first_layer_mm_s
+from slicer.speed import first_layer_speeds
 from slicer.support.reason import explain
 from slicer.support.support import Supports, own_supports
 from slicer.travel.order import order_beads
@@ -115,7 +115,7 @@ def _ordered(beads: list[Bead], shells: Shells, index: int, tip: Floats | None) 
     if not on_platform and index < process.interface_layers:
         fan, add_c = process.interface_fan, process.interface_temperature_add_c
     if index == 0:
-        fixed = first_layer_mm_s(process, on_platform)
+        fixed = first_layer_speeds(process, on_platform)
         flow *= process.first_layer_flow if on_platform else process.interface_flow
     placed = in_pieces(placed, height_mm)
     speeds = speeds_mm_s(placed, profile, height_mm, fixed, flow)

@@ -8,8 +8,8 @@ KEYS = tuple(key for key in Process.model_fields if key.endswith("acceleration_m
 INSIDE = (Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
 
 
-def of_kind_mm_s(process: Process) -> dict[Kind, float]:
-    """The process's speed of every kind of bead."""
+def stroke_speeds(process: Process) -> dict[Kind, float]:
+    """mm/s by kind of bead."""
     return {
         Kind.OUTER_WALL: process.outer_wall_speed_mm_s,
         Kind.INNER_WALL: process.inner_wall_speed_mm_s,
@@ -27,8 +27,8 @@ def of_kind_mm_s(process: Process) -> dict[Kind, float]:
     }
 
 
-def first_layer_mm_s(process: Process, on_platform: bool) -> dict[Kind, float]:
-    """Speeds by kind of a part's first layer, on the platform or on plastic."""
+def first_layer_speeds(process: Process, on_platform: bool) -> dict[Kind, float]:
+    """mm/s by kind of a part's first layer, on the platform or on plastic."""
     if not on_platform:
         return dict.fromkeys(Kind, process.interface_speed_mm_s)
     inside = process.first_layer_infill_speed_mm_s or process.first_layer_speed_mm_s

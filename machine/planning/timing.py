@@ -13,6 +13,7 @@ from mdp.kernels.arrays import floats
 from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 from profiles.machine import Machine
+from slicer.estimate.duration import trapezoid_s
 
 TINY = 1e-9
 
@@ -103,11 +104,8 @@ def corner_speed(blocks: Blocks, before: int, after: int, junction_speed: float)
 
 @part
 def block_time(blocks: Blocks, i: int, v0: float, v1: float) -> float:
-    """Seconds of a block from one speed to another: a trapezoid of speeds, or a triangle where it does not reach its own."""
-    a, length = blocks.acceleration[i], blocks.length[i]
-    peak = min(blocks.cruise[i], np.sqrt(0.5 * (v0 * v0 + v1 * v1) + a * length))
-    ramps = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * a)
-    return float((2.0 * peak - v0 - v1) / a + max(0.0, length - ramps) / peak)
+    """Seconds of a block from one speed to another."""
+    return trapezoid_s(blocks.length[i], blocks.cruise[i], blocks.acceleration[i], v0, v1)
 
 
 @kernel

@@ -5,18 +5,25 @@ once by more than the junction speed, and none accelerates faster than it may.
 from math import sqrt
 
 from mdp.kernels.arrays import floats
-from mdp.kernels.kernel import kernel
+from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats
 
 TINY = 1e-9
 
 
-def line_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, ends_mm_s: float = 0.0) -> float:
-    """Seconds of a straight line that is begun and ended at one speed: a trapezoid of speeds, or a triangle."""
+@part
+def trapezoid_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, v0: float, v1: float) -> float:
+    """Seconds of a straight move from one speed to another: a trapezoid of speeds, or a triangle where it gets no faster."""
+    peak = min(speed_mm_s, sqrt(0.5 * (v0 * v0 + v1 * v1) + acceleration_mm_s2 * length_mm))
+    ramps_mm = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * acceleration_mm_s2)
+    return float((2.0 * peak - v0 - v1) / acceleration_mm_s2 + max(0.0, length_mm - ramps_mm) / max(peak, TINY))
+
+
+@kernel
+def line_s(length_mm: float, speed_mm_s: float, acceleration_mm_s2: float, ends_mm_s: float) -> float:
+    """Seconds of a straight line that is begun and ended at one speed."""
     ends = min(ends_mm_s, speed_mm_s)
-    peak = min(speed_mm_s, sqrt(ends * ends + acceleration_mm_s2 * length_mm))
-    ramps_mm = (peak * peak - ends * ends) / acceleration_mm_s2
-    return 2.0 * (peak - ends) / acceleration_mm_s2 + max(0.0, length_mm - ramps_mm) / max(peak, TINY)
+    return trapezoid_s(length_mm, speed_mm_s, acceleration_mm_s2, ends, ends)
 
 
 @kernel
@@ -29,8 +36,8 @@ def loop_s(loop: Floats, speed_mm_s: float, acceleration_mm_s2: float, junction_
     corner, ramp, length = floats(n + 1, 0.0), floats(n, 0.0), floats(n, 0.0)
     x, y = 0.0, 0.0
     for i in range(n):
-        following = (i + 1) % n
-        dx, dy = loop[following, 0] - loop[i, 0], loop[following, 1] - loop[i, 1]
+        after = (i + 1) % n
+        dx, dy = loop[after, 0] - loop[i, 0], loop[after, 1] - loop[i, 1]
         length[i] = max(sqrt(dx * dx + dy * dy), TINY)
         dx, dy = dx / length[i], dy / length[i]
         ramp[i] = acceleration_mm_s2 / max(abs(dx), abs(dy), TINY)
@@ -42,8 +49,5 @@ def loop_s(loop: Floats, speed_mm_s: float, acceleration_mm_s2: float, junction_
     seconds = 0.0
     for i in range(n):
         corner[i + 1] = min(corner[i + 1], sqrt(corner[i] ** 2 + 2.0 * ramp[i] * length[i]))
-        v0, v1 = corner[i], corner[i + 1]
-        peak = min(speed_mm_s, sqrt(0.5 * (v0 * v0 + v1 * v1) + ramp[i] * length[i]))
-        ramps_mm = (2.0 * peak * peak - v0 * v0 - v1 * v1) / (2.0 * ramp[i])
-        seconds += (2.0 * peak - v0 - v1) / ramp[i] + max(0.0, length[i] - ramps_mm) / peak
+        seconds += trapezoid_s(length[i], speed_mm_s, ramp[i], corner[i], corner[i + 1])
     return float(seconds)

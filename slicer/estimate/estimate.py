@@ -16,11 +16,11 @@ from profiles.profile import Profile
 from slicer.estimate.duration import line_s
 from slicer.estimate.sampled_part import SampledPart, sample_part
 from slicer.estimate.shell import extent_of
-from slicer.estimate.strokes import Pace, Strokes, line_strokes, loop_strokes, shell_strokes, support_strokes
+from slicer.estimate.strokes import LayerSpeeds, Strokes, line_strokes, loop_strokes, shell_strokes, support_strokes
 from slicer.finish.vase import vase_profile
 from slicer.geometry.polygons import contours, offset
 from slicer.paths import Kind, bead_area_mm2
-from slicer.speed import first_layer_mm_s
+from slicer.speed import axes_mm_s2, first_layer_speeds, travel_mm_s2
 from slicer.support.pedestal import DENSITY, ROOF_LAYERS
 from slicer.walls.brim import brim
 
@@ -65,9 +65,9 @@ def _estimate_part(part: SampledPart, profile: Profile, top_mm: float) -> Estima
     filament_mm2 = 0.25 * pi * profile.material.diameter_mm**2
     total = Estimate(0.0, 0.0, 0.0) if part.on_platform else Estimate(TURN_S, profile.material.prime_extra_mm, 0.0)
     for layer, stands_for in zip(part.choice.layers.tolist(), part.choice.counts.tolist(), strict=True):
-        pace = _pace(part, layer, profile)
-        own = _part_strokes(part, layer, pace)
-        support = _auxiliary_strokes(part, layer, pace, top_mm)
+        speeds = _layer_speeds(part, layer, profile)
+        own = _part_strokes(part, layer, speeds)
+        support = _auxiliary_strokes(part, layer, speeds, top_mm)
         flow = profile.material.flow * _flow(part, layer, profile.process)
         time_s = _layer_s([*own, *support], _travel_s(part, layer, own, support, profile), profile.process)
         mm3 = flow * sum(strokes.mm3 for strokes in (*own, *support))
@@ -76,9 +76,9 @@ def _estimate_part(part: SampledPart, profile: Profile, top_mm: float) -> Estima
     return total
 
 
-def _pace(part: SampledPart, layer: int, profile: Profile) -> Pace:
-    fixed_mm_s = None if layer else first_layer_mm_s(profile.process, part.on_platform)
-    return Pace(profile, float(part.heights.height_mm[layer]), fixed_mm_s)
+def _layer_speeds(part: SampledPart, layer: int, profile: Profile) -> LayerSpeeds:
+    fixed_mm_s = None if layer else first_layer_speeds(profile.process, part.on_platform)
+    return LayerSpeeds(profile, float(part.heights.height_mm[layer]), fixed_mm_s, layer == 0 and part.on_platform)
 
 
 def _flow(part: SampledPart, layer: int, process: Process) -> float:
@@ -88,44 +88,44 @@ def _flow(part: SampledPart, layer: int, process: Process) -> float:
     return process.first_layer_flow if part.on_platform else process.interface_flow
 
 
-def _part_strokes(part: SampledPart, layer: int, pace: Pace) -> list[Strokes]:
+def _part_strokes(part: SampledPart, layer: int, speeds: LayerSpeeds) -> list[Strokes]:
     """What a layer prints of the part itself."""
-    return [] if layer < part.pedestal else shell_strokes(part.shell(layer), part.processes[layer], pace)
+    return [] if layer < part.pedestal else shell_strokes(part.shell(layer), part.processes[layer], speeds)
 
 
-def _auxiliary_strokes(part: SampledPart, layer: int, pace: Pace, top_mm: float) -> list[Strokes]:
+def _auxiliary_strokes(part: SampledPart, layer: int, speeds: LayerSpeeds, top_mm: float) -> list[Strokes]:
     """What a layer prints for the part: support, pedestal, skirt and brim."""
     process, on_plate = part.processes[layer], layer == 0 and part.on_platform
-    strokes = support_strokes(part.support, float(part.heights.cut_mm[layer]), process, pace, on_plate)
+    strokes = support_strokes(part.support, float(part.heights.cut_mm[layer]), process, speeds, on_plate)
     if layer < part.pedestal:
-        strokes += _pedestal_strokes(part, layer, pace)
+        strokes += _pedestal_strokes(part, layer, speeds)
     if on_plate:
         outline = part.sections[0]
-        beads = brim(outline + part.support.foot, outline, part.plate, process, top_mm=top_mm, height_mm=pace.height_mm)
+        beads = brim(outline + part.support.foot, outline, part.plate, process, top_mm=top_mm, height_mm=speeds.height_mm)
         loops = [bead.points[:-1] for bead in beads]
-        strokes += loop_strokes(Kind.SKIRT, loops, bead_area_mm2(process.line_width_mm, pace.height_mm), 0.0, pace)
+        strokes += loop_strokes(Kind.SKIRT, loops, bead_area_mm2(process.line_width_mm, speeds.height_mm), 0.0, speeds)
     return strokes
 
 
-def _pedestal_strokes(part: SampledPart, layer: int, pace: Pace) -> list[Strokes]:
+def _pedestal_strokes(part: SampledPart, layer: int, speeds: LayerSpeeds) -> list[Strokes]:
     """A layer of the pedestal: its outline, sparse lines, closed at the platform and at the roof."""
     process, outline = part.processes[layer], part.sections[layer]
     width = process.line_width_mm
-    bead_mm2 = bead_area_mm2(width, pace.height_mm)
+    bead_mm2 = bead_area_mm2(width, speeds.height_mm)
     closed = layer == 0 or layer >= part.pedestal - ROOF_LAYERS
-    strokes = loop_strokes(Kind.SUPPORT, contours(offset(outline, -0.5 * width)), bead_mm2, 0.0, pace)
+    strokes = loop_strokes(Kind.SUPPORT, contours(offset(outline, -0.5 * width)), bead_mm2, 0.0, speeds)
     inside = extent_of(offset(outline, -width))
-    return strokes + line_strokes(Kind.SUPPORT, inside, 1.0 if closed else DENSITY, width, process.infill_angle_deg, pace)
+    density, angle = 1.0 if closed else DENSITY, process.infill_angle_deg
+    return strokes + line_strokes(Kind.SUPPORT, inside, speeds, density=density, width_mm=width, angle_deg=angle)
 
 
 def _travel_s(part: SampledPart, layer: int, own: Sequence[Strokes], support: Sequence[Strokes], profile: Profile) -> float:
     """Seconds of a layer's travels, and of the lift to it."""
     process, machine = profile.process, profile.machine
     hops = sum(_starts(strokes) for strokes in own) + SUPPORT_HOPS * sum(_starts(strokes) for strokes in support)
-    axes_mm_s2 = min(machine.x.acceleration_mm_s2, machine.y.acceleration_mm_s2)
-    acceleration = min(process.travel_acceleration_mm_s2 or axes_mm_s2, axes_mm_s2)
+    acceleration = min(travel_mm_s2(profile) or axes_mm_s2(profile), axes_mm_s2(profile))
     speed = min(process.travel_speed_mm_s, machine.x.speed_mm_s, machine.y.speed_mm_s)
-    return hops * line_s(HOP_MM, speed, acceleration)
+    return hops * line_s(HOP_MM, speed, acceleration, 0.0)
 
 
 def _starts(strokes: Strokes) -> float:
@@ -137,11 +137,11 @@ def _starts(strokes: Strokes) -> float:
 
 def _layer_s(strokes: Sequence[Strokes], travel_s: float, process: Process) -> float:
     """Seconds of a layer, slowed down to least_layer_time_s as the slicer does it, which knows no acceleration."""
-    length_mm = sum(each.length_mm for each in strokes)
+    length_mm = sum(kind.length_mm for kind in strokes)
     if length_mm <= 0.0:
         return 0.0
-    steady_s = sum(each.length_mm / each.speed_mm_s for each in strokes)
-    lost_s = sum(each.time_s for each in strokes) - steady_s
+    steady_s = sum(kind.length_mm / kind.speed_mm_s for kind in strokes)
+    lost_s = sum(kind.time_s for kind in strokes) - steady_s
     asked_s = min(process.least_layer_time_s - STEADY * travel_s, length_mm / process.least_speed_mm_s)
     slowed_s = max(steady_s, asked_s)
     return slowed_s + lost_s * steady_s / slowed_s + travel_s

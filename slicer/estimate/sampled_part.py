@@ -48,7 +48,7 @@ class SampledPart:
         own, model = self.sections[layer], self._model(layer)
         solid = process.infill_density >= 1.0 or (not self.on_platform and layer < solid_bottom_layers(process))
         covers = None if solid else self._covers(layer, own if model is None else model)
-        return shell_of(own, process, height_mm, covers, model, self._ceiling(layer))
+        return shell_of(own, process, height_mm, covered=covers, model=model, ceiling=self._ceiling(layer))
 
     def _covers(self, layer: int, model: Polygons) -> Polygons:
         """What of a layer the model covers above and below, judged by the farthest of its skins and the middle one."""

@@ -54,6 +54,7 @@ def shell_of(
     section: Polygons,
     process: Process,
     height_mm: float,
+    *,
     covered: Polygons | None,
     model: Polygons | None = None,
     ceiling: Polygons | None = None,

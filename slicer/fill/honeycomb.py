@@ -16,7 +16,7 @@ TURN_DEG = 60.0
 def honeycomb(layer: PatternLayer) -> LinePattern:
     """Zigzags of the density."""
     side = side_mm(layer.spacing_mm, min(layer.density, 1.0))
-    return LinePattern(layer.angle_deg + TURN_DEG * (layer.number % 3), lambda box: _zigzags(box, side, layer.spacing_mm))
+    return LinePattern(layer.angle_deg + TURN_DEG * (layer.number % 3), lambda box: _rows(box, side, layer.spacing_mm))
 
 
 def side_mm(spacing_mm: float, density: float) -> float:
@@ -29,7 +29,7 @@ def side_mm(spacing_mm: float, density: float) -> float:
     return (per_side + sqrt(per_side**2 - 4.0 * strip * fixed)) / (2.0 * strip)
 
 
-def _zigzags(box: Box, side: float, spacing_mm: float) -> Lines:
+def _rows(box: Box, side: float, spacing_mm: float) -> Lines:
     strip = 0.5 * sqrt(3.0) * side
     reach = max(strip - spacing_mm, 0.0)
     slant = reach / sqrt(3.0)

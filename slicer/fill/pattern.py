@@ -1,4 +1,4 @@
-"""Line patterns: open lines over a box in a frame turned by an angle, before they are clipped to an area."""
+"""Line patterns: open lines over a box in a frame turned by an angle, clipped to an area, and the zigzags of support."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,9 @@ from math import ceil
 import numpy as np
 
 from mdp.mesh import Floats
-from slicer.geometry.clip import NO_PIECES, Border, Indices, Pieces, clip_lines, rotation_2d
+from slicer.geometry.clip import NO_PIECES, Border, Indices, Pieces, border_of, clip_lines, rotation_2d
+from slicer.geometry.polygons import Polygons
+from slicer.geometry.scanlines import join_lines, scan_lines
 
 Box = tuple[float, float, float, float]
 Lines = tuple[Floats, Indices]
@@ -47,6 +49,22 @@ def clip_pattern(border: Border, pattern: LinePattern) -> Pieces:
 def grid_numbers(low: float, high: float, apart_mm: float) -> Floats:
     """Whole numbers k for which (k + 1/2) apart lies between low and high: a grid that is the same in every layer."""
     return np.arange(ceil(low / apart_mm - 0.5), ceil(high / apart_mm - 0.5), dtype=np.float64)
+
+
+def zigzag_lines(area: Polygons, fence: Polygons, angle_deg: float, apart_mm: float, reach_mm: float) -> list[Floats]:
+    """Lines (n, 2) on the grid of parallel_lines that end on the border of an area.
+
+    Ends of neighbouring lines nearer than reach_mm are joined unless the fence lies between them.
+    """
+    sides = border_of(area).turned(angle_deg)
+    if not len(sides):
+        return []
+    heights = (grid_numbers(float(sides[:, 1].min()), float(sides[:, 1].max()), apart_mm) + 0.5) * apart_mm
+    rows = scan_lines(sides, heights)
+    if not len(rows):
+        return []
+    points, starts = join_lines(rows, border_of(fence).turned(angle_deg), reach_mm)
+    return np.split(points @ rotation_2d(angle_deg).T, starts[1:])
 
 
 def horizontal_lines(heights: Floats, box: Box) -> Lines:

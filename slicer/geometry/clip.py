@@ -11,7 +11,7 @@ from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import kernel, part
 from mdp.kernels.sorting import sort_into_bins
 from mdp.mesh import Floats
-from slicer.geometry.polygons import Polygons, contours
+from slicer.geometry.polygons import Polygons, contours, edges_of
 from slicer.geometry.segments import Segment, crossing, edge
 
 Indices = NDArray[np.int64]
@@ -61,13 +61,7 @@ NO_PIECES = Pieces(np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros((0, 2), np.
 def border_of(polygons: Polygons) -> Border:
     """The border of polygons."""
     loops = contours(polygons)
-    offsets = np.cumsum([0, *(len(loop) for loop in loops)], dtype=np.int64)
-    if not loops:
-        return Border(np.zeros((0, 4)), offsets)
-    points = np.concatenate(loops)
-    following = np.arange(1, len(points) + 1)
-    following[offsets[1:] - 1] = offsets[:-1]
-    return Border(np.hstack([points, points[following]]), offsets)
+    return Border(edges_of(loops), np.cumsum([0, *(len(loop) for loop in loops)], dtype=np.int64))
 
 
 def rotation_2d(angle_deg: float) -> Floats:

@@ -169,9 +169,9 @@ def edges_of(loops: Sequence[Floats]) -> Floats:
         return np.zeros((0, 4))
     points = np.concatenate(loops)
     ends = np.cumsum([len(loop) for loop in loops])
-    following = np.arange(1, len(points) + 1)
-    following[ends - 1] = np.concatenate([[0], ends[:-1]])
-    return np.hstack([points, points[following]])
+    after = np.arange(1, len(points) + 1)
+    after[ends - 1] = np.concatenate([[0], ends[:-1]])
+    return np.hstack([points, points[after]])
 
 
 def area_mm2(loop: Floats) -> float:

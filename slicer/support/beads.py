@@ -3,7 +3,7 @@
 from mdp.mesh import Floats
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
-from slicer.fill.zigzag import zigzag_lines
+from slicer.fill.pattern import zigzag_lines
 from slicer.geometry.polygons import Polygons, close_loop, contours, offset, opening
 from slicer.paths import Kind
 from slicer.travel.islands import OUTSIDE

@@ -12,8 +12,8 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm
+from slicer.fill.pattern import zigzag_lines
 from slicer.fill.skin import SolidLines, skin_beads
-from slicer.fill.zigzag import zigzag_lines
 from slicer.geometry.cross_section import cross_sections
 from slicer.geometry.polygons import Polygons, clean, close_loop, contours, offset
 from slicer.paths import Kind

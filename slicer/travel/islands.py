@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Ints
 from slicer.bead import Bead
-from slicer.geometry.polygons import Polygons, area_mm2, contours, start_at
+from slicer.geometry.polygons import Polygons, area_mm2, contours, edges_of
 from slicer.geometry.segments import inside
 from slicer.paths import Kind
 
@@ -39,11 +39,10 @@ def _pieces_around(starts: Floats, area: Polygons) -> Ints:
     outer = sorted((loop for loop in contours(area) if area_mm2(loop) > 0), key=lambda loop: abs(area_mm2(loop)))
     if len(outer) < 2:
         return np.zeros(len(starts), np.int32)
-    sides = [np.hstack([loop, start_at(loop, 1)]) for loop in outer]
-    offsets = np.cumsum([0, *(len(side) for side in sides)])
+    offsets = np.cumsum([0, *(len(loop) for loop in outer)])
     boxes = np.array([[*loop.min(axis=0), *loop.max(axis=0)] for loop in outer])
-    found: Ints = _containing(np.concatenate(sides), offsets, boxes, starts)
-    return found
+    pieces: Ints = _containing(edges_of(outer), offsets, boxes, starts)
+    return pieces
 
 
 @kernel

@@ -9,11 +9,11 @@ SQUARE = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]])
 
 
 def test_a_long_line_loses_the_time_of_one_acceleration() -> None:
-    assert line_s(10.0, 50.0, 1000.0) == pytest.approx(10.0 / 50.0 + 50.0 / 1000.0)
+    assert line_s(10.0, 50.0, 1000.0, 0.0) == pytest.approx(10.0 / 50.0 + 50.0 / 1000.0)
 
 
 def test_a_short_line_never_reaches_its_speed() -> None:
-    assert line_s(1.0, 50.0, 1000.0) == pytest.approx(2.0 * (1.0 / 1000.0) ** 0.5)
+    assert line_s(1.0, 50.0, 1000.0, 0.0) == pytest.approx(2.0 * (1.0 / 1000.0) ** 0.5)
 
 
 def test_a_line_begun_and_ended_at_its_speed_loses_nothing() -> None:
@@ -21,7 +21,7 @@ def test_a_line_begun_and_ended_at_its_speed_loses_nothing() -> None:
 
 
 def test_a_square_that_stops_at_its_corners_is_four_lines() -> None:
-    assert loop_s(SQUARE, 50.0, 1000.0, 1e-6) == pytest.approx(4.0 * line_s(20.0, 50.0, 1000.0), rel=1e-3)
+    assert loop_s(SQUARE, 50.0, 1000.0, 1e-6) == pytest.approx(4.0 * line_s(20.0, 50.0, 1000.0, 0.0), rel=1e-3)
 
 
 def test_a_square_is_slowed_at_its_corners_to_the_junction_speed() -> None:

@@ -13,7 +13,7 @@ SPACING = spacing_mm(0.45, 0.2)
 
 
 def test_walls_are_nested_a_spacing_apart() -> None:
-    sides = [area_mm2(loops[0]) ** 0.5 for loops in shell_of(SQUARE, PROCESS, 0.2, SQUARE).walls]
+    sides = [area_mm2(loops[0]) ** 0.5 for loops in shell_of(SQUARE, PROCESS, 0.2, covered=SQUARE).walls]
     outer = 20.0 - 0.45
     assert sides == pytest.approx([outer, outer - 2.0 * SPACING, outer - 4.0 * SPACING], abs=0.01)
 
@@ -21,9 +21,9 @@ def test_walls_are_nested_a_spacing_apart() -> None:
 def test_what_is_covered_is_sparse_and_what_is_bare_is_skin() -> None:
     half = Polygons.square((10.0, 20.0))
     inside = 20.0 - 0.45 - 5.0 * SPACING
-    covered = shell_of(SQUARE, PROCESS, 0.2, SQUARE)
-    bare = shell_of(SQUARE, PROCESS, 0.2, None)
-    partly = shell_of(SQUARE, PROCESS, 0.2, half)
+    covered = shell_of(SQUARE, PROCESS, 0.2, covered=SQUARE)
+    bare = shell_of(SQUARE, PROCESS, 0.2, covered=None)
+    partly = shell_of(SQUARE, PROCESS, 0.2, covered=half)
     assert (covered.skin.area_mm2, covered.sparse.area_mm2) == pytest.approx((0.0, inside**2), abs=0.1)
     assert (bare.skin.area_mm2, bare.sparse.area_mm2) == pytest.approx((inside**2, 0.0), abs=0.1)
     assert partly.skin.area_mm2 + partly.sparse.area_mm2 == pytest.approx(inside**2, abs=0.1)
@@ -31,14 +31,14 @@ def test_what_is_covered_is_sparse_and_what_is_bare_is_skin() -> None:
 
 
 def test_a_strip_of_three_beads_keeps_a_gap_between_its_walls() -> None:
-    strip = shell_of(Polygons.square((20.0, 1.2)), PROCESS, 0.2, None)
+    strip = shell_of(Polygons.square((20.0, 1.2)), PROCESS, 0.2, covered=None)
     assert sum(place.area_mm2 for place in strip.narrow) == pytest.approx(19.0 * (1.2 - 0.45 - SPACING), rel=0.1)
     assert strip.skin.area_mm2 == 0.0
 
 
 def test_along_the_face_of_a_cut_runs_one_wall_and_infill_begins_behind_it() -> None:
     model = Polygons.square((40.0, 20.0))
-    cut = shell_of(SQUARE, PROCESS, 0.2, SQUARE, model)
+    cut = shell_of(SQUARE, PROCESS, 0.2, covered=SQUARE, model=model)
     three, one = 0.225 + 2.5 * SPACING, 0.225 + 0.5 * SPACING
     assert len(cut.walls) == PROCESS.interface_walls == 1
     assert cut.sparse.area_mm2 == pytest.approx((20.0 - three - one) * (20.0 - 2.0 * three), rel=0.01)
@@ -47,6 +47,6 @@ def test_along_the_face_of_a_cut_runs_one_wall_and_infill_begins_behind_it() -> 
 
 def test_under_a_later_part_is_a_floor() -> None:
     half = Polygons.square((10.0, 20.0))
-    assert shell_of(SQUARE, PROCESS, 0.2, SQUARE, None, half).sparse.area_mm2 == pytest.approx(
+    assert shell_of(SQUARE, PROCESS, 0.2, covered=SQUARE, ceiling=half).sparse.area_mm2 == pytest.approx(
         (20.0 - 0.225 - 2.5 * SPACING - 10.0) * (20.0 - 0.45 - 5.0 * SPACING), rel=0.01
     )

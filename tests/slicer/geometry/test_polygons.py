@@ -1,10 +1,36 @@
-"""Pieces of polygons keep their holes, offsets their inside."""
+"""Polygons: their booleans and offsets judged by shapely, their pieces, their contours."""
 
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from slicer.geometry.polygons import Polygons, contours, islands, offset, offset_round, opening
+from mdp.mesh import Floats
+from slicer.geometry.polygons import (
+    MITRE,
+    Polygons,
+    area_mm2,
+    bounding_box,
+    close_loop,
+    closing,
+    contours,
+    difference,
+    edges,
+    half_plane,
+    islands,
+    offset,
+    offset_round,
+    opening,
+    resample,
+    start_at,
+    strips,
+    union,
+)
+from tests.slicer.hand import as_shapely, ragged
+
+seeds = st.integers(0, 10**6)
+few = settings(deadline=None, max_examples=25)
 
 # a section of a thin curved shell without its infill: the hole touches the outline in two corners, to 1e-8 mm
 OUTLINE = [
@@ -52,3 +78,102 @@ def grown_mm2(polygons: Polygons, distance_mm: float) -> float:
     loops = [shapely.Polygon(loop) for loop in contours(polygons)]
     whole = loops[0].difference(shapely.union_all(loops[1:]))
     return float(whole.buffer(distance_mm).area)
+
+
+def differs_mm2(polygons: Polygons, expected: shapely.Geometry) -> float:
+    return float(as_shapely(polygons).symmetric_difference(expected).area)
+
+
+@few
+@given(seeds)
+def test_booleans_of_several_are_shapely_s(seed: int) -> None:
+    first, second, third = ragged(seed), ragged(seed + 1).translate((9.0, 4.0)), ragged(seed + 2).translate((-7.0, 8.0))
+    theirs = [as_shapely(area) for area in (first, second, third)]
+    assert differs_mm2(union([first, second, third]), shapely.union_all(theirs)) < 1e-4
+    assert differs_mm2(difference(first, second, third), theirs[0] - theirs[1] - theirs[2]) < 1e-4
+
+
+@few
+@given(seeds, st.floats(0.05, 2.0))
+def test_an_offset_lies_between_round_ones_of_its_distance_and_of_the_longest_mitre(seed: int, distance_mm: float) -> None:
+    star = ragged(seed)
+    area = as_shapely(star)
+    wide, narrow = as_shapely(offset(star, distance_mm)), as_shapely(offset(star, -distance_mm))
+    assert wide.buffer(1e-4).covers(area.buffer(0.99 * distance_mm))
+    assert area.buffer(1.01 * MITRE * distance_mm).covers(wide)
+    assert area.buffer(-0.98 * distance_mm).buffer(1e-4).covers(narrow)
+    assert narrow.buffer(1e-4).covers(area.buffer(-1.01 * MITRE * distance_mm))
+
+
+@few
+@given(seeds, st.floats(-1.5, 1.5).filter(lambda distance: abs(distance) > 0.05))
+def test_a_round_offset_is_shapely_s(seed: int, distance_mm: float) -> None:
+    star = ragged(seed)
+    expected = as_shapely(star).buffer(distance_mm, quad_segs=8)
+    assert differs_mm2(offset_round(star, distance_mm), expected) < 0.01 * abs(distance_mm) * as_shapely(star).length
+
+
+@few
+@given(seeds, st.floats(0.1, 1.5))
+def test_opening_takes_only_what_is_narrow_away_and_closing_only_adds_such(seed: int, radius_mm: float) -> None:
+    star = ragged(seed)
+    area, opened, closed = (as_shapely(polygons) for polygons in (star, opening(star, radius_mm), closing(star, radius_mm)))
+    assert area.buffer(1e-4).covers(opened)
+    assert opened.buffer(1e-4).covers(area.buffer(-1.01 * MITRE * radius_mm).buffer(radius_mm))
+    assert (area - closed).area < 2.0 * radius_mm**2, "but for tips that are sharper than a mitre"
+    assert area.buffer(1.01 * MITRE * radius_mm).buffer(-radius_mm).buffer(0.02).covers(closed)
+
+
+@few
+@given(seeds, st.floats(0.0, 6.3), st.floats(-40.0, 40.0))
+def test_a_half_plane_is_what_lies_on_one_side_of_a_line(seed: int, turn: float, c: float) -> None:
+    star, (a, b) = ragged(seed), (np.cos(turn), np.sin(turn))
+    side = shapely.affinity.rotate(shapely.box(-c, -200.0, 200.0, 200.0), turn, origin=(0.0, 0.0), use_radians=True)
+    assert differs_mm2(half_plane(star, a, b, c), as_shapely(star) & side) < 1e-4
+
+
+@pytest.mark.parametrize(("c", "area"), [(0.0, 4.0), (1e-12, 4.0), (-1e-12, 0.0)])
+def test_a_half_plane_without_a_direction_holds_all_or_nothing(c: float, area: float) -> None:
+    assert half_plane(Polygons.square((2.0, 2.0)), 0.0, 0.0, c).area() == area
+    assert half_plane(Polygons(), 1.0, 0.0, 5.0).is_empty()
+
+
+@few
+@given(st.lists(st.tuples(st.floats(-20, 20), st.floats(-20, 20)), min_size=2, max_size=8, unique=True), st.floats(0.1, 2.0))
+def test_strips_are_segments_with_square_ends(points: list[tuple[float, float]], reach_mm: float) -> None:
+    line = np.array(points)
+    segments = [shapely.LineString(line[k : k + 2]) for k in range(len(line) - 1)]
+    expected = shapely.union_all([segment.buffer(reach_mm, cap_style="square") for segment in segments if segment.length > 1e-3])
+    assert differs_mm2(strips([line], reach_mm), expected) < 1e-3
+
+
+@few
+@given(seeds, st.floats(0.2, 5.0))
+def test_a_sampled_loop_keeps_its_corners_and_has_no_longer_edge_than_asked(seed: int, step_mm: float) -> None:
+    for loop in contours(ragged(seed)):
+        sampled = resample(loop, step_mm)
+        assert np.hypot(*np.diff(close_loop(sampled), axis=0).T).max() <= step_mm + 1e-9
+        assert {tuple(point) for point in loop.tolist()} <= {tuple(point) for point in sampled.tolist()}
+        assert area_mm2(sampled) == pytest.approx(area_mm2(loop))
+
+
+@few
+@given(seeds)
+def test_contours_edges_and_areas_agree_with_shapely(seed: int) -> None:
+    star = ragged(seed)
+    area, sides = as_shapely(star), edges(star)
+    assert np.hypot(*(sides[:, 2:] - sides[:, :2]).T).sum() == pytest.approx(area.length)
+    assert sum(area_mm2(loop) for loop in contours(star)) == pytest.approx(area.area)
+    assert sorted(piece.area() for piece in islands(star)) == pytest.approx(sorted(p.area for p in shapely.get_parts(area)))
+    assert bounding_box(star, 0.5).bounds() == pytest.approx(area.envelope.buffer(0.5, join_style="mitre").bounds)
+
+
+def test_a_loop_is_the_same_from_any_of_its_points() -> None:
+    loop: Floats = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0]])
+    assert start_at(loop, 2).tolist() == [[3.0, 2.0], [0.0, 0.0], [3.0, 0.0]]
+    assert area_mm2(start_at(loop, 1)) == area_mm2(loop) == 3.0
+
+
+def test_nothing_has_no_pieces_contours_or_edges() -> None:
+    assert (islands(Polygons()), contours(Polygons()), edges(Polygons()).shape) == ([], [], (0, 4))
+    assert union([]).is_empty()

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from slicer.bead import length_mm
-from slicer.fill.zigzag import zigzag_lines
+from slicer.fill.pattern import zigzag_lines
 from slicer.geometry.polygons import Polygons
 from tests.slicer.fill.areas import STARS
 from tests.slicer.hand import as_shapely

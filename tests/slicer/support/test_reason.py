@@ -1,0 +1,61 @@
+"""Why a place gets no support: for every reason a part that has it."""
+
+import manifold3d as m3
+import pytest
+
+from mdp.decomposition import Part
+from slicer.parts import slice_parts
+from slicer.slice import slice_part
+from tests.shapes import standing, tee
+from tests.slicer.hand import cut, profile, whole
+
+BLOCK = m3.Manifold.cube
+
+
+def pit(width_mm: float, deep_mm: float) -> Part:
+    """A block with a closed chamber, whose ceiling is too wide for the bridges that are allowed."""
+    chamber = BLOCK((width_mm, 16, deep_mm)).translate((10 - 0.5 * width_mm, 2, 15 - deep_mm))
+    return whole(standing(BLOCK((20, 20, 20)) - chamber))
+
+
+def crossed(height_mm: float, normal: tuple[float, float, float]) -> list[Part]:
+    """A post with an arm that ends in a bar across it, cut beside the post."""
+    arm = BLOCK((30, 8, 4)) + BLOCK((4, 20, 4)).translate((26, 0, 0))
+    return cut(standing(BLOCK((8, 8, 30)) + arm.translate((0, 0, height_mm))), (normal, 4.0))
+
+
+DEEP_GAP = "process.support_bottom_gap_mm=0.6"
+NO_BRIDGES = ("process.bridge_longest_mm=1", "process.support_distance_mm=1")
+
+
+@pytest.mark.parametrize(
+    ("parts", "settings", "reason"),
+    [
+        ([whole(tee(height=14))], ("machine.table.radius_mm=8",), "the plate ends before"),
+        (
+            [pit(16, 0.7)],
+            (*NO_BRIDGES, "process.support_bottom_gap_mm=0.6"),
+            "there is no room for support between it and the plastic below",
+        ),
+        ([pit(2.4, 10.0)], NO_BRIDGES, "there is no room for support beside the walls"),
+        (crossed(8, (1, 0, 0)), (), "the head would meet the table if support were printed there with part 2"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_place_without_support_has_the_reason_that_its_part_is_made_for(
+    parts: list[Part], settings: tuple[str, ...], reason: str
+) -> None:
+    places = [place for piece in slice_parts(parts, profile(*settings), processes=1) for place in piece.unsupported]
+    assert {place.reason for place in places} == {reason}
+    assert [place.mm2 for place in places] == sorted((place.mm2 for place in places), reverse=True)
+
+
+def test_an_arm_farther_out_than_support_may_lean_from_its_part_s_own_foot() -> None:
+    gallows = BLOCK((16, 8, 10)) + BLOCK((8, 8, 18)) + BLOCK((26, 8, 4)).translate((0, 0, 18))
+    base, top = cut(standing(gallows), ((0, 0, 1), 10.0))
+    (place,) = slice_part(top, profile("process.support_branch_angle_deg=30"), [base]).unsupported
+    assert place.reason == "support would have to lean by more than 30 deg to find ground"
+
+
+def test_a_print_that_hangs_nowhere_has_no_reason_to_give() -> None:
+    assert slice_part(whole(standing(BLOCK((10, 10, 5)))), profile()).unsupported == ()
