@@ -29,7 +29,7 @@ PROGRESS_S = 0.2  # a person reads no faster
 ASK_S = 5.0  # between temperature questions to a printer that does not report by itself, or has fallen silent
 REPORT_S = 2  # between reports of one that does
 BOUNDARY_S = 15.0  # a pause waits so long for the end of a stroke
-MUTE_LINES = 4  # between records of the journal for such a one: what it may have done since is done twice
+MUTE_LINES = 4  # between records of the journal where answers do not name lines: what was done since is done twice
 NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
 

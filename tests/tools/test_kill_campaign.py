@@ -52,6 +52,6 @@ def test_power_cuts_lose_no_stroke_and_no_height_that_was_not_asked_for(
     monkeypatch: pytest.MonkeyPatch, advanced: bool, most: int
 ) -> None:
     monkeypatch.setattr(kill_campaign, "LAYERS", 4)
-    for cut in cut_campaign(6, 5, BuildOptions(advanced_ok=advanced, rx_ring=RING)):
+    for cut in cut_campaign(4, 5, BuildOptions(advanced_ok=advanced, rx_ring=RING)):
         assert (cut.result.gap, cut.result.twice <= most) == (0, True), cut.result.how
         assert cut.off_mm < (0.005 if cut.heights == 1 else LIFT_MM / 2 + 0.005), cut.result.how

@@ -26,17 +26,17 @@ OUTLINE_MM = 2.0  # beside the print: farther than the drop at the tip is wide
 
 
 def program_of(machine: str, upright: bool) -> tuple[Profile, MachineProgram]:
-    """A post 60 mm high; unless it is upright its top is cut off at a slant and printed with the table tilted."""
+    """A post 30 mm high; unless it is upright its top is cut off at a slant and printed with the table tilted."""
     profile = load(machine=machine, settings=["machine.purge_mm=0"])
-    post, slant = m3.Manifold.cube((10.0, 10.0, 60.0)).translate((-5.0, -5.0, 0.0)), np.radians(20.0)
-    plane = Plane(np.array([np.sin(slant), 0.0, np.cos(slant)]), 48.0)
+    post, slant = m3.Manifold.cube((10.0, 10.0, 30.0)).translate((-5.0, -5.0, 0.0)), np.radians(20.0)
+    plane = Plane(np.array([np.sin(slant), 0.0, np.cos(slant)]), 22.0)
     top, rest = post.split_by_plane(tuple(plane.normal), plane.offset_mm)
     parts = [part(1, from_manifold(post if upright else rest), PLATFORM, level(profile.machine), profile.machine)]
     if not upright:
         mesh = from_manifold(top)
         parts.append(part(2, mesh, plane, allowed_poses(profile.machine, plane.normal, mesh.vertices)[0], profile.machine))
     whole = Decomposition("post", from_manifold(post), tuple(parts), len(parts), "classic", 100.0, 0.0, 0, 1, 0.0)
-    layers = {1: 300 if upright else 230, 2: 5}
+    layers = {1: 150 if upright else 105, 2: 5}
     return profile, plan(whole, [squares(each, profile, layers[each.index]) for each in parts], profile)
 
 
