@@ -10,7 +10,7 @@ import argparse
 import statistics
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from itertools import product
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -156,16 +156,14 @@ def _moved(browser: Browser, x: float, y: float) -> float:
 def on_benches(count: int, models: Sequence[Path]) -> str:
     """A row: processes and memory of so many benches on each of which the models were opened one after the other and a plane
     tried, and of the first alone when the others are closed."""
-    with workbench() as running, ExitStack() as lines:
+    with workbench() as running:
         above, origin = f"/{running.place.split('/')[1]}/benches", f"http://127.0.0.1:{running.port}"
         for _ in range(count - 1):
             running.ask(f"{above}?like=1", "POST", Origin=origin)
         benches = [Running(running.process, running.address.replace("/1/", f"/{k + 1}/")) for k in range(count)]
-        pages = [lines.enter_context(bench.line()) for bench in benches]
-        for model in models:
-            for bench, page in zip(benches, pages, strict=True):
-                bench.send(model)
-                page.until(lambda state: state["model"] and state["model"]["name"] == model.name)  # noqa: B023
+        for model, bench in product(models, benches):
+            bench.send(model)
+            with bench.line() as page:
                 page.do("add", normal=[0, 0, 1], offset_mm=page.state["model"]["size_mm"][2] * HEIGHT_SHARE)
                 page.until(lambda state: state["trial"] and state["parts"] == 2 and state["resting"] and not state["preparing"])
         filled = memory(running)
