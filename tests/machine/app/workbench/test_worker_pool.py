@@ -115,8 +115,8 @@ def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_
 
 
 def test_a_process_that_rests_goes_and_the_next_task_starts_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker_pool, "REST_AFTER_S", 0.05)
     started, pool = Started(monkeypatch), WorkerPool(1)
-    pool.rest_after_s = 0.05
 
     async def work() -> None:
         tasks = TaskQueue(pool)
