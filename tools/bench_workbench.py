@@ -2,13 +2,15 @@
 
 Starts `tiltprint edit` on models of its own, a figure with a wavy skin in 10,000 and 100,000 faces, and is a page of it: drags a
 plane as a hand does, the next move when the figures of the one before are there. In Chromium, where it is installed, also
-turns the model and drags the handle of the plane. --model FILE: a model of yours instead.
+turns the model and drags the handle of the plane. --model FILE: a model of yours instead. --benches N ...: how many processes and
+how much memory so many benches take, each with the figure, planes tried on it, and a second figure after that.
 """
 
 import argparse
 import statistics
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
@@ -29,6 +31,7 @@ WAVE_MM, FOOT_MM = 0.02, 5.0  # of the skin, growing from the platform upwards
 HEIGHT_SHARE, STEP_SHARE, LEAN = 0.3, 0.004, 0.01  # of the plane that is dragged
 PAUSE_S = 0.016  # of a hand between two places, a picture of a screen
 COLUMNS = ("faces", "open s", "first figures s", "live ms", "the same in a page", "risky while turning ms", "stopped / taken s")
+SETTLED_S = 3.0  # until processes that are not needed any more are gone
 SCREEN = "document.documentElement.dataset"
 
 
@@ -150,6 +153,34 @@ def _moved(browser: Browser, x: float, y: float) -> float:
     return float(browser.value(f"{SCREEN}.triedMs"))
 
 
+def on_benches(count: int, models: Sequence[Path]) -> str:
+    """A row: processes and memory of so many benches on each of which the models were opened one after the other and a plane
+    tried, and of the first alone when the others are closed."""
+    with workbench() as running:
+        above, origin = f"/{running.place.split('/')[1]}/benches", f"http://127.0.0.1:{running.port}"
+        for _ in range(count - 1):
+            running.ask(f"{above}?like=1", "POST", Origin=origin)
+        benches = [Running(running.process, running.address.replace("/1/", f"/{k + 1}/")) for k in range(count)]
+        for model, bench in product(models, benches):
+            bench.send(model)
+            with bench.line() as page:
+                page.do("add", normal=[0, 0, 1], offset_mm=page.state["model"]["size_mm"][2] * HEIGHT_SHARE)
+                page.until(lambda state: state["trial"] and state["parts"] == 2 and state["resting"] and not state["preparing"])
+        filled = memory(running)
+        for k in range(2, count + 1):
+            running.ask(f"{above}/{k}", "DELETE", Origin=origin)
+        sleep(SETTLED_S)
+        return f"| {count} | {filled} | {memory(running)} |"
+
+
+def memory(running: Running) -> str:
+    """How many processes a workbench is, and how much memory they take together; what they share is counted once."""
+    processes = [running.process.pid, *running.children()]
+    rolls = [Path(f"/proc/{pid}/smaps_rollup").read_text() for pid in processes]
+    kib = sum(int(line.split()[1]) for roll in rolls for line in roll.splitlines() if line.startswith("Pss:"))
+    return f"{len(processes)}, {kib / 2**20:.2f} GiB"
+
+
 def told(row: dict[str, float]) -> str:
     """A row of the table."""
     live = f"{1000 * row['live']:.0f} / {1000 * row['worst']:.0f}"
@@ -158,13 +189,28 @@ def told(row: dict[str, float]) -> str:
     return f"| {row['faces']:.0f} | {row['open']:.1f} | {row['first']:.2f} | {live} | {page} | {turn} | {ends} |"
 
 
+def measure_benches(counts: Sequence[int], faces: int) -> None:
+    """Print the table of memory."""
+    print("| benches | processes, memory | the same when all but one are closed |\n|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        models = [Path(folder) / f"{name}.stl" for name in ("first", "second")]
+        for model in models:
+            model.write_bytes(stl(mesh_of(figure(faces))))
+        for count in counts:
+            print(on_benches(count, models), flush=True)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", action="append", default=[])
     parser.add_argument("--faces", action="append", default=[], type=int)
     parser.add_argument("--moves", type=int, default=20)
+    parser.add_argument("--benches", nargs="+", default=[], type=int)
     options = parser.parse_args(arguments)
+    if options.benches:
+        measure_benches(options.benches, (options.faces or FACES)[-1])
+        return
     print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}")
     with tempfile.TemporaryDirectory() as folder:
         models = list(options.model)

@@ -27,7 +27,10 @@ def make_ready(tell: Tell, number: int, bench: Bench) -> None:
 
 
 def load_kernels(tell: Tell) -> None:
-    """Have what planes need loaded, or compiled, before there is a model: a box shows what that is."""
+    """Have what planes need loaded, or compiled, before there is a model: a box shows what that is. From now on the process is
+    another bench's."""
+    global _ready
+    _ready = None
     compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
     corners = np.array(list(product((0.0, 10.0), repeat=3)))
     Trials(convex_hull(corners), load()).warm()

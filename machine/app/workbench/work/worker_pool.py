@@ -22,10 +22,10 @@ COMMAND = (sys.executable, "-m", "machine.app.workbench.work.worker")
 
 @dataclass(eq=False)
 class Worker:
-    """A process, the tasks that it was taken for last, and what will end it when it has rested."""
+    """A process, the tasks that it was taken for last, None when it is ended, and what will end it when it has rested."""
 
     process: Process
-    tasks: "TaskQueue"
+    tasks: "TaskQueue | None"
     end: asyncio.TimerHandle | None = None
 
 
@@ -34,7 +34,6 @@ class WorkerPool:
 
     def __init__(self, most: int, most_each: int = 1) -> None:
         self.most, self.most_each = most, most_each
-        self.rest_after_s = REST_AFTER_S
         self._places = asyncio.Semaphore(most)
         self._starting = 0
         self._busy: list[Worker] = []
@@ -65,8 +64,9 @@ class WorkerPool:
                 end_process(worker.process)
                 raise
             else:
-                worker.end = asyncio.get_running_loop().call_later(self.rest_after_s, self._end, worker)
-                self._idle.append(worker)
+                if worker.tasks is not None:
+                    worker.end = asyncio.get_running_loop().call_later(REST_AFTER_S, self._end, worker)
+                    self._idle.append(worker)
             finally:
                 self._busy.remove(worker)
 
@@ -98,6 +98,7 @@ class WorkerPool:
         return worker
 
     def _end(self, worker: Worker) -> None:
+        worker.tasks = None
         end_process(worker.process)
         if worker in self._idle:
             self._idle.remove(worker)

@@ -35,7 +35,8 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def names_in(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.rglob("*") if path.is_file())
+    """The files that pages have sent; what a bench makes of them lies beside their folders."""
+    return sorted(path.name for path in folder.glob("*/*") if path.is_file())
 
 
 def left_by_a_killed_one(*names: str) -> Path:

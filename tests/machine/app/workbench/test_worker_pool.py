@@ -2,12 +2,13 @@
 
 import asyncio
 from collections.abc import Coroutine
+from contextlib import AsyncExitStack
 from typing import Any
 
 import pytest
 
 from machine.app.requests import Given
-from machine.app.workbench.bench.bench import Bench, with_model
+from machine.app.workbench.bench.bench import Bench, History, Step, with_model
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.work import worker_pool
 from machine.app.workbench.work.cutting import SearchWay
@@ -114,8 +115,8 @@ def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_
 
 
 def test_a_process_that_rests_goes_and_the_next_task_starts_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker_pool, "REST_AFTER_S", 0.05)
     started, pool = Started(monkeypatch), WorkerPool(1)
-    pool.rest_after_s = 0.05
 
     async def work() -> None:
         tasks = TaskQueue(pool)
@@ -147,6 +148,31 @@ def test_a_bench_gets_the_process_that_it_had_and_its_end_is_that_of_this_proces
 
     run(work(), pool)
     assert len(started.processes) == 2
+
+
+def test_a_search_that_waits_for_the_processes_of_other_benches_says_so() -> None:
+    pools = WorkerPools()
+    pools.long = WorkerPool(1)
+
+    async def work() -> tuple[str, str]:
+        session = Session(PROFILE, Given(), pools)
+        session.history = History(Step("", with_model(Bench(PROFILE), model())))
+        told = []
+        for others in (0, 1):
+            async with AsyncExitStack() as stack:
+                if others:
+                    await stack.enter_async_context(pools.long.worker(TaskQueue(pools.long)))
+                session.finding.begin()
+                assert session.finding.search is not None
+                told.append(session.finding.search.searched.text)
+                await asyncio.sleep(0)
+                session.finding.stop()
+        await asyncio.sleep(0)
+        session.close()
+        await asyncio.gather(*session._tasks, return_exceptions=True)
+        return told[0], told[1]
+
+    assert run(work(), pools.long) == ("beginning", "waiting until the work of other benches is done")
 
 
 def test_planes_are_tried_on_their_own_bench_whoever_had_the_process_in_between() -> None:
