@@ -59,6 +59,9 @@ def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm:
     layer meets the top: it is lower, or, where that would make it lower than least_layer_height_mm or a quarter layer, the
     last few share what remains. A part lower than the least layer is one of that height.
     Raises SliceError for a part that is too high to be meant.
+
+    >>> equal_heights(0.9, Process(name="example", first_layer_height_mm=0.3), True, 0.4).tip_mm.round(6).tolist()
+    [0.3, 0.5, 0.7, 0.9]
     """
     _check(top_mm, process)
     overlap, first = _first(process, on_platform)
