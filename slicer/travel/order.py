@@ -90,7 +90,7 @@ def _island_order(groups: dict[int, list[Bead]], first: Floats, support_first: b
         if stage == 1 and 2 in stages:
             parts = np.array([_middle(groups[island]) for island in stages[2]])
             goal = parts[np.argmin(((parts - places.mean(axis=0)) ** 2).sum(axis=1))][None]
-        order, _ = order_paths(places, places, np.ones(len(places), np.bool_), first[0], first[1], goal)
+        order, _ = order_paths(places, places, np.ones(len(places), np.bool_), first, goal)
         islands += [stages[stage][k] for k in order]
         first = _middle(groups[islands[-1]])
     return islands
