@@ -113,7 +113,11 @@ def _corners(points: Floats, tolerance_mm: float) -> NDArray[np.bool_]:
 
 
 def spacing_mm(width_mm: float, height_mm: float) -> float:
-    """Distance of neighbouring beads whose rounded sides leave no plastic over: cross-section / height."""
+    """Distance of neighbouring beads whose rounded sides leave no plastic over: cross-section / height.
+
+    >>> round(spacing_mm(0.45, 0.2), 3)
+    0.407
+    """
     return width_mm - height_mm * ROUND_SIDES
 
 

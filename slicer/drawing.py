@@ -7,7 +7,7 @@ import numpy as np
 
 from mdp.mesh import Floats
 from profiles.errors import SliceError
-from slicer.paths import Kind, Layer, Path, SlicedPart
+from slicer.paths import Kind, Path, SlicedPart
 
 COLOURS = {
     Kind.OUTER_WALL: "#e8a33d",
@@ -45,7 +45,8 @@ def layer_svg(sliced: SlicedPart, number: int) -> str:
     points = np.concatenate([path.points for path in layer.paths])
     low, high = points.min(axis=0) - MARGIN_MM, points.max(axis=0) + MARGIN_MM
     kinds = [kind for kind in Kind if any(path.kind is kind for path in layer.paths)]
-    lines = [*_head(sliced.index, number, layer, low, high, len(kinds)), *_legend(kinds, low, high)]
+    title = f"part {sliced.index}, layer {number}, z {layer.z_mm:.3f} mm, height {layer.height_mm:.3f} mm"
+    lines = [*_head(title, low, high, len(kinds)), *_legend(kinds, low, high)]
     lines.append('<g transform="scale(1 -1)" fill="none" stroke-linecap="round" stroke-linejoin="round">')
     for kind in kinds:
         lines += _beads(kind, [path for path in layer.paths if path.kind is kind])
@@ -53,14 +54,14 @@ def layer_svg(sliced: SlicedPart, number: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _head(part: int, number: int, layer: Layer, low: Floats, high: Floats, rows: int) -> Iterator[str]:
+def _head(title: str, low: Floats, high: Floats, rows: int) -> Iterator[str]:
     width, height = high - low
     width, height = max(width, 10.0 * LEGEND_MM), height + LEGEND_MM * (rows + 1)
     yield (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{SCALE * width:.0f}" height="{SCALE * height:.0f}" '
         f'viewBox="{low[0]:.3f} {-high[1]:.3f} {width:.3f} {height:.3f}">'
     )
-    yield f"<title>part {part}, layer {number}, z {layer.z_mm:.3f} mm, height {layer.height_mm:.3f} mm</title>"
+    yield f"<title>{title}</title>"
     yield f'<rect x="{low[0]:.3f}" y="{-high[1]:.3f}" width="{width:.3f}" height="{height:.3f}" fill="#ffffff"/>'
 
 

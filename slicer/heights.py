@@ -46,9 +46,10 @@ def layer_heights(mesh: Mesh, profile: Profile, on_platform: bool, pedestal_mm: 
     roof_mm = pedestal_mm - process.pedestal_gap_mm
     if pedestal_mm < top and roof_mm >= process.least_layer_height_mm:
         pedestal = equal_heights(roof_mm, process, True, nozzle_mm)
-        return pedestal + _heights_from(mesh, process, nozzle_mm, pedestal_mm, pedestal_mm, process.first_layer_height_mm)
-    overlap, first = _first(process, on_platform)
-    return _heights_from(mesh, process, nozzle_mm, -overlap, 0.0, first)
+        return pedestal + _heights_from(
+            mesh, process, nozzle_mm, _Bottom(pedestal_mm, pedestal_mm, process.first_layer_height_mm)
+        )
+    return _heights_from(mesh, process, nozzle_mm, _bottom(process, on_platform))
 
 
 def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm: float) -> Heights:
@@ -59,28 +60,47 @@ def equal_heights(top_mm: float, process: Process, on_platform: bool, nozzle_mm:
     layer meets the top: it is lower, or, where that would make it lower than least_layer_height_mm or a quarter layer, the
     last few share what remains. A part lower than the least layer is one of that height.
     Raises SliceError for a part that is too high to be meant.
+
+    >>> equal_heights(0.9, Process(name="example", first_layer_height_mm=0.3), True, 0.4).tip_mm.round(6).tolist()
+    [0.3, 0.5, 0.7, 0.9]
     """
     _check(top_mm, process)
-    overlap, first = _first(process, on_platform)
-    return _equal_from(top_mm, process, nozzle_mm, -overlap, 0.0, first)
+    return _equal_from(top_mm, process, nozzle_mm, _bottom(process, on_platform))
 
 
-def _heights_from(mesh: Mesh, process: Process, nozzle_mm: float, from_mm: float, base_mm: float, first_mm: float) -> Heights:
-    """Layers from one height up to the mesh's top, the first of a given height; base_mm: where the mesh begins."""
+@dataclass(frozen=True)
+class _Bottom:
+    """from_mm: where the first layer begins; base_mm: where the mesh does; first_mm: height of that layer."""
+
+    from_mm: float
+    base_mm: float
+    first_mm: float
+
+
+def _bottom(process: Process, on_platform: bool) -> _Bottom:
+    """On plastic the first layer is pressed in."""
+    if on_platform:
+        return _Bottom(0.0, 0.0, process.first_layer_height_mm)
+    return _Bottom(-process.interface_overlap * process.layer_height_mm, 0.0, process.layer_height_mm)
+
+
+def _heights_from(mesh: Mesh, process: Process, nozzle_mm: float, bottom: _Bottom) -> Heights:
+    """Layers from the bottom up to the mesh's top."""
     top, least = float(mesh.bounds_mm[1, 2]), process.least_layer_height_mm
     _check(top, process)
-    adaptive = process.adaptive_cusp_mm > 0.0 and top - from_mm > first_mm + least
-    thick = adaptive_heights(mesh, process, from_mm + first_mm, top) if adaptive else []
+    adaptive = process.adaptive_cusp_mm > 0.0 and top - bottom.from_mm > bottom.first_mm + least
+    thick = adaptive_heights(mesh, process, bottom.from_mm + bottom.first_mm, top) if adaptive else []
     if not thick:
-        return _equal_from(top, process, nozzle_mm, from_mm, base_mm, first_mm)
-    rest = top - from_mm - first_mm - sum(thick)
+        return _equal_from(top, process, nozzle_mm, bottom)
+    rest = top - bottom.from_mm - bottom.first_mm - sum(thick)
     if rest > 1e-6:
         thick = _spread(thick, rest, least, process.most_layer_height_mm)
-    return _stack_layers(np.array([first_mm, *thick]), from_mm, base_mm, top)
+    return _stack_layers([bottom.first_mm, *thick], bottom.from_mm, bottom.base_mm, top)
 
 
-def _equal_from(top_mm: float, process: Process, nozzle_mm: float, from_mm: float, base_mm: float, first_mm: float) -> Heights:
+def _equal_from(top_mm: float, process: Process, nozzle_mm: float, bottom: _Bottom) -> Heights:
     """The same of equal layers. What is no higher than a layer and a little is one layer, pressed in less deep if need be."""
+    from_mm, first_mm = bottom.from_mm, bottom.first_mm
     layer, total, most = process.layer_height_mm, top_mm - from_mm, min(process.highest_layer_mm, nozzle_mm)
     count = max(floor((total - first_mm) / layer + 1e-9), 0)
     rest = total - first_mm - count * layer
@@ -92,24 +112,17 @@ def _equal_from(top_mm: float, process: Process, nozzle_mm: float, from_mm: floa
         thick.append(rest)
     elif count:
         thick = _spread(thick, rest, least, most)
-    elif from_mm < base_mm:
+    elif from_mm < bottom.base_mm:
         first_mm = min(total, most)
         from_mm = top_mm - first_mm
     else:
         first_mm, *thick = _spread([first_mm], rest, least, most)
-    return _stack_layers(np.array([first_mm, *thick]), from_mm, base_mm, top_mm)
+    return _stack_layers([first_mm, *thick], from_mm, bottom.base_mm, top_mm)
 
 
-def _first(process: Process, on_platform: bool) -> tuple[float, float]:
-    """How deep the first layer is pressed in, and its height."""
-    if on_platform:
-        return 0.0, process.first_layer_height_mm
-    return process.interface_overlap * process.layer_height_mm, process.layer_height_mm
-
-
-def _stack_layers(thick: Floats, from_mm: float, base_mm: float, top_mm: float) -> Heights:
+def _stack_layers(thick_mm: list[float], from_mm: float, base_mm: float, top_mm: float) -> Heights:
     """Layers of those heights on each other, cut in the middle of what they fill between base and top."""
-    tip = from_mm + np.cumsum(thick)
+    thick, tip = np.array(thick_mm), from_mm + np.cumsum(thick_mm)
     return Heights(tip, thick, 0.5 * (np.maximum(tip - thick, base_mm) + np.minimum(tip, top_mm)))
 
 

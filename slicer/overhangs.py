@@ -130,7 +130,7 @@ def bridges_of_layers(
             continue
         slopes = outlines[i] - union([free, *(bridge.place for bridge in overhang.bridges)])
         anchors = edges(offset(union([_plastic_below(sections, i), held, slopes]), 0.25 * process.line_width_mm))
-        bridges[i] += tuple(each for island in islands(bare) for each in find_bridges(island, anchors, process.line_width_mm))
+        bridges[i] += tuple(span for island in islands(bare) for span in find_bridges(island, anchors, process.line_width_mm))
     return bridges
 
 

@@ -47,6 +47,17 @@ def slice_part(
     earlier, later: the parts printed before and after this one; the part with index 1 stands on the platform. Support is
     the part's own (slice_parts hands it down to earlier parts). The same input gives the same paths. on_layer: called after each
     layer with its number and how many there are. Raises SliceError when the part gives no bead at all.
+
+    >>> from manifold3d import Manifold
+    >>> from mdp.cut import mesh_of
+    >>> from mdp.plane import PLATFORM
+    >>> from mdp.pose import level, rotation
+    >>> from profiles.profile import load
+    >>> profile, plate = load(), mesh_of(Manifold.cube((20.0, 20.0, 1.0)))
+    >>> pose = level(profile.machine)
+    >>> part = Part(1, plate, PLATFORM, pose, rotation(profile.machine, pose), plate.volume_mm3, 0.0)
+    >>> [round(layer.z_mm, 3) for layer in slice_part(part, profile).layers]
+    [0.2, 0.4, 0.6, 0.8, 1.0]
     """
     sections = section_part(part, profile, earlier, later)
     overhangs = find_overhangs(sections)

@@ -1,1 +1,1 @@
-"""Fill: skins, sparse infill, bridges."""
+"""Fill: which places are skin and which sparse, and the beads of skins, sparse infill and bridges."""

@@ -1,4 +1,4 @@
-"""Bridges: hanging places whose lines can span from bank to bank, and the direction in which they sag least."""
+"""Bridges: hanging places whose lines can span from anchor to anchor, and the direction in which they sag least."""
 
 from dataclasses import dataclass, replace
 
@@ -19,7 +19,7 @@ TURNS = 18  # directions tried over half a turn, besides those of the place's ow
 SIDES = 8  # so many of its longest sides are tried, along and across
 LEAST = 4.0  # in line widths squared: a smaller place is no bridge but an edge
 NARROW = 4.0  # line widths: narrower strips of skin over sparse infill are no bridges
-ANCHOR = 2.0  # line widths that the lines of a bridge reach over its banks
+REACH = 2.0  # line widths that the lines of a bridge reach over its anchors
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
 ADRIFT = 10.0  # and one held nowhere like this
 TOLERATED = 0.02  # share of a bridge's length that may have a loose end: corners of the place
@@ -41,26 +41,27 @@ class Bridge:
     loose: float
 
     def carries(self, longest_mm: float) -> bool:
-        """Whether it needs no support: every line from bank to bank, none longer than that."""
+        """Whether it needs no support: every line from anchor to anchor, none longer than that."""
         return self.loose <= TOLERATED and self.longest_mm <= longest_mm + ROUNDING_MM
 
 
-def find_bridge(hanging: Polygons, banks: Floats, width_mm: float) -> Bridge | None:
+def find_bridge(hanging: Polygons, anchors: Floats, width_mm: float) -> Bridge | None:
     """Lines over one connected hanging place in the direction that sags least; None where there is nothing to hold on to.
 
-    banks: (n, 4) edges of the layer below, grown by a quarter of a line. The sum of squared spans is least, a line held at
-    one end counting as 2.63 times its length: where all lines reach over, that is the direction of the shortest spans.
+    anchors: (n, 4) edges of what may hold lines: the layer below, grown by a quarter of a line. The sum of squared spans is
+    least, a line held at one end counting as 2.63 times its length: where all lines reach over, that is the direction of the
+    shortest spans.
     """
-    if hanging.area() < LEAST * width_mm**2 or not len(banks):
+    if hanging.area() < LEAST * width_mm**2 or not len(anchors):
         return None
     sides = edges(hanging)
     angles = _angles(sides)
-    best, longest_mm, loose, _ = _least_sag(sides, _edges_near(banks, sides), np.array(angles), width_mm)
+    best, longest_mm, loose, _ = _least_sag(sides, _edges_near(anchors, sides), np.array(angles), width_mm)
     return None if best < 0 else Bridge(hanging, float(np.degrees(angles[best])), longest_mm, loose)
 
 
-def find_bridges(hanging: Polygons, banks: Floats, width_mm: float) -> list[Bridge]:
-    """Lines over one connected hanging place, each piece of it in the direction in which most of them reach from bank to bank.
+def find_bridges(hanging: Polygons, anchors: Floats, width_mm: float) -> list[Bridge]:
+    """Lines over one connected hanging place, each piece of it in the direction in which most of them are held at both ends.
 
     Where no direction holds all of the place, what the best one holds is bridged so, and the rest in its turn.
     """
@@ -68,8 +69,8 @@ def find_bridges(hanging: Polygons, banks: Floats, width_mm: float) -> list[Brid
     left = [hanging]
     while left:
         place = left.pop()
-        bridge = find_bridge(place, banks, width_mm)
-        held = None if bridge is None or bridge.loose <= TOLERATED else _held_piece(place, banks, width_mm)
+        bridge = find_bridge(place, anchors, width_mm)
+        held = None if bridge is None or bridge.loose <= TOLERATED else _held_piece(place, anchors, width_mm)
         if held is None:
             bridges += [bridge] if bridge is not None else []
         else:
@@ -78,10 +79,10 @@ def find_bridges(hanging: Polygons, banks: Floats, width_mm: float) -> list[Brid
     return bridges
 
 
-def _held_piece(place: Polygons, banks: Floats, width_mm: float) -> Bridge | None:
-    """What of a place has lines from bank to bank in the direction that has most of them; None where that is next to nothing."""
+def _held_piece(place: Polygons, anchors: Floats, width_mm: float) -> Bridge | None:
+    """What of a place has lines held at both ends in the direction that has most of them; None where that is next to nothing."""
     sides = edges(place)
-    angles, near = np.array(_angles(sides)), _edges_near(banks, sides)
+    angles, near = np.array(_angles(sides)), _edges_near(anchors, sides)
     held_mm = _least_sag(sides, near, angles, width_mm)[3]
     angle = float(angles[int(np.argmax(held_mm))])
     rows = _held_rows(sides, near, angle, width_mm)
@@ -95,13 +96,13 @@ def _held_piece(place: Polygons, banks: Floats, width_mm: float) -> Bridge | Non
     return Bridge(piece, float(np.degrees(angle)), float((rows[:, 1] - rows[:, 0]).max()), 0.0)
 
 
-def _edges_near(banks: Floats, sides: Floats) -> Floats:
+def _edges_near(anchors: Floats, sides: Floats) -> Floats:
     """The edges that a ray to the right may cross from anywhere on a place with these sides."""
     x, y = sides[:, 0], sides[:, 1]
     above, below = y.min() - NEAR_MM, y.max() + NEAR_MM
-    right = np.maximum(banks[:, 0], banks[:, 2]) > x.min() - NEAR_MM
-    level = (np.maximum(banks[:, 1], banks[:, 3]) > above) & (np.minimum(banks[:, 1], banks[:, 3]) < below)
-    near: Floats = banks[right & level]
+    right = np.maximum(anchors[:, 0], anchors[:, 2]) > x.min() - NEAR_MM
+    level = (np.maximum(anchors[:, 1], anchors[:, 3]) > above) & (np.minimum(anchors[:, 1], anchors[:, 3]) < below)
+    near: Floats = anchors[right & level]
     return near
 
 
@@ -132,16 +133,16 @@ def _rows_at(sides: Floats, angle: float, width_mm: float) -> Floats:
 
 
 @part
-def _held_ends(row: Floats, banks: Floats, angle: float) -> int:
-    """How many ends of a line lie on a bank."""
+def _held_ends(row: Floats, anchors: Floats, angle: float) -> int:
+    """How many ends of a line lie on an anchor."""
     cos, sin, held = np.cos(angle), np.sin(angle), 0
     for end in range(2):
-        held += is_inside(banks, cos * row[end] - sin * row[2], sin * row[end] + cos * row[2])
+        held += is_inside(anchors, cos * row[end] - sin * row[2], sin * row[end] + cos * row[2])
     return held
 
 
 @kernel
-def _least_sag(sides: Floats, banks: Floats, angles: Floats, width_mm: float) -> tuple[int, float, float, Floats]:
+def _least_sag(sides: Floats, anchors: Floats, angles: Floats, width_mm: float) -> tuple[int, float, float, Floats]:
     """Which angle sags least (-1: none is held), its longest span and the share of its lines that is loose; of every angle the
     length of its lines that are held at both ends."""
     best, least, longest_mm, loose = -1, np.inf, 0.0, 0.0
@@ -151,7 +152,7 @@ def _least_sag(sides: Floats, banks: Floats, angles: Floats, width_mm: float) ->
         total = sagging = free = longest = 0.0
         any_held = False
         for r in range(len(rows)):
-            held = _held_ends(rows[r], banks, angles[a])
+            held = _held_ends(rows[r], anchors, angles[a])
             span = rows[r, 1] - rows[r, 0]
             total, longest, any_held = total + span, max(longest, span), any_held or held > 0
             sagging += sag_of[held] * span * span
@@ -163,12 +164,12 @@ def _least_sag(sides: Floats, banks: Floats, angles: Floats, width_mm: float) ->
 
 
 @kernel
-def _held_rows(sides: Floats, banks: Floats, angle: float, width_mm: float) -> Floats:
+def _held_rows(sides: Floats, anchors: Floats, angle: float, width_mm: float) -> Floats:
     """(n, 3) the lines at an angle that are held at both ends, as _rows_at."""
     rows = _rows_at(sides, angle, width_mm)
     n = 0
     for r in range(len(rows)):
-        if _held_ends(rows[r], banks, angle) == 2:
+        if _held_ends(rows[r], anchors, angle) == 2:
             for k in range(3):
                 rows[n, k] = rows[r, k]
             n += 1
@@ -176,9 +177,9 @@ def _held_rows(sides: Floats, banks: Floats, angle: float, width_mm: float) -> F
 
 
 def bridge_area(span: Bridge, inside: Polygons, width_mm: float) -> Polygons:
-    """Where the lines of a bridge run: over what hangs of a layer's inside, and onto the banks as far as the inside reaches."""
+    """Where the lines of a bridge run: over what hangs of a layer's inside, and onto the anchors as far as the inside reaches."""
     open_place = opening(span.place ^ inside, 0.5 * width_mm)
-    return open_place if open_place.is_empty() else offset(open_place, ANCHOR * width_mm) ^ inside
+    return open_place if open_place.is_empty() else offset(open_place, REACH * width_mm) ^ inside
 
 
 def bridge_beads(area: Polygons, lines: SolidLines, flow: float) -> list[Bead]:
@@ -197,7 +198,7 @@ def infill_bridge_area(solid: Polygons, sparse_below: Polygons, width_mm: float)
     if place.area() < (NARROW * width_mm) ** 2:
         return Polygons()
     open_place = opening(place, 0.5 * NARROW * width_mm)
-    return open_place if open_place.is_empty() else offset(open_place, ANCHOR * width_mm) ^ solid
+    return open_place if open_place.is_empty() else offset(open_place, REACH * width_mm) ^ solid
 
 
 def infill_bridge_beads(area: Polygons, lines: SolidLines, flow: float) -> list[Bead]:

@@ -1,1 +1,1 @@
-"""Plane geometry: polygons, lines clipped to them, cells, distances, triangulations; nothing of printing."""
+"""Plane geometry: cross sections of meshes, polygons, lines clipped to them, cells, distances, triangulations."""

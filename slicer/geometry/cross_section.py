@@ -29,7 +29,7 @@ def cross_sections(mesh: Mesh, cuts_mm: Floats) -> list[list[Floats]]:
     >>> corners = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]])
     >>> tetrahedron = Mesh(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
     >>> [loop.tolist() for loop in cross_sections(tetrahedron, np.array([1.0]))[0]]
-    [[[0.0, 3.0], [0.0, 0.0], [3.0, 0.0]]]
+    [[[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]]]
     """
     across = opposites(mesh.faces)
     open_edges = int((across < 0).sum())

@@ -32,7 +32,11 @@ def clean(loops: Sequence[Floats], closing_mm: float = CLOSING_MM) -> Polygons:
 
 
 def offset(polygons: Polygons, distance_mm: float, mitre: float = MITRE) -> Polygons:
-    """Every boundary moved outward (negative: inward) by the distance, corners mitred up to so many distances."""
+    """Every boundary moved outward (negative: inward) by the distance, corners mitred up to so many distances.
+
+    >>> offset(Polygons.square((2.0, 1.0)), 0.5).area()
+    6.0
+    """
     return _moved(polygons, distance_mm, JoinType.Miter, mitre, 0)
 
 

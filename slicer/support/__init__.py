@@ -1,1 +1,1 @@
-"""Support: what hangs, where support may stand, how it grows, and its beads."""
+"""Support: where it may stand, how it grows down, its beads, why a place gets none. Public: support.own_supports."""

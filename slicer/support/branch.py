@@ -91,7 +91,7 @@ class Growth:
 
 def lower_branches(branches: Sequence[Branch], areas: ReachableAreas, layer: int, growth: Growth) -> list[Branch]:
     """The branches of a layer in the layer below: every place of the former is within the lean of one of the latter, or
-    on ground.
+    where it may stand.
     """
     z, lean, reachable = float(areas.top_mm[layer - 1]), float(areas.lean_mm[layer]), areas.reachable[layer - 1]
     targets = _target_branches(branches, z, lean, float(areas.top_mm[layer]) - z, growth)

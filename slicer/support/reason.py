@@ -65,8 +65,8 @@ def _part_at_table(place: Polygons, z_mm: float, sections: Sections) -> int | No
     corners = np.concatenate(contours(place))
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     base_mm, machine = sections.part.base.offset_mm, sections.profile.machine
-    beneath, under = (np.append(middle, base_mm + z) @ sections.part.rotation for z in (z_mm, 0.0))
-    if not sections.on_platform and beneath[2] < least_tip_height_mm(machine, sections.part.pose):
+    below, under = (np.append(middle, base_mm + z) @ sections.part.rotation for z in (z_mm, 0.0))
+    if not sections.on_platform and below[2] < least_tip_height_mm(machine, sections.part.pose):
         return sections.part.index
     other = next((part for part in reversed(sections.earlier) if part.base.heights_mm(under[None])[0] > 0.0), None)
     if other is None or other.index == 1 or under[2] >= least_tip_height_mm(machine, other.pose):

@@ -68,33 +68,32 @@ def _sequence(beads: Sequence[Bead], islands: Ints, first: Floats, support_first
     groups: defaultdict[int, list[Bead]] = defaultdict(list)
     for bead, island in zip(beads, islands.tolist(), strict=True):
         groups[island].append(bead)
-    tour = _tour(groups, first, support_first)
+    order = _island_order(groups, first, support_first)
     tip, placed = first, list[tuple[Bead, Floats]]()
-    for place, island in enumerate(tour):
+    for island, after in zip(order, [*order[1:], order[-1]], strict=True):
         phases = _phases(groups[island])
-        following = tour[place + 1] if place + 1 < len(tour) else island
-        goal = NOWHERE if following == island and len(phases) == 1 else _middle(groups[following])[None]
+        goal = NOWHERE if after == island and len(phases) == 1 else _middle(groups[after])[None]
         placed += _in_phases(phases, tip, goal)
         tip = placed[-1][1][-1]
     return placed
 
 
-def _tour(groups: dict[int, list[Bead]], first: Floats, support_first: bool) -> list[int]:
+def _island_order(groups: dict[int, list[Bead]], first: Floats, support_first: bool) -> list[int]:
     """The islands in a short order after skirt and brim, support before the part where that is asked for."""
     stages: defaultdict[int, list[int]] = defaultdict(list)
     for island in sorted(groups):
         stages[0 if island == FIRST else 1 if support_first and groups[island][0].kind in SUPPORTS else 2].append(island)
-    tour: list[int] = []
+    islands: list[int] = []
     for stage in sorted(stages):
         places = np.array([_middle(groups[island]) for island in stages[stage]])
         goal = NOWHERE
         if stage == 1 and 2 in stages:
             parts = np.array([_middle(groups[island]) for island in stages[2]])
             goal = parts[np.argmin(((parts - places.mean(axis=0)) ** 2).sum(axis=1))][None]
-        order, _ = order_paths(places, places, np.ones(len(places), np.bool_), first[0], first[1], goal)
-        tour += [stages[stage][k] for k in order]
-        first = _middle(groups[tour[-1]])
-    return tour
+        order, _ = order_paths(places, places, np.ones(len(places), np.bool_), first, goal)
+        islands += [stages[stage][k] for k in order]
+        first = _middle(groups[islands[-1]])
+    return islands
 
 
 def _middle(beads: Sequence[Bead]) -> Floats:

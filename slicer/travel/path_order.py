@@ -38,12 +38,13 @@ class _Sequence(NamedTuple):
 
 
 @kernel
-def order_paths(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], x: float, y: float, goal: Floats) -> Order:
-    """Order and reversals of n paths from the place x, y; starts, ends: (n, 2) mm; fixed: (n,) must not be reversed.
+def order_paths(starts: Floats, ends: Floats, fixed: NDArray[np.bool_], tip: Floats, goal: Floats) -> Order:
+    """Order and reversals of n paths; starts, ends: (n, 2) mm; fixed: (n,) must not be reversed.
 
-    goal: (1, 2) where the order should end up, or (0, 2).
+    tip: (2,) where all begins; goal: (1, 2) where the order should end up, or (0, 2).
     """
     n = len(starts)
+    x, y = tip[0], tip[1]
     order, flips = _greedy(starts, ends, fixed, x, y)
     sequence = _Sequence(order, flips, flags(n), table(n + len(goal), 4), x, y)
     for k in range(n):

@@ -41,7 +41,7 @@ def order_lines(
                 begun[k] = _begin_at(lines[k], _corner(lines[k], tip, tip, True))
     for _ in range(ROUNDS if any(freedom) else 1):
         entries, exits = np.array([line[0] for line in begun]), np.array([line[-1] for line in begun])
-        order, flips = order_paths(entries, exits, held, tip[0], tip[1], goal)
+        order, flips = order_paths(entries, exits, held, tip, goal)
         since = tip
         for place, k in enumerate(order.tolist()):
             if freedom[k]:

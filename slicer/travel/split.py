@@ -32,8 +32,8 @@ def split(
     sides = edges(place)
     sides = sides[np.argsort(np.minimum(sides[:, 1], sides[:, 3]), kind="stable")]
     out: list[Placed] = []
-    for each in placed:
-        out += _split_bead(each, sides, shortest_mm, other) if each.bead.kind in kinds else [each]
+    for bead in placed:
+        out += _split_bead(bead, sides, shortest_mm, other) if bead.bead.kind in kinds else [bead]
     return out
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mdp.mesh import Floats
 from slicer.travel.path_order import order_paths
 
-NO_GOAL = np.zeros((0, 2))
+NO_GOAL, ORIGIN = np.zeros((0, 2)), np.zeros(2)
 
 
 def paths(seed: int, count: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -46,7 +46,7 @@ def travel(starts: Floats, ends: Floats, order: Iterable[int], flips: Iterable[b
 def test_an_order_of_few_paths_is_close_to_the_shortest_there_is(seed: int, count: int, goal: bool) -> None:
     starts, ends, fixed = paths(seed, count)
     target = np.array([[25.0, 25.0]]) if goal else NO_GOAL
-    order, flips = order_paths(starts, ends, fixed, 0.0, 0.0, target)
+    order, flips = order_paths(starts, ends, fixed, ORIGIN, target)
     reversals = product(*([False] if still else [False, True] for still in fixed))
     every = ((p, [flipped[k] for k in p]) for flipped in reversals for p in permutations(range(count)))
     best = min(travel(starts, ends, p, chosen, target) for p, chosen in every)
@@ -57,7 +57,7 @@ def test_an_order_of_few_paths_is_close_to_the_shortest_there_is(seed: int, coun
 @given(st.integers(0, 10**6), st.integers(1, 80))
 def test_an_order_has_each_path_once_reverses_none_fixed_and_is_never_longer_than_the_greedy_one(seed: int, count: int) -> None:
     starts, ends, fixed = paths(seed, count)
-    order, flips = order_paths(starts, ends, fixed, 0.0, 0.0, NO_GOAL)
+    order, flips = order_paths(starts, ends, fixed, ORIGIN, NO_GOAL)
     assert sorted(order) == list(range(count))
     assert not (flips & fixed[order]).any()
     assert travel(starts, ends, order, flips) <= travel(starts, ends, *nearest_first(starts, ends, fixed)) + 1e-6
@@ -67,5 +67,5 @@ def test_exchanges_save_a_tenth_of_the_travel_between_many_short_lines() -> None
     starts, ends, _ = paths(3, 3000)
     ends = starts + 0.05 * (ends - starts)
     loose = np.zeros(3000, dtype=bool)
-    shorter = travel(starts, ends, *order_paths(starts, ends, loose, 0.0, 0.0, NO_GOAL))
+    shorter = travel(starts, ends, *order_paths(starts, ends, loose, ORIGIN, NO_GOAL))
     assert shorter < 0.92 * travel(starts, ends, *nearest_first(starts, ends, loose))
