@@ -7,7 +7,7 @@ import numpy as np
 from mdp.mesh import Floats
 from mdp.overhang import PLATFORM_TOLERANCE_MM
 from mdp.support_need.patches import NARROW
-from mdp.sweep.section_moments import greatest_stress_per_moment
+from mdp.sweep.bending import greatest_stress_per_moment
 from profiles.machine import Table
 from slicer.geometry.polygons import Polygons, edges, offset, opening
 
