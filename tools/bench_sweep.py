@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 import numba
 import numpy as np
 
+from mdp.kernels.arrays import dot
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import risky_upright, threshold
 from mdp.read import locate, read_mesh
@@ -19,7 +20,6 @@ from mdp.sweep.integrals import (
     Needs,
     OffsetGrid,
     Overhangs,
-    dot,
     find_heights,
     find_lowest,
     integrate_risky_area,

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdp.cost.hidden import hidden_shares
-from mdp.cost.model_need import ModelNeed
-from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface, Piece
+from mdp.cost.model_need import MADE_BY_A_CUT, ModelNeed, ModelSurface, Piece
 from mdp.cut import Solid
 from mdp.mesh import Floats, Mesh, dot
 from mdp.overhang import standing

@@ -14,9 +14,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.cost.clipping import Planes, along, clip_below, find_chord, find_heights, flat_area_mm2, planes_of
 from mdp.cost.cost import CostTerms
-from mdp.cost.forecast import Faces, faces_of, weight_along
+from mdp.cost.forecast import (
+    Faces,
+    Planes,
+    along,
+    clip_below,
+    faces_of,
+    find_chord,
+    find_heights,
+    flat_area_mm2,
+    planes_of,
+    weight_along,
+)
 from mdp.kernels.arrays import floats, ints, table
 from mdp.kernels.kernel import inlined, kernel, part
 from mdp.mesh import Floats, Ints

@@ -1,9 +1,11 @@
-"""Arrays: new arrays inside kernels, each kind compiled once."""
+"""Arrays: new arrays inside kernels, each kind compiled once, and products of many vectors with one."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdp.kernels.kernel import part
+from mdp.kernels.kernel import part, vector_part
+
+Floats = NDArray[np.float64]
 
 
 @part
@@ -16,7 +18,7 @@ def ints(size: int, value: int) -> NDArray[np.int32]:
 
 
 @part
-def floats(size: int, value: float) -> NDArray[np.float64]:
+def floats(size: int, value: float) -> Floats:
     """(size,) numbers, all of one value."""
     array = np.empty(size, np.float64)
     for k in range(size):
@@ -25,7 +27,7 @@ def floats(size: int, value: float) -> NDArray[np.float64]:
 
 
 @part
-def table(rows: int, columns: int) -> NDArray[np.float64]:
+def table(rows: int, columns: int) -> Floats:
     """(rows, columns) zeros."""
     array = np.empty((rows, columns), np.float64)
     for row in range(rows):
@@ -60,3 +62,11 @@ def flags(size: int) -> NDArray[np.bool_]:
     for k in range(size):
         array[k] = False
     return array
+
+
+@vector_part
+def dot(x: Floats, y: Floats, z: Floats, d: Floats, out: Floats) -> None:
+    """Products of (n,) vectors given by their coordinates with one vector."""
+    d0, d1, d2 = d[0], d[1], d[2]
+    for k in range(len(out)):
+        out[k] = x[k] * d0 + y[k] * d1 + z[k] * d2

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from mdp.cost.cost import CostTerms, SeamPlaces, measure_seam
-from mdp.cost.model_surface import Piece
+from mdp.cost.model_need import Piece
 from mdp.cut import Solid, above
 from mdp.mesh import Floats
 from mdp.overhang import risky_upright

@@ -9,8 +9,7 @@ import numpy as np
 
 from mdp.clearance import allowed_poses
 from mdp.cost.cost import CostTerms, SeamPlaces
-from mdp.cost.model_need import ModelNeed
-from mdp.cost.model_surface import ModelSurface
+from mdp.cost.model_need import ModelNeed, ModelSurface
 from mdp.cut import below, solid_of
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import BASE_TOLERANCE_MM, UP, Mask, standing, threshold

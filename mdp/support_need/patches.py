@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdp.directions.frame import FramedDirections
-from mdp.kernels.arrays import floats, ints
-from mdp.kernels.kernel import kernel, part, vector_part
+from mdp.kernels.arrays import dot, floats, ints
+from mdp.kernels.kernel import kernel, part
 from mdp.mesh import Floats, Ints
 from mdp.support_need.descent import SAFE, View
 from mdp.support_need.dips import UNSEEN, Pool, begins_in_air
@@ -66,29 +66,16 @@ def classify(begin_row: int, end_row: int, surface: LinkedFaces, along: FramedDi
     for row in range(begin_row, end_row):
         d = along.directions[row]
         view = View(surface, d, heights, cosines, number, limits.base_mm, place)
-        _find_heights(surface.vertices[0], surface.vertices[1], surface.vertices[2], d, heights, pool.seen)
-        _find_cosines(surface.normals[0], surface.normals[1], surface.normals[2], d, cosines)
+        dot(surface.vertices[0], surface.vertices[1], surface.vertices[2], d, heights)
+        dot(surface.normals[0], surface.normals[1], surface.normals[2], d, cosines)
+        for v in range(size):
+            pool.seen[v] = UNSEEN
         many = _find_risky(view, limits.risky_below, risky)
         for own in range(1, _find_patches(view, risky[:many], patches) + 1):
             patch = _measure(view, patches, own, along.frames[row])
             if _carries_itself(view, patches, patch, pool, limits):
                 for f in patch.faces:
                     out[row, f] = CARRIES_ITSELF
-
-
-@vector_part
-def _find_heights(x: Floats, y: Floats, z: Floats, d: Floats, heights: Floats, seen: Ints) -> None:
-    d0, d1, d2 = d[0], d[1], d[2]
-    for v in range(len(x)):
-        heights[v] = x[v] * d0 + y[v] * d1 + z[v] * d2
-        seen[v] = UNSEEN
-
-
-@vector_part
-def _find_cosines(x: Floats, y: Floats, z: Floats, d: Floats, cosines: Floats) -> None:
-    d0, d1, d2 = d[0], d[1], d[2]
-    for f in range(len(x)):
-        cosines[f] = x[f] * d0 + y[f] * d1 + z[f] * d2
 
 
 @part

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import floats, int_table, table
+from mdp.kernels.arrays import dot, floats, int_table, table
 from mdp.kernels.kernel import inlined, part, vector_part
 from mdp.mesh import Floats, Ints
 from mdp.overhang import Mask
@@ -127,14 +127,6 @@ def sort_heights(a: Indices, b: Indices, c: Indices, heights: Floats, block: Blo
         least, most = min(p, q), max(p, q)
         low[k], high[k] = min(least, r), max(most, r)
         middle[k] = max(least, min(most, r))
-
-
-@vector_part
-def dot(x: Floats, y: Floats, z: Floats, d: Floats, out: Floats) -> None:
-    """Products of (n,) vectors given by their coordinates with one vector."""
-    d0, d1, d2 = d[0], d[1], d[2]
-    for k in range(len(out)):
-        out[k] = x[k] * d0 + y[k] * d1 + z[k] * d2
 
 
 @vector_part

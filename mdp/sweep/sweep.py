@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdp.kernels.arrays import floats, int_table, ints
+from mdp.kernels.arrays import dot, floats, int_table, ints
 from mdp.kernels.kernel import kernel
 from mdp.kernels.threads import in_threads
 from mdp.mesh import Floats, Ints, Mesh
@@ -31,7 +31,6 @@ from mdp.sweep.integrals import (
     Needs,
     OffsetGrid,
     Overhangs,
-    dot,
     find_heights,
     find_lowest,
     integrate_risky_area,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from mdp.cost.cost import CostTerms, SeamPlaces, measure_seam
 from mdp.cost.forecast import Surface
-from mdp.cost.model_surface import ModelSurface
+from mdp.cost.model_need import ModelSurface
 from mdp.cut import Solid, below, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Floats, Mesh

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdp.cost.model_surface import MADE_BY_A_CUT, ModelSurface
+from mdp.cost.model_need import MADE_BY_A_CUT, ModelSurface
 from mdp.cut import above, below, solid_of
 from mdp.plane import Plane
 from tests import shapes

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mdp.mesh import Floats
-from mdp.sweep.section_moments import greatest_stress_per_moment
+from mdp.sweep.bending import greatest_stress_per_moment
 
 
 def _modulus(*loops: Floats) -> float:

@@ -1,0 +1,32 @@
+"""Rays over the tree of boxes against every triangle looked at one by one."""
+
+import numpy as np
+import pytest
+
+from mdp.mesh import Floats, Mesh
+from mdp.sweep.slivers import OPPOSITE_COSINE, thin_faces
+from mdp.sweep.sweep import Remainder
+from tests.mdp.solids import random_solid
+
+
+def nearest_mm(origin: Floats, ray: Floats, mesh: Mesh) -> float:
+    """How far along a ray the first face is met that looks along it; infinite: none is."""
+    facing = mesh.normals @ ray >= OPPOSITE_COSINE
+    normals, (first, second, third) = mesh.normals[facing], (mesh.vertices[mesh.faces[facing, k]] for k in range(3))
+    along = np.einsum("ij,ij->i", first - origin, normals) / (normals @ ray)
+    place = origin + along[:, None] * ray
+    sides = [np.cross(b - a, place - a) for a, b in ((first, second), (second, third), (third, first))]
+    inside = np.all([np.einsum("ij,ij->i", side, normals) >= -1e-9 for side in sides], axis=0)
+    return float(along[inside & (along > 0.0)].min(initial=np.inf))
+
+
+@pytest.mark.parametrize(("seed", "thickness_mm"), [(0, 1.0), (1, 2.5), (2, 6.0), (3, 20.0)])
+def test_the_solid_is_thin_where_a_face_that_looks_the_other_way_is_the_nearest(seed: int, thickness_mm: float) -> None:
+    solid = random_solid(seed)
+    remainder = Remainder(solid, np.zeros(len(solid.faces), np.bool_))
+    mesh, thin = remainder.facets.mesh, thin_faces(remainder.triangles, thickness_mm)
+    assert thin.shape == (len(mesh.faces),)
+    for face in range(0, len(mesh.faces), 5):
+        nearest = nearest_mm(mesh.vertices[mesh.faces[face]].mean(axis=0), -mesh.normals[face], mesh)
+        if abs(nearest - thickness_mm) > 1e-6:
+            assert thin[face] == (nearest < thickness_mm)
