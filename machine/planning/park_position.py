@@ -4,6 +4,7 @@ The way is clear of table, cradle and print: up at the place where the print sto
 stands, and back the same way.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from mdp.pose import UP, Pose, rotation
 from profiles.machine import Machine
 
 ASIDE_MM = 1.0  # free at the ends of the axes
+BESIDE_MM = 20.0  # from the outline of a finished print: what drips falls beside it, and a hand can reach it
 PARTS = 4  # a way is tried in so many pieces when it is not clear as a whole
 
 
@@ -26,8 +28,13 @@ class Park:
     stand_mm: tuple[float, float, float]
 
 
-def find_park_position(machine: Machine, printed: Printed, at_mm: Floats, pose: Pose) -> Park | None:
-    """Where to wait when the tip stands at at_mm (axis positions X Y Z); None when no way up is proved clear."""
+def find_park_position(
+    machine: Machine, printed: Printed, at_mm: Floats, pose: Pose, stands: Sequence[tuple[float, float]] = ()
+) -> Park | None:
+    """Where to wait when the tip stands at at_mm (axis positions X Y Z); None when no way up is proved clear.
+
+    stands: X, Y of the places that may be chosen besides the corners of the axes; the nearest is.
+    """
     x, y, z = (float(value) for value in at_mm)
     most = machine.z.limits_mm[1]
     top = obstacle_top_mm(machine, printed, pose) + machine.lift_mm
@@ -39,12 +46,27 @@ def find_park_position(machine: Machine, printed: Printed, at_mm: Floats, pose: 
     lift = (x, y, height)
     if height < min(top, most) - 1e-9:
         return Park(lift, lift)
-    corners = sorted(_corners(machine), key=lambda corner: abs(corner[0] - x) + abs(corner[1] - y))
-    for corner in corners:
-        stand = (*corner, height)
+    for place in sorted([*stands, *_corners(machine)], key=lambda place: abs(place[0] - x) + abs(place[1] - y)):
+        stand = (*place, height)
         if height >= top - 1e-9 or _path_is_clear(machine, pose, np.array(lift), np.array(stand), printed):
             return Park(lift, stand)
     return Park(lift, lift)
+
+
+def beside(machine: Machine, printed: Printed, at_mm: Floats, pose: Pose) -> list[tuple[float, float]]:
+    """X, Y beside a finished print, as far as the axes reach: straight out of its outline to each side, or where the tip is."""
+    x, y = (float(value) for value in at_mm[:2])
+    right, back, left, front = printed.reach(machine, pose, np.vstack([np.eye(3)[:2], -np.eye(3)[:2]]))
+    outline = ((-left, right), (-front, back))
+    if any(value <= low - BESIDE_MM or value >= high + BESIDE_MM for value, (low, high) in zip((x, y), outline, strict=True)):
+        return [(x, y)]
+    places = []
+    for axis, (low, high) in zip((machine.x, machine.y), outline, strict=True):
+        for value in (low - BESIDE_MM, high + BESIDE_MM):
+            within = min(max(value, axis.limits_mm[0] + ASIDE_MM), axis.limits_mm[1] - ASIDE_MM)
+            if not low <= within <= high:
+                places.append((within, y) if axis is machine.x else (x, within))
+    return places
 
 
 def obstacle_top_mm(machine: Machine, printed: Printed | None, pose: Pose) -> float:

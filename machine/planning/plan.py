@@ -9,7 +9,7 @@ from machine.kinematics.collision import Printed, hull, join_hulls
 from machine.kinematics.table import part_shift, workpiece_points
 from machine.planning import limits
 from machine.planning.moves import BeginLayer, BeginPart, MachineProgram, Move, Pause, Reorient, Stroke, Travel, rows
-from machine.planning.park_position import find_park_position
+from machine.planning.park_position import beside, find_park_position
 from machine.planning.priming import run_in
 from machine.planning.purge import purge_lanes, purge_width_mm
 from machine.planning.reorient import Route, Speeds, Turn, route, top_z
@@ -199,7 +199,7 @@ def _finish(tip: Tip, part: int, printed: Printed, profile: Profile) -> Iterator
         way = _route(Turn(tip.pose, home, tip.at_mm, None), part, printed, profile)
         yield from _to_stand(tip, way, profile)
         yield _reorient(tip, home, profile)
-    park = find_park_position(machine, printed, tip.at_mm, home)
+    park = find_park_position(machine, printed, tip.at_mm, home, beside(machine, printed, tip.at_mm, home))
     if park is None:
         yield from go(tip, [*tip.at_mm[:2], min(float(tip.at_mm[2]) + machine.lift_mm, machine.z.limits_mm[1])], profile)
         return

@@ -9,6 +9,7 @@ from machine.gcode.writer import write_gcode
 from machine.kinematics.collision import hull, solids
 from machine.kinematics.table import machine_points, workpiece_points
 from machine.planning.moves import MachineProgram
+from machine.planning.park_position import BESIDE_MM
 from machine.planning.plan import plan
 from machine.reader.parse import parse_gcode
 from machine.reader.parsed import MoveKind
@@ -22,7 +23,7 @@ from tests.machine.hand import part, squares
 from tests.shapes import from_manifold
 
 MACHINES = sorted(shipped("machine"))
-OUTLINE_MM = 2.0  # beside the print: farther than the drop at the tip is wide
+OUTLINE_MM = BESIDE_MM - 2.0  # of the middles of the beads
 
 
 def program_of(machine: str, upright: bool) -> tuple[Profile, MachineProgram]:

@@ -80,7 +80,7 @@ G1 Y-4.325 E0.29280
 ;Z:0.6
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=3
-M73 P13 R1
+M73 P14 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -137,7 +137,7 @@ G1 Y-59.325 E0.29279
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=5
 M106 S255
-M73 P45 R1
+M73 P46 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -160,7 +160,7 @@ G1 Y-59.325 E0.29280
 ;Z:0.6
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=6
-M73 P49 R1
+M73 P50 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -188,7 +188,6 @@ G0 X100.000 Y-147.050 F9000
 ;TYPE:Custom
 G0 B0.0000 A0.0000 F600
 G0 Z75.000 F300
-G0 X149.000 Y-296.050 F9000
 ;TYPE:Custom
 MANUAL_STEPPER STEPPER=stepper_b GCODE_AXIS=
 MANUAL_STEPPER STEPPER=stepper_a GCODE_AXIS=
@@ -200,7 +199,7 @@ M73 P100 R0
 ; filament used [mm] = 15.19
 ; filament used [cm3] = 0.04
 ; filament used [g] = 0.05
-; estimated printing time (normal mode) = 54s
+; estimated printing time (normal mode) = 53s
 ; tiltprint_config = begin
 ; machine.name = Fractal 5 Pro
 ; machine.shape = table

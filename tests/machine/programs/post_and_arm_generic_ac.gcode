@@ -108,7 +108,7 @@ M486 S1
 ;Z:0.2
 ;HEIGHT:0.2
 M107
-M73 P40 R1
+M73 P42 R1
 G1 E0.80000 F2100
 ;TYPE:External perimeter
 ;WIDTH:0.45
@@ -126,7 +126,7 @@ G1 Y-71.325 E0.29279
 ;Z:0.4
 ;HEIGHT:0.2
 M106 S255
-M73 P47 R1
+M73 P48 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -148,7 +148,7 @@ G1 Y-71.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P54 R1
+M73 P56 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -176,7 +176,6 @@ G0 X0.000 Y-160.000 F9000
 ;TYPE:Custom
 G0 A0.0000 C0.0000 F2546
 G0 Z70.000 F600
-G0 X-159.000 Y-159.000 F9000
 ;TYPE:Custom
 M104 S0
 M140 S0
@@ -186,7 +185,7 @@ M73 P100 R0
 ; filament used [mm] = 15.19
 ; filament used [cm3] = 0.04
 ; filament used [g] = 0.05
-; estimated printing time (normal mode) = 33s
+; estimated printing time (normal mode) = 32s
 ; tiltprint_config = begin
 ; machine.name = generic A/C table
 ; machine.shape = table
