@@ -2,7 +2,7 @@
 
 from math import ceil
 
-from mdp.sweep.section_moments import greatest_stress_per_moment
+from mdp.sweep.bending import greatest_stress_per_moment
 from profiles.machine import Table
 from profiles.process import Process
 from slicer.bead import Bead, spacing_mm

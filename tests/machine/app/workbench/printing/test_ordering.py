@@ -4,7 +4,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from machine.view.comparison import Alternative
 
 from machine.app.requests import PrintRequest
 from machine.app.workbench.printing.at_page import AtPage
@@ -15,6 +14,7 @@ from machine.app.workbench.printing.process import Checks, carry_out
 from machine.app.workbench.work.slices import Sliced
 from machine.dryrun.dryrun import dry_run, summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings
+from machine.program import Alternative
 from profiles.errors import PlanError, PrinterError, UserError
 from profiles.profile import Profile, load
 
