@@ -12,15 +12,16 @@ from pathlib import Path
 from time import process_time
 
 from compare_prints import files, mesh_of
-from slicer.demand.plan import plan_supports
-from slicer.demand.reason import explain
-from slicer.demand.site import survey
 
 from machine.app.pipeline.pricing import pricing
 from mdp.search.search import decompose
 from profiles.errors import UserError
 from profiles.profile import Profile, load
-from slicer.support.support import Supports
+from slicer.overhangs import find_overhangs
+from slicer.sectioning import section_part
+from slicer.support.handed_down.plan import plan_supports
+from slicer.support.reason import explain
+from slicer.support.support import Supports, own_supports
 
 HEAD = (
     "model",
@@ -56,19 +57,19 @@ def row(file: Path, profile: Profile) -> str:
     try:
         parts = decompose(mesh_of(file, profile), file.name, profile, price=pricing(profile)).parts
         began = process_time()
-        sites = [survey(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
-        own = [site.supports for site in sites]
+        sections = [section_part(part, profile, parts[:k], parts[k + 1 :]) for k, part in enumerate(parts)]
+        own = [own_supports(layers, find_overhangs(layers)) for layers in sections]
         planning = process_time()
-        planned = plan_supports(sites)
+        planned = plan_supports(own)
     except UserError as error:
         return f"| {file.name} | {error} |"
     needs_mm2 = sum(supports.wanted_mm2 for supports in own)
-    left_mm2 = [sum(each.unsupported_mm2 for each in several) for several in (own, [each for _, each in planned])]
-    volumes = [_mm3(several, profile) for several in (own, [each for _, each in planned])]
+    left_mm2 = [sum(supports.unsupported_mm2 for supports in several) for several in (own, planned)]
+    volumes = [_mm3(several, profile) for several in (own, planned)]
     why = [
-        f"part {site.part.index} layer {place.layer + 1}: {place.mm2:.1f} mm2, {place.reason}"
-        for site, supports in planned
-        for place in explain(site, supports)
+        f"part {part.index} layer {place.layer + 1}: {place.mm2:.1f} mm2, {place.reason}"
+        for part, supports in zip(parts, planned, strict=True)
+        for place in explain(supports)
     ]
     cells = [file.name, len(parts), f"{needs_mm2:.1f}", *(f"{mm2:.1f}" for mm2 in left_mm2)]
     cells += [f"{left_mm2[1] / max(needs_mm2, 1e-9):.4f}", *(f"{mm3:.0f}" for mm3 in volumes)]

@@ -44,7 +44,20 @@ PROFILE = load()
 LIMIT = 95
 GREETING_S = 0.15  # before that nothing has been sent
 QUICK = Timing(drain_s=0.05, quiet_s=0.03)
-START = ["G21", "G90", "M83", "M140 S25", "M104 S175", "G28 X Y Z", "G92 A0 C0", "M190 S25", "M109 S175", "G92 E0", "M106 S128"]
+START = [
+    "G21",
+    "M84 S0",
+    "G90",
+    "M83",
+    "M140 S25",
+    "M104 S175",
+    "G28 X Y Z",
+    "G92 A0 C0",
+    "M190 S25",
+    "M109 S175",
+    "G92 E0",
+    "M106 S128",
+]
 POSES = ((0, 0), (30, 725), (-20, 360))
 LAYERS, STROKES = 16, 40
 SPEED = 500.0  # times real time, of every other printer: its planner is full when the host dies

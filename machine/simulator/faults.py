@@ -100,20 +100,23 @@ def units_of(kind: Kind) -> tuple[Unit, ...]:
     return ("answer",) if kind in OK_KINDS else ("line", "byte", "answer")
 
 
-def random_script(seed: int, count: int, lines: range, kinds: Sequence[Kind] = KINDS) -> FaultScript:
+def random_script(
+    seed: int, count: int, lines: range, kinds: Sequence[Kind] = KINDS, line_bytes: int = LINE_BYTES
+) -> FaultScript:
     """`count` faults of these kinds at random places of those lines, the same for the same seed.
 
-    Answers are taken to be half as long as lines. One in eight of stalls, blocks and disconnections lasts for ever.
+    line_bytes: how long a line is on the wire, so that byte faults fall among them. Answers are taken to be half as long. One in
+    eight of stalls, blocks and disconnections lasts for ever.
     """
     rng = random.Random(seed)
-    return FaultScript(tuple(_random_fault(rng, rng.choice(kinds), lines) for _ in range(count)), seed)
+    return FaultScript(tuple(_random_fault(rng, rng.choice(kinds), lines, line_bytes) for _ in range(count)), seed)
 
 
-def _random_fault(rng: random.Random, kind: Kind, lines: range) -> Fault:
+def _random_fault(rng: random.Random, kind: Kind, lines: range, line_bytes: int) -> Fault:
     line, to_host = rng.choice(lines), rng.random() < 0.5
     seconds = inf if rng.random() < 0.125 and kind != "delay" else rng.uniform(0.05, MOST_S)
     if kind in BYTE_KINDS:
-        at = int((line + rng.random()) * LINE_BYTES / (2 if to_host else 1))
+        at = int((line + rng.random()) * line_bytes / (2 if to_host else 1))
         return Fault(kind, at, to_host, rng.randrange(8), seconds=seconds)
     value = max(1, line - rng.randint(-2, 12)) if kind == "spurious resend" else None
     return Fault(kind, line, value=value, seconds=seconds)

@@ -103,7 +103,7 @@ EXCLUDE_OBJECT_END NAME=part_1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
-G0 Z7.339 F300
+G0 Z8.292 F300
 G0 X100.000 Y-147.050 F9000
 ;TYPE:Custom
 G0 B90.0000 A90.0000 F600
@@ -118,7 +118,7 @@ EXCLUDE_OBJECT_START NAME=part_2
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=4
 M107
-M73 P42 R1
+M73 P43 R1
 G1 E0.80000 F2100
 ;TYPE:External perimeter
 ;WIDTH:0.45
@@ -160,7 +160,7 @@ G1 Y-59.325 E0.29280
 ;Z:0.6
 ;HEIGHT:0.2
 SET_PRINT_STATS_INFO CURRENT_LAYER=6
-M73 P50 R1
+M73 P51 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -183,7 +183,7 @@ EXCLUDE_OBJECT_END NAME=part_2
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
-G0 Z7.600 F300
+G0 Z8.292 F300
 G0 X100.000 Y-147.050 F9000
 ;TYPE:Custom
 G0 B0.0000 A0.0000 F600
@@ -199,7 +199,7 @@ M73 P100 R0
 ; filament used [mm] = 15.19
 ; filament used [cm3] = 0.04
 ; filament used [g] = 0.05
-; estimated printing time (normal mode) = 53s
+; estimated printing time (normal mode) = 54s
 ; tiltprint_config = begin
 ; machine.name = Fractal 5 Pro
 ; machine.shape = table

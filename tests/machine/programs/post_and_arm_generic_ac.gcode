@@ -71,7 +71,7 @@ G1 Y-4.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P16 R1
+M73 P17 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -94,8 +94,8 @@ M486 S-1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
-G0 Z2.528 F600
-G0 X53.333 Y-106.667 F9000
+G0 Z2.049 F600
+G0 X-53.333 Y-106.667 F9000
 ;TYPE:Custom
 G0 A90.0000 C90.0000 F2546
 ;PART:2 of 2
@@ -148,7 +148,7 @@ G1 Y-71.325 E0.29280
 ;LAYER_CHANGE
 ;Z:0.6
 ;HEIGHT:0.2
-M73 P56 R1
+M73 P55 R1
 ;WIPE_START
 G1 X-2.325 E-0.80000 F5250
 ;WIPE_END
@@ -185,7 +185,7 @@ M73 P100 R0
 ; filament used [mm] = 15.19
 ; filament used [cm3] = 0.04
 ; filament used [g] = 0.05
-; estimated printing time (normal mode) = 32s
+; estimated printing time (normal mode) = 31s
 ; tiltprint_config = begin
 ; machine.name = generic A/C table
 ; machine.shape = table

@@ -12,14 +12,14 @@ from machine.app.pipeline import compilers
 from machine.app.pipeline.pricing import pricing
 from machine.app.terminal.advice import better_in_words, laid_in_words
 from machine.app.workbench.bench.bench import Bench, locked_plan, parts_of, plan_of_bench
-from machine.app.workbench.work.tell import Tell
+from machine.app.workbench.work.processes import Tell
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.directions.orientation import standing_still
 from mdp.mesh import Floats, Mesh
 from mdp.plans.plan_file import PlanFile, plan_of
 from mdp.plans.writing import plan_text
 from mdp.ranking.ranker import CLASSIC, ranker_named
-from mdp.save import FOLDER_FILES, part_file, stl, threemf
+from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
 from mdp.search.by_plan import cut_by_plan
 from mdp.search.laying import find_better_way, lay_down
 from mdp.search.search import Progress, decompose
@@ -111,7 +111,8 @@ def make_folder(tell: Tell, bench: Bench, out: Path) -> None:
     """The folder of `decompose -o` with the parts as the bench has them, as a zip."""
     made = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     parts = [(part_file(part.index), stl(part.mesh)) for part in made.parts]
-    write_zip(out, [*parts, (FOLDER_FILES[0], threemf(made)), (PLAN_NAME, _plan_text(made, bench).encode())])
+    model, _, plan, scene = FOLDER_FILES
+    write_zip(out, [*parts, (model, threemf(made)), (plan, _plan_text(made, bench).encode()), (scene, glb(made))])
 
 
 def _plan_text(made: Decomposition, bench: Bench) -> str:

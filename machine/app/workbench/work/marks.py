@@ -6,7 +6,7 @@ import numpy as np
 
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.marks import marked, named_faces
-from machine.app.workbench.work.tell import Tell
+from machine.app.workbench.work.processes import Tell
 from mdp.zone import Zones
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.model import Model
-from machine.app.workbench.work.tell import Tell
+from machine.app.workbench.work.processes import Tell
 from mdp.directions.orientation import in_words, side_in_words
 from mdp.read import read_mesh
 from mdp.search.laying import distinct_orientations

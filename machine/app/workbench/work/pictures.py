@@ -8,7 +8,7 @@ from machine.app.pictures.png import png_bytes
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench, write_zip
-from machine.app.workbench.work.tell import Tell
+from machine.app.workbench.work.processes import Tell
 
 
 def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:

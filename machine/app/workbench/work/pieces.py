@@ -5,7 +5,7 @@ from pathlib import Path
 
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
-from machine.app.workbench.work.tell import Tell
+from machine.app.workbench.work.processes import Tell
 from machine.planning.fit import check_parts
 from machine.view.encoding import pack
 from machine.view.parts import page_colours

@@ -4,10 +4,13 @@ workbench alone, and one signal ends it with all that it has started."""
 import asyncio
 import os
 import signal
+from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 from weakref import WeakKeyDictionary
 
 Process = asyncio.subprocess.Process
+Tell = Callable[[Any], None]  # what a task calls to say something to its bench meanwhile
 
 
 class _Here:

@@ -10,7 +10,7 @@ from machine.app.pipeline.copies import in_copies
 from machine.app.pipeline.pipeline import build
 from machine.app.workbench.bench.bench import Bench, plan_of_bench
 from machine.app.workbench.work.cutting import PLAN_NAME, cut_bench
-from machine.app.workbench.work.tell import Tell
+from machine.app.workbench.work.processes import Tell
 from machine.app.workbench.work.walls import walls
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, known_findings

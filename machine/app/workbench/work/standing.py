@@ -8,7 +8,7 @@ from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import mesh_blocks
 from machine.app.workbench.work.cutting import standing_mesh
 from machine.app.workbench.work.pieces import out_of_reach
-from machine.app.workbench.work.tell import Tell
+from machine.app.workbench.work.processes import Tell
 from mdp.overhang import risky_upright
 from mdp.pedestal import on_pedestal, pedestal_under
 from mdp.search.parts import one_piece

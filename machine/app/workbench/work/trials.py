@@ -11,7 +11,7 @@ import numpy as np
 from machine.app.pipeline import compilers
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.work.cutting import standing_mesh
-from machine.app.workbench.work.tell import Tell
+from machine.app.workbench.work.processes import Tell
 from mdp.cut import convex_hull
 from mdp.plane import Plane
 from mdp.plans.plan_file import PlannedPart

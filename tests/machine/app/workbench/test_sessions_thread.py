@@ -17,6 +17,7 @@ from machine.app.workbench.session.session import Session
 from machine.app.workbench.session.workbench import Workbench
 from machine.app.workbench.web.server import application
 from machine.app.workbench.web.sessions_thread import SessionsThread
+from machine.app.workbench.web.uploads import Uploads
 from profiles.profile import load
 
 PORT, TOKEN = 8000, "token"
@@ -48,7 +49,7 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(sessions: SessionsTh
         said: asyncio.Queue[Any] = asyncio.Queue()
         told: asyncio.Queue[Any] = asyncio.Queue()
         await sessions.run(begin())
-        app = application(workbench, sessions, prints, TOKEN, PORT, 1)
+        app = application(workbench, sessions, prints, TOKEN, PORT, Uploads(1))
         line = asyncio.create_task(app(scope(f"/{TOKEN}/1/prints"), said.get, told.put))  # type: ignore[arg-type]
         said.put_nowait({"type": "websocket.connect"})
         while (await told.get())["type"] != "websocket.send":
@@ -83,8 +84,8 @@ def test_an_application_hears_and_answers_from_the_other_loop_and_is_cancelled_w
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
         loops.append(asyncio.get_running_loop())
-        await send({"type": "answer", "body": (await receive())["body"]})
         try:
+            await send({"type": "answer", "body": (await receive())["body"]})
             await asyncio.Event().wait()
         finally:
             ended.set()

@@ -1,7 +1,9 @@
 """What is known of slices is not asked for again: a print of them is refused before a printer is asked, or begins sooner."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from zlib import crc32
 
 import pytest
 
@@ -24,14 +26,25 @@ GOOD, BAD = [*HEAT, "G1 X10 E1 F600", "M104 S0"], ["G28", "G1 X500 F600"]
 OTHER = Finding("warning", "told", 1, 0, 0, "was found before")
 
 
-def text(lines: list[str]) -> bytes:
-    return ("\n".join(lines) + "\n").encode()
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def file(lines: list[str]) -> Path:
+    """A G-code file of these lines."""
+    content = ("\n".join(lines) + "\n").encode()
+    path = Path(f"{crc32(content)}.gcode")
+    path.write_bytes(content)
+    return path
 
 
 def session(lines: list[str], profile: Profile = PROFILE) -> Any:
     """A bench whose slices are these lines, dry-run as slicing does it."""
     known = known_findings(lines, profile, dry_run(lines, profile).findings)
-    sliced = Sliced(b"", text(lines), 60.0, 1.0, known, Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0))
+    sliced = Sliced(
+        Path("page.html"), file(lines), "key", 60.0, 1.0, known, Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
+    )
     bench = SimpleNamespace(model=SimpleNamespace(name="box.stl"), profile=profile)
     return SimpleNamespace(closed=False, bench=bench, slicing=SimpleNamespace(needed=lambda: sliced))
 
@@ -57,7 +70,7 @@ def refusal(given: Any, port: str, **further: Any) -> UserError:
 def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_in_the_sentence_of_print() -> None:
     told = str(refusal(session(BAD), "/dev/no-such-port"))
     silent: Any = Silent()
-    by_print = carry_out(PrintOrder("box.stl", text(BAD), PROFILE, PrintRequest("sim")), AtPage(silent), Checks(silent, silent))
+    by_print = carry_out(PrintOrder("box.stl", file(BAD), PROFILE, PrintRequest("sim")), AtPage(silent), Checks(silent, silent))
     assert (told, by_print["end"]) == (by_print["sentence"], "refused")
     assert told.startswith("the dry run found ")
     assert "X goes to 500 mm" in told
@@ -67,7 +80,7 @@ def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_i
 @pytest.mark.parametrize(("machine", "port", "further", "sentence"), [
     ("linuxcnc_xyzac", "/dev/no-such-port", {}, "speaks linuxcnc, which opens files itself: use export"),
     ("generic_ac", "duet:printer", {}, "generic A/C table writes for marlin, but a Duet prints reprapfirmware: "),
-    ("generic_ac", "/dev/no-such-port", {"baud": 7}, "--baud is 7: "),
+    ("generic_ac", "/dev/no-such-port", {"baud": 7}, "baud rate 7 is not possible: "),
     ("generic_ac", "sim", {"sim_speed": -1.0}, "--sim-speed is -1: "),
 ])  # fmt: skip
 def test_what_the_machine_and_the_port_decide_is_refused_first(
@@ -88,13 +101,13 @@ def test_stale_slices_are_refused_before_all_else() -> None:
 
 
 def program(lines: list[str], profile: Profile, known: KnownFindings | None) -> tuple[Finding, ...]:
-    return program_of(PrintOrder("box.stl", text(lines), profile, PrintRequest("sim"), known=known)).run.findings
+    return program_of(PrintOrder("box.stl", file(lines), profile, PrintRequest("sim"), known=known)).run.findings
 
 
 def test_what_is_known_of_the_very_lines_for_the_very_profile_is_not_looked_for_again() -> None:
     known = known_findings(GOOD, PROFILE, [OTHER])
     assert program(GOOD, PROFILE, known) == (OTHER,)
-    order = PrintOrder("box.stl", text(GOOD), PROFILE, PrintRequest("sim"), known=known)
+    order = PrintOrder("box.stl", file(GOOD), PROFILE, PrintRequest("sim"), known=known)
     anew = dry_run(GOOD, PROFILE)
     assert summary(program_of(order).run) | {"findings": []} == summary(anew) | {"findings": []}
 
@@ -113,5 +126,5 @@ def test_what_differs_by_a_byte_or_a_setting_is_dry_run_anew(lines: list[str], p
 
 def test_a_line_that_would_be_two_when_the_text_is_read_again_is_dry_run_anew() -> None:
     in_one = [*GOOD[:-2], "\n".join(GOOD[-2:])]
-    assert text(in_one) == text(GOOD)
+    assert file(in_one) == file(GOOD)
     assert OTHER not in program(GOOD, PROFILE, known_findings(in_one, PROFILE, [OTHER]))
