@@ -95,9 +95,7 @@ def test_firefox_finds_parts_and_goes_through_the_front(firefox: Firefox) -> Non
     assert firefox.value("document.body.classList.contains('no-cuts')")
 
 
-@pytest.mark.skip(
-    reason="since benches share workers the lock or the tilt is not heard in Firefox; Chromium has the same way in test_workbench_planes"
-)
+@pytest.mark.skip(reason="since benches share workers the lock or the tilt is not heard in Firefox")
 def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mark(firefox: Firefox) -> None:
     firefox.click("[data-view=front]")
     firefox.click("#add")
