@@ -109,12 +109,11 @@ class Feed:
         return self.modal.take(command) if self._bounds is None else self._bounds.track(self.modal, command)[0]
 
     def _send(self, line: int, command: str) -> None:
-        if self._journal is not None and (
-            shifts(command, self.modal.axes.letters)
-            or self._journal.record_due(line, EVERY_LINES if self.exchange.connection.advanced else MUTE_LINES)
-        ):
-            self.history.sent = line
-            self._record()
+        if self._journal is not None:
+            shift, advanced = shifts(command, self.modal.axes.letters), self.exchange.connection.advanced
+            if shift or self._journal.record_due(line, EVERY_LINES if advanced else MUTE_LINES):
+                self.history.sent = line
+                self._record(hurry=shift)
         number = self.exchange.send(command)
         moves = self._track(command)
         self.sent += 1
@@ -287,9 +286,9 @@ class Feed:
         state = FINISHED if self.finished else PAUSED if waits is not None else self.state
         return Checkpoint(history.sent, history.acknowledged, history.executed, number, waits or history.pose, state)
 
-    def _record(self) -> None:
+    def _record(self, hurry: bool = False) -> None:
         if self._journal is not None:
-            self._journal.write(self._checkpoint())
+            self._journal.write(self._checkpoint(), hurry)
 
     def show(self, now_s: float) -> None:
         """Report the progress."""

@@ -98,7 +98,7 @@ class Journal:
         self.path, self.trouble = path, ""
         self.last = Checkpoint()
         self._noted_s = 0.0
-        self._dirty, self._end = threading.Event(), threading.Event()
+        self._dirty, self._hurry, self._end = threading.Event(), threading.Event(), threading.Event()
         try:
             self._file = os.open(path, _FLAGS, PRIVATE)
         except FileExistsError:
@@ -120,16 +120,19 @@ class Journal:
         """Whether a record is due before this line is sent, so that the newest one is less than so many lines behind."""
         return line - self.last.sent >= lines
 
-    def write(self, checkpoint: Checkpoint) -> None:
-        """Write a checkpoint at once."""
+    def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:
+        """Write a checkpoint at once; hurry: to the disk, too, for a computer may lose its power with its printer."""
         self.last = checkpoint
         self._write(_as_list(checkpoint))
+        if hurry:
+            self._hurry.set()
 
     def close(self) -> None:
         """Bring everything to the disk and end."""
         if not self._end.is_set():
             self._end.set()
             self._dirty.set()
+            self._hurry.set()
             self._sync_thread.join()
             self._to_disk()
             os.close(self._file)
@@ -152,12 +155,13 @@ class Journal:
         self._dirty.set()
 
     def _sync(self) -> None:
-        """fsync at most once a second, in a thread: an SD card may take longer over it than a printer waits."""
+        """fsync once a second, or in a hurry, in a thread: an SD card may take longer over it than a printer waits."""
         while not self._end.is_set():
             self._dirty.wait()
             self._dirty.clear()
+            self._hurry.clear()
             self._to_disk()
-            self._end.wait(SYNC_S)
+            self._hurry.wait(SYNC_S)
 
     def _to_disk(self) -> None:
         try:

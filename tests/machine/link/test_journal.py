@@ -2,6 +2,7 @@
 
 import json
 import os
+import threading
 from pathlib import Path
 from zlib import crc32
 
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from machine.app.printer.journal_folder import KEPT, new_journal
+from machine.link import journal as journal_module
 from machine.link.journal import EVERY_LINES, Checkpoint, Journal, JournalHeading, mark_resumed, read_journal
 from machine.reader.gcode_file import GcodeFile
 from profiles.errors import JournalError, OutputError
@@ -110,6 +112,22 @@ def test_the_sender_is_never_sixteen_lines_ahead_of_the_record(tmp_path: Path) -
     with Journal(tmp_path / "j", HEADING) as journal:
         journal.write(at(100))
         assert [journal.record_due(104 + ahead) for ahead in (0, EVERY_LINES - 1, EVERY_LINES)] == [False, False, True]
+
+
+def test_a_record_in_a_hurry_is_on_the_disk_before_its_second_is_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced, fsync = threading.Semaphore(0), os.fsync
+
+    def sync(descriptor: int) -> None:
+        fsync(descriptor)
+        synced.release()
+
+    monkeypatch.setattr(journal_module, "SYNC_S", 1e6)
+    monkeypatch.setattr(os, "fsync", sync)
+    with Journal(tmp_path / "j", HEADING) as journal:
+        assert synced.acquire(timeout=60.0)  # the heading
+        journal.write(at(16), hurry=True)
+        assert synced.acquire(timeout=60.0)
+        assert read_journal(tmp_path / "j").last == at(16)
 
 
 def test_nothing_new_is_not_noted(tmp_path: Path) -> None:

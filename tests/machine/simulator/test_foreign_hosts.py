@@ -79,7 +79,7 @@ def test_printrun_s_core_prints_through_a_uart() -> None:
 
 
 def test_printrun_s_core_heals_damaged_lines_as_on_a_real_printer() -> None:
-    faults = FaultScript((Fault("flip", 800, value=1), Fault("drop", 1200), Fault("flip", 1600, value=0)))
+    faults = FaultScript((Fault("flip", 803, value=1), Fault("drop", 1303), Fault("flip", 2103, value=0)))
     heard: list[str] = []
     with SimulatedPrinter(CHOSEN.machine, faults=faults) as printer:
         assert_printed(print_with_printcore(printer, heard))
