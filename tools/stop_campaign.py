@@ -33,6 +33,7 @@ from machine.simulator.simulator import SimulatedPrinter
 from mdp.cut import mesh_of
 from mdp.save import stl
 from profiles.profile import load
+from tests.machine import prints
 from tests.machine import workbench as harness
 from tests.machine.prints import PrintPage, prints_line
 from tests.machine.workbench import QUICK, Page, Running, workbench
@@ -122,13 +123,16 @@ def process(*part: str, out: Any = subprocess.PIPE) -> Iterator["subprocess.Pope
 
 def begin_prints(page: PrintPage, ports: Sequence[str]) -> list[int]:
     """The numbers of prints at these ports that all move already."""
-    for port in ports:
-        page.do("check", port=port)
 
     def of(port: str) -> dict[str, Any]:
-        return next((each for each in page.state["prints"] if each["port"] == port), {"phase": ""})
+        return next((each for each in page.state["prints"] if each["port"] == port), {"phase": "over", "number": 0})
 
-    page.until(lambda one: all(of(port)["phase"] in ("ready", "over") for port in ports))
+    while wanting := [port for port in ports if of(port)["phase"] == "over"]:  # a busy computer asks a printer in vain
+        before = {port: of(port)["number"] for port in wanting}
+        for port in wanting:
+            page.do("check", port=port)
+        page.until(lambda one: all(of(port)["number"] != number for port, number in before.items()))  # noqa: B023
+        page.until(lambda one: all(of(port)["phase"] in ("ready", "over") for port in ports))
     for port in ports:
         page.do("begin", print=of(port)["number"])
     page.until(lambda one: all((of(port)["progress"] or {}).get("state") == "printing" for port in ports))
@@ -248,7 +252,7 @@ def main() -> None:
         serve()
     if asked.sleeper is not None:
         sleep_lightly(asked.sleeper)
-    harness.PATIENCE_S = PATIENCE_S
+    harness.PATIENCE_S = prints.PATIENCE_S = PATIENCE_S
     chance, window_s, stops, answers = random.Random(asked.seed), 15.0, list[Span](), list[Span]()
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         ball = Path(name) / "ball.stl"

@@ -1,3 +1,6 @@
+import gc
+import weakref
+
 import manifold3d as m3
 import numpy as np
 import pytest
@@ -108,3 +111,13 @@ def test_one_direction_is_what_brute_force_gives(vector: tuple[float, float, flo
         if normal @ up < -(np.sin(np.radians(ANGLE_DEG)) + 1e-4) and max(heights[k] for k in face) > 0.3
     )
     assert risky_areas(mesh, up[None], ANGLE_DEG)[0] == pytest.approx(risky, abs=1e-9)
+
+
+def test_what_is_known_of_a_mesh_is_worked_out_once_and_keeps_the_mesh_from_nobody() -> None:
+    mesh = tee()
+    assert best_orientation(mesh, ANGLE_DEG) is best_orientation(mesh, ANGLE_DEG)
+    assert best_orientation(mesh, ANGLE_DEG) is not best_orientation(tee(), ANGLE_DEG)
+    left = weakref.ref(mesh)
+    del mesh
+    gc.collect()
+    assert left() is None

@@ -39,7 +39,7 @@ class StandingModel:
             self._desk.start(self._work(self._desk.bench, asked))
 
     async def _work(self, bench: Bench, asked: tuple[object, ...]) -> None:
-        standing: Standing = await self._desk.quick.run("stand", bench)
+        standing: Standing = await self._desk.hand.run("stand", bench)
         if self._wanted == asked:
             self._known = standing
             if standing.refusal:

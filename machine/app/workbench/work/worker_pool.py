@@ -30,10 +30,10 @@ class Worker:
 
 
 class WorkerPool:
-    """At most so many processes, and at most so many of them at once for one session. All from the event loop."""
+    """At most so many processes. All from the event loop."""
 
-    def __init__(self, most: int, most_each: int = 1) -> None:
-        self.most, self.most_each = most, most_each
+    def __init__(self, most: int) -> None:
+        self.most = most
         self._places = asyncio.Semaphore(most)
         self._starting = 0
         self._busy: list[Worker] = []
@@ -106,10 +106,10 @@ class WorkerPool:
 
 class WorkerPools:
     """Those of one run of the program. quick: for what a person waits for; long: for searches and slices; hand: for planes in
-    hand, whose processes keep what they have worked out for the bench."""
+    hand and a model that is turned; its processes keep what they have worked out for planes on the bench."""
 
     def __init__(self) -> None:
-        self.quick, self.long, self.hand = WorkerPool(3, most_each=2), WorkerPool(2), WorkerPool(3)
+        self.quick, self.long, self.hand = WorkerPool(3), WorkerPool(2), WorkerPool(3)
 
     def end(self) -> None:
         """End all processes."""
@@ -118,21 +118,22 @@ class WorkerPools:
 
 
 class TaskQueue:
-    """The tasks of one session in a pool, at most so many of them at once as the pool allows to each."""
+    """The tasks of one session in a pool, one after the other."""
 
     def __init__(self, pool: WorkerPool) -> None:
         self.pool = pool
-        self._places = asyncio.Semaphore(pool.most_each)
+        self._one = asyncio.Lock()
         self._closed = False
 
     async def warm(self) -> None:
         """Start a process before it is needed."""
-        await self.pool.warm(self)
+        async with self._one:
+            await self.pool.warm(self)
 
     async def run(self, task: str, *given: Any, tell: Callable[[Any], None] = lambda value: None) -> Any:
         """What a task gives. Raises UserError with its sentence; a task that is cancelled is stopped at once."""
         try:
-            async with self._places, self.pool.worker(self) as process:
+            async with self._one, self.pool.worker(self) as process:
                 kind, value = await _answer(process, (task, given), tell)
         except (asyncio.IncompleteReadError, ConnectionError):
             raise UserError("the process that did this work has ended before it was done: try it again") from None

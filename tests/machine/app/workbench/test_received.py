@@ -35,8 +35,8 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def names_in(folder: Path) -> list[str]:
-    """The files that pages have sent; what a bench makes of them lies beside their folders."""
-    return sorted(path.name for path in folder.glob("*/*") if path.is_file())
+    """Its files, without those that a bench has made of what it has received."""
+    return sorted(path.name for path in folder.rglob("*") if path.is_file() and not path.name.startswith("made-"))
 
 
 def left_by_a_killed_one(*names: str) -> Path:
@@ -68,7 +68,7 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
 def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(place: Path) -> None:
     folder = left_by_a_killed_one("tee.stl")
     assert tidy_left() == tidy_left() == (folder,)
-    assert names_in(folder) == ["tee.stl"]
+    assert names_in(folder) == [FOUND, "tee.stl"]
     past_s = (folder / FOUND).stat().st_mtime - KEPT_S - 1.0
     os.utime(folder / FOUND, (past_s, past_s))
     assert tidy_left() == ()
