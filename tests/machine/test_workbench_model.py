@@ -14,6 +14,12 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not instal
 RING_Y = """(() => { const path = document.querySelector('[data-ring=y] .near'), box = $('rings').getBoundingClientRect();
   const at = (share) => path.getPointAtLength(share * path.getTotalLength());
   return [at(0.5), at(0.6)].map(({ x, y }) => [x + box.x, y + box.y]); })()"""
+SLIPPED = """(() => { let seed = 7; const random = () => (seed = seed * 16807 % 2147483647) / 2147483647 - 0.5;
+  const place = () => [random(), random(), random()], ends = () => [place(), place()];
+  return Array.from({ length: 2000 }, () => { const [a, b] = ends(), [c, d] = ends(), along = random() + 0.5;
+    const on = add(scaled(a, along), scaled(b, 1 - along)), from = scaled(place(), 100);
+    return faceMet({ corners: [a, b, c, b, a, d].flat(), count: 2 }, from, unit(sub(on, from)));
+  }).filter((face) => face < 0).length; })()"""
 TURNED = "$('undo').getAttribute('aria-label') === 'undo: turn the model'"
 
 
@@ -42,6 +48,11 @@ def test_a_drag_of_a_ring_turns_the_model_in_one_step_and_red_follows_it(browser
     browser.click("#undo")
     browser.wait("$('undo').getAttribute('aria-label').startsWith('undo: open')")
     assert area(browser) == standing
+
+
+def test_a_click_on_the_edge_between_two_faces_meets_one_of_them(browser: Browser, bench: Running) -> None:
+    browser.open(bench.address)
+    assert browser.value(SLIPPED) == 0
 
 
 def test_arrow_keys_turn_a_ring_and_shift_takes_15_degrees_at_once(browser: Browser, bench: Running) -> None:

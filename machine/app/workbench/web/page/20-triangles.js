@@ -43,6 +43,8 @@ function paintedRed(count, red, colour, into) {
 
 const wordOf = ([r, g, b], a) => new Uint32Array(new Uint8Array([r, g, b, a]).buffer)[0];
 
+const EDGE_SLACK = 1e-9; // of a triangle's side: a ray along an edge, as one through the middle of a square, would slip between two faces by rounding
+
 /** The first face that a ray meets, from a place along a direction in the frame of the triangles; -1: none. */
 function faceMet({ corners, count }, from, along) {
   let best = -1, least = Infinity;
@@ -51,9 +53,9 @@ function faceMet({ corners, count }, from, along) {
     const across = cross(along, other), turn = dot(one, across);
     if (Math.abs(turn) < 1e-12) continue;
     const to = sub(from, a), u = dot(to, across) / turn;
-    if (u < 0 || u > 1) continue;
+    if (u < -EDGE_SLACK || u > 1 + EDGE_SLACK) continue;
     const beyond = cross(to, one), v = dot(along, beyond) / turn;
-    if (v < 0 || u + v > 1) continue;
+    if (v < -EDGE_SLACK || u + v > 1 + EDGE_SLACK) continue;
     const far = dot(other, beyond) / turn;
     if (far > 0 && far < least) [best, least] = [face, far];
   }
