@@ -135,8 +135,14 @@ def begin_prints(page: PrintPage, ports: Sequence[str]) -> list[int]:
         page.until(lambda one: all(of(port)["phase"] in ("ready", "over") for port in ports))
     for port in ports:
         page.do("begin", print=of(port)["number"])
-    page.until(lambda one: all((of(port)["progress"] or {}).get("state") == "printing" for port in ports))
+    page.until(lambda one: all(of(port)["phase"] == "over" or _moves(of(port)) for port in ports))
+    if ended_early := [of(port)["sentence"] for port in ports if of(port)["phase"] == "over"]:
+        raise SystemExit(f"a print has not begun: {ended_early[0]}")
     return [int(of(port)["number"]) for port in ports]
+
+
+def _moves(told: dict[str, Any]) -> bool:
+    return bool(told["progress"]) and told["progress"]["state"] == "printing"
 
 
 def ended(page: PrintPage, number: int) -> dict[str, Any]:

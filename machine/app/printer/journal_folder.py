@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from os.path import isfile, lexists
 from pathlib import Path
+from time import time
 
 from machine.app.file_roles import PROGRAM, program_beside
 from machine.app.output import write_lines
@@ -16,6 +17,7 @@ from profiles.folders import state_folder
 from profiles.profile import Profile
 
 KEPT = 20
+BEGUN_S = 3600.0  # a program as new as this may be of a print that another process begins now: its journal comes after it
 
 
 def new_journal(
@@ -103,17 +105,27 @@ def _new_path(name: str) -> Path:
 
 
 def _thin(folder: Path) -> None:
-    """Leave room for one more: delete all but the newest and those being printed; a program goes when no journal beside it is
-    left that names it."""
+    """Leave room for one more: delete all but the newest and those being printed; a program that is not new goes when no journal
+    beside it is left that names it."""
     for old in _newest_first(folder)[KEPT - 1 :]:
         if not is_being_printed(old):
             old.unlink(missing_ok=True)
     headings = b"".join(map(_first_line, _newest_first(folder)))
     for program in folder.glob(f"*{PROGRAM}"):
-        if program.name.encode() not in headings:
+        if program.name.encode() not in headings and not _is_new(program):
             program.unlink(missing_ok=True)
 
 
+def _is_new(program: Path) -> bool:
+    try:
+        return time() - program.stat().st_mtime < BEGUN_S
+    except FileNotFoundError:  # another process was quicker
+        return False
+
+
 def _first_line(journal: Path) -> bytes:
-    with journal.open("rb") as file:
-        return file.readline(LONGEST_BYTES)
+    try:
+        with journal.open("rb") as file:
+            return file.readline(LONGEST_BYTES)
+    except FileNotFoundError:
+        return b""

@@ -55,10 +55,10 @@ def running_simulators() -> tuple[SerialDevice, ...]:
         return ()
     for file in files:
         with suppress(OSError), file.open("r+", encoding="utf-8") as text:
-            if _lock(text):
+            path, _, description = text.read().partition("\n")
+            if path and _lock(text):  # an empty one is of a simulator that has not locked it yet
                 file.unlink(missing_ok=True)
                 continue
-            path, _, description = text.read().partition("\n")
             if path:
                 devices.append(SerialDevice(path, path, description.strip(), ""))
     return tuple(sorted(devices, key=lambda device: device.path))

@@ -17,6 +17,7 @@ except ImportError:  # without locks nothing is known of other programs, and not
 
 PREFIX = "tiltprint-edit-"
 FOUND = "found"  # file in a folder that was left, as old as the knowledge of that
+BEGUN_S = 60.0  # an empty folder as new as this may be of a program that starts now and has not locked it yet
 KEPT_S = 24 * 3600.0  # what lay on the benches of a program that was killed: nobody else may have it
 UNSAFE = re.compile(r"[^\w .()+-]")
 LONGEST_NAME = 100
@@ -60,7 +61,7 @@ def tidy_left() -> tuple[Path, ...]:
     left = []
     for folder in sorted(Path(tempfile.gettempdir()).glob(f"{PREFIX}*")):
         with suppress(OSError):
-            lock = _lock(folder)
+            lock = None if _is_begun(folder) else _lock(folder)
             if lock is None:
                 continue
             try:
@@ -77,6 +78,10 @@ def files_in(*folders: Path) -> list[Path]:
     """The files of the folders of some Received, the newest ones first."""
     files = [path for folder in folders for path in folder.glob("*/*") if path.is_file()]
     return sorted(files, key=lambda path: (path.stat().st_mtime, path), reverse=True)
+
+
+def _is_begun(folder: Path) -> bool:
+    return time.time() - folder.stat().st_mtime < BEGUN_S and not any(folder.iterdir())
 
 
 def _is_done_with(folder: Path) -> bool:

@@ -1,6 +1,7 @@
 """The journals of the state folder: whatever lies there ends no list with a traceback, and a print that runs is not offered."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -99,3 +100,16 @@ def test_a_journal_is_not_offered_and_not_thinned_out_before_its_print_has_ended
         assert Path(path).exists()
         printing.send_signal(signal.SIGKILL)
     assert path in [str(each.path) for each in resumable_journals()]
+
+
+def test_a_program_whose_journal_another_process_has_yet_to_begin_is_not_thinned_out() -> None:
+    folder = state_folder() / "journals"
+    folder.mkdir(exist_ok=True)
+    begun, orphan = folder / "begun.journal.gcode", folder / "orphan.journal.gcode"
+    for program in (begun, orphan):
+        program.write_text("G28\n")
+    os.utime(orphan, (0.0, 0.0))
+    with new_journal(LINES, load(), "next"):
+        pass
+    assert begun.exists()
+    assert not orphan.exists()
