@@ -29,12 +29,8 @@ _MODEL = (
 
 _GLTF = 0.001 * np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000.0]])  # mm with z up to metres with y up
 
-FOLDER_FILES = (
-    "decomposition.3mf",
-    "decomposition.json",
-    "plan.toml",
-    "decomposition.glb",
-)  # beside the parts in a folder that is asked for
+# Beside the parts in a folder that is asked for.
+FOLDER_FILES = ("decomposition.3mf", "decomposition.json", "plan.toml", "decomposition.glb")
 PART_FILES = "part-[0-9][0-9]*.stl"  # what part_file gives
 HEADING = b"tiltprint part"  # of the STL files that stl() gives
 
@@ -73,7 +69,7 @@ def threemf(decomposition: Decomposition) -> bytes:
 def glb(decomposition: Decomposition) -> bytes:
     """All parts in place as one scene for viewers, named and coloured, in print order, the same bytes every time.
 
-    As glTF wants it, in metres with y up: a node above the parts, which are in mm with z up, turns and scales them.
+    As glTF wants it, in metres with y up: each part, in mm with z up, hangs on a node that turns and scales it.
     """
     from trimesh import Scene
     from trimesh.visual.material import PBRMaterial
@@ -82,7 +78,7 @@ def glb(decomposition: Decomposition) -> bytes:
     scene = Scene(base_frame="workpiece")
     for part in decomposition.parts:
         body, name = part.mesh.to_trimesh(), part_file(part.index).removesuffix(".stl")
-        colour = [int(COLOURS[(part.index - 1) % len(COLOURS)][k : k + 2], 16) for k in (1, 3, 5)]
+        colour = bytes.fromhex(COLOURS[(part.index - 1) % len(COLOURS)][1:])
         body.visual = TextureVisuals(material=PBRMaterial(name, baseColorFactor=[*colour, 255], metallicFactor=0.0))
         scene.add_geometry(body, node_name=name, geom_name=name, transform=_GLTF)
     return bytes(scene.export(file_type="glb"))

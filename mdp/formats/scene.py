@@ -1,8 +1,8 @@
 """Scenes: formats beyond our own readers, glTF with its buffers outside and COLLADA, by trimesh."""
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -13,8 +13,12 @@ from profiles.errors import MeshError
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-Z_UP_OF_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-UNIT = re.compile(rb'<unit\b[^>]*\bmeter\s*=\s*"([^"]+)"')
+# Right, inwards and up of COLLADA's <up_axis>, as rows; Y_UP where none is told (COLLADA 1.4.1, 5-8).
+Z_UP_OF = {
+    "X_UP": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
+    "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "Z_UP": np.eye(3),
+}
 MM = 1000.0
 
 
@@ -38,7 +42,7 @@ def read(path: Path) -> list[Surface]:
     if not placed:
         raise MeshError(f"{path}: its scene places no mesh")
     check_meshes(path, len(placed), sum(len(mesh.faces) for _, mesh in placed))
-    turn = _to_mm_with_z_up(path.read_bytes()) if path.suffix.lower() == ".dae" else np.eye(3)
+    turn = _to_mm_with_z_up(path) if path.suffix.lower() == ".dae" else np.eye(3)
     return [_surface(path, mesh, matrix, turn) for matrix, mesh in placed]
 
 
@@ -48,12 +52,18 @@ def _surface(path: Path, mesh: "Trimesh", matrix: Floats, turn: Floats) -> Surfa
     return check_surface(path, vertices, mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0.0 else mesh.faces)
 
 
-def _to_mm_with_z_up(document: bytes) -> Floats:
+def _to_mm_with_z_up(path: Path) -> Floats:
     """(3, 3) that takes the coordinates of a COLLADA document to mm with z up (its <asset>: <unit>, <up_axis>)."""
-    unit = UNIT.search(document)
+    asset = ElementTree.parse(path).find("{*}asset")
+    unit = None if asset is None else asset.find("{*}unit")
+    axis = "Y_UP" if asset is None else asset.findtext("{*}up_axis", "Y_UP").strip()
+    told = "1" if unit is None else unit.get("meter", "1")
     try:
-        metres = float(unit[1]) if unit else 1.0
+        metres = float(told)
     except ValueError:
-        metres = 1.0
-    scale = 1.0 if metres == 1.0 else MM * metres
-    return scale * (Z_UP_OF_Y_UP if b"<up_axis>Y_UP" in document else np.eye(3))
+        metres = np.nan
+    if not 0.0 < metres < np.inf:
+        raise MeshError(f"{path}: its <unit> is {told[:40]!r} m, it must be a number above 0")
+    if axis not in Z_UP_OF:
+        raise MeshError(f"{path}: its <up_axis> is {axis[:40]!r}, it must be one of {', '.join(Z_UP_OF)}")
+    return (1.0 if metres == 1.0 else MM * metres) * Z_UP_OF[axis]

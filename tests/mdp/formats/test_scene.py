@@ -8,6 +8,7 @@ import pytest
 import trimesh
 from trimesh.exchange.gltf import export_gltf
 
+from mdp.formats.scene import _to_mm_with_z_up
 from mdp.read import read_mesh
 from tests.mdp import files
 from tests.mdp.files import refusal, save
@@ -63,7 +64,8 @@ def test_a_gltf_without_its_buffers_or_of_nothing_ends_in_a_sentence(tmp_path: P
 @pytest.mark.parametrize(
     ("asset", "sides_mm"),
     [
-        ("", (20, 30, 40)),
+        ("", (20, 40, 30)),
+        ("<up_axis>X_UP</up_axis>", (30, 40, 20)),
         ('<unit name="meter" meter="1"/><up_axis>Z_UP</up_axis>', (20, 30, 40)),
         ('<unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis>', (200, 300, 400)),
         ('<unit name="millimeter" meter="0.001"/><up_axis>Y_UP</up_axis>', (20, 40, 30)),
@@ -74,6 +76,27 @@ def test_collada_tells_its_unit_and_its_upward_axis(tmp_path: Path, asset: str, 
     mesh, notes = read_mesh(save(tmp_path / "a.dae", dae(asset)))
     assert notes == ()
     assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx(sides_mm)
+
+
+def test_what_is_up_in_collada_stays_up_and_nothing_is_mirrored(tmp_path: Path) -> None:
+    pytest.importorskip("collada")
+    for axis, up in (("X_UP", [1, 0, 0]), ("Y_UP", [0, 1, 0]), ("Z_UP", [0, 0, 1])):
+        turn = _to_mm_with_z_up(save(tmp_path / "a.dae", dae(f"<up_axis>{axis}</up_axis>")))
+        assert (turn @ up).tolist() == [0.0, 0.0, 1.0]
+        assert np.linalg.det(turn) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("asset", "sentence"),
+    [
+        ('<unit meter="much"/>', "its <unit> is 'much' m, it must be a number above 0"),
+        ("<unit meter='0'/>", "its <unit> is '0' m, it must be a number above 0"),
+        ("<up_axis>UP</up_axis>", "its <up_axis> is 'UP', it must be one of X_UP, Y_UP, Z_UP"),
+    ],
+)
+def test_a_unit_or_an_axis_that_is_none_is_refused(tmp_path: Path, asset: str, sentence: str) -> None:
+    pytest.importorskip("collada")
+    assert sentence in refusal(save(tmp_path / "a.dae", dae(asset)))
 
 
 def test_without_its_library_collada_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
