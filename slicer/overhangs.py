@@ -1,7 +1,7 @@
 """Overhangs: the places of each layer that hang over nothing and are too flat to carry themselves, and which of them bridge."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
@@ -14,7 +14,6 @@ from slicer.geometry.polygons import Polygons, edges, islands, offset, opening, 
 from slicer.sections import Sections
 from slicer.zones import no_support_areas
 
-EMPTY = Polygons()
 LEAST_MM2 = 1e-3  # places smaller than this are rounding
 HEAP = 12  # so many layers are united first: a sweep over all of them at once meets many more crossings
 
@@ -26,10 +25,10 @@ class Overhang:
     unwanted: what hangs, and a person wants no support for.
     """
 
-    hanging: Polygons = EMPTY
+    hanging: Polygons = field(default_factory=Polygons)
     bridges: tuple[Bridge, ...] = ()
-    ledges: Polygons = EMPTY
-    unwanted: Polygons = EMPTY
+    ledges: Polygons = field(default_factory=Polygons)
+    unwanted: Polygons = field(default_factory=Polygons)
 
 
 def find_overhangs(sections: Sections) -> list[Overhang]:
@@ -63,7 +62,7 @@ def _all_overhangs(sections: Sections) -> list[Overhang]:
     for i in range(int(sections.on_platform), len(outlines)):
         below = _plastic_below(sections, i)
         floating, triangles = _floating(outlines[i], below), faces.get(i, [])
-        hanging = (outlines[i] - below) ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else EMPTY
+        hanging = (outlines[i] - below) ^ offset(Polygons(triangles), 0.5 * RIM_MM) if triangles else Polygons()
         hanging = hanging if floating.is_empty() else hanging + floating
         if not hanging.is_empty():
             all_need = len(needing.get(i, ())) == len(triangles)
@@ -75,13 +74,13 @@ def _all_overhangs(sections: Sections) -> list[Overhang]:
 
 def _plastic_below(sections: Sections, layer: int) -> Polygons:
     """What a layer that is not on the platform lies on."""
-    return sections.outlines[layer - 1] if layer else offset(sections.plastic_below or EMPTY, RIM_MM)
+    return sections.outlines[layer - 1] if layer else offset(sections.plastic_below or Polygons(), RIM_MM)
 
 
 def _floating(outline: Polygons, below: Polygons) -> Polygons:
     """The pieces of a layer that begin over nothing, however steep they are: a bell's rim that gets thick enough for a line."""
     begun = [] if outline.is_empty() else [piece for piece in islands(outline) if (piece ^ below).is_empty()]
-    return union(begun) if begun else EMPTY
+    return union(begun)
 
 
 def _sort_islands(

@@ -42,16 +42,13 @@ class ThickSupport:
         return k if k < len(self.areas) and self.areas[k] is not NOTHING else None
 
 
-NONE = ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons())
-
-
 def thick_support(part: Part, heights: Heights, profile: Profile, plate: Polygons) -> ThickSupport:
     """The support of a part; parts printed later are not looked at."""
     process, mesh, on_platform = profile.process, part.in_part_frame(), part.index == 1
     risky = _hanging(mesh, process, on_platform)
     hanging_mm2 = -float((mesh.normals[risky, 2] * mesh.areas_mm2[risky]).sum())
     if process.support == "none" or hanging_mm2 <= process.support_least_mm2:
-        return NONE
+        return ThickSupport(np.zeros(0), np.zeros(0), (), (), (), Polygons())
     top_mm = float(mesh.vertices[mesh.faces[risky], 2].max())
     thick = _thick_layers(float(heights.tip_mm[0]), min(top_mm + LEAST_MM, float(heights.tip_mm[-1])))
     outlines = [clean(loops, 0.0).simplify(COARSE_MM) for loops in cross_sections(mesh, thick.cut_mm)]

@@ -26,7 +26,6 @@ from slicer.travel.path_order import order_paths
 from slicer.travel.retracting import travels
 from slicer.travel.rings import AS_IT_IS, CLOSED, OPEN, order_lines
 
-NO_SUPPORT = Polygons()
 SEAMED = (*WALLS, Kind.SKIRT)  # kinds whose rings begin where they do
 FILL, LAST = 1, 99  # beads of these ranks fill what the walls enclose, in any order; what smooths a top comes after
 ROUNDS = 2  # a phase ends well only once it is known where the next one begins
@@ -43,7 +42,7 @@ class Placed:
 
 
 def order_beads(
-    beads: Sequence[Bead], section: Polygons, process: Process, tip: Floats | None, support: Polygons = NO_SUPPORT
+    beads: Sequence[Bead], section: Polygons, process: Process, tip: Floats | None, support: Polygons | None = None
 ) -> list[Placed]:
     """The beads of one layer in printing order.
 
@@ -51,6 +50,7 @@ def order_beads(
     """
     if not beads:
         return []
+    support = Polygons() if support is None else support
     first = beads[0].points[0] if tip is None else tip
     placed = _sequence(beads, islands_of(beads, section, support), first, tip is None)
     to = np.array([points[0] for _, points in placed])

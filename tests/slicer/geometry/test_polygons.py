@@ -1,10 +1,15 @@
 """Polygons: their booleans and offsets judged by shapely, their pieces, their contours."""
 
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from inspect import isfunction
+
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from manifold3d import CrossSection, Manifold
 
 from mdp.mesh import Floats
 from slicer.geometry.polygons import (
@@ -28,6 +33,7 @@ from slicer.geometry.polygons import (
     union,
 )
 from tests.slicer.hand import as_shapely, ragged
+from tools.draw_rooms import modules
 
 seeds = st.integers(0, 10**6)
 few = settings(deadline=None, max_examples=25)
@@ -177,3 +183,11 @@ def test_a_loop_is_the_same_from_any_of_its_points() -> None:
 def test_nothing_has_no_pieces_contours_or_edges() -> None:
     assert (islands(Polygons()), contours(Polygons()), edges(Polygons()).shape) == ([], [], (0, 4))
     assert union([]).is_empty()
+
+
+def test_no_module_keeps_polygons_of_which_manifold3d_would_complain_when_the_program_ends() -> None:
+    names = [name for name in modules() if name.startswith(("mdp.", "slicer.", "machine.planning")) and "learning" not in name]
+    held = [value for name in names for value in vars(import_module(name)).values()]
+    held += [field.default for kind in held if is_dataclass(kind) for field in fields(kind)]
+    held += [default for one in held if isfunction(one) for default in one.__defaults__ or ()]
+    assert [value for value in held if isinstance(value, CrossSection | Manifold)] == []
