@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.connection import GREETING_STATES, Connection
-from machine.link.protocol.events import Event, Ok, Position
+from machine.link.protocol.events import Event, Position, position_in
 from machine.link.protocol.framing import LINE_LIMIT
 from machine.link.protocol.slow_commands import is_waited_for
 from machine.link.protocol.states import State
@@ -106,10 +106,7 @@ class Exchange:
         now_s = self.medium.now_s()
         if data:
             for event in connection.receive(data, now_s):
-                if isinstance(event, Position):
-                    self._position = event
-                elif isinstance(event, Ok) and event.position is not None:
-                    self._position = event.position
+                self._position = position_in(event) or self._position
                 self._on_event(event)
         connection.tick(now_s)
         if connection.fault is not None:

@@ -10,7 +10,18 @@ from time import monotonic
 from machine.firmware.line import BAUDS
 from machine.link.port import Port
 from machine.link.protocol.decoder import LineDecoder
-from machine.link.protocol.events import NAME, Area, Busy, Event, FirmwareFault, Identity, Ok, Position, Resend, lacks_checksum
+from machine.link.protocol.events import (
+    NAME,
+    Area,
+    Busy,
+    Event,
+    FirmwareFault,
+    Ok,
+    Resend,
+    identity_in,
+    lacks_checksum,
+    position_in,
+)
 from machine.link.protocol.framing import FAR_NUMBER, frame
 
 TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and as many with its start
@@ -143,21 +154,12 @@ class _Inquiry:
             self._next_number = event.line
         elif isinstance(event, Area):
             self._area = event
-        elif isinstance(event, Identity):
-            self._words = event.text
-        elif isinstance(event, Position):
-            self._read_position(event)
-        elif isinstance(event, Ok):
-            self._ok = True
-            if event.identity is not None:
-                self._words = event.identity.text
-            if event.position is not None:
-                self._read_position(event.position)
-            self.named = bool(self._words)
-
-    def _read_position(self, position: Position) -> None:
-        self._letters = "".join(letter for letter, _ in position.axes if letter != "E")
-        self.placed = True
+        if identity := identity_in(event):
+            self._words = identity.text
+        if position := position_in(event):
+            self._letters, self.placed = "".join(letter for letter, _ in position.axes if letter != "E"), True
+        if isinstance(event, Ok):
+            self._ok, self.named = True, bool(self._words)
 
     def _limits(self) -> dict[str, tuple[float, float]]:
         """The area with the letters of M114: Marlin names the axes from the fourth on I, J, K, whatever their words are."""

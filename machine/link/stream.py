@@ -8,8 +8,9 @@ from machine.link.exchange import Exchange, Reconnection
 from machine.link.feed import Feed
 from machine.link.journal import Journal
 from machine.link.line_outcome import line_was_done
-from machine.link.medium import SERIAL, Medium, reopen, stable_name
+from machine.link.medium import SERIAL, Medium, reopen
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
+from machine.link.port import stable_name
 from machine.link.progress import PrintJob, Progress, Schedule, last_known
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing

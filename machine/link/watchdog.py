@@ -9,7 +9,17 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.link.pending_commands import Command, PendingCommand
-from machine.link.protocol.events import Action, Busy, Echo, Event, Identity, Ok, Temperature, unknown_command
+from machine.link.protocol.events import (
+    Action,
+    Busy,
+    Echo,
+    Event,
+    Ok,
+    Temperature,
+    identity_in,
+    temperature_in,
+    unknown_command,
+)
 from machine.link.protocol.framing import name_of
 from profiles.errors import PrinterError
 
@@ -118,12 +128,10 @@ class PrinterReports:
             # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
             paused = isinstance(event, Busy) and "paused for" in event.text
             self.waiting = "the printer waits for a person: look at its display" if paused else ""
-        report = event.temperature if isinstance(event, Ok) else event
-        if isinstance(report, Temperature):
+        if report := temperature_in(event):
             self.temperature, self.temperature_s = report, now_s
             self._watchdog.check(report, now_s)
-        identity = event.identity if isinstance(event, Ok) else event
-        if isinstance(identity, Identity):
+        if identity := identity_in(event):
             self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
         elif unknown := unknown_command(event):
             self.unknown.add(unknown)

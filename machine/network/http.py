@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from machine.network.address import NAMES, ServerAddress
 from machine.network.credentials import Credentials, how_to_give_a_key, servers_file
-from profiles.errors import NoAnswerError, ServerError
+from profiles.errors import NoAnswerError, ServerError, causes
 
 if TYPE_CHECKING:
     import httpx
@@ -226,7 +226,7 @@ def _certificates(address: ServerAddress, credentials: Credentials) -> ssl.SSLCo
 
 def _transport_sentence(error: httpx.TransportError, address: ServerAddress, httpx_: Any) -> str:
     """What went wrong below HTTP, and what to look at."""
-    where, chain = f"{address.host} at port {address.port}", _causes(error)
+    where, chain = f"{address.host} at port {address.port}", causes(error)
     if any(isinstance(cause, socket.gaierror) for cause in chain):
         return f"{address.text}: no computer of the name {address.host} is known here: an IP address will do, too"
     if trust := next((cause for cause in chain if isinstance(cause, ssl.SSLCertVerificationError)), None):
@@ -252,11 +252,3 @@ def _transport_sentence(error: httpx.TransportError, address: ServerAddress, htt
 
 def _reason(error: Exception) -> str:
     return ERRNO.sub("", plain(str(error)).lower()) or type(error).__name__
-
-
-def _causes(error: BaseException | None) -> list[BaseException]:
-    causes: list[BaseException] = []
-    while error is not None and error not in causes:
-        causes.append(error)
-        error = error.__cause__ or error.__context__
-    return causes

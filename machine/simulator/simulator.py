@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from math import inf
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
 from typing import Any, Self
 
 from machine.simulator.board import BuildOptions, build_options
@@ -71,7 +70,7 @@ class SimulatedPrinter:
         self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self._wake.send(b"x")
         if self._thread is not None:
             self._thread.join()

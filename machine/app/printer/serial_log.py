@@ -7,7 +7,6 @@ from dataclasses import replace
 from datetime import datetime
 from io import BufferedWriter
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from machine.link.medium import SERIAL, Medium, Traffic, Wire
@@ -65,7 +64,7 @@ class SerialLog:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _flush(self) -> None:

@@ -7,7 +7,6 @@ import sys
 import threading
 from collections.abc import Callable
 from time import monotonic
-from types import TracebackType
 from typing import Any, Self
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
@@ -132,7 +131,7 @@ class Typing:
         self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         import termios
 
         os.write(self._wake, b"x")
@@ -176,7 +175,7 @@ class ConsoleTyping:
         self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self._over.set()
         self._thread.join()
 

@@ -22,6 +22,7 @@ from machine.link.protocol.events import (
     Resend,
     Start,
     Wait,
+    identity_in,
     is_halt,
 )
 from machine.link.protocol.flow_control import FlowControl
@@ -136,9 +137,8 @@ class Connection:
     def _handle(self, event: Event, now_s: float) -> None:
         match event:
             case Ok():
-                if (identity := event.identity) is not None:
-                    self.greeting.learn(identity)
-                    self.window.rx_bytes = self.greeting.rx_bytes
+                if identity := identity_in(event):
+                    self._learn(identity)
                 self._handle_ok(event, now_s)
             case Resend() if self.state is not State.SYNC:
                 self._handle_resend(event, now_s)
@@ -162,8 +162,11 @@ class Connection:
             case Echo():
                 self._oks.hear_echo(event.text)
             case Identity() | Capability() | Area():
-                self.greeting.learn(event)
-                self.window.rx_bytes = self.greeting.rx_bytes
+                self._learn(event)
+
+    def _learn(self, answer: Identity | Capability | Area) -> None:
+        self.greeting.learn(answer)
+        self.window.rx_bytes = self.greeting.rx_bytes
 
     def _handle_ok(self, ok: Ok, now_s: float) -> None:
         """What an `ok` answers depends on the state: M110, a Resend, or a line in flight."""
