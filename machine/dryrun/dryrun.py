@@ -1,7 +1,7 @@
 """Dryrun: a G-code text played through the machine's kinematics, without a machine."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import pi
 from typing import Any
 
@@ -147,8 +147,5 @@ def summary(run: DryRun) -> dict[str, Any]:
             letter: [float(program.end[:, k].min()), float(program.end[:, k].max())] if len(program.end) else []
             for k, letter in enumerate(run.letters)
         },
-        "findings": [
-            {"severity": f.severity, "code": f.code, "line": f.line, "part": f.part, "layer": f.layer, "message": f.message}
-            for f in run.findings
-        ],
+        "findings": [asdict(finding) for finding in run.findings],
     }
