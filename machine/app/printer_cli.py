@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import ConsoleRequest, Given, PrintRequest, SendRequest, SimulatorRequest
+from machine.app.requests import ConsoleRequest, Given, PrintRequest, SimulatorRequest
 from machine.app.terminal.option_groups import with_option_groups
 from machine.app.terminal.options import (
     Baud,
@@ -80,7 +80,7 @@ def send(
     """
     from machine.app.commands.send import send
 
-    return send(model_request(file, SearchOptions(), given, force=force), SendRequest(to, start, log))
+    return send(model_request(file, SearchOptions(), given, force=force), to, start=start, log=log)
 
 
 def follow(

@@ -52,16 +52,10 @@ HELP = """What you type is sent, one line after the other is answered. Besides:
 """
 DIM, RED, YELLOW, CYAN = "2", "31", "33", "36"
 COLOURS: dict[type[Event], str] = {
-    Ok: DIM,
-    Busy: DIM,
+    **dict.fromkeys((Ok, Busy), DIM),
     Temperature: CYAN,
-    Echo: YELLOW,
-    Action: YELLOW,
-    Start: YELLOW,
-    Banner: YELLOW,
-    LineError: RED,
-    Resend: RED,
-    FirmwareFault: RED,
+    **dict.fromkeys((Echo, Action, Start, Banner), YELLOW),
+    **dict.fromkeys((LineError, Resend, FirmwareFault), RED),
 }
 
 

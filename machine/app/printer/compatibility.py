@@ -26,14 +26,8 @@ SHAPING = ("shape", "dialect", "coordinates", "tool_mm")
 AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
 
 
-def identify_printer_at(port: str, baud: int) -> Answer:
-    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is."""
-    with open_port(port, baud) as wire:
-        return identify_printer(wire, baud)
-
-
 def identify_printer(wire: Port, baud: int) -> Answer:
-    """The same for a port that is open already."""
+    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is."""
     port = wire.name
     answer, rate = ask_at_any_rate(wire, baud)
     if answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED) and rate != baud:
@@ -74,7 +68,10 @@ def _why(answer: Answer, port: str, baud: int) -> str:
 def check_port(port: str, baud: int, sim_speed: float) -> Answer | None:
     """What answers at a port, refused at once when it is no printer; None for the simulated one. Raises PrinterError."""
     check_speed(sim_speed)
-    return None if port == SIMULATED else identify_printer_at(port, baud)
+    if port == SIMULATED:
+        return None
+    with open_port(port, baud) as wire:
+        return identify_printer(wire, baud)
 
 
 def is_rate_limited(port: str) -> bool:
@@ -182,7 +179,7 @@ def firmware_mismatch(answer: Answer, machine: Machine) -> str:
         return ""
     return (
         f"the printer's firmware moves {' '.join(answer.letters)}, but {machine.name} needs {' '.join(wanted)}: "
-        f"{_enumerate(lacking)} {'is' if len(lacking) == 1 else 'are'} missing"
+        f"{' and '.join(lacking)} {'is' if len(lacking) == 1 else 'are'} missing"
     )
 
 
@@ -221,7 +218,3 @@ def _changed(file: str, machine: Machine, key: str, then: object, now: object) -
 
 def _text(value: object) -> str:
     return ", ".join(f"{x:g}" for x in value) if isinstance(value, tuple) else str(value)
-
-
-def _enumerate(letters: list[str]) -> str:
-    return " and ".join(letters)

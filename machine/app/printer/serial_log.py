@@ -107,7 +107,7 @@ class SerialLog:
 
     def _open(self, file: Path) -> BufferedWriter | None:
         try:
-            return open(file, "wb", opener=_open_private)
+            return open(file, "wb", opener=lambda name, flags: os.open(name, flags, 0o600))
         except OSError as error:
             self._fail(error)
             return None
@@ -115,10 +115,6 @@ class SerialLog:
     def _fail(self, error: OSError) -> None:
         self.trouble = reason(error)
         self._out = None
-
-
-def _open_private(file: str, flags: int) -> int:
-    return os.open(file, flags, 0o600)
 
 
 class TappedWire:

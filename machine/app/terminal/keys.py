@@ -65,15 +65,6 @@ class Keyboard:
             self._tell("cancelling")
             self._control.ask(Command.CANCEL)
 
-    def _pause(self) -> None:
-        self._control.ask(Command.PAUSE)
-
-    def _resume(self) -> None:
-        self._control.ask(Command.RESUME)
-
-    def _toggle(self) -> None:
-        self._control.ask(Command.RESUME if self._state in STANDING else Command.PAUSE)
-
     def _cancel(self) -> None:
         self._sure = True
         self._tell(SURE)
@@ -94,9 +85,9 @@ class Keyboard:
 
 
 _ACTS: dict[str, Callable[[Keyboard], None]] = {
-    "p": Keyboard._pause,
-    "r": Keyboard._resume,
-    " ": Keyboard._toggle,
+    "p": lambda board: board._control.ask(Command.PAUSE),
+    "r": lambda board: board._control.ask(Command.RESUME),
+    " ": lambda board: board._control.ask(Command.RESUME if board._state in STANDING else Command.PAUSE),
     "c": lambda board: board._cancel(),
     "q": lambda board: board._explain(),
     "+": lambda board: board._faster(STEP_PERCENT),
