@@ -32,6 +32,7 @@ class Exchange:
         self,
         wire: Wire,
         medium: Medium,
+        *,
         timing: Timing,
         on_event: Callable[[Event], None],
         on_turn: Callable[[float], None],
@@ -41,7 +42,7 @@ class Exchange:
         baud: int | None = None,
     ) -> None:
         self.wire, self.medium = wire, medium
-        self.connection = Connection(timing, medium.now_s(), limit, rx_bytes=rx_bytes, baud=baud)
+        self.connection = Connection(timing, medium.now_s(), limit=limit, rx_bytes=rx_bytes, baud=baud)
         self.greeted = False
         self._on_event, self._on_turn, self._on_lost = on_event, on_turn, on_lost
         self._position: Position | None = None

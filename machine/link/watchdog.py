@@ -120,7 +120,7 @@ class PrinterReports:
         self.unknown: set[str] = set()
         self.waiting = ""
         self._warned: dict[str, int] = {}
-        self._watchdog = watchdog
+        self.watchdog = watchdog
 
     def read(self, event: Event, now_s: float) -> PendingCommand | None:
         """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
@@ -130,7 +130,7 @@ class PrinterReports:
             self.waiting = "the printer waits for a person: look at its display" if paused else ""
         if report := temperature_in(event):
             self.temperature, self.temperature_s = report, now_s
-            self._watchdog.check(report, now_s)
+            self.watchdog.check(report, now_s)
         if identity := identity_in(event):
             self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
         elif unknown := unknown_command(event):
@@ -152,10 +152,6 @@ class PrinterReports:
     def warnings(self) -> list[str]:
         """What the printer said about a program that it does not understand; what it said again is counted."""
         return [text if count == 1 else f"{text} (x {count})" for text, count in self._warned.items()]
-
-    def check_silence(self, now_s: float, mute: bool) -> None:
-        """Judge a silence; raises PrinterError. mute: nothing can be reported now."""
-        self._watchdog.check_silence(now_s, mute)
 
     def _read_echo(self, text: str) -> None:
         if any(words in text for words in COLD):

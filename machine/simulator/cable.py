@@ -100,6 +100,13 @@ class Cable:
         """Whether the printer reads nothing, so that the host's writing comes to a halt."""
         return now_s < self._blocked_s
 
+    def reads_nothing(self, now_s: float) -> bool:
+        """Whether the host's bytes are left where they are, so that its writing comes to a halt."""
+        return self._firmware.full or (self.blocked(now_s) and not self._firmware.has_ring)
+
+    def clear(self) -> None:
+        """Nothing is on its way between two turns."""
+
     def due_s(self, now_s: float) -> float:
         """When something happens without further bytes, on the cable's clock; inf: never."""
         firmware_s = inf if self._speed == inf else self._firmware.next_s() / self._speed + LATE_S

@@ -187,7 +187,8 @@ class Motion:
             feed = _length(real, end) / seconds
         strokes = end[5] != real[5]
         most_mm_s2 = self._printing if strokes else self._travelling
-        block = block_of(real, end, feed, self.speeds, self.accelerations, most_mm_s2)
+        speeds, accelerations = self.speeds, self.accelerations
+        block = block_of(real, end, feed, speeds=speeds, accelerations=accelerations, most_mm_s2=most_mm_s2)
         self.place, self._real = list(place), end
         if block is not None:
             self.energised = True

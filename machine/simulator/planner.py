@@ -242,7 +242,7 @@ def corner2(before: Block, after: Block, jerk: float) -> float:
     return v * v
 
 
-def block_of(start: Place, end: Place, feed: float, speeds: Place, accelerations: Place, most_mm_s2: float) -> Block | None:
+def block_of(start: Place, end: Place, feed: float, *, speeds: Place, accelerations: Place, most_mm_s2: float) -> Block | None:
     """A block from place to place; None when nothing moves. most_mm_s2: acceleration set for moves of X Y Z."""
     deltas = [b - a for a, b in zip(start, end, strict=True)]
     x, y, z, tilt, turn, filament = deltas

@@ -103,7 +103,7 @@ class SimulatedPrinter:
                 self._plug(there)
             if there:
                 self._answer(answer)
-            reading = [] if self._reads_nothing(now_s) else self._terminal.readable_ends()
+            reading = [] if self._line.reads_nothing(now_s) else self._terminal.readable_ends()
             writing = self._terminal.writable_ends() if self._out else []
             waited_for: list[Any] = [*reading, self._end]
             readable, _, _ = select.select(waited_for, writing, [], self._pause_s(now_s))
@@ -111,16 +111,9 @@ class SimulatedPrinter:
                 return
             data = self._terminal.read() if readable else b""
 
-    def _reads_nothing(self, now_s: float) -> bool:
-        """Whether the host's bytes are left where they are, so that its writing comes to a halt."""
-        if isinstance(self._line, Uart):
-            return self._line.full
-        return self._firmware.full or (self._cable.blocked(now_s) and not self._firmware.has_ring)
-
     def _plug(self, there: bool) -> None:
         self._out = b""
-        if isinstance(self._line, Uart):
-            self._line.clear()
+        self._line.clear()
         if there:
             self._terminal.open()
         else:

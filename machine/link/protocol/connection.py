@@ -51,6 +51,7 @@ class Connection:
         self,
         timing: Timing | None = None,
         now_s: float = 0.0,
+        *,
         limit: int = LINE_LIMIT,
         firmware: Firmware = MARLIN,
         rx_bytes: int | None = None,

@@ -92,7 +92,7 @@ def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
     told: list[Progress] = []
     body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + body, printer.path, 250000, told.append, timing=PATIENT)
+        print_lines(HEAT + body, printer.path, 250000, on_progress=told.append, timing=PATIENT)
     last = told[-1]
     assert (last.sent, last.acknowledged, last.total) == (6, 6, 6)
     assert (last.part, last.parts, last.layer, last.share) == (2, 2, 2, 0.5)
@@ -112,7 +112,7 @@ COMMENTED = {
 def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) -> None:
     told: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, told.append, timing=PATIENT)
+        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, on_progress=told.append, timing=PATIENT)
     parsed = parse_gcode(COMMENTED[slicer], MACHINE)
     assert (told[-1].layer, told[-1].part or 0) == (2, parsed.part[-1]) == (parsed.layer[-1], parsed.part[-1])
 
@@ -120,7 +120,7 @@ def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) ->
 def test_m73_and_m220_count_in_lower_case_too() -> None:
     told: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, told.append, timing=PATIENT)
+        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, on_progress=told.append, timing=PATIENT)
     assert (told[-1].share, told[-1].feed_percent) == (0.5, 80.0)
 
 
@@ -128,7 +128,9 @@ def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:
     told: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
         schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=2.0)
-        print_lines(iter(["G21", "M220 S50", "G90"]), printer.path, 250000, told.append, schedule=schedule, timing=PATIENT)
+        print_lines(
+            iter(["G21", "M220 S50", "G90"]), printer.path, 250000, on_progress=told.append, schedule=schedule, timing=PATIENT
+        )
     assert told[-1].left_s == pytest.approx((1000.0 - 300.0) / 2.0 / 0.5)
     assert told[-1].total is None
 
@@ -191,7 +193,9 @@ def _once_sent(count: int, act: Callable[[], object]) -> Callable[[Progress], No
 def test_stopping_leaves_heaters_off_and_moves_nothing_home(lines: list[str]) -> None:
     stop = threading.Event()
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
-        outcome = print_lines(["M106 S255", *lines], printer.path, 250000, _once_sent(2, stop.set), stop=stop, timing=PATIENT)
+        outcome = print_lines(
+            ["M106 S255", *lines], printer.path, 250000, on_progress=_once_sent(2, stop.set), stop=stop, timing=PATIENT
+        )
         record = printer.record
     assert outcome.cancelled
     assert outcome.heaters_off
@@ -204,7 +208,7 @@ def test_without_an_emergency_parser_stopping_still_switches_the_heaters_off() -
     stop = threading.Event()
     with SimulatedPrinter(MACHINE, speed=5.0, build=BuildOptions(emergency_parser=False)) as printer:
         lines = ["M104 S200", *(["G1 X5 F3000", "G1 X0"] * 999)]
-        outcome = print_lines(lines, printer.path, 250000, _once_sent(9, stop.set), stop=stop, timing=PATIENT)
+        outcome = print_lines(lines, printer.path, 250000, on_progress=_once_sent(9, stop.set), stop=stop, timing=PATIENT)
         assert outcome.heaters_off
         assert printer.record.nozzle_target_c == 0.0
 
@@ -213,7 +217,7 @@ def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         press = _once_sent(9, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT))
         with pytest.raises(KeyboardInterrupt):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, press, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=press, timing=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
         assert printer.record.happened("nozzle 200")
 
@@ -225,7 +229,7 @@ def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
 
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         with pytest.raises(ZeroDivisionError):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, burst, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=burst, timing=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
 
 
@@ -306,7 +310,7 @@ def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
         other = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
         kill = _once_sent(9, lambda: os.write(other, b"\nM112\n"))
         with pytest.raises(FirmwareError, match="Printer halted"):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, kill, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=kill, timing=PATIENT)
         os.close(other)
         assert printer.record.nozzle_target_c == 0.0
 
