@@ -126,6 +126,6 @@ def _of_part(program: ParsedProgram, rows: NDArray[np.int64], totals: PartTotals
     extreme = np.abs(ends[:, :, axis] - bounds[side, axis]).min(axis=0).argmin()
     shifted = bool(np.abs(apart[0] - apart[1]).max() <= PLACE_MM)  # both sides are moved alike
     moved = f"lies {abs(apart[side, axis]):.2f} mm aside" if shifted else "reaches"
-    here, told = (f"{'XYZ'[axis]}{corners[side, axis]:.3f}" for corners in (bounds, totals.bounds_mm))
-    message = f"part {totals.part} {moved} to {here}, the file tells of {told} ({PLACE_MM:g} mm are allowed)"
+    laid, recorded = (f"{'XYZ'[axis]}{corners[side, axis]:.3f}" for corners in (bounds, totals.bounds_mm))
+    message = f"part {totals.part} {moved} to {laid}, the file tells of {recorded} ({PLACE_MM:g} mm are allowed)"
     yield at_row(program, int(rows[0] if shifted else rows[extreme]), "error", "contents", message)

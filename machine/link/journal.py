@@ -273,4 +273,4 @@ def _checkpoint(path: Path, value: Any, number: int) -> Checkpoint:
 
 
 def _is_pose(values: list[Any]) -> bool:
-    return all(each is None or (isinstance(each, int | float) and abs(each) < BEYOND_MM) for each in values)
+    return all(value is None or (isinstance(value, int | float) and abs(value) < BEYOND_MM) for value in values)

@@ -30,15 +30,15 @@ MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_
 class SimulatedFirmware:
     """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile.
 
-    kept: how many moves stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
+    kept_moves: so many stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
     """
 
     def __init__(
-        self, machine: Machine, build: BuildOptions | None = None, busy_s: float = BUSY_S, kept: int | None = None
+        self, machine: Machine, build: BuildOptions | None = None, busy_s: float = BUSY_S, kept_moves: int | None = None
     ) -> None:
         self._build = build or BuildOptions()
         self._said: list[str] = []
-        self.board = Board(machine, self._build, self._said.append, kept)
+        self.board = Board(machine, self._build, self._said.append, kept_moves)
         self._rules = self.board.rules
         self._macros = dialect_of(machine).macros
         self.board.busy_every_s = self._busy_default_s = busy_s if self._build.busy and self._rules.has_build_options else 0.0
