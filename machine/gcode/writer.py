@@ -76,7 +76,7 @@ def _lines(program: MachineProgram, profile: Profile, elapsed: Floats, filament_
             yield ";WIPE_END"
         elif isinstance(move, Retract):
             pen.filament_mm -= move.filament_mm
-            yield f"{pen.dialect.stroke}{pen.filament()}{pen.speed(move.speed_mm_s)}"
+            yield f"G1{pen.filament()}{pen.speed(move.speed_mm_s)}"
         elif isinstance(move, Reorient):
             yield from _heat_ahead(program, place, profile, pen)
             yield from _reorient(move, next_part, pen)
@@ -270,7 +270,7 @@ def _with_arcs(move: Stroke, tolerance_mm: float, pen: Pen) -> Iterator[str]:
     for (first, last), (x, y, clockwise) in zip(runs.tolist(), arcs.tolist(), strict=True):
         if first > done:
             yield from write_path(move.points_mm[done : first + 1], move.filament_mm[done:first], move.speed_mm_s, pen)
-        word = pen.dialect.arc_right if clockwise > 0 else pen.dialect.arc_left
+        word = "G2" if clockwise > 0 else "G3"
         yield f"{word}{_arc(move, (first, last), (x - flat[first, 0], y - flat[first, 1]), pen)}"
         done = last
     if done < len(flat) - 1:

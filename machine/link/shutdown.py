@@ -86,11 +86,7 @@ class Heaters(Enum):
 
 
 def heaters_off(
-    wire: Wire,
-    medium: Medium,
-    timeout_s: float = SETTLE_S,
-    homing: bool = False,
-    on_turn: Callable[[], None] = lambda: None,
+    wire: Wire, medium: Medium, timeout_s: float = SETTLE_S, homing: bool = False, on_turn: Callable[[], None] = lambda: None
 ) -> Heaters:
     """Stop the printer and switch the heaters off; what its own words prove.
 

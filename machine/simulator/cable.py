@@ -113,9 +113,9 @@ class Cable:
         times = (self._in.due_s(), self._out.due_s(), self._blocked_s, self._back_s, firmware_s)
         return min((t for t in times if t > now_s), default=inf)
 
-    def exchange(self, data: bytes, now_s: float = 0.0, until_s: float | None = None) -> bytes:
-        """What the host hears after these bytes; until_s: how far the firmware's clock may run, if not as speed says."""
-        until_s = until_s if until_s is not None else inf if self._speed == inf else now_s * self._speed
+    def exchange(self, data: bytes, now_s: float = 0.0) -> bytes:
+        """What the host hears after these bytes."""
+        until_s = inf if self._speed == inf else now_s * self._speed
         if self._clean:
             answers = self._firmware.advance(until_s) if until_s < inf else b""
             self._firmware.receive(data)

@@ -141,10 +141,7 @@ def _report_end(end: End, file: str, server: str, progress: "ProgressToldByServe
         show(f"printed {file} on {server} in {duration(progress.elapsed_s)}\n")
         return
     after = f" after {progress.line} lines" if progress.line else ""
-    said = {
-        End.LEFT: f"{file} goes on printing on {server}",
-        End.CANCELLED: f"the print was cancelled on {server}{after}",
-    }
+    said = {End.LEFT: f"{file} goes on printing on {server}", End.CANCELLED: f"the print was cancelled on {server}{after}"}
     say(f"tiltprint: interrupted; {said[end]}")
 
 
