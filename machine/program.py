@@ -31,16 +31,16 @@ class Program:
 class Alternative:
     """One way to print a model. risky_mm2: hanging faces that need support; unsupported_mm2: those that can get none; seam_mm:
     length of the seams between parts; interface_mm3: plastic that one piece would not have, by the part that stands
-    there; findings: how many its dry run has; message: why it cannot be printed so, or ""."""
+    there; findings: how many its dry run has; message: why it cannot be printed so, or "". None: it cannot be printed so."""
 
     name: str
     orientation: str
     parts: int
-    time_s: float | None
-    filament_mm: float | None
-    filament_g: float | None
-    support_mm3: float | None
-    risky_mm2: float
+    time_s: float | None = None
+    filament_mm: float | None = None
+    filament_g: float | None = None
+    support_mm3: float | None = None
+    risky_mm2: float = 0.0
     message: str = ""
     unsupported_mm2: float | None = None
     seam_mm: float = 0.0

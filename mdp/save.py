@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from mdp.decomposition import Decomposition
+from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
+from mdp.plane import Plane
 
 # Okabe and Ito's palette, told apart by colour-blind people too.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#999999")
@@ -29,8 +30,7 @@ _MODEL = (
 
 _GLTF = 0.001 * np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000.0]])  # mm with z up to metres with y up
 
-# Beside the parts in a folder that is asked for.
-FOLDER_FILES = ("decomposition.3mf", "decomposition.json", "plan.toml", "decomposition.glb")
+FOLDER_FILES = ("decomposition.3mf", "decomposition.json", "plan.toml", "decomposition.glb")  # beside the parts in a folder
 PART_FILES = "part-[0-9][0-9]*.stl"  # what part_file gives
 HEADING = b"tiltprint part"  # of the STL files that stl() gives
 
@@ -104,7 +104,7 @@ def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> 
             {
                 "index": part.index,
                 "direction": part.direction.tolist(),
-                "base": {"normal": part.base.normal.tolist(), "offset_mm": part.base.offset_mm},
+                "base": plane_values(part.base),
                 "tilt_deg": part.pose.tilt_deg,
                 "turn_deg": part.pose.turn_deg,
                 "volume_mm3": part.volume_mm3,
@@ -115,19 +115,19 @@ def json_values(decomposition: Decomposition, read_s: float, total_s: float) -> 
             }
             for part in decomposition.parts
         ],
-        "front": [
-            {
-                "parts": row.parts,
-                "support_area_mm2": row.support_area_mm2,
-                "seam_mm": row.seam_mm,
-                "cost_mm2": row.cost_mm2,
-                "time_s": row.time_s,
-                "filament_mm": row.filament_mm,
-                "chosen": row.chosen,
-            }
-            for row in decomposition.front
-        ],
+        "front": [front_values(row) for row in decomposition.front],
     }
+
+
+def front_values(row: FrontRow) -> dict[str, Any]:
+    """What is told of a row of the front."""
+    names = ("parts", "support_area_mm2", "seam_mm", "cost_mm2", "time_s", "filament_mm", "chosen")
+    return {name: getattr(row, name) for name in names}
+
+
+def plane_values(plane: Plane) -> dict[str, Any]:
+    """A plane as JSON has it."""
+    return {"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm}
 
 
 def _object(mesh: Mesh, index: int) -> str:

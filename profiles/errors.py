@@ -33,6 +33,15 @@ def reason(error: OSError) -> str:
     return (error.strerror or str(error)).lower()
 
 
+def causes(error: BaseException | None) -> list[BaseException]:
+    """An error, then what lies beneath it: what it was raised from, or while what was handled."""
+    beneath: list[BaseException] = []
+    while error is not None and error not in beneath:
+        beneath.append(error)
+        error = error.__cause__ or error.__context__
+    return beneath
+
+
 class ProfileError(UserError):
     """A profile or a --set option is wrong; the message lists every problem with its key."""
 

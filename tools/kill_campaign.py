@@ -45,19 +45,9 @@ LIMIT = 95
 GREETING_S = 0.15  # before that nothing has been sent
 QUICK = Timing(drain_s=0.05, quiet_s=0.03)
 START = [
-    "G21",
-    "M84 S0",
-    "G90",
-    "M83",
-    "M140 S25",
-    "M104 S175",
-    "G28 X Y Z",
-    "G92 A0 C0",
-    "M190 S25",
-    "M109 S175",
-    "G92 E0",
-    "M106 S128",
-]
+    "G21", "M84 S0", "G90", "M83", "M140 S25", "M104 S175", "G28 X Y Z", "G92 A0 C0", "M190 S25",
+    "M109 S175", "G92 E0", "M106 S128",
+]  # fmt: skip
 POSES = ((0, 0), (30, 725), (-20, 360))
 LAYERS, STROKES = 16, 40
 SPEED = 500.0  # times real time, of every other printer: its planner is full when the host dies
@@ -67,12 +57,14 @@ LIFT_MM, GROUP = 0.6, 10  # every tenth stroke is reached by a lifted travel
 
 @dataclass(frozen=True)
 class Result:
-    """What became of one moment. executed: moves before the second run; first: the program's move with which it began."""
+    """What became of one moment. executed: moves before the second run; first: the program's move with which it began. Of a power
+    cut off_mm: how much too high, or low, the print went on.
+    """
 
     how: str
     executed: int
     first: int
-    moves: int
+    off_mm: float = 0.0
 
     @property
     def gap(self) -> int:
@@ -190,7 +182,7 @@ def judged(how: str, moves: list[list[float]], whole: list[list[float]]) -> Resu
     tail = 0
     while tail < min(len(moves) - last, len(whole)) and moves[-1 - tail] == whole[-1 - tail]:
         tail += 1
-    return Result(how, last, len(whole) - tail, len(moves))
+    return Result(how, last, len(whole) - tail)
 
 
 def undisturbed(folder: Path, speed: float) -> tuple[list[list[float]], float]:
@@ -230,13 +222,8 @@ def lifted_program() -> list[str]:
             strokes += 1
             if strokes % GROUP == 0:
                 x, y = line.split()[1:3]
-                lines += [
-                    "G1 E-0.8 F2100",
-                    f"G0 Z{z + LIFT_MM:.2f} F900",
-                    f"G0 {x} {y}.5 F9000",
-                    f"G0 Z{z:.2f} F900",
-                    "G1 E0.8 F2100",
-                ]
+                lines += ["G1 E-0.8 F2100", f"G0 Z{z + LIFT_MM:.2f} F900", f"G0 {x} {y}.5 F9000"]
+                lines += [f"G0 Z{z:.2f} F900", "G1 E0.8 F2100"]
         lines.append(line)
     return lines
 
@@ -266,17 +253,6 @@ class _Plug:
             raise PowerCutError
 
 
-@dataclass(frozen=True)
-class Cut:
-    """What became of one power cut. heights: at how many the tip may have stood by the journal; off_mm: how much too high, or
-    low, the print went on.
-    """
-
-    result: Result
-    heights: int = 1
-    off_mm: float = 0.0
-
-
 def moves_of(printer: VirtualPrinter) -> list[list[float]]:
     """X Y Z tilt turn where each executed move ended, and its filament."""
     record = printer.record
@@ -284,7 +260,7 @@ def moves_of(printer: VirtualPrinter) -> list[list[float]]:
     return rows
 
 
-def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float, whole: list[list[float]]) -> Cut:
+def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float, whole: list[list[float]]) -> Result:
     """Cut the power of a print after some time, and resume it. whole: the moves of an undisturbed print."""
     printer = VirtualPrinter(PROFILE.machine, build, baud=BAUD)
     medium, heading = printer.medium, JournalHeading(str(text.path), text.sha256(), "campaign", {})
@@ -295,7 +271,7 @@ def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float,
     except PowerCutError:
         pass
     stood_mm = printer.firmware.board.motion.at(printer.now_s)[2]
-    point, doubts = read_interrupted_print(text, read_journal(journal).last, PROFILE, LIMIT), [1]
+    point, doubts = read_interrupted_print(text, read_journal(journal).last, PROFILE, LIMIT), list[int]()
 
     def begin(status: PrinterStatus) -> ResumePoint:
         way, told = plan_resume(point, status, PROFILE), point
@@ -309,26 +285,24 @@ def power_cut(build: BuildOptions, text: GcodeFile, journal: Path, cut_s: float,
         with Journal(journal.with_suffix(".rest"), heading) as written:
             print_lines(text, PATH, BAUD, journal=written, profile=PROFILE, begin=begin, medium=medium)
     except JournalError as refused:
-        return Cut(Result(f"refused: {str(refused).partition(': ')[2].partition(',')[0]}", done, done, done))
-    how = "hardly begun: anew" if not point.stroked else "height in doubt, asked" if len(doubts) > 1 else "height known"
-    return judged_cut(how, done, doubts[-1], moves_of(printer), whole)
+        return Result(f"refused: {str(refused).partition(': ')[2].partition(',')[0]}", done, done)
+    how = "hardly begun: anew" if not point.stroked else "height in doubt, asked" if doubts else "height known"
+    return judged_cut(how, done, moves_of(printer), whole)
 
 
-def judged_cut(how: str, done: int, heights: int, moves: list[list[float]], whole: list[list[float]]) -> Cut:
+def judged_cut(how: str, done: int, moves: list[list[float]], whole: list[list[float]]) -> Result:
     """done: moves before the cut, the one under way included. The rest is compared without Z, whose error is measured."""
     flat, planned = ([[*move[:2], *move[3:]] for move in rows] for rows in (moves, whole))
     tail = 0
     while tail < min(len(moves) - done, len(whole)) and flat[-1 - tail] == planned[-1 - tail]:
         tail += 1
     pairs = zip(moves[len(moves) - tail :], whole[len(whole) - tail :], strict=True)
-    off_mm = max(
-        (abs(made[2] - wanted[2]) for made, wanted in pairs if wanted[5] > 0), default=0.0
-    )  # the way there has heights, too
+    off_mm = max((abs(laid[2] - wanted[2]) for laid, wanted in pairs if wanted[5] > 0), default=0.0)  # of strokes alone
     whole_moves = done - 1 if moves[done - 1] != whole[done - 1] else done  # the one under way has to be made again
-    return Cut(Result(how, whole_moves, len(whole) - tail, len(moves)), heights, off_mm)
+    return Result(how, whole_moves, len(whole) - tail, off_mm)
 
 
-def cut_campaign(cuts: int, seed: int, build: BuildOptions) -> list[Cut]:
+def cut_campaign(cuts: int, seed: int, build: BuildOptions) -> list[Result]:
     """Results of power cuts at random moments between the first stroke and the end."""
     chance = random.Random(seed)
     with tempfile.TemporaryDirectory() as name:
@@ -361,13 +335,13 @@ def main() -> None:
         print(f"| {how} | {count} | {sum(r.gap for r in mine)} | {max(r.twice for r in mine)} |")
 
 
-def show_cuts(cuts: list[Cut]) -> None:
+def show_cuts(cuts: list[Result]) -> None:
     """A row for each kind of end."""
     print("| what the journal told | cuts | moves missing | moves made twice, most | Z wrong by at most, mm |")
     print("|---|---|---|---|---|")
-    for how, count in sorted(Counter(cut.result.how for cut in cuts).items()):
-        mine = [cut for cut in cuts if cut.result.how == how]
-        missing, twice = sum(cut.result.gap for cut in mine), max(cut.result.twice for cut in mine)
+    for how, count in sorted(Counter(cut.how for cut in cuts).items()):
+        mine = [cut for cut in cuts if cut.how == how]
+        missing, twice = sum(cut.gap for cut in mine), max(cut.twice for cut in mine)
         print(f"| {how} | {count} | {missing} | {twice} | {max(cut.off_mm for cut in mine):.2f} |")
 
 

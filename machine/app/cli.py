@@ -18,7 +18,7 @@ from machine.app.setup_cli import calibrate, profiles_app
 from machine.app.terminal.interrupts import outside_compiler
 from machine.app.terminal.plain import plain_line
 from machine.app.terminal.usage import sentence
-from profiles.errors import UserError
+from profiles.errors import UserError, causes
 
 ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by what --install-completion writes: words are wanted, no command
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -83,7 +83,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     except BrokenPipeError:
         return 0
     except Exception as error:  # noqa: BLE001 - the one place where a bug becomes a message and a log file
-        if _interrupted(error):
+        # Compiled code turns Ctrl-C into an error of its own.
+        if any(isinstance(cause, KeyboardInterrupt) for cause in causes(error)):
             return _complain("interrupted", 130)
         if isinstance(error, OSError) and error.errno in FULL:
             return _complain(f"{error.filename or _full()} cannot be written: no space is left")
@@ -100,15 +101,6 @@ def _full() -> str:
     except OSError:
         return "standard output"
     return "a file"
-
-
-def _interrupted(error: BaseException | None) -> bool:
-    """Whether Ctrl-C lies beneath: compiled code turns it into an error of its own."""
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
 
 
 def _complain(message: str, code: int = 1) -> int:

@@ -8,26 +8,14 @@ from typing import Annotated
 import typer
 
 from machine.app.requests import UPLOAD_MIB, Cuts, Outputs
+from machine.app.terminal import options
 from machine.app.terminal.option_groups import with_option_groups
-from machine.app.terminal.options import (
-    Force,
-    HtmlFile,
-    JsonFile,
-    Model,
-    ModelOrGcode,
-    ModelProfileOptions,
-    ProfileOptions,
-    ProgramOptions,
-    SearchOptions,
-    model_request,
-    program_request,
-)
 
 
 def decompose(
-    model: Model,
+    model: options.Model,
     *,
-    search: SearchOptions,
+    search: options.SearchOptions,
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="folder for part-NN.stl, 3MF, JSON")] = None,
     plan: Annotated[
         Path | None, typer.Option("--plan", metavar="FILE", help="where FILE exists: cut by it without a search; else write it")
@@ -35,7 +23,7 @@ def decompose(
     planes: Annotated[
         Path | None, typer.Option("--planes", metavar="FILE", help="planes by hand, cut first; the search finds the others")
     ] = None,
-    json: JsonFile = None,
+    json: options.JsonFile = None,
     png: Annotated[Path | None, typer.Option("--png", metavar="FILE", help="picture of the parts")] = None,
     sheet: Annotated[
         Path | None, typer.Option("--sheet", metavar="FILE", help="picture of the print order, tilted as printed")
@@ -43,11 +31,11 @@ def decompose(
     front: Annotated[
         Path | None, typer.Option("--front", metavar="FILE", help="picture of how every number of parts would cut the model")
     ] = None,
-    html: HtmlFile = None,
+    html: options.HtmlFile = None,
     record: Annotated[
         Path | None, typer.Option("--record", metavar="FILE", help="what the search saw, as .npz for training")
     ] = None,
-    given: ModelProfileOptions,
+    given: options.ModelProfileOptions,
 ) -> int:
     """Cut a model into parts, each with its own printing direction."""
     from machine.app.commands.decompose import decompose
@@ -57,66 +45,66 @@ def decompose(
         folder=out, json=json, html=html, png=png, sheet=sheet, front=front, record=record, plan=None if known else plan
     )
     cuts = Cuts(plan if known else None, search.parts, planes)
-    return decompose(model_request(model, search, given, outputs=outputs, cuts=cuts))
+    return decompose(options.model_request(model, search, given, outputs=outputs, cuts=cuts))
 
 
 def export(
-    model: Model,
+    model: options.Model,
     *,
     out: Annotated[Path, typer.Option("-o", "--out", metavar="OUT.gcode", help="G-code file to write; - for standard output")],
-    program: ProgramOptions,
-    json: JsonFile = None,
+    program: options.ProgramOptions,
+    json: options.JsonFile = None,
     svg: Annotated[Path | None, typer.Option("--svg", metavar="FILE", help="picture of one layer, see --layer")] = None,
-    html: HtmlFile = None,
+    html: options.HtmlFile = None,
     layer: Annotated[str | None, typer.Option("--layer", metavar="PART:LAYER", help="which layer; else the first, 1:1")] = None,
     compare: Annotated[
         bool, typer.Option("--compare", help="tell also time, material, support and risky area printed in one part")
     ] = False,
-    force: Force = False,
-    given: ModelProfileOptions,
+    force: options.Force = False,
+    given: options.ModelProfileOptions,
 ) -> int:
     """Write the G-code of a model, dry-run first."""
     from machine.app.commands.export import export
 
     outputs = Outputs(gcode=out, json=json, html=html, svg=svg, layer=layer)
-    return export(program_request(model, program, given, outputs=outputs, compare=compare, force=force))
+    return export(options.program_request(model, program, given, outputs=outputs, compare=compare, force=force))
 
 
 def simulate(
-    model: ModelOrGcode,
+    model: options.ModelOrGcode,
     *,
-    program: ProgramOptions,
-    json: JsonFile = None,
+    program: options.ProgramOptions,
+    json: options.JsonFile = None,
     reference: Annotated[
         str | None, typer.Option("--model", metavar="MODEL", help="hold a G-code file's plastic against this model")
     ] = None,
-    html: HtmlFile = None,
+    html: options.HtmlFile = None,
     baud: Annotated[
         int | None, typer.Option("--baud", metavar="N", help="find moves that a line of N bits a second brings too late")
     ] = None,
-    given: ProfileOptions,
+    given: options.ProfileOptions,
 ) -> int:
     """Dry-run a model or a G-code file. The plastic is held against the model; exit 1 when a finding is an error."""
     from machine.app.commands.simulate import simulate
 
-    return simulate(program_request(model, program, given, outputs=Outputs(json=json, html=html)), reference, baud)
+    return simulate(options.program_request(model, program, given, outputs=Outputs(json=json, html=html)), reference, baud)
 
 
 def view(
-    model: ModelOrGcode,
+    model: options.ModelOrGcode,
     *,
-    program: ProgramOptions,
+    program: options.ProgramOptions,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="VIEW.html", help="page to write; else named after the model, here")
     ] = None,
     open_: Annotated[bool, typer.Option("--open", help="show the page in the browser")] = False,
     compare: Annotated[bool, typer.Option("--compare", help="tell also time and material printed in one part")] = False,
-    given: ProfileOptions,
+    given: options.ProfileOptions,
 ) -> int:
     """Write one HTML page that shows a model or a G-code file. In it: parts, layers, the moving machine, a report."""
     from machine.app.commands.view import view
 
-    return view(program_request(model, program, given, outputs=Outputs(html=out), compare=compare), open_)
+    return view(options.program_request(model, program, given, outputs=Outputs(html=out), compare=compare), open_)
 
 
 def edit(
@@ -134,7 +122,7 @@ def edit(
     upload_mib: Annotated[
         int, typer.Option("--upload-mib", metavar="N", min=1, max=1024, help="the largest file that is taken from a page")
     ] = UPLOAD_MIB,
-    given: ModelProfileOptions,
+    given: options.ModelProfileOptions,
 ) -> int:
     """Open the workbench: a page to look, cut, slice and print. It is on this computer alone; Ctrl-C ends it."""
     from machine.app.commands.edit import edit

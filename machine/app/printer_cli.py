@@ -6,47 +6,28 @@ from typing import Annotated
 
 import typer
 
-from machine.app.requests import ConsoleRequest, Given, PrintRequest, SendRequest, SimulatorRequest
+from machine.app.requests import ConsoleRequest, Given, PrintRequest, SimulatorRequest
+from machine.app.terminal import options
 from machine.app.terminal.option_groups import with_option_groups
-from machine.app.terminal.options import (
-    Baud,
-    ForceAll,
-    LogFile,
-    MachineGiven,
-    MachineName,
-    ModelOrGcode,
-    PortOrSim,
-    ProfileOptions,
-    ProgramOptions,
-    SearchOptions,
-    Settings,
-    SimSpeed,
-    Watch,
-    WatchPort,
-    machine_profile,
-    model_request,
-    page_port,
-    program_request,
-)
 
 BAUD = PrintRequest.baud
 
 
 def print_(
-    model: ModelOrGcode,
+    model: options.ModelOrGcode,
     *,
-    port: PortOrSim,
-    program: ProgramOptions,
-    baud: Baud = BAUD,
-    speed: SimSpeed = 0.0,
-    watch: Watch = False,
-    watch_port: WatchPort = None,
-    log: LogFile = None,
+    port: options.PortOrSim,
+    program: options.ProgramOptions,
+    baud: options.Baud = BAUD,
+    speed: options.SimSpeed = 0.0,
+    watch: options.Watch = False,
+    watch_port: options.WatchPort = None,
+    log: options.LogFile = None,
     journal: Annotated[
         Path | None, typer.Option("--journal", metavar="FILE", help="for resume; else a new file in the state folder")
     ] = None,
-    force: ForceAll = False,
-    given: ProfileOptions,
+    force: options.ForceAll = False,
+    given: options.ProfileOptions,
 ) -> int:
     """Print a model or a G-code file on a printer or a simulated one.
 
@@ -56,8 +37,8 @@ def print_(
     """
     from machine.app.commands.print import print_model
 
-    printing = PrintRequest(port, baud, speed, log, journal, page_port(watch, watch_port))
-    return print_model(program_request(model, program, given, force=force), printing)
+    printing = PrintRequest(port, baud, speed, log, journal, options.page_port(watch, watch_port))
+    return print_model(options.program_request(model, program, given, force=force), printing)
 
 
 def send(
@@ -70,9 +51,9 @@ def send(
         ),
     ],
     start: Annotated[bool, typer.Option("--start", help="print it at once; print --port SERVER follows it, too")] = False,
-    log: LogFile = None,
-    force: ForceAll = False,
-    given: ProfileOptions,
+    log: options.LogFile = None,
+    force: options.ForceAll = False,
+    given: options.ProfileOptions,
 ) -> int:
     """Hand a G-code file to a print server. It is dry-run and held against machine and server first.
 
@@ -80,13 +61,13 @@ def send(
     """
     from machine.app.commands.send import send
 
-    return send(model_request(file, SearchOptions(), given, force=force), SendRequest(to, start, log))
+    return send(options.model_request(file, options.SearchOptions(), given, force=force), to, start=start, log=log)
 
 
 def follow(
     server: Annotated[str, typer.Argument(metavar="SERVER", help="octoprint:HOST, moonraker:HOST or duet:HOST")],
     *,
-    log: LogFile = None,
+    log: options.LogFile = None,
 ) -> int:
     """Follow and command what a print server prints already.
 
@@ -103,15 +84,15 @@ def resume(
     ] = None,
     *,
     port: Annotated[str | None, typer.Option("--port", metavar="PORT", help="serial port")] = None,
-    baud: Baud = BAUD,
+    baud: options.Baud = BAUD,
     yes: Annotated[bool, typer.Option("--yes", help="go on without asking")] = False,
-    watch: Watch = False,
-    watch_port: WatchPort = None,
+    watch: options.Watch = False,
+    watch_port: options.WatchPort = None,
     further: Annotated[
         Path | None, typer.Option("--journal", metavar="FILE", help="journal of the rest; else a new file in the state folder")
     ] = None,
-    log: LogFile = None,
-    machine: MachineGiven = None,
+    log: options.LogFile = None,
+    machine: options.MachineGiven = None,
 ) -> int:
     """Go on with a print after a power cut, a crash or a pulled plug."""
     from machine.app.commands.resume import list_resumable, resume
@@ -121,8 +102,8 @@ def resume(
         return list_resumable()
     if port is None:
         raise JournalError(f"journal {journal}: at which port is the printer? --port PORT is expected")
-    named = None if machine is None else machine_profile(machine)
-    return resume(journal, PrintRequest(port, baud, 0.0, log, further, page_port(watch, watch_port)), named, yes)
+    named = None if machine is None else options.machine_profile(machine)
+    return resume(journal, PrintRequest(port, baud, 0.0, log, further, options.page_port(watch, watch_port)), named, yes)
 
 
 def ports(
@@ -141,16 +122,16 @@ def ports(
 
 def console(
     *,
-    port: PortOrSim,
-    baud: Baud = BAUD,
-    speed: SimSpeed = 0.0,
+    port: options.PortOrSim,
+    baud: options.Baud = BAUD,
+    speed: options.SimSpeed = 0.0,
     reports: Annotated[bool, typer.Option("--reports/--no-reports", help="show temperatures that the printer reports")] = True,
     leave_heaters: Annotated[
         bool, typer.Option("--leave-heaters", help="heaters stay as they are on leaving; else they are switched off")
     ] = False,
-    log: LogFile = None,
-    machine: MachineName = Given.machine,
-    settings: Settings = None,
+    log: options.LogFile = None,
+    machine: options.MachineName = Given.machine,
+    settings: options.Settings = None,
 ) -> int:
     """Talk to a printer. Lines typed, or piped in, are sent; its answers are shown.
 
@@ -158,7 +139,7 @@ def console(
     """
     from machine.app.commands.console import console
 
-    return console(ConsoleRequest(machine_profile(machine, settings), port, baud, speed, reports, leave_heaters, log))
+    return console(ConsoleRequest(options.machine_profile(machine, settings), port, baud, speed, reports, leave_heaters, log))
 
 
 def simulator(
@@ -171,13 +152,15 @@ def simulator(
     habits: Annotated[
         str | None, typer.Option("--habits", metavar="LIST", help="how the firmware was built: no-advanced-ok,no-busy,...")
     ] = None,
-    machine: MachineName = Given.machine,
-    settings: Settings = None,
+    machine: options.MachineName = Given.machine,
+    settings: options.Settings = None,
 ) -> int:
     """A simulated printer for any host to print on; Ctrl-C ends it."""
     from machine.app.commands.simulator import simulate_printer
 
-    return simulate_printer(SimulatorRequest(machine_profile(machine, settings), pty, tcp, faults, speed, baud, habits or ""))
+    return simulate_printer(
+        SimulatorRequest(options.machine_profile(machine, settings), pty, tcp, faults, speed, baud, habits or "")
+    )
 
 
 COMMANDS: dict[str, Callable[..., int]] = {

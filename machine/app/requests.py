@@ -124,15 +124,6 @@ class PrintRequest:
 
 
 @dataclass(frozen=True)
-class SendRequest:
-    """A print server to hand a program to. start: print it at once; log as for a print."""
-
-    server: str
-    start: bool = False
-    log: Path | None = None
-
-
-@dataclass(frozen=True)
 class ConsoleRequest:
     """A printer to talk to line by line. reports: show temperature reports; log as for a print."""
 

@@ -129,9 +129,9 @@ class _Guess:
         """The machine with these numbers; along its own axis the tilt's point stays where the profile has it."""
         machine, along = self.machine, unit(self.machine.tilt.axis)
         point = along * (along @ np.array(machine.tilt.point_mm)) + numbers[3:5] @ _across(machine)
-        found = {"sign": self.signs[0], "zero_deg": float(numbers[5]), "point_mm": tuple(point.tolist())}
+        tilt = {"sign": self.signs[0], "zero_deg": float(numbers[5]), "point_mm": tuple(point.tolist())}
         turn = machine.turn.model_copy(update={"sign": self.signs[1], "point_mm": tuple(numbers[:3].tolist())})
-        return machine.model_copy(update={"tilt": machine.tilt.model_copy(update=found), "turn": turn})
+        return machine.model_copy(update={"tilt": machine.tilt.model_copy(update=tilt), "turn": turn})
 
 
 def calibrate(

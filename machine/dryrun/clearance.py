@@ -1,5 +1,6 @@
 """Clearance: every move of the head against the table and its cradle, every turn of them against the head."""
 
+from collections.abc import Iterator
 from math import ceil
 
 import numpy as np
@@ -104,7 +105,7 @@ def _turns(program: ParsedProgram, deposited: Floats, deposited_row: NDArray[np.
     return problems
 
 
-def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) -> list[Finding]:
+def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) -> Iterator[Finding]:
     """One turn of the table, swept: no pose is farther from a tried one than what its gaps leave room for.
 
     Between two poses every point of what turns moves, against the tip, by at most `_way_mm`; where the gaps at both ends do not
@@ -141,15 +142,13 @@ def _turn(program: ParsedProgram, row: int, printed: Printed, machine: Machine) 
         middle = 0.5 * (low + high)
         between = room(middle, 0.5 * distance)
         open_intervals += [(low, middle, left, between), (middle, high, between, right)]
-    problems = []
     if open_intervals:
         message = "the table turns so far that not all of the turn was tested for collisions"
-        problems.append(at_row(program, row, "warning", "not-tested", message))
+        yield at_row(program, row, "warning", "not-tested", message)
     for (body, solid), (gap, pose) in least.items():
         meets = f"comes to {gap:.2f} mm from" if gap > 0 else "runs into"
         where = f"{machine.tilt.letter}{pose.tilt_deg:.1f} {machine.turn.letter}{pose.turn_deg:.1f}"
-        problems.append(at_row(program, row, "error", "collision", f"{body} {meets} {solid} while the table turns, at {where}"))
-    return problems
+        yield at_row(program, row, "error", "collision", f"{body} {meets} {solid} while the table turns, at {where}")
 
 
 def _limit_turn(start: Floats, end: Floats, machine: Machine) -> tuple[Floats, Floats]:

@@ -1,7 +1,7 @@
 """Dryrun: a G-code text played through the machine's kinematics, without a machine."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import pi
 from typing import Any
 
@@ -61,10 +61,10 @@ class DryRun:
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
-def dry_run(lines: Iterable[str], profile: Profile, found: Sequence[Finding] | None = None) -> DryRun:
+def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | None = None) -> DryRun:
     """Read G-code lines and play them: times, deposited plastic, findings. Raises GcodeError for what is not G-code.
 
-    found: the findings of an earlier dry run of these very lines with this very profile, which are not looked for again.
+    known: the findings of an earlier dry run of these very lines with this very profile, which are not looked for again.
     """
     machine, text = profile.machine, lines if isinstance(lines, Sequence) else list(lines)
     program = parse_gcode(text, machine)
@@ -75,10 +75,10 @@ def dry_run(lines: Iterable[str], profile: Profile, found: Sequence[Finding] | N
     area = pi * profile.material.diameter_mm**2 / 4.0
     stop = motion.standstills(program)
     contacts = None
-    if found is None:
+    if known is None:
         deposited = beads_of(program, segments, rows, profile)
         contacts = replay(program, deposited, profile)
-        found = _findings(text, program, deposited, contacts, profile)
+        known = _findings(text, program, deposited, contacts, profile)
     return DryRun(
         program=program,
         times_s=move_times(motion.deltas(program), program.feed / 60.0, stop, machine, program.acceleration),
@@ -87,7 +87,7 @@ def dry_run(lines: Iterable[str], profile: Profile, found: Sequence[Finding] | N
         segment_row=rows,
         segment_mm3=program.e_mm[rows] * area,
         contacts=contacts,
-        findings=tuple(found),
+        findings=tuple(known),
         letters=tuple(axis_limits(machine)),
     )
 
@@ -147,8 +147,5 @@ def summary(run: DryRun) -> dict[str, Any]:
             letter: [float(program.end[:, k].min()), float(program.end[:, k].max())] if len(program.end) else []
             for k, letter in enumerate(run.letters)
         },
-        "findings": [
-            {"severity": f.severity, "code": f.code, "line": f.line, "part": f.part, "layer": f.layer, "message": f.message}
-            for f in run.findings
-        ],
+        "findings": [asdict(finding) for finding in run.findings],
     }

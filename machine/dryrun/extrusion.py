@@ -4,6 +4,7 @@ A bead's cross-section is that of its width and height as the file tells them (P
 its own files' filament within 0.3 %); where a file tells none, that of other beads of its kind.
 """
 
+from collections.abc import Iterator
 from math import pi
 
 import numpy as np
@@ -29,14 +30,14 @@ FASTER = 1.3  # than all but a few strokes
 FEW = 0.03
 
 
-def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> list[Finding]:
+def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
     """Errors of code extrusion and extruding-travel; a warning of code extrusion where the file tells no widths."""
     if not len(deposited.rows):
-        return []
+        return
     sized = (program.width_mm[deposited.rows] > 0) & (program.height_mm[deposited.rows] > 0)
     counted = ~program.rows_of_types(*UNEVEN)[deposited.rows] & ~_climbs(program, deposited)
     length = deposited.length_mm
-    problems = _fast(program, deposited.rows, length)
+    yield from _fast(program, deposited.rows, length)
     spare = profile.material.prime_extra_mm * pi * profile.material.diameter_mm**2 / 4.0 + SPARE_MM3
     for known, most in ((True, LAYER_MOST), (False, UNTOLD_MOST)):
         mine = np.flatnonzero(counted & (sized == known) & (length > 0))
@@ -46,11 +47,9 @@ def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> list
         pushed = program.e_mm[rows] * pi * profile.material.diameter_mm**2 / 4.0
         needed = length[mine] * (_area(program, rows, profile) if known else 1.0)
         if known:
-            problems += _whole_file(program, rows, (pushed, needed), profile) or _odd(
-                program, rows, length[mine], pushed / needed
-            )
-        problems += _layers(program, rows, (pushed, needed, length[mine]), spare, most)
-    return problems
+            whole_file = _whole_file(program, rows, (pushed, needed), profile)
+            yield from whole_file or _odd(program, rows, length[mine], pushed / needed)
+        yield from _layers(program, rows, (pushed, needed, length[mine]), spare, most)
 
 
 def _climbs(program: ParsedProgram, deposited: Beads) -> NDArray[np.bool_]:
@@ -91,10 +90,9 @@ def _whole_file(
     return [at_row(program, int(rows[0]), "error", "extrusion", message)]
 
 
-def _odd(program: ParsedProgram, rows: NDArray[np.int64], length: Floats, share: Floats) -> list[Finding]:
+def _odd(program: ParsedProgram, rows: NDArray[np.int64], length: Floats, share: Floats) -> Iterator[Finding]:
     """Single moves far from the cross-section told, in every part that has a good length of them."""
     odd = (length > ROW_MM) & ((share < ROW_LEAST) | (share > ROW_MOST))
-    problems = []
     for mine in by_part(program, np.flatnonzero(odd), rows):
         if length[mine].sum() < ODD_MM:
             continue
@@ -103,13 +101,12 @@ def _odd(program: ParsedProgram, rows: NDArray[np.int64], length: Floats, share:
             f"a move pushes {worst:.2f} of the plastic that its width and height need, {ROW_LEAST:g} to {ROW_MOST:g} are allowed "
             f"(moves: {len(mine)})"
         )
-        problems.append(at_row(program, int(rows[mine[0]]), "error", "extrusion", message))
-    return problems
+        yield at_row(program, int(rows[mine[0]]), "error", "extrusion", message)
 
 
 def _layers(
     program: ParsedProgram, rows: NDArray[np.int64], plastic: tuple[Floats, Floats, Floats], spare: float, most: float
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """In every part the first layer that gets more or less than the file's layers do, kind by kind.
 
     plastic: (m,) pushed by each bead, needed, and how long it is. spare: mm3 that a layer may get beyond its own, which come
@@ -125,7 +122,6 @@ def _layers(
     got, due, long = (np.bincount(group, weights=values) for values in (pushed, needed * usual, length))
     share = got / np.maximum(due, 1e-12)
     bad = np.flatnonzero((long > LAYER_MM) & (np.abs(got - due) > spare) & ((share > most) | (share < 1.0 / most)))
-    problems = []
     for mine in by_part(program, np.flatnonzero(np.isin(group, bad)), rows):
         layers = np.unique(group[mine])
         row = int(rows[mine[np.argmax(group[mine] == layers[0])]])
@@ -133,8 +129,7 @@ def _layers(
             f"layer {program.layer[row]} gets {share[layers[0]]:.2f} of the plastic that such beads get in the rest of the file, "
             f"{1 / most:.2f} to {most:.2f} are allowed (layers: {len(layers)})"
         )
-        problems.append(at_row(program, row, severity, "extrusion", message))
-    return problems
+        yield at_row(program, row, severity, "extrusion", message)
 
 
 def _weighted_median(values: Floats, weights: Floats) -> float:
@@ -143,22 +138,20 @@ def _weighted_median(values: Floats, weights: Floats) -> float:
     return float(values[order[np.searchsorted(sums, 0.5 * sums[-1])]])
 
 
-def _fast(program: ParsedProgram, rows: NDArray[np.int64], length: Floats) -> list[Finding]:
+def _fast(program: ParsedProgram, rows: NDArray[np.int64], length: Floats) -> Iterator[Finding]:
     """Strokes as fast as travels, in a file whose other strokes are slower; a slow machine purges as fast as it goes."""
     travels = np.flatnonzero((program.kind == MoveKind.TRAVEL) & (program.e_mm == 0.0))
     across = np.hypot(*(program.end[travels] - program.start[travels])[:, :2].T)
     if not (across > ROW_MM).any():
-        return []
+        return
     usual = _weighted_median(program.feed[travels], np.where(across > ROW_MM, across, 0.0))
     feed = program.feed[rows]
     fast = (feed > FAST * usual) & (length > ROW_MM) & ~program.rows_of_types(Kind.PURGE.value)[rows]
     if not fast.any() or fast.mean() > FEW or usual * FAST < FASTER * np.quantile(feed[~fast], 1.0 - FEW):
-        return []
-    problems = []
+        return
     for mine in by_part(program, rows[fast]):
         message = (
             f"a move pushes filament at {program.feed[mine[0]] / 60:.0f} mm/s, the speed of the travels (moves: {len(mine)}): "
             "filament flows during a travel"
         )
-        problems.append(at_row(program, int(mine[0]), "error", "extruding-travel", message))
-    return problems
+        yield at_row(program, int(mine[0]), "error", "extruding-travel", message)

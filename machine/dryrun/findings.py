@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.reader.parsed import OWN, Event, ParsedProgram
+from mdp.mesh import Floats
 from profiles.profile import Profile
 
 Severity = Literal["error", "warning"]
@@ -72,22 +73,15 @@ def by_part(
 
 
 def per_part(
-    program: ParsedProgram,
-    marked: NDArray[np.bool_],
-    badness: NDArray[np.float64],
-    severity: Severity,
-    code: str,
-    message: str,
-) -> list[Finding]:
+    program: ParsedProgram, marked: NDArray[np.bool_], badness: Floats, message: str, *, code: str, severity: Severity = "error"
+) -> Iterator[Finding]:
     """One finding for every part that has rows marked: the first marked row's place.
 
     message takes {value} (the badness of the worst row of that part, as %.3f) and {count}.
     """
-    problems = []
     for mine in by_part(program, np.flatnonzero(marked)):
         worst = f"{float(badness[mine].max()):.3f}".rstrip("0").rstrip(".")
-        problems.append(at_row(program, int(mine[0]), severity, code, message.format(value=worst, count=len(mine))))
-    return problems
+        yield at_row(program, int(mine[0]), severity, code, message.format(value=worst, count=len(mine)))
 
 
 def cut_short(program: ParsedProgram, row: int, what: str) -> Finding:

@@ -1,5 +1,6 @@
 """Heat: findings about temperatures, fans and flow, and about numbers nobody has measured."""
 
+from collections.abc import Iterable, Iterator
 from math import pi
 
 import numpy as np
@@ -32,7 +33,7 @@ def findings(program: ParsedProgram, profile: Profile, own: bool) -> list[Findin
     ]
 
 
-def _cold(program: ParsedProgram) -> list[Finding]:
+def _cold(program: ParsedProgram) -> Iterable[Finding]:
     """Filament pushed while the nozzle has not been waited for, or its heater is off."""
     hot = np.zeros(len(program.line), dtype=np.bool_)
     heating = [e for e in program.events if e.code in ("M104", "M109")]
@@ -47,11 +48,10 @@ def _cold(program: ParsedProgram) -> list[Finding]:
     waited_row = max((event.row for event in heating if event.row <= first), default=0)
     severity, unless = unless_own(program, waited_row, first)
     message = f"{{count}} moves push filament through a nozzle that is not hot: M109 S must come first and stay on{unless}"
-    return per_part(program, rows, program.e_mm, severity, "cold-extrusion", message)
+    return per_part(program, rows, program.e_mm, message, code="cold-extrusion", severity=severity)
 
 
-def _left_on(program: ParsedProgram) -> list[Finding]:
-    problems = []
+def _left_on(program: ParsedProgram) -> Iterator[Finding]:
     extruding = np.flatnonzero(program.e_mm > 1e-9)
     last = int(extruding[-1]) if len(extruding) else -1  # a macro in the midst of the print ends nothing
     for codes, name, off in ((("M104", "M109"), "nozzle", "M104 S0"), (("M140", "M190"), "bed", "M140 S0")):
@@ -59,8 +59,7 @@ def _left_on(program: ParsedProgram) -> list[Finding]:
         if events and events[-1].value > 0:
             severity, unless = unless_own(program, max(events[-1].row, last + 1), len(program.line))
             message = f"the {name} heater stays at {events[-1].value:g} deg C after the end: {off} is missing{unless}"
-            problems.append(at_event(program, events[-1], severity, "heater-on", message))
-    return problems
+            yield at_event(program, events[-1], severity, "heater-on", message)
 
 
 def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
@@ -78,7 +77,7 @@ def _temperature(program: ParsedProgram, profile: Profile, own: bool) -> list[Fi
         least, most = min(own_c) - 0.5, min(max(own_c) + hotter, machine.nozzle_limit_c) + 0.5
     message = f"the nozzle is at {{value}} deg C, {max(least, 0.0):g} to {most:g} are expected (moves: {{count}})"
     cool, hot = beads & (wanted < least), beads & (wanted > most)
-    return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted, "error", "temperature", message)]
+    return [problem for rows in (cool, hot) for problem in per_part(program, rows, wanted, message, code="temperature")]
 
 
 def _bed_off(program: ParsedProgram) -> list[Finding]:
@@ -92,7 +91,7 @@ def _bed_off(program: ParsedProgram) -> list[Finding]:
     return [at_row(program, int(off[0]), "warning", "bed-off", message)] if len(off) else []
 
 
-def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
+def _fan(program: ParsedProgram, profile: Profile, own: bool) -> Iterator[Finding]:
     """In every part layers without any fan where the file has one in layers like them.
 
     In a file of ours no layer is without, but for the first ones. Other slicers switch the fan with the time that a layer takes,
@@ -100,7 +99,7 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
     """
     beads = (program.kind == MoveKind.EXTRUDE) & ~program.rows_of_types(Kind.PURGE.value)
     if not beads.any():
-        return []
+        return
     fan = fan_shares(program, profile.machine)
     layer = program.layer_keys()
     length = np.linalg.norm((program.end - program.start)[:, :3], axis=1)
@@ -120,15 +119,13 @@ def _fan(program: ParsedProgram, profile: Profile, own: bool) -> list[Finding]:
         quick = seconds[at] < QUICKER * float(np.median(seconds[at][blown[at] > 0.0])) if (blown > 0.0).any() else ~still
         once = np.count_nonzero(np.diff(still.astype(np.int8), prepend=0) > 0) == 1
         if not once or not quick[still].all():
-            return []
-    problems = []
+            return
     for mine in by_part(program, rows[still]):
         if len(mine) < FEWEST_STILL:
             continue
         row = int(mine[0])
         message = f"no fan blows in layer {program.layer[row]}, where the file's other layers have one (layers: {len(mine)})"
-        problems.append(at_row(program, row, "error", "fan", message))
-    return problems
+        yield at_row(program, row, "error", "fan", message)
 
 
 def _without_fan(part: int, profile: Profile) -> int:
@@ -139,7 +136,7 @@ def _without_fan(part: int, profile: Profile) -> int:
     return process.interface_layers if process.interface_fan == 0.0 else 0
 
 
-def _flow(program: ParsedProgram, profile: Profile) -> list[Finding]:
+def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:
     """Plastic per second at the asked speed, against what the hot end melts."""
     material = profile.material
     rows = program.kind == MoveKind.EXTRUDE
@@ -148,23 +145,21 @@ def _flow(program: ParsedProgram, profile: Profile) -> list[Finding]:
     flow = program.e_mm * area / length * program.feed / 60.0
     most = material.volumetric_limit_mm3_s
     message = f"{{value}} mm3/s are asked for, {material.name} allows {most:g} mm3/s (moves: {{count}})"
-    return per_part(program, rows & (flow > most * SLACK), flow, "warning", "flow", message)
+    return per_part(program, rows & (flow > most * SLACK), flow, message, code="flow", severity="warning")
 
 
-def _profile(program: ParsedProgram, profile: Profile) -> list[Finding]:
-    problems = []
+def _profile(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
     machine = profile.machine
     if machine.uncalibrated:
         count = len(machine.uncalibrated)
         which = f"{count} numbers of {machine.name} are" if count > 1 else f"one number of {machine.name} is"
         message = f"{which} in no source, measure them (docs/calibration.md): {', '.join(machine.uncalibrated)}"
-        problems.append(Finding("warning", "uncalibrated", 0, 0, 0, message))
+        yield Finding("warning", "uncalibrated", 0, 0, 0, message)
     for place in program.unsupported:
         where = f", most of them in layer {place.layer}" if place.layer else ""
         why = f": {place.reason}" if place.reason else ""
         message = f"{place.mm2:g} mm2 of risky faces of part {place.part} could be given no support{where}{why}"
-        problems.append(Finding("warning", "unsupported", place.line, place.part, place.layer, message))
-    return problems
+        yield Finding("warning", "unsupported", place.line, place.part, place.layer, message)
 
 
 def _unknown_commands(program: ParsedProgram) -> list[Finding]:

@@ -4,6 +4,8 @@ Two signs: a bead that begins above all that its part has laid before, by the he
 whose beads have nothing under them, by the plastic that lies there.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -98,7 +100,7 @@ def _begins(program: ParsedProgram, rows: NDArray[np.int64]) -> NDArray[np.bool_
     return begins
 
 
-def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
+def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> Iterator[Finding]:
     """In every part the first layer of which more than half has nothing under it, though it is no bridge and no overhang.
 
     What spans the cells of sparse infill is a bridge, however much of a layer that is (machine.dryrun.replay).
@@ -112,7 +114,6 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
     air = np.bincount(group, weights=contacts.air_mm[rows])
     whole = np.bincount(group, weights=length)
     bad = np.flatnonzero((loose > FLOATING_SHARE * whole) & (whole > LEAST_MM) & (air > 0.0))
-    problems = []
     for mine in by_part(program, rows[np.isin(group, bad)]):
         layer = program.layer_keys(mine).min()
         row = int(mine[np.argmax(program.layer_keys(mine) == layer)])
@@ -120,5 +121,4 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             f"{loose[layer]:.1f} mm of the {whole[layer]:.1f} mm of layer {program.layer[row]} have nothing under them, in "
             f"stretches longer than sparse infill's cells are wide: a layer below it is missing"
         )
-        problems.append(at_row(program, row, "error", "gap", message))
-    return problems
+        yield at_row(program, row, "error", "gap", message)

@@ -1,5 +1,7 @@
 """Motion: findings about axes: limits, speeds, homing, turning while plastic flows or while the firmware begins to follow."""
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,16 +32,14 @@ def findings(program: ParsedProgram, machine: Machine) -> list[Finding]:
     ]
 
 
-def _outside(program: ParsedProgram, machine: Machine) -> list[Finding]:
-    problems = []
+def _outside(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     for axis, (letter, (least, most)) in enumerate(axis_limits(machine).items()):
         values = program.end[:, axis]
         unit = "mm" if axis < 3 else "deg"
         allowed = f"allowed is {least:g} to {most:g} {unit} (moves: {{count}})"
         above, below = values > most + ROUNDING, values < least - ROUNDING
-        problems += per_part(program, above, values, "error", "axis-limit", f"{letter} goes to {{value}} {unit}, {allowed}")
-        problems += per_part(program, below, -values, "error", "axis-limit", f"{letter} goes to -{{value}} {unit}, {allowed}")
-    return problems
+        yield from per_part(program, above, values, f"{letter} goes to {{value}} {unit}, {allowed}", code="axis-limit")
+        yield from per_part(program, below, -values, f"{letter} goes to -{{value}} {unit}, {allowed}", code="axis-limit")
 
 
 def deltas(program: ParsedProgram) -> Floats:
@@ -54,23 +54,21 @@ def standstills(program: ParsedProgram) -> NDArray[np.bool_]:
     return stop
 
 
-def _too_fast(program: ParsedProgram, machine: Machine) -> list[Finding]:
+def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     change = deltas(program)
     length, _ = lengths(change)
     surely = np.maximum(np.abs(change) - WRITTEN, 0.0)
     speed = surely / np.maximum(length, 1e-9)[:, None] * (program.feed / 60.0)[:, None]
     names = [*axis_limits(machine), "E"]
-    problems = []
     for axis, (letter, most) in enumerate(zip(names, axis_speeds(machine), strict=True)):
         unit = "deg/s" if axis in (3, 4) else "mm/s"
         rounding = length * 0.0 + 1.0 / 60.0  # F is written as a whole number
         message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most:g} {unit} (moves: {{count}})"
-        problems += per_part(program, speed[:, axis] > most * SLACK + rounding, speed[:, axis], "warning", "axis-speed", message)
-    return problems
+        fast = speed[:, axis] > most * SLACK + rounding
+        yield from per_part(program, fast, speed[:, axis], message, code="axis-speed", severity="warning")
 
 
-def _homing(program: ParsedProgram, machine: Machine) -> list[Finding]:
-    problems = []
+def _homing(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     for event in program.events:
         if event.code != "G28" or event.row == 0:
             continue
@@ -78,12 +76,11 @@ def _homing(program: ParsedProgram, machine: Machine) -> list[Finding]:
         later = [e for e in program.events if e.code == "G92" and machine.tilt.letter in e.letters and e.row == event.row]
         if abs(tilt - machine.tilt.zero_deg) > LEVEL_DEG and not any(e.line < event.line for e in later):
             message = f"homing while the table stands at {machine.tilt.letter}{tilt:.3f}: it must be level"
-            problems.append(at_event(program, event, "error", "homing-tilted", message))
+            yield at_event(program, event, "error", "homing-tilted", message)
         printed = program.kind[: event.row] == MoveKind.EXTRUDE
         if printed.any() and (not set(event.letters) & set("XYZ") or "Z" in event.letters):
             message = "Z is homed after plastic was laid: the tip may run into the print unless the machine homes upwards"
-            problems.append(at_event(program, event, "warning", "homing-over-print", message))
-    return problems
+            yield at_event(program, event, "warning", "homing-over-print", message)
 
 
 def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
@@ -102,20 +99,19 @@ def _moves_before_homing(program: ParsedProgram) -> list[Finding]:
     return []
 
 
-def _turning_strokes(program: ParsedProgram, machine: Machine) -> list[Finding]:
+def _turning_strokes(program: ParsedProgram, machine: Machine) -> Iterable[Finding]:
     rows = (program.kind == MoveKind.ROTATE) & (program.e_mm > 1e-9)
     letters = f"{machine.tilt.letter} or {machine.turn.letter}"
     message = f"{letters} turns while {{value}} mm of filament are extruded (moves: {{count}})"
-    return per_part(program, rows, program.e_mm, "error", "turning-stroke", message)
+    return per_part(program, rows, program.e_mm, message, code="turning-stroke")
 
 
-def _following_switches(program: ParsedProgram, machine: Machine) -> list[Finding]:
+def _following_switches(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     """Switching that keeps the coordinates takes another place for the present one: beyond A0 C0 it is a wrong one."""
     dialect = dialect_of(machine)
     if not dialect.follow_keeps_coordinates:
-        return []
+        return
     level = np.array([machine.tilt.zero_deg, machine.turn.zero_deg])
-    problems = []
     for event in program.events:
         if event.code not in (dialect.follow_on, dialect.follow_off) or event.row == 0:
             continue
@@ -124,5 +120,4 @@ def _following_switches(program: ParsedProgram, machine: Machine) -> list[Findin
             stands_at = f"{machine.tilt.letter}{stands[0]:g} {machine.turn.letter}{stands[1]:g}"
             home = f"{machine.tilt.letter}{level[0]:g} {machine.turn.letter}{level[1]:g}"
             message = f"{event.code} while the table stands at {stands_at}: Marlin loses the position; turn it to {home} first"
-            problems.append(at_event(program, event, "error", "following-switched", message))
-    return problems
+            yield at_event(program, event, "error", "following-switched", message)

@@ -4,7 +4,7 @@ Its configuration and poses say whether it was made for this machine, its parts'
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,19 +36,17 @@ def has_material(lines: Sequence[str], profile: Profile) -> bool:
     return bool(recorded) and all(recorded[key][1] == comment(f"{key} = {value}") for key, value in material if key in recorded)
 
 
-def _geometry(lines: Sequence[str], profile: Profile) -> list[Finding]:
+def _geometry(lines: Sequence[str], profile: Profile) -> Iterator[Finding]:
     """Keys of the chain of axes that the file's configuration has otherwise than the profile."""
     recorded = _configuration(lines)
     now = {key: (comment(f"{key} = {value}"), value) for key, value in flat(profile.model_dump(), "")}
-    problems = []
     for code, keys, what in (("centre", CENTRE, "rotation centre"), ("sign", SIGN, "sense of the axes")):
         for key in keys:
             line, text = recorded.get(key, (0, ""))
             if line and key in now and text != now[key][0]:
                 was = text.partition(" = ")[2]
                 message = f"the file was made for another {what}: {key} = {was}, the profile has {now[key][1]}"
-                problems.append(Finding("error", code, line, 0, 0, message))
-    return problems
+                yield Finding("error", code, line, 0, 0, message)
 
 
 def _configuration(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
@@ -66,11 +64,10 @@ def _configuration(lines: Sequence[str]) -> dict[str, tuple[int, str]]:
     return recorded
 
 
-def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> list[Finding]:
+def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
     """Parts of which beads are laid at another pose than their ;POSE: comment tells."""
     letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
     rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0))
-    problems = []
     for number in [k for k, line in enumerate(lines, start=1) if line[:6] == ";POSE:"]:
         comment_pose = POSE.match(lines[number - 1])
         if comment_pose is None or (comment_pose[1], comment_pose[3]) != letters:
@@ -85,19 +82,17 @@ def _poses(lines: Sequence[str], program: ParsedProgram, profile: Profile) -> li
                 f"the part is printed at {letters[0]}{at[0]:.3f} {letters[1]}{at[1]:.3f}, "
                 f"it was made for {letters[0]}{wanted[0]:.3f} {letters[1]}{wanted[1]:.3f}"
             )
-            problems.append(at_row(program, row, "error", "pose", message))
-    return problems
+            yield at_row(program, row, "error", "pose", message)
 
 
-def _part_totals(program: ParsedProgram) -> list[Finding]:
+def _part_totals(program: ParsedProgram) -> Iterator[Finding]:
     """Parts whose beads do not come to what the file tells of them, and parts that are missing."""
     beads = (program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value)
-    problems = _missing(program, beads)
+    yield from _missing(program, beads)
     for totals in program.part_totals:
         rows = np.flatnonzero(beads & (program.part == totals.part))
         if len(rows):
-            problems += _of_part(program, rows, totals)
-    return problems
+            yield from _of_part(program, rows, totals)
 
 
 def _missing(program: ParsedProgram, beads: NDArray[np.bool_]) -> list[Finding]:
@@ -112,35 +107,25 @@ def _missing(program: ParsedProgram, beads: NDArray[np.bool_]) -> list[Finding]:
     return [Finding("error", "missing", line, absent[0], 0, message)]
 
 
-def _of_part(program: ParsedProgram, rows: NDArray[np.int64], totals: PartTotals) -> list[Finding]:
+def _of_part(program: ParsedProgram, rows: NDArray[np.int64], totals: PartTotals) -> Iterator[Finding]:
     """What differs in a part: its layers, its filament, where it lies."""
-    problems = []
     layers = len(np.unique(program.layer[rows]))
     if layers != totals.layers:
         message = f"beads are laid in {layers} layers of part {totals.part}, the file tells of {totals.layers}"
-        problems.append(at_row(program, int(rows[-1]), "error", "contents", message))
+        yield at_row(program, int(rows[-1]), "error", "contents", message)
     pushed = float(program.e_mm[rows].sum())
     if abs(pushed - totals.filament_mm) > max(FILAMENT_MM, FILAMENT_SHARE * totals.filament_mm):
         message = f"part {totals.part} pushes {pushed:.2f} mm of filament, the file tells of {totals.filament_mm:.2f} mm"
-        problems.append(at_row(program, int(rows[0]), "error", "contents", message))
+        yield at_row(program, int(rows[0]), "error", "contents", message)
     ends = np.stack([program.start[rows, :3], program.end[rows, :3]])
     bounds = np.stack([ends.min(axis=(0, 1)), ends.max(axis=(0, 1))])
     apart = bounds - totals.bounds_mm
     if np.abs(apart).max() <= PLACE_MM:
-        return problems
+        return
     side, axis = (int(v) for v in np.unravel_index(np.abs(apart).argmax(), apart.shape))
     extreme = np.abs(ends[:, :, axis] - bounds[side, axis]).min(axis=0).argmin()
-    moved = (
-        f"part {totals.part} lies {abs(apart[side, axis]):.2f} mm aside" if _is_shift(apart) else f"part {totals.part} reaches"
-    )
-    message = (
-        f"{moved} to {'XYZ'[axis]}{bounds[side, axis]:.3f}, the file tells of {'XYZ'[axis]}{totals.bounds_mm[side, axis]:.3f} "
-        f"({PLACE_MM:g} mm are allowed)"
-    )
-    row = int(rows[0] if _is_shift(apart) else rows[extreme])
-    return [*problems, at_row(program, row, "error", "contents", message)]
-
-
-def _is_shift(apart: NDArray[np.float64]) -> bool:
-    """True where both sides of a part are moved alike."""
-    return bool(np.abs(apart[0] - apart[1]).max() <= PLACE_MM)
+    shifted = bool(np.abs(apart[0] - apart[1]).max() <= PLACE_MM)  # both sides are moved alike
+    moved = f"lies {abs(apart[side, axis]):.2f} mm aside" if shifted else "reaches"
+    laid, recorded = (f"{'XYZ'[axis]}{corners[side, axis]:.3f}" for corners in (bounds, totals.bounds_mm))
+    message = f"part {totals.part} {moved} to {laid}, the file tells of {recorded} ({PLACE_MM:g} mm are allowed)"
+    yield at_row(program, int(rows[0] if shifted else rows[extreme]), "error", "contents", message)

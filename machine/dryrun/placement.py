@@ -1,5 +1,7 @@
 """Placement: findings about where beads are laid (off the plate, in air, overlapping) and the head in earlier plastic."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,39 +29,36 @@ ON_PLATE = 1.5  # heights of a bead: so low its top is where it lies on the plat
 PURGE_STEP_MM = 0.3
 
 
-def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
+def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> Iterator[Finding]:
     """Errors and warnings of code air, filled, contact and low-travel, one a part; not-tested where the table turns too often."""
     length = np.zeros(len(program.line))
     length[deposited.rows] = deposited.length_mm
     deep = "the head runs {value} mm deep into earlier plastic (moves: {count})"
-    problems = per_part(program, contacts.depth_mm > 0.0, contacts.depth_mm, "error", "contact", deep)
-    problems += _too_low(program, contacts)
-    problems += [*_in_air(program, length, contacts), *_in_plastic(program, length, contacts)]
+    yield from per_part(program, contacts.depth_mm > 0.0, contacts.depth_mm, deep, code="contact")
+    yield from _too_low(program, contacts)
+    yield from _in_air(program, length, contacts)
+    yield from _in_plastic(program, length, contacts)
     if contacts.untested_row >= 0:
         message = "the table turns too often: from here on no move was tried against earlier plastic"
-        problems.append(at_row(program, contacts.untested_row, "warning", "not-tested", message))
-    return problems
+        yield at_row(program, contacts.untested_row, "warning", "not-tested", message)
 
 
-def _too_low(program: ParsedProgram, contacts: Contacts) -> list[Finding]:
+def _too_low(program: ParsedProgram, contacts: Contacts) -> Iterator[Finding]:
     """In every part the first way to or from a turn of the table that does not lead above the print."""
-    problems = []
     for rows in by_part(program, np.flatnonzero(contacts.close_mm > 0.0)):
         left = max(CROSSING_MM - float(contacts.close_mm[rows].max()), 0.0)
         message = (
             f"the tip crosses the print {left:.2f} mm above it on the way to or from a turn of the table, {CROSSING_MM:g} mm are "
             f"needed (moves: {len(rows)})"
         )
-        problems.append(at_row(program, int(rows[0]), "error", "low-travel", message))
-    return problems
+        yield at_row(program, int(rows[0]), "error", "low-travel", message)
 
 
-def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[Finding]:
+def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> Iterator[Finding]:
     """Parts with too much that hangs where the slicer has not said so, and parts that begin in air."""
     own = ~program.rows_of_types(PURGE)
     hanging = np.where(own & ~program.rows_of_types(*HANGING), contacts.air_mm, 0.0)
     support = program.rows_of_types(*SUPPORT)
-    problems = []
     for part in np.unique(program.part[hanging > 0.0]):
         mine = own & (program.part == part)
         whole, loose = float(length[mine].sum()), float(hanging[mine].sum())
@@ -79,8 +78,7 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[
             message = f"the part begins in air: {first:.1f} mm of its first layer have nothing under them"
         rows = begins & (contacts.air_mm > 0) if lost else mine & (hanging > 0)
         row = at if stretch > STRETCH_MM and not lost else int(np.flatnonzero(rows)[0])
-        problems.append(at_row(program, row, severity, "air", message))
-    return problems
+        yield at_row(program, row, severity, "air", message)
 
 
 def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> tuple[float, int]:
@@ -92,19 +90,17 @@ def _longest_mm(hanging: Floats, length: Floats, mine: NDArray[np.bool_]) -> tup
     return float(stretches[longest]), int(np.argmax(loose & (group == longest)))
 
 
-def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> list[Finding]:
+def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> Iterator[Finding]:
     """The first layer of every part in which a great share of the beads finds its room taken."""
     counted = ~program.rows_of_types(PURGE, IRONING) & (length > 0)
     group = program.layer_keys()
     overlapping = np.bincount(group[counted], weights=contacts.overlapping_mm[counted])
     whole = np.bincount(group[counted], weights=length[counted])
     bad = np.flatnonzero((overlapping > LEAST_MM) & (overlapping > OVERLAPPING_SHARE * whole))
-    problems = []
     for rows in by_part(program, np.flatnonzero(counted & np.isin(group, bad) & (contacts.overlapping_mm > 0))):
         groups = np.unique(group[rows])
         message = f"{overlapping[groups].sum():.1f} mm are extruded where plastic already is (layers: {len(groups)})"
-        problems.append(at_row(program, int(rows[0]), "error", "filled", message))
-    return problems
+        yield at_row(program, int(rows[0]), "error", "filled", message)
 
 
 def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> tuple[float, float, float]:
@@ -115,7 +111,7 @@ def unsupported_mm(program: ParsedProgram, deposited: Beads, contacts: Contacts)
     return float(length.sum()), float(contacts.air_mm[own & ~reported].sum()), float(contacts.air_mm[own & reported].sum())
 
 
-def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> list[Finding]:
+def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64], profile: Profile) -> Iterator[Finding]:
     """Strokes of the layer on the plate that lie beyond its edge: an error a part, with the farthest.
 
     segments: (m, 2, 3) deposited, workpiece frame; rows: (m,) their rows in the program.
@@ -129,7 +125,7 @@ def off_plate(program: ParsedProgram, segments: Floats, rows: NDArray[np.int64],
     marked[rows[beyond]] = True
     badness[rows] = over
     message = f"the first layer reaches {{value}} mm over the plate's edge, {edge} (moves: {{count}})"
-    return per_part(program, marked, badness, "error", "off-plate", message)
+    return per_part(program, marked, badness, message, code="off-plate")
 
 
 def purged_into(program: ParsedProgram, deposited: Beads) -> list[Finding]:

@@ -50,9 +50,12 @@ class Contacts(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What the rows of one pose meet: rows from `first` on are its own, support keeps `gap` away, the plate is a x + b y + c."""
+    """What the rows of one pose meet: rows from `first` on are its own, support keeps `gap` away, the plate is a x + b y + c;
+    head: what may run into all of that.
+    """
 
     field: Field
+    head: Head
     first: int
     gap: float
     plate: Floats
@@ -76,10 +79,10 @@ def replay(program: ParsedProgram, deposited: Beads, profile: Profile) -> Contac
         turned += before
         if turned > MOST_TURNED:
             return contacts._replace(untested_row=int(run.rows[0]))
-        field = _field(deposited, int(before), int(after), run, ups, machine)
+        field = _field(deposited, (int(before), int(after)), run, ups, machine)
         if field is not None:
-            about = Surroundings(field, int(run.rows[0]), gap, _plate(machine, run.pose))
-            _replay_run(run.rows, moves, strokes, about, head, contacts)
+            plate = _plate(machine, run.pose)
+            _replay_run(run.rows, moves, strokes, Surroundings(field, head, int(run.rows[0]), gap, plate), contacts)
     return contacts
 
 
@@ -89,8 +92,11 @@ def head_of(machine: Machine) -> Head:
     return Head(np.array(machine.head.silhouette_mm, dtype=np.float64), boxes)
 
 
-def _field(deposited: Beads, before: int, after: int, run: PoseRun, ups: Floats, machine: Machine) -> Field | None:
-    """The field of a run at one pose with all earlier plastic in it; None where nothing was or will be laid."""
+def _field(deposited: Beads, laid: tuple[int, int], run: PoseRun, ups: Floats, machine: Machine) -> Field | None:
+    """The field of a run at one pose with all earlier plastic in it; None where nothing was or will be laid. laid: how many beads
+    are before the run and after it.
+    """
+    before, after = laid
     if after == 0:
         return None
     ends = machine_points(machine, run.pose, deposited.segments_mm[:after].reshape(-1, 3)).reshape(-1, 2, 3)
@@ -203,24 +209,17 @@ def _settle(stretch: tuple[int, int, float], rows: NDArray[np.int64], pending: F
 
 
 @kernel
-def _replay_run(
-    rows: NDArray[np.int64],
-    moves: Moves,
-    strokes: Strokes,
-    about: Surroundings,
-    head: Head,
-    contacts: Contacts,
-) -> None:
+def _replay_run(rows: NDArray[np.int64], moves: Moves, strokes: Strokes, about: Surroundings, contacts: Contacts) -> None:
     """Try each row of a run against the field, then lay it."""
     pending, first, open_mm, most, held = table(len(rows), 2), 0, 0.0, 0.0, FREE_END
     for at in range(len(rows)):
         row = rows[at]
         a, b = moves.start[row], moves.end[row]
         extruded = strokes.height[row] > 0.0
-        contacts.depth_mm[row] = depth_of(a, b, moves.slack[row], about.field, head)
+        contacts.depth_mm[row] = depth_of(a, b, moves.slack[row], about.field, about.head)
         if moves.lower[row] > 0.0:
             down = np.array([0.0, 0.0, moves.lower[row]])
-            contacts.close_mm[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, head)
+            contacts.close_mm[row] = depth_of(a[:3] - down, b[:3] - down, 0.0, about.field, about.head)
         if not extruded:
             continue
         if at and strokes.path[row] != strokes.path[rows[at - 1]]:

@@ -1,5 +1,7 @@
 """Sequence: findings about the order of parts and layers, and about filament pulled back and pushed again."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from machine.dryrun.findings import Finding, at_row, by_part
@@ -33,21 +35,19 @@ def _parts(program: ParsedProgram) -> list[Finding]:
     return [at_row(program, row, "error", "order", message)]
 
 
-def _layers(program: ParsedProgram) -> list[Finding]:
+def _layers(program: ParsedProgram) -> Iterator[Finding]:
     """In every part the first layer that lies lower than the one before it."""
     rows = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part > 0) & ~program.rows_of_types(Kind.PURGE.value))
     z, height = program.end[rows, 2], program.height_mm[rows]
     same = (np.diff(program.part[rows]) == 0) & np.all(program.end[rows[1:], 3:] == program.end[rows[:-1], 3:], axis=1)
     lower = np.flatnonzero(same & (np.diff(program.layer[rows]) != 0) & (np.diff(z) < -0.25 * height[1:] - SLACK_MM))
-    problems = []
     for mine in by_part(program, lower + 1, rows):
         k = int(mine[0]) - 1
         message = f"layer {program.layer[rows[k + 1]]} lies {z[k] - z[k + 1]:.2f} mm lower than the layer before it"
-        problems.append(at_row(program, int(rows[k + 1]), "error", "order", message))
-    return problems
+        yield at_row(program, int(rows[k + 1]), "error", "order", message)
 
 
-def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> list[Finding]:
+def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
     """Filament pushed at standstill that was not pulled back before, and beads begun with filament still pulled back.
 
     Nothing is said of a program that never pulls back; what the start block does is its own affair.
@@ -59,7 +59,7 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> list[Fi
         counted[purge[-1] + 1 :] = True
     rows = np.flatnonzero((np.abs(e) > 1e-9) & counted)
     if not (e[rows] < 0.0).any():
-        return []
+        return
     pushing = program.kind[rows] == MoveKind.EXTRUDE
     # What is done between two beads must come to nothing, or to the extra push after it.
     run = np.cumsum(pushing)
@@ -71,7 +71,6 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> list[Fi
     inner = np.arange(len(balance))
     over = stood & (balance < -extra - SLACK_MM) & (inner > 0)
     under = stood & (balance > SLACK_MM) & (inner < run[-1])
-    problems = []
     for wrong, sentence, next_bead in (
         (over, "{:.3f} mm more filament is pushed than was pulled back", 0),
         (under, "{:.3f} mm of filament stay pulled back", 1),
@@ -81,26 +80,23 @@ def _unbalanced_retractions(program: ParsedProgram, profile: Profile) -> list[Fi
         for mine in by_part(program, np.arange(len(places)), places):
             worst = float(np.abs(balance[runs[mine]]).max())
             message = f"{sentence.format(worst)} before the next bead (places: {len(mine)})"
-            problems.append(at_row(program, int(places[mine[0]]), "error", "retraction", message))
-    return problems
+            yield at_row(program, int(places[mine[0]]), "error", "retraction", message)
 
 
-def _far_pulled(program: ParsedProgram) -> list[Finding]:
+def _far_pulled(program: ParsedProgram) -> Iterator[Finding]:
     """In every part the first place between two beads where more filament is pulled back than a hot end holds."""
     beads = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (program.part + program.layer > 0))
     if len(beads) < 2:
-        return []
+        return
     rows = np.arange(beads[0], beads[-1])
     last = beads[np.searchsorted(beads, rows, side="right") - 1]
     pulled = program.filament_mm[last] - program.filament_mm[rows]
     far = rows[pulled > MOST_PULLED_MM]
-    problems = []
     for mine in by_part(program, far):
         row = int(mine[0])
         amount = float(pulled[row - rows[0]])
         message = f"{amount:.1f} mm of filament are pulled back, {MOST_PULLED_MM:g} mm are allowed: more leaves the hot end"
-        problems.append(at_row(program, row, "error", "retraction", message))
-    return problems
+        yield at_row(program, row, "error", "retraction", message)
 
 
 def _oozing(program: ParsedProgram) -> list[Finding]:

@@ -5,7 +5,7 @@ planner is Marlin's: at most 15 blocks, each as fast as those behind it let the 
 while fewer than half of the places are taken, so that the sender catches up; the first block of an idle machine waits for two.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -71,8 +71,7 @@ def find_starvation(run: DryRun, lines: Sequence[str], machine: Machine, baud: i
 
 def _findings(
     program: ParsedProgram, rows: NDArray[np.bool_], stopped: NDArray[np.bool_], times_s: Floats, baud: int
-) -> list[Finding]:
-    problems = []
+) -> Iterator[Finding]:
     for mine in by_part(program, np.flatnonzero(rows)):
         needed = 1.0 / max(float(np.median(times_s[mine])), TINY)
         stops = int(stopped[mine].sum())
@@ -80,8 +79,7 @@ def _findings(
             f"{baud} baud bring {len(mine)} moves too late, {needed:.0f} lines/s are needed there: the printer slows down"
             f"{f' and stops {stops} times' if stops else ''}; a faster line or longer segments help"
         )
-        problems.append(at_row(program, int(mine[0]), "warning", "starvation", message))
-    return problems
+        yield at_row(program, int(mine[0]), "warning", "starvation", message)
 
 
 def feeding(program: ParsedProgram, lines: Sequence[str], machine: Machine, baud: float) -> Feeding:

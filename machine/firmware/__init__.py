@@ -18,15 +18,7 @@ from profiles.machine import Machine
 
 __all__ = ["FIRMWARES", "Dialect", "Firmware", "dialect_of", "dialects", "firmware_of", "identify", "simulation_of"]
 
-FIRMWARES: tuple[Firmware, ...] = (
-    MARLIN,
-    REPETIER,
-    SMOOTHIEWARE,
-    REPRAPFIRMWARE,
-    KLIPPER,
-    LINUXCNC,
-    GRBLHAL,
-)
+FIRMWARES: tuple[Firmware, ...] = (MARLIN, REPETIER, SMOOTHIEWARE, REPRAPFIRMWARE, KLIPPER, LINUXCNC, GRBLHAL)
 
 
 def dialects() -> dict[str, Dialect]:

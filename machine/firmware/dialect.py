@@ -22,9 +22,6 @@ class Dialect:
     fan_off: str = "M107"
     fan_full: int = 255
     travel: str = "G0"
-    stroke: str = "G1"
-    arc_right: str = "G2"
-    arc_left: str = "G3"
     filament: str = "E"  # the first of these letters that no rotary axis has
     filament_relative: bool = True
     modes: tuple[str, ...] = ("G21", "G90", "M83")  # said again after the start block, whatever that has left

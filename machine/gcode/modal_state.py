@@ -11,19 +11,8 @@ from machine.gcode.words import Word, read_letters, read_number, read_values, re
 
 MOVES = frozenset({"G0", "G1", "G2", "G3"})
 SETTINGS = (
-    "M200",
-    "M201",
-    "M203",
-    "M204",
-    "M205",
-    "M207",
-    "M220",
-    "M221",
-    "SET_VELOCITY_LIMIT",
-    "M900",
-    "M572",
-    "SET_PRESSURE_ADVANCE",
-)
+    "M200", "M201", "M203", "M204", "M205", "M207", "M220", "M221", "SET_VELOCITY_LIMIT", "M900", "M572", "SET_PRESSURE_ADVANCE",
+)  # fmt: skip
 
 Place = tuple[float | None, ...]  # X Y Z tilt turn E
 

@@ -85,7 +85,7 @@ def write_path(points_mm: Floats, filament_mm: Floats, speed_mm_s: float, pen: P
     filament = pen.filament_mm + np.cumsum(steps_mm)
     pen.filament_mm = float(filament[-1])
     ending = pen.speed(speed_mm_s / slower)
-    words = PathWords(as_bytes(pen.dialect.stroke), ord(pen.filament_letter), pen.dialect.filament_relative, as_bytes(ending))
+    words = PathWords(as_bytes("G1"), ord(pen.filament_letter), pen.dialect.filament_relative, as_bytes(ending))
     known = np.array([pen.x, pen.y, pen.z, pen.pushed])
     lines = path_lines(rounded[1:].astype(np.int64), np.rint(filament * 1e5).astype(np.int64), words, known)
     pen.x, pen.y, pen.z, pen.pushed = known.tolist()

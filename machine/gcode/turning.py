@@ -73,7 +73,7 @@ def _followed(to: Pose, seconds: float, pen: Pen) -> Iterator[str]:
         else:
             step = moved if moved > 0 else hypot(to.tilt_deg - begin.tilt_deg, to.turn_deg - begin.turn_deg) / count
             feed = f" F{number(max(60.0 * step * count / seconds, 0.001))}"
-        yield f"{pen.dialect.stroke}{place}{_words(pose, pen)}{feed}"
+        yield f"G1{place}{_words(pose, pen)}{feed}"
     if pen.dialect.inverse_time:
         yield "G94"
 

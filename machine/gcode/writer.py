@@ -38,12 +38,11 @@ def write_gcode(program: MachineProgram, profile: Profile) -> Iterator[str]:
     dialect = dialect_of(machine)
     letter = next(word for word in dialect.filament if word not in (machine.tilt.letter, machine.turn.letter))
     pen = Pen(dialect, machine, letter, level(machine))
-    parts = [move for move in program.moves if isinstance(move, BeginPart)]
     elapsed, filament_mm = elapsed_s(program, profile)
-    pen.values = placeholders(program.name, profile, parts, float(elapsed[-1]), filament_mm)
+    pen.values = placeholders(program.name, profile, _parts(program), float(elapsed[-1]), filament_mm)
     for name in BLOCKS:
         _block(name, pen)
-    return _lines(program, profile, parts, elapsed, filament_mm, pen)
+    return _lines(program, profile, elapsed, filament_mm, pen)
 
 
 def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]:
@@ -57,10 +56,8 @@ def elapsed_s(program: MachineProgram, profile: Profile) -> tuple[Floats, float]
     return elapsed, float(straight.end[:, 5].max(initial=0.0))
 
 
-def _lines(
-    program: MachineProgram, profile: Profile, parts: list[BeginPart], elapsed: Floats, filament_mm: float, pen: Pen
-) -> Iterator[str]:
-    total = float(elapsed[-1])
+def _lines(program: MachineProgram, profile: Profile, elapsed: Floats, filament_mm: float, pen: Pen) -> Iterator[str]:
+    total, parts = float(elapsed[-1]), _parts(program)
     coming = iter(parts)
     next_part = next(coming, None)
     last_strokes = _last_strokes(program)
@@ -79,7 +76,7 @@ def _lines(
             yield ";WIPE_END"
         elif isinstance(move, Retract):
             pen.filament_mm -= move.filament_mm
-            yield f"{pen.dialect.stroke}{pen.filament()}{pen.speed(move.speed_mm_s)}"
+            yield f"G1{pen.filament()}{pen.speed(move.speed_mm_s)}"
         elif isinstance(move, Reorient):
             yield from _heat_ahead(program, place, profile, pen)
             yield from _reorient(move, next_part, pen)
@@ -96,6 +93,10 @@ def _lines(
     yield from _progress(total, total, pen)
     yield from _dialect_line(pen.dialect.last, pen)
     yield from settings.foot(profile, filament_mm, total)
+
+
+def _parts(program: MachineProgram) -> list[BeginPart]:
+    return [move for move in program.moves if isinstance(move, BeginPart)]
 
 
 def _last_strokes(program: MachineProgram) -> set[int]:
@@ -269,18 +270,20 @@ def _with_arcs(move: Stroke, tolerance_mm: float, pen: Pen) -> Iterator[str]:
     for (first, last), (x, y, clockwise) in zip(runs.tolist(), arcs.tolist(), strict=True):
         if first > done:
             yield from write_path(move.points_mm[done : first + 1], move.filament_mm[done:first], move.speed_mm_s, pen)
-        yield _arc(move, first, last, (x - flat[first, 0], y - flat[first, 1]), clockwise > 0, pen)
+        word = "G2" if clockwise > 0 else "G3"
+        yield f"{word}{_arc(move, (first, last), (x - flat[first, 0], y - flat[first, 1]), pen)}"
         done = last
     if done < len(flat) - 1:
         yield from write_path(move.points_mm[done:], move.filament_mm[done:], move.speed_mm_s, pen)
 
 
-def _arc(move: Stroke, first: int, last: int, centre: tuple[float, float], clockwise: bool, pen: Pen) -> str:
+def _arc(move: Stroke, run: tuple[int, int], centre: tuple[float, float], pen: Pen) -> str:
+    """The words of an arc. run: its first and last point; centre: seen from its beginning."""
+    first, last = run
     pen.filament_mm += float(move.filament_mm[first:last].sum())
     ((pen.x, pen.y),) = thousandths(move.points_mm[last : last + 1, :2])
-    word = pen.dialect.arc_right if clockwise else pen.dialect.arc_left
     place = f" X{pen.x / 1000:.3f} Y{pen.y / 1000:.3f} I{centre[0]:.3f} J{centre[1]:.3f}"
-    return f"{word}{place}{pen.filament()}{pen.speed(move.speed_mm_s)}"
+    return f"{place}{pen.filament()}{pen.speed(move.speed_mm_s)}"
 
 
 def _travel(move: Travel, pen: Pen) -> Iterator[str]:

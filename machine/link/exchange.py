@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from machine.link.medium import Medium, Wire
 from machine.link.protocol.connection import GREETING_STATES, Connection
-from machine.link.protocol.events import Event, Ok, Position
+from machine.link.protocol.events import Event, Position, position_in
 from machine.link.protocol.framing import LINE_LIMIT
 from machine.link.protocol.slow_commands import is_waited_for
 from machine.link.protocol.states import State
@@ -32,6 +32,7 @@ class Exchange:
         self,
         wire: Wire,
         medium: Medium,
+        *,
         timing: Timing,
         on_event: Callable[[Event], None],
         on_turn: Callable[[float], None],
@@ -41,7 +42,7 @@ class Exchange:
         baud: int | None = None,
     ) -> None:
         self.wire, self.medium = wire, medium
-        self.connection = Connection(timing, medium.now_s(), limit, rx_bytes=rx_bytes, baud=baud)
+        self.connection = Connection(timing, medium.now_s(), limit=limit, rx_bytes=rx_bytes, baud=baud)
         self.greeted = False
         self._on_event, self._on_turn, self._on_lost = on_event, on_turn, on_lost
         self._position: Position | None = None
@@ -106,10 +107,7 @@ class Exchange:
         now_s = self.medium.now_s()
         if data:
             for event in connection.receive(data, now_s):
-                if isinstance(event, Position):
-                    self._position = event
-                elif isinstance(event, Ok) and event.position is not None:
-                    self._position = event.position
+                self._position = position_in(event) or self._position
                 self._on_event(event)
         connection.tick(now_s)
         if connection.fault is not None:

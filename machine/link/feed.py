@@ -39,6 +39,7 @@ class Feed:
     def __init__(
         self,
         job: PrintJob,
+        *,
         control: Control | None,
         journal: Journal | None,
         on_progress: Callable[[Progress], None] | None,
@@ -221,7 +222,7 @@ class Feed:
         """Once a turn of the exchange."""
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
         self.poll()
-        self.reports.check_silence(now_s, self._cannot_report())
+        self.reports.watchdog.check_silence(now_s, self._cannot_report())
         if self._journal is not None:
             self._journal.update(self._checkpoint(), now_s)
         if now_s - max(self.reports.temperature_s, self._asked_s) >= ASK_S and self.exchange.connection.can_send("M105"):

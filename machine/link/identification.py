@@ -9,8 +9,8 @@ from time import monotonic
 
 from machine.firmware.line import BAUDS
 from machine.link.port import Port
+from machine.link.protocol import events
 from machine.link.protocol.decoder import LineDecoder
-from machine.link.protocol.events import NAME, Area, Busy, Event, FirmwareFault, Identity, Ok, Position, Resend, lacks_checksum
 from machine.link.protocol.framing import FAR_NUMBER, frame
 
 TIMEOUT_S = 6.0  # a board that restarts when its port is opened spends 2 s in its boot loader and as many with its start
@@ -49,7 +49,7 @@ class Answer:
     @property
     def firmware(self) -> str:
         """The firmware's name and version without the rest of its line."""
-        name = KEY.split(self.words.removeprefix(NAME).strip())[0]
+        name = KEY.split(self.words.removeprefix(events.NAME).strip())[0]
         version = VERSION.search(self.words)
         return f"{name} {version[1]}" if version else name
 
@@ -88,7 +88,7 @@ class _Inquiry:
         self._port, self._stop = port, stop
         self._decoder = LineDecoder()
         self._words = self._fault = self._letters = ""
-        self._area: Area | None = None
+        self._area: events.Area | None = None
         self._ok = self.named = self.placed = self._refused = False
         self._busy = ""  # what it says of that
         self._next_number = 0  # that a firmware which insists on numbers and checksums wants
@@ -132,32 +132,23 @@ class _Inquiry:
         words = self._decoder.foreign
         return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
 
-    def _read(self, event: Event) -> None:
-        if isinstance(event, FirmwareFault):
+    def _read(self, event: events.Event) -> None:
+        if isinstance(event, events.FirmwareFault):
             self._fault = event.text
-        elif isinstance(event, Busy):
+        elif isinstance(event, events.Busy):
             self._busy = event.text.rpartition("busy:")[2].strip() or "busy"
-        elif lacks_checksum(event):
+        elif events.lacks_checksum(event):
             self._refused = True
-        elif isinstance(event, Resend) and self._refused:
+        elif isinstance(event, events.Resend) and self._refused:
             self._next_number = event.line
-        elif isinstance(event, Area):
+        elif isinstance(event, events.Area):
             self._area = event
-        elif isinstance(event, Identity):
-            self._words = event.text
-        elif isinstance(event, Position):
-            self._read_position(event)
-        elif isinstance(event, Ok):
-            self._ok = True
-            if event.identity is not None:
-                self._words = event.identity.text
-            if event.position is not None:
-                self._read_position(event.position)
-            self.named = bool(self._words)
-
-    def _read_position(self, position: Position) -> None:
-        self._letters = "".join(letter for letter, _ in position.axes if letter != "E")
-        self.placed = True
+        if identity := events.identity_in(event):
+            self._words = identity.text
+        if position := events.position_in(event):
+            self._letters, self.placed = "".join(letter for letter, _ in position.axes if letter != "E"), True
+        if isinstance(event, events.Ok):
+            self._ok, self.named = True, bool(self._words)
 
     def _limits(self) -> dict[str, tuple[float, float]]:
         """The area with the letters of M114: Marlin names the axes from the fourth on I, J, K, whatever their words are."""

@@ -14,11 +14,10 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from os.path import isdir, isfile, lexists
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 from zlib import crc32
 
-from profiles.errors import JournalError, OutputError
+from profiles.errors import JournalError, OutputError, reason
 
 try:
     import fcntl
@@ -104,8 +103,8 @@ class Journal:
         except FileExistsError:
             raise OutputError(f"journal {path} exists already: each print has one of its own, choose another name") from None
         except OSError as error:
-            raise OutputError(f"journal {path} cannot be written: {(error.strerror or str(error)).lower()}") from None
-        _lock(self._file)  # before the heading: whoever can read that sees the lock
+            raise OutputError(f"journal {path} cannot be written: {reason(error)}") from None
+        lock(self._file)  # before the heading: whoever can read that sees the lock
         self._write({"format": FORMAT} | asdict(heading))
         self._sync_thread = threading.Thread(target=self._sync, name="journal", daemon=True)
         self._sync_thread.start()
@@ -140,7 +139,7 @@ class Journal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _write(self, value: Any) -> None:
@@ -151,7 +150,7 @@ class Journal:
             if os.write(self._file, record) < len(record):
                 self.trouble = "the disk is full"
         except OSError as error:
-            self.trouble = (error.strerror or str(error)).lower()
+            self.trouble = reason(error)
         self._dirty.set()
 
     def _sync(self) -> None:
@@ -167,20 +166,20 @@ class Journal:
         try:
             os.fsync(self._file)
         except OSError as error:
-            self.trouble = self.trouble or (error.strerror or str(error)).lower()
+            self.trouble = self.trouble or reason(error)
 
 
 def is_being_printed(path: Path) -> bool:
     """Whether the print of a journal that was read runs now; False where that cannot be known, as on a disk without locks."""
     try:
         with path.open("rb") as file:
-            return not _lock(file.fileno(), shared=True)
+            return not lock(file.fileno(), shared=True)
     except OSError:
         return False
 
 
-def _lock(descriptor: int, shared: bool = False) -> bool:
-    """Lock an open journal until it is closed; False when another process holds it. shared: with others who only look."""
+def lock(descriptor: int, shared: bool = False) -> bool:
+    """Lock an open file until it is closed; False when another process holds it. shared: with others who only look."""
     try:
         if sys.platform == "win32":
             os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
@@ -202,7 +201,7 @@ def mark_resumed(path: Path, contents: JournalContents, rest: Path) -> None:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        raise JournalError(f"journal {path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+        raise JournalError(f"journal {path} cannot be written: {reason(error)}") from None
 
 
 def _record(value: Any) -> bytes:
@@ -244,7 +243,7 @@ def _records(path: Path) -> Iterator[tuple[Any, int]]:
             while line := file.readline(LONGEST_BYTES):
                 yield _value(line), len(line)
     except OSError as error:
-        raise JournalError(f"journal {path} cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise JournalError(f"journal {path} cannot be read: {reason(error)}") from None
 
 
 def _value(line: bytes) -> Any:
@@ -274,4 +273,4 @@ def _checkpoint(path: Path, value: Any, number: int) -> Checkpoint:
 
 
 def _is_pose(values: list[Any]) -> bool:
-    return all(each is None or (isinstance(each, int | float) and abs(each) < BEYOND_MM) for each in values)
+    return all(value is None or (isinstance(value, int | float) and abs(value) < BEYOND_MM) for value in values)

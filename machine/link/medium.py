@@ -1,16 +1,13 @@
 """Medium: what a stream runs on, so that a printer, a simulated one in memory, real and virtual time serve alike."""
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from time import monotonic, sleep
 from typing import Protocol
 
 from machine.link.port import open_port
 from profiles.errors import PortError
 
-BY_ID = Path("/dev/serial/by-id")
 EVERY_S = 0.2
 
 Traffic = Callable[[str, bytes], None]  # "<" received or ">" sent, and the bytes
@@ -49,15 +46,6 @@ class Medium:
 
 
 SERIAL = Medium()
-
-
-def stable_name(port: str) -> str:
-    """The name by which a device is found again: an adapter that is plugged in again may become another /dev/tty."""
-    try:
-        target = os.path.realpath(port)
-        return next((str(link) for link in sorted(BY_ID.iterdir()) if os.path.realpath(link) == target), port)
-    except OSError:
-        return port
 
 
 def reopen(name: str, baud: int, medium: Medium, on_turn: Callable[[], None], end_s: float) -> Wire | None:

@@ -8,12 +8,11 @@ import stat
 from contextlib import suppress
 from dataclasses import dataclass
 from time import monotonic
-from types import TracebackType
 from typing import Any, Self
 from urllib.parse import urlsplit
 
 from machine.firmware.line import check_baud
-from profiles.errors import PortError
+from profiles.errors import PortError, causes
 
 try:
     import serial
@@ -83,7 +82,7 @@ class Port:
             else:
                 self._write_descriptor(self._descriptor, data)
         except _TROUBLE as error:
-            if _timed_out(error):
+            if any(isinstance(cause, _TIMEOUTS) for cause in causes(error)):  # by pyserial's own clock or by its socket's
                 raise PortError(f"the printer at {self.name} has stopped reading: it took no bytes for {WRITE_S:g} s") from None
             raise self._lost(error) from None
 
@@ -136,7 +135,7 @@ class Port:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _lost(self, error: Exception) -> PortError:
@@ -238,9 +237,15 @@ def serial_devices() -> tuple[SerialDevice, ...]:
 
 def _stable_names() -> dict[str, str]:
     """Device path -> its name under /dev/serial/by-id, which stays the same wherever it is plugged in."""
-    folder = "/dev/serial/by-id"
-    names = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
+    folder, names = "/dev/serial/by-id", list[str]()
+    with suppress(OSError):
+        names = sorted(os.listdir(folder), reverse=True)
     return {os.path.realpath(f"{folder}/{name}"): f"{folder}/{name}" for name in names}
+
+
+def stable_name(port: str) -> str:
+    """The name by which a device is found again: an adapter that is plugged in again may become another /dev/tty."""
+    return _stable_names().get(os.path.realpath(port), port)
 
 
 def _description(port: Any) -> str:
@@ -315,18 +320,9 @@ def _owners(name: str) -> str:
 
 
 def _number(error: BaseException) -> int | None:
-    number = getattr(error, "errno", None)
-    if number is None and error.args and isinstance(error.args[0], int):
-        number = error.args[0]
-    # pyserial wraps a failed tcgetattr or connect as text only; the trouble itself is the one it was handling.
-    return _number(error.__context__) if number is None and error.__context__ is not None else number
-
-
-def _timed_out(error: BaseException | None) -> bool:
-    """Whether a write gave up, by pyserial's own clock or by its socket's."""
-    while error is not None and not isinstance(error, _TIMEOUTS):
-        error = error.__context__
-    return error is not None
+    """The system's number. pyserial wraps a failed tcgetattr or connect as text only; the trouble itself lies beneath."""
+    numbers = (getattr(cause, "errno", None) or next(iter(cause.args), None) for cause in causes(error))
+    return next((number for number in numbers if isinstance(number, int)), None)
 
 
 def _reason(error: Exception) -> str:

@@ -24,16 +24,16 @@ class Progress:
     the temperatures were reported.
     """
 
-    sent: int
-    acknowledged: int
-    total: int | None
     elapsed_s: float
-    left_s: float | None
-    share: float | None
     temperature: Temperature
-    part: int | None
-    parts: int | None
-    layer: int | None
+    sent: int = 0
+    acknowledged: int = 0
+    total: int | None = None
+    left_s: float | None = None
+    share: float | None = None
+    part: int | None = None
+    parts: int | None = None
+    layer: int | None = None
     state: str = "printing"
     file_line: int = 0
     feed_percent: float = 100.0

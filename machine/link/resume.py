@@ -19,12 +19,13 @@ from machine.gcode.modes import E_AXIS, axes_of
 from machine.kinematics.collision import Printed
 from machine.link.journal import EVERY_LINES, LEFT, PAUSED, Checkpoint
 from machine.link.line_history import shifts
-from machine.link.pause.park_moves import filament_commands, heat_commands
+from machine.link.pause.park_moves import axis_position, filament_commands, heat_commands
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pause.return_path import homed_return_moves, return_moves
 from machine.link.progress import ProgramPosition
 from machine.link.protocol.framing import command_of
 from machine.link.status import PrinterStatus
+from machine.planning.reorient import Turn
 from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.errors import JournalError, SilenceError
@@ -238,32 +239,25 @@ def _reported_position(point: InterruptedPrint, status: PrinterStatus) -> tuple[
 
 
 def _goal(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
-    x, y, z, tilt, turn = (value if value is not None else np.nan for value in point.modal.at[:E_AXIS])
-    machine = profile.machine
-    pose = Pose(machine.tilt.zero_deg if np.isnan(tilt) else tilt, machine.turn.zero_deg if np.isnan(turn) else turn)
-    return np.array([x, y, z]), pose
+    standing = axis_position(profile.machine, point.modal.place(), False)
+    assert standing is not None  # _check has seen to it
+    return standing
 
 
 def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose) -> tuple[str, ...]:
     """Heat (the tip may be stuck in the plastic), up, back over the print, down, filament, modes."""
     goal, goal_pose = _goal(point, profile)
     pull, push = filament_commands(point.modal, profile)
-    path = return_moves(profile, point.printed, at, pose, goal, goal_pose)
+    path = return_moves(profile, point.printed, Turn(pose, goal_pose, at, goal))
     return ("G21", "G90", *heat_commands(point.modal, profile), *pull, "G90", *path, *push, *point.modal.lines())
 
 
 def _homed_approach(point: InterruptedPrint, profile: Profile) -> tuple[str, ...]:
     """The same after a restart: the axes are called what they stand at, the tip rises, X and Y are homed."""
-    goal, goal_pose = _goal(point, profile)
+    (goal, goal_pose), (at, pose) = _goal(point, profile), position_at_interruption(point, profile)
     pull, push = filament_commands(point.modal, profile)
-    path = homed_return_moves(
-        profile,
-        point.printed,
-        *position_at_interruption(point, profile),
-        goal,
-        goal_pose,
-        (*heat_commands(point.modal, profile), *pull, "G90"),
-    )
+    heat = (*heat_commands(point.modal, profile), *pull, "G90")
+    path = homed_return_moves(profile, point.printed, Turn(pose, goal_pose, at, goal), heat)
     return (*path, *push, *point.modal.lines())
 
 
@@ -290,8 +284,8 @@ def heights_mm(point: InterruptedPrint) -> tuple[float, ...]:
     """
     if point.stood_mm is not None:
         return (point.stood_mm,)
-    found = sorted(z for modal in (point.modal, *(state.modal for state in point.ahead)) if (z := modal.at[2]) is not None)
-    return tuple(z for k, z in enumerate(found) if k == 0 or z - found[k - 1] > UNSURE_MM)
+    heights = sorted(z for modal in (point.modal, *(state.modal for state in point.ahead)) if (z := modal.at[2]) is not None)
+    return tuple(z for k, z in enumerate(heights) if k == 0 or z - heights[k - 1] > UNSURE_MM)
 
 
 def is_in_doubt(way: ResumePlan, point: InterruptedPrint, profile: Profile) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Ok, Position, Resend, Temperature, is_halt, lacks_checksum, read_event
+from machine.link.protocol.events import Ok, Position, Resend, is_halt, lacks_checksum, position_in, read_event, temperature_in
 from machine.link.protocol.framing import FAR_NUMBER, frame, number_lines
 from profiles.errors import PortError
 
@@ -86,11 +86,7 @@ class Heaters(Enum):
 
 
 def heaters_off(
-    wire: Wire,
-    medium: Medium,
-    timeout_s: float = SETTLE_S,
-    homing: bool = False,
-    on_turn: Callable[[], None] = lambda: None,
+    wire: Wire, medium: Medium, timeout_s: float = SETTLE_S, homing: bool = False, on_turn: Callable[[], None] = lambda: None
 ) -> Heaters:
     """Stop the printer and switch the heaters off; what its own words prove.
 
@@ -127,12 +123,10 @@ class _Shown:
     def ends(self, line: bytes) -> bool:
         """Whether nothing more needs to be asked."""
         event = read_event(line)
-        report = event.temperature if isinstance(event, Ok) else event
+        report = temperature_in(event)
         self.answered = self.answered or isinstance(event, Ok)
         self.halted = self.halted or _shows_kill(line)
-        self.off = self.off or (
-            isinstance(report, Temperature) and report.nozzle_target_c == 0 and report.bed_target_c in (0, None)
-        )
+        self.off = self.off or (report is not None and report.nozzle_target_c == 0 and report.bed_target_c in (0, None))
         return self.off or self.halted
 
 
@@ -145,8 +139,7 @@ def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn
 
     def reports_done(line: bytes) -> bool:
         event = read_event(line)
-        position = event if isinstance(event, Position) else event.position if isinstance(event, Ok) else None
-        positions.extend([position] if position is not None else [])
+        positions.extend(filter(None, [position_in(event)]))
         return isinstance(event, Ok) and event.temperature is not None
 
     step = ("M83", "G91", f"G1 {words} F{feed_mm_min:.0f}", "G90", "M400", "M114", "M105")

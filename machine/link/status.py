@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from machine.link.medium import Medium, Wire
-from machine.link.protocol.events import Banner, Event, Ok, Position, Resend, Start, Temperature, read_event
+from machine.link.protocol.events import Banner, Event, Ok, Position, Resend, Start, Temperature, position_in, read_event
 from machine.link.protocol.framing import FAR_NUMBER, frame
 from machine.link.shutdown import Orders
 
@@ -19,53 +19,41 @@ TRIES, ANSWER_S = 3, 4.0  # a board that restarts when its port is opened spends
 STILL_S = 300.0  # a printer that still works on its queue answers when that is empty
 
 
-@dataclass(frozen=True)
+@dataclass
 class PrinterStatus:
     """The number of the last line the printer has taken, where it says it stands, its temperatures; None: not reported.
 
     greeted: the firmware said its greeting meanwhile: it has just restarted.
     """
 
-    last_number: int | None
-    position: Position | None
-    temperature: Temperature
-    greeted: bool = False
-
-
-@dataclass
-class _StatusAnswers:
-    """What has come so far."""
-
-    number: int | None = None
+    last_number: int | None = None
     position: Position | None = None
     temperature: Temperature = field(default_factory=Temperature)
     greeted: bool = False
 
-    def hear_greeting(self, event: Event) -> None:
-        """A board that restarts begins its line numbers anew."""
+    def _read(self, line: bytes) -> Event:
+        """Any line; a board that restarts begins its line numbers anew."""
+        event = read_event(line)
         if isinstance(event, Start | Banner):
-            self.greeted, self.number = True, None if self.number is None else 0
+            self.greeted, self.last_number = True, None if self.last_number is None else 0
+        return event
 
     def read_number(self, line: bytes) -> bool:
         """Whether the far number was answered, by a refusal or, where numbers are not checked, by what M105 is answered with."""
-        event = read_event(line)
-        self.hear_greeting(event)
+        event = self._read(line)
         if last_line := LAST_LINE.search(line):
-            self.number = int(last_line[1])
+            self.last_number = int(last_line[1])
         elif isinstance(event, Resend):  # Repetier and OctoPrint's virtual printer do not name the last line
-            self.number = event.line - 1
-        return self.number is not None or (isinstance(event, Ok) and event.temperature is not None)
+            self.last_number = event.line - 1
+        return self.last_number is not None or (isinstance(event, Ok) and event.temperature is not None)
 
     def read_position(self, line: bytes) -> bool:
         """Take a position; whether the temperature that is asked for after it has come."""
-        event = read_event(line)
-        self.hear_greeting(event)
-        if isinstance(event, Position):
-            self.position = event
-        elif isinstance(event, Ok):
-            self.position = event.position or self.position
-            self.temperature = event.temperature or self.temperature
-            return event.temperature is not None
+        event = self._read(line)
+        self.position = position_in(event) or self.position
+        if isinstance(event, Ok) and event.temperature is not None:
+            self.temperature = event.temperature
+            return True
         return False
 
 
@@ -74,19 +62,19 @@ def query_status(wire: Wire, medium: Medium, on_turn: Callable[[], None]) -> Pri
 
     Raises PortError, and what on_turn(), called meanwhile, raises to end the asking.
     """
-    answers, orders = _StatusAnswers(), Orders(wire, medium, on_turn)
+    status, orders = PrinterStatus(), Orders(wire, medium, on_turn)
     for _ in range(TRIES):
         wire.write(b"\n" + frame(FAR_NUMBER, "M105"))
-        if orders.wait_for(answers.read_number, medium.now_s() + ANSWER_S):
+        if orders.wait_for(status.read_number, medium.now_s() + ANSWER_S):
             break
     else:
-        return PrinterStatus(None, None, Temperature())
+        return PrinterStatus()
     orders.wait_for(lambda line: False, medium.now_s() + 0.5)  # the rest of the refusal
     for _ in range(TRIES):  # what was asked is lost when the board restarts meanwhile
-        before, answers.greeted = answers.greeted, False
-        orders.give(QUESTIONS, lambda line: answers.read_position(line) or answers.greeted, medium.now_s() + STILL_S)
-        again, answers.greeted = answers.greeted, answers.greeted or before
+        before, status.greeted = status.greeted, False
+        orders.give(QUESTIONS, lambda line: status.read_position(line) or status.greeted, medium.now_s() + STILL_S)
+        again, status.greeted = status.greeted, status.greeted or before
         if not again:
             break
         orders.wait_for(lambda line: False, medium.now_s() + ANSWER_S)
-    return PrinterStatus(answers.number, answers.position, answers.temperature, answers.greeted)
+    return status

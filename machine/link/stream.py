@@ -8,8 +8,9 @@ from machine.link.exchange import Exchange, Reconnection
 from machine.link.feed import Feed
 from machine.link.journal import Journal
 from machine.link.line_outcome import line_was_done
-from machine.link.medium import SERIAL, Medium, reopen, stable_name
+from machine.link.medium import SERIAL, Medium, reopen
 from machine.link.pending_commands import CancelledError, Control, EmergencyError
+from machine.link.port import stable_name
 from machine.link.progress import PrintJob, Progress, Schedule, last_known
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.protocol.timeout import Timing
@@ -46,13 +47,12 @@ def print_lines(
     lines: Iterable[str],
     port: str,
     baud: int = 115200,
+    *,
     on_progress: Callable[[Progress], None] | None = None,
     stop: Flag | None = None,
     schedule: Schedule | None = None,
-    total: int | None = None,
     timing: Timing | None = None,
     limit: int = LINE_LIMIT,
-    *,
     control: Control | None = None,
     journal: Journal | None = None,
     profile: Profile | None = None,
@@ -62,10 +62,10 @@ def print_lines(
     """Print a program: send every line's command, wait until the last one is done.
 
     What can be read twice (a sequence, a GcodeFile) is checked wholly before the port is opened, an iterator line by line as it
-    is reached; lines are consumed lazily. A plain string is taken as its lines. schedule: for the time left, total: the
-    number of commands where `lines` is an iterator; limit: characters of a line, number and checksum included, that the firmware
-    keeps. control: commands of a person; journal: written for a later resume; profile: lets a pause
-    lift, park and cool the nozzle, and the watchdog know what is too hot; begin: for a resumed print, decides where it goes on.
+    is reached; lines are consumed lazily. A plain string is taken as its lines. schedule: for the time left; limit: characters of
+    a line, number and checksum included, that the firmware keeps. control: commands of a person; journal: written for a later
+    resume; profile: lets a pause lift, park and cool the nozzle, and the watchdog know what is too hot; begin: for a resumed
+    print, decides where it goes on.
 
     A set `stop` flag ends the print: feeding stops, moves are stopped, heaters and fan go off, the tip is lifted, nothing homes
     or turns; the Outcome says cancelled. KeyboardInterrupt does the same and is raised again. Raises LocalProtocolError for a
@@ -74,15 +74,19 @@ def print_lines(
     """
     if isinstance(lines, str):
         lines = lines.splitlines()
+    total = None
     if not isinstance(lines, Iterator):
         total = sum(1 for number, line in enumerate(lines, 1) if command_of(line, number, limit))
     job = PrintJob(total, schedule, limit, profile)
-    feed = Feed(job, control, journal, on_progress, stop, medium.now_s())
+    feed = Feed(job, control=control, journal=journal, on_progress=on_progress, stop=stop, start_s=medium.now_s())
     name = stable_name(port)
     wire = medium.open(port, baud)
     rx_bytes = None if profile is None else profile.machine.receive_bytes - 1  # a ring holds one byte less than its size
     finder = _PortFinder(feed, name, baud, medium)
-    exchange = Exchange(wire, medium, timing or Timing(), feed.handle_event, feed.handle_turn, finder, limit, rx_bytes, baud)
+    exchange = Exchange(
+        wire, medium, timing=timing or Timing(), on_event=feed.handle_event, on_turn=feed.handle_turn, on_lost=finder,
+        limit=limit, rx_bytes=rx_bytes, baud=baud,
+    )  # fmt: skip
     feed.exchange = exchange
     try:
         return _Print(feed, exchange, medium, journal).run(lines, begin)
@@ -179,8 +183,8 @@ class _Print:
         alive = not isinstance(error, FirmwareError)
         waits = alive and not isinstance(error, SilenceError)  # whose homing has been waited for already
         heaters = self._shut_down(timeout_s, alive, waits)
-        told = f"{heaters.value}: {self._revival()}" if heaters is Heaters.HALTED else heaters.value
-        return told if heaters is Heaters.OFF else f"{told}{heat}"
+        words = f"{heaters.value}: {self._revival()}" if heaters is Heaters.HALTED else heaters.value
+        return words if heaters is Heaters.OFF else f"{words}{heat}"
 
     def _last_known(self) -> str:
         reports = self.feed.reports

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from machine.link.pending_commands import Command, PendingCommand
-from machine.link.protocol.events import Action, Busy, Echo, Event, Identity, Ok, Temperature, unknown_command
+from machine.link.protocol import events
 from machine.link.protocol.framing import name_of
 from profiles.errors import PrinterError
 
@@ -78,7 +78,7 @@ class Watchdog:
     reported_s: float | None = None
     _heaters: tuple[HeaterWatch, HeaterWatch] = field(default_factory=lambda: (HeaterWatch(NOZZLE), HeaterWatch(BED)))
 
-    def check(self, report: Temperature, now_s: float) -> None:
+    def check(self, report: events.Temperature, now_s: float) -> None:
         """Judge a report. Raises PrinterError."""
         self.reported_s = now_s
         pairs = ((report.nozzle_c, report.nozzle_target_c), (report.bed_c, report.bed_target_c))
@@ -106,32 +106,30 @@ class PrinterReports:
     """
 
     def __init__(self, watchdog: Watchdog, now_s: float) -> None:
-        self.temperature, self.firmware, self.temperature_s = Temperature(), "unknown", now_s
+        self.temperature, self.firmware, self.temperature_s = events.Temperature(), "unknown", now_s
         self.unknown: set[str] = set()
         self.waiting = ""
         self._warned: dict[str, int] = {}
-        self._watchdog = watchdog
+        self.watchdog = watchdog
 
-    def read(self, event: Event, now_s: float) -> PendingCommand | None:
+    def read(self, event: events.Event, now_s: float) -> PendingCommand | None:
         """Take note; a command when the printer asks for something. Raises PrinterError when the print must end."""
-        if isinstance(event, Ok | Busy):
+        if isinstance(event, events.Ok | events.Busy):
             # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament is out, M0, a question on its display.
-            paused = isinstance(event, Busy) and "paused for" in event.text
+            paused = isinstance(event, events.Busy) and "paused for" in event.text
             self.waiting = "the printer waits for a person: look at its display" if paused else ""
-        report = event.temperature if isinstance(event, Ok) else event
-        if isinstance(report, Temperature):
+        if report := events.temperature_in(event):
             self.temperature, self.temperature_s = report, now_s
-            self._watchdog.check(report, now_s)
-        identity = event.identity if isinstance(event, Ok) else event
-        if isinstance(identity, Identity):
+            self.watchdog.check(report, now_s)
+        if identity := events.identity_in(event):
             self.firmware = identity.text.removeprefix("FIRMWARE_NAME:").strip()
-        elif unknown := unknown_command(event):
+        elif unknown := events.unknown_command(event):
             self.unknown.add(unknown)
             if not _shows(unknown):
                 self._warn(f"Unknown command: {unknown}")
-        elif isinstance(event, Echo):
+        elif isinstance(event, events.Echo):
             self._read_echo(event.text)
-        elif isinstance(event, Action):
+        elif isinstance(event, events.Action):
             return self._read_action(event)
         return None
 
@@ -145,10 +143,6 @@ class PrinterReports:
         """What the printer said about a program that it does not understand; what it said again is counted."""
         return [text if count == 1 else f"{text} (x {count})" for text, count in self._warned.items()]
 
-    def check_silence(self, now_s: float, mute: bool) -> None:
-        """Judge a silence; raises PrinterError. mute: nothing can be reported now."""
-        self._watchdog.check_silence(now_s, mute)
-
     def _read_echo(self, text: str) -> None:
         if any(words in text for words in COLD):
             raise PrinterError(
@@ -157,7 +151,7 @@ class PrinterReports:
         if any(word in text for word in WARNS):
             self._warn(text)
 
-    def _read_action(self, action: Action) -> PendingCommand | None:
+    def _read_action(self, action: events.Action) -> PendingCommand | None:
         if action.name == "disconnect":
             raise PrinterError("the printer asked to be disconnected (//action:disconnect)")
         if action.name not in ASKS and action.name not in SILENT:

@@ -4,6 +4,13 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
+from machine.link.protocol.events import Temperature
+
+
+def temperature(nozzle: Any, bed: Any, now: str, target: str) -> Temperature:
+    """What two JSON objects tell of nozzle and bed under these keys."""
+    return Temperature(*(number(table(heater).get(key)) for heater in (nozzle, bed) for key in (now, target)))
+
 
 def table(value: Any) -> Mapping[str, Any]:
     """A JSON object; an empty one where it is none."""

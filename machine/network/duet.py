@@ -10,11 +10,10 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from machine.link.protocol.events import Temperature
-from machine.network.answers import entry, number, table, whole
+from machine.network.answers import entry, number, table, temperature, whole
 from machine.network.credentials import how_to_give_a_key
 from machine.network.gcode_upload import GcodeUpload, Sent
-from machine.network.http import HttpSession, Refusals, Reply, plain
+from machine.network.http import HttpSession, Reply, plain
 from machine.network.server import ACTIVE, JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
@@ -32,11 +31,7 @@ STATES = {
     "paused": Phase.PAUSED,
     "resuming": Phase.RESUMING,
     "cancelling": Phase.CANCELLING,
-    "halted": Phase.OFFLINE,
-    "off": Phase.OFFLINE,
-    "updating": Phase.OFFLINE,
-    "starting": Phase.OFFLINE,
-    "disconnected": Phase.OFFLINE,
+    **dict.fromkeys(("halted", "off", "updating", "starting", "disconnected"), Phase.OFFLINE),
 }
 
 
@@ -93,13 +88,13 @@ class Duet(PrintServer):
         elapsed_s = number(job.get("duration"))
         under_way = Phase.READY if elapsed_s is None else Phase.PRINTING  # busy, changingTool: within a print or without one
         phase = STATES.get(state, under_way)
-        said = self._get("/rr_reply")
+        heaters, said = table(model.get("heat")).get("heaters"), self._get("/rr_reply")
         words = plain(said.body.decode("utf-8", "replace")) if said.status == 200 else ""
         return JobStatus(
             self._since_start(phase, before),
             bytes_read=whole(job.get("filePosition")),
             elapsed_s=elapsed_s,
-            temperature=self._temperature(table(model.get("heat")).get("heaters")),
+            temperature=temperature(entry(heaters, self._nozzle), entry(heaters, self._bed), "current", "active"),
             message=words or (f"it is {state}" if phase is Phase.OFFLINE else ""),
         )
 
@@ -111,10 +106,6 @@ class Duet(PrintServer):
         if phase is not Phase.READY or before is None or self._last is None:
             return phase
         return Phase.CANCELLED if self._last in STOPPED else Phase.DONE
-
-    def _temperature(self, heaters: Any) -> Temperature:
-        reported = (table(entry(heaters, index)) for index in (self._nozzle, self._bed))
-        return Temperature(*(number(heater.get(key)) for heater in reported for key in ("current", "active")))
 
     def has(self, file: str) -> bool:
         return table(self._value("/rr_fileinfo", {"name": FOLDER + file})).get("err") == 0
@@ -198,7 +189,7 @@ class Duet(PrintServer):
 
     def _value(self, path: str, params: Mapping[str, str]) -> Any:
         sentence = {503: f"{self.name} is short of memory just now: try again"}
-        return self._http.check(self._get(path, params), "to answer", Refusals(sentence))
+        return self._http.check(self._get(path, params), "to answer", sentence)
 
     def _get(self, path: str, params: Mapping[str, str] | None = None) -> Reply:
         """The reply; a session that has ended is begun again."""

@@ -49,42 +49,33 @@ class _Heard:
 
 
 def follow_print(
-    server: PrintServer, file: str, size: int, *, on_status: OnStatus, control: Control, left: Callable[[], bool]
+    server: PrintServer,
+    file: str,
+    size: int,
+    *,
+    on_status: OnStatus,
+    control: Control,
+    left: Callable[[], bool],
+    running: JobStatus | None = None,
 ) -> End:
     """Have a file printed that a server holds, and follow that to its end.
 
-    size: of the file, bytes; left(): whether the person has gone away. Raises ServerError when it is refused, fails or is lost,
-    or when the server no longer prints it and nobody here has cancelled it.
+    size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
+    the server is at already, which is not to be started. Raises ServerError when it is refused, fails or is lost, or when the
+    server no longer prints it and nobody here has cancelled it.
     """
-    return _Follower(server, file, size, on_status, control, left).run()
-
-
-def follow_running(
-    server: PrintServer, now: JobStatus, *, on_status: OnStatus, control: Control, left: Callable[[], bool]
-) -> End:
-    """Follow the print that a server is at already to its end. now: an active status of it. Raises ServerError as above."""
-    return _Follower(server, now.file, 0, on_status, control, left, now).run()
-
-
-def _stop_at_once(server: PrintServer) -> None:
-    """The emergency stop. Raises ServerError where it is not confirmed."""
-    try:
-        server.emergency_stop()
-    except ServerError as error:
-        raise ServerError(UNCONFIRMED.format(server=server.name, error=error)) from None
+    return _Follower(server, file, size, on_status, control, left, running).run()
 
 
 @dataclass
 class _Follower:
-    """running: what is not to be started, for the server is at it."""
-
     server: PrintServer
     file: str
     size: int
     on_status: OnStatus
     control: Control
     left: Callable[[], bool]
-    running: JobStatus | None = None
+    running: JobStatus | None
 
     def __post_init__(self) -> None:
         self._heard, self._over = _Heard(), threading.Event()
@@ -213,7 +204,10 @@ class _Follower:
         """Hand on what a person has asked for; True after an emergency stop."""
         while (request := self.control.take()) is not None:
             if request.command is Command.EMERGENCY_STOP:
-                _stop_at_once(self.server)
+                try:
+                    self.server.emergency_stop()
+                except ServerError as error:
+                    raise ServerError(UNCONFIRMED.format(server=self.server.name, error=error)) from None
                 return True
             if order := self._order(request):
                 self._orders.append(order)

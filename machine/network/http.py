@@ -14,12 +14,12 @@ import ssl
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from machine.network.address import NAMES, ServerAddress
 from machine.network.credentials import Credentials, how_to_give_a_key, servers_file
-from profiles.errors import NoAnswerError, ServerError
+from profiles.errors import NoAnswerError, ServerError, causes
 
 if TYPE_CHECKING:
     import httpx
@@ -50,18 +50,12 @@ class Reply:
             return None
 
 
-@dataclass(frozen=True)
-class Refusals:
-    """What a status means to a request, where that is not what it usually means. key: it is about the key."""
-
-    sentences: Mapping[int, str] = field(default_factory=dict)
-    key: tuple[int, ...] = (401, 403)
-
-
 class HttpSession:
     """get() and post() below a server's address; from any thread. Raises ServerError with a sentence for a person, NoAnswerError
-    where the request may have been taken.
+    where the request may have been taken. key_refused: statuses that are about the key.
     """
+
+    key_refused: tuple[int, ...] = (401, 403)
 
     def __init__(self, address: ServerAddress, credentials: Credentials, tell: Tell | None = None) -> None:
         import httpx
@@ -163,32 +157,28 @@ class HttpSession:
         key = self.credentials.key
         return text.replace(key, "***") if key else text
 
-    def check(self, reply: Reply, purpose: str, refusals: Refusals | None = None) -> Any:
-        """The value of a good reply. Raises ServerError; purpose: what was wanted, as `starting the print`."""
-        refusals = refusals or Refusals()
+    def check(self, reply: Reply, purpose: str, refusals: Mapping[int, str] | None = None) -> Any:
+        """The value of a good reply. Raises ServerError; purpose: what was wanted, as `starting the print`; refusals: what a
+        status means to this request, where that is not what it usually means.
+        """
         status, address = reply.status, self.address
         if 200 <= status < 300:
             return reply.json()
         words = self.words(reply)
-        if status in refusals.sentences:
-            raise ServerError(refusals.sentences[status].format(words=words or f"status {status}"))
-        if 300 <= status < 400:
-            where = (
-                plain(self._without_key(reply.location.partition("?")[0])) or "nowhere"
-            )  # behind it a Duet's password may be repeated
+        if refusals and status in refusals:
+            raise ServerError(refusals[status].format(words=words or f"status {status}"))
+        if 300 <= status < 400:  # behind a question mark a Duet's password may be repeated
+            where = plain(self._without_key(reply.location.partition("?")[0])) or "nowhere"
             raise ServerError(f"{self.name} redirects to {where}: give that server's address, no key is carried there")
-        if status in refusals.key:
-            raise ServerError(self._key_sentence(status, words))
+        if status in self.key_refused:
+            known = bool(self.credentials.key)
+            refused = f"refuses the key or what its user may do ({words or status})" if known else "wants a key"
+            raise ServerError(f"{self.name} {refused}: {how_to_give_a_key(address)}")
         if status == 404:
             raise ServerError(f"{address.url} is no {NAMES[address.kind].removeprefix('a ')}: it knows no {reply.path}")
         if status in (413, 507):
             raise ServerError(f"{self.name} has no room for it ({words or status}): delete files there")
         raise ServerError(f"{self.name} refuses {purpose}: {words or f'status {status}'}")
-
-    def _key_sentence(self, status: int, words: str) -> str:
-        if not self.credentials.key:
-            return f"{self.name} wants a key: {how_to_give_a_key(self.address)}"
-        return f"{self.name} refuses the key or what its user may do ({words or status}): {how_to_give_a_key(self.address)}"
 
     def words(self, reply: Reply) -> str:
         """A server's own words on what it refuses, short and without the key; "" when it has none."""
@@ -226,7 +216,7 @@ def _certificates(address: ServerAddress, credentials: Credentials) -> ssl.SSLCo
 
 def _transport_sentence(error: httpx.TransportError, address: ServerAddress, httpx_: Any) -> str:
     """What went wrong below HTTP, and what to look at."""
-    where, chain = f"{address.host} at port {address.port}", _causes(error)
+    where, chain = f"{address.host} at port {address.port}", causes(error)
     if any(isinstance(cause, socket.gaierror) for cause in chain):
         return f"{address.text}: no computer of the name {address.host} is known here: an IP address will do, too"
     if trust := next((cause for cause in chain if isinstance(cause, ssl.SSLCertVerificationError)), None):
@@ -252,11 +242,3 @@ def _transport_sentence(error: httpx.TransportError, address: ServerAddress, htt
 
 def _reason(error: Exception) -> str:
     return ERRNO.sub("", plain(str(error)).lower()) or type(error).__name__
-
-
-def _causes(error: BaseException | None) -> list[BaseException]:
-    causes: list[BaseException] = []
-    while error is not None and error not in causes:
-        causes.append(error)
-        error = error.__cause__ or error.__context__
-    return causes

@@ -8,16 +8,14 @@ emergency stop is not.
 from collections.abc import Mapping
 from typing import Any
 
-from machine.link.protocol.events import Temperature
-from machine.network.answers import entry, number, table, whole
+from machine.network.answers import entry, number, table, temperature, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
-from machine.network.http import HttpSession, Refusals
+from machine.network.http import HttpSession
 from machine.network.server import JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
 READ_S = 300.0  # the server reads a whole file for its metadata before it answers
 ORDERED_S = 120.0
-KEY = (401,)
 STEPPER = "manual_stepper "
 STATES = {
     "standby": Phase.READY,
@@ -33,10 +31,11 @@ REPORTED = ("webhooks", "print_stats", "virtual_sdcard", "extruder", "heater_bed
 class Moonraker(PrintServer):
     """PrintServer of a Moonraker."""
 
+    key_header = "X-Api-Key"
+
     def __init__(self, http: HttpSession) -> None:
         super().__init__(http)
-        if http.credentials.key:
-            http.set_header("X-Api-Key", http.credentials.key)
+        http.key_refused = (401,)
 
     def greet(self) -> ServerIdentity:
         """Its version; axes, limits, steppers and commands of its Klipper where that is ready."""
@@ -72,18 +71,14 @@ class Moonraker(PrintServer):
         if server.get("klippy_state") != "ready":
             return JobStatus(Phase.OFFLINE, message=self._trouble(server))
         objects = self._query(REPORTED)
-        job, card, moves = (
-            table(objects.get("print_stats")),
-            table(objects.get("virtual_sdcard")),
-            table(objects.get("gcode_move")),
-        )
+        job, card, moves = (table(objects.get(name)) for name in ("print_stats", "virtual_sdcard", "gcode_move"))
         feed, flow = number(moves.get("speed_factor")), number(moves.get("extrude_factor"))
         return JobStatus(
             STATES.get(str(job.get("state")), Phase.READY),
             str(job.get("filename") or ""),
             whole(card.get("file_position")),
             number(job.get("total_duration")),
-            _temperature(objects),
+            temperature(objects.get("extruder"), objects.get("heater_bed"), "temperature", "target"),
             None if feed is None else 100.0 * feed,
             None if flow is None else 100.0 * flow,
             str(job.get("message") or ""),
@@ -115,7 +110,7 @@ class Moonraker(PrintServer):
             403: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})",
             422: f"{self.name} has received another file than was sent ({{words}}): send it again",
         }
-        value = table(self._http.check(reply, "the file", Refusals(sentences, KEY)))
+        value = table(self._http.check(reply, "the file", sentences))
         path = table(value.get("item")).get("path")
         if not isinstance(path, str):
             raise ServerError(f"{self.name} has not said that it holds the file: send it again")
@@ -144,23 +139,16 @@ class Moonraker(PrintServer):
         self._value(self._http.post("/printer/emergency_stop"), "the emergency stop")
 
     def _query(self, names: tuple[str, ...]) -> Mapping[str, Any]:
-        value = self._value(
-            self._http.post("/printer/objects/query", {"objects": dict.fromkeys(names)}), "to tell of its printer"
-        )
-        return table(table(table(value).get("result")).get("status"))
+        reply = self._http.post("/printer/objects/query", {"objects": dict.fromkeys(names)})
+        return table(table(table(self._value(reply, "to tell of its printer")).get("result")).get("status"))
 
     def _get(self, path: str) -> Any:
         return table(self._value(self._http.get(path), "to say who it is")).get("result")
 
     def _order(self, path: str, value: Mapping[str, Any] | None = None, sentences: Mapping[int, str] | None = None) -> None:
         reply = self._http.post(path, value, answer_s=ORDERED_S)
-        self._http.check(reply, f"{path.rpartition('/')[2]}", Refusals(sentences or {}, KEY))
+        self._http.check(reply, f"{path.rpartition('/')[2]}", sentences)
 
     def _value(self, reply: Any, purpose: str) -> Any:
         sentence = {503: f"{self.name} has lost its Klipper: {{words}}"}
-        return self._http.check(reply, purpose, Refusals(sentence, KEY))
-
-
-def _temperature(objects: Mapping[str, Any]) -> Temperature:
-    nozzle, bed = table(objects.get("extruder")), table(objects.get("heater_bed"))
-    return Temperature(*(number(heater.get(key)) for heater in (nozzle, bed) for key in ("temperature", "target")))
+        return self._http.check(reply, purpose, sentence)

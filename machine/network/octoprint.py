@@ -7,10 +7,8 @@ Any refusal for want of a key is 403. The file is kept under temporary names unt
 from collections.abc import Mapping
 from typing import Any
 
-from machine.link.protocol.events import Temperature
-from machine.network.answers import number, table, whole
+from machine.network.answers import number, table, temperature, whole
 from machine.network.gcode_upload import GcodeUpload, Sent
-from machine.network.http import HttpSession, Refusals
 from machine.network.server import JobStatus, Phase, PrintServer, ServerIdentity
 from profiles.errors import ServerError
 
@@ -28,10 +26,7 @@ FLAGS = (
 class OctoPrint(PrintServer):
     """PrintServer of an OctoPrint."""
 
-    def __init__(self, http: HttpSession) -> None:
-        super().__init__(http)
-        if http.credentials.key:
-            http.set_header("X-Api-Key", http.credentials.key)
+    key_header = "X-Api-Key"
 
     def greet(self) -> ServerIdentity:
         """Its version; what it drives is not told by the API."""
@@ -49,13 +44,13 @@ class OctoPrint(PrintServer):
         progress, file = table(job.get("progress")), table(table(job.get("job")).get("file"))
         reply = self._http.get("/api/printer", {"exclude": "sd"})
         printer = {} if reply.status == 409 else table(self._http.check(reply, "to tell of its printer"))
-        done = number(progress.get("completion"))
+        heaters, done = table(printer.get("temperature")), number(progress.get("completion"))
         return JobStatus(
             _phase(table(table(printer.get("state")).get("flags")), progress),
             str(file.get("path") or ""),
             whole(progress.get("filepos")),
             number(progress.get("printTime")),
-            _temperature(table(printer.get("temperature"))),
+            temperature(heaters.get("tool0"), heaters.get("bed"), "actual", "target"),
             message=str(job.get("error") or ("" if printer else f"its printer is not connected ({job.get('state')})")),
             share=None if done is None else done / 100.0,
         )
@@ -68,7 +63,7 @@ class OctoPrint(PrintServer):
         """Hand over a file; the name is the one that the server has made of it."""
         reply = self._http.upload_form("/api/files/local", {}, upload.name, upload.read_by(sent), answer_s=STORED_S)
         sentence = {409: f"{self.name} is printing a file of this name now, which cannot be replaced ({{words}})"}
-        value = table(self._http.check(reply, "the file", Refusals(sentence)))
+        value = table(self._http.check(reply, "the file", sentence))
         local = table(table(value.get("files")).get("local"))
         if not value.get("done") or not isinstance(local.get("path"), str):
             raise ServerError(f"{self.name} has not said that it holds the whole file: send it again")
@@ -100,7 +95,7 @@ class OctoPrint(PrintServer):
 
     def _order(self, path: str, value: Mapping[str, Any], purpose: str, refused: Mapping[int, str] | None = None) -> None:
         sentences = refused or {409: f"{self.name} refuses {purpose}: {{words}}"}
-        self._http.check(self._http.post(path, value), purpose, Refusals(sentences))
+        self._http.check(self._http.post(path, value), purpose, sentences)
 
 
 def _phase(flags: Mapping[str, Any], progress: Mapping[str, Any]) -> Phase:
@@ -111,8 +106,3 @@ def _phase(flags: Mapping[str, Any], progress: Mapping[str, Any]) -> Phase:
             return phase
     done = number(progress.get("completion"))
     return Phase.DONE if done is not None and done >= 100.0 else Phase.READY
-
-
-def _temperature(reported: Mapping[str, Any]) -> Temperature:
-    nozzle, bed = table(reported.get("tool0")), table(reported.get("bed"))
-    return Temperature(*(number(heater.get(key)) for heater in (nozzle, bed) for key in ("actual", "target")))

@@ -63,10 +63,16 @@ class ServerIdentity:
 
 
 class PrintServer(ABC):
-    """One print server. name: as the user names it. All raise ServerError; status() and orders may come from any thread."""
+    """One print server. name: as the user names it; key_header: which header carries a key. All raise ServerError; status() and
+    orders may come from any thread.
+    """
+
+    key_header = ""
 
     def __init__(self, http: HttpSession) -> None:
         self._http, self.name = http, http.name
+        if self.key_header and http.credentials.key:
+            http.set_header(self.key_header, http.credentials.key)
 
     def close(self) -> None:
         """Leave."""

@@ -17,9 +17,9 @@ SWAY_MM = 0.05  # a followed turn, which goes in straight steps and rounded plac
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """n rows in axis positions. told: (n, ROW) what the reader has of each; start, end: (n, 5); feed: (n,)."""
+    """n rows in axis positions. read: (n, ROW) what the reader has of each; start, end: (n, 5); feed: (n,)."""
 
-    told: Floats
+    read: Floats
     start: Floats
     end: Floats
     feed: Floats
@@ -28,7 +28,7 @@ class _Rows:
     @property
     def e_mm(self) -> Floats:
         """(n,) filament pushed."""
-        pushed: Floats = self.told[:, 12] - self.told[:, 6]
+        pushed: Floats = self.read[:, 12] - self.read[:, 6]
         return pushed
 
     def change(self) -> Floats:
@@ -38,10 +38,10 @@ class _Rows:
 
 def parsed_program(reader: Reader) -> ParsedProgram:
     """All that was read."""
-    told = np.array(reader.rows, dtype=np.float64).reshape(-1, ROW)
-    rows = _Rows(told, told[:, 1:6], told[:, 7:12], told[:, 13], tuple(reader.events))
+    read = np.array(reader.rows, dtype=np.float64).reshape(-1, ROW)
+    rows = _Rows(read, read[:, 1:6], read[:, 7:12], read[:, 13], tuple(reader.events))
     asked = _feed_length(rows.change(), reader.dialect.largest_delta)
-    followed = np.flatnonzero(told[:, 20] > 0)
+    followed = np.flatnonzero(read[:, 20] > 0)
     if len(followed):
         rows = replace(rows, start=rows.start.copy(), end=rows.end.copy())
         for side in (rows.start, rows.end):
@@ -52,11 +52,11 @@ def parsed_program(reader: Reader) -> ParsedProgram:
     if len(followed):
         rows = _merge_turns(keep, rows, change)
         change = rows.change()
-    whole = rows.told[:, [0, 14, 15, 16]].astype(np.int64)
+    whole = rows.read[:, [0, 14, 15, 16]].astype(np.int64)
     return ParsedProgram(
         line=whole[:, 0], start=rows.start, end=rows.end, e_mm=rows.e_mm, filament_mm=np.cumsum(rows.e_mm), feed=rows.feed,
         kind=_kinds(change), part=whole[:, 1], layer=whole[:, 2], type=whole[:, 3], types=tuple(reader.types),
-        width_mm=rows.told[:, 17], height_mm=rows.told[:, 18], acceleration=rows.told[:, 19],
+        width_mm=rows.read[:, 17], height_mm=rows.read[:, 18], acceleration=rows.read[:, 19],
         events=rows.events, ignored=reader.ignored,
         layers=reader.layers, parts=tuple(dict.fromkeys(reader.parts)), unsupported=tuple(reader.unsupported),
         announced=reader.announced, part_totals=tuple(reader.part_totals),
@@ -126,7 +126,7 @@ def _merge_turns(keep: NDArray[np.bool_], rows: _Rows, change: Floats) -> _Rows:
     minutes = np.add.reduceat(_feed_length(change) / rows.feed, first)
     place = np.append(np.cumsum(keep) - 1, len(first))
     events = tuple(replace(event, row=int(place[event.row])) for event in rows.events)
-    merged = _Rows(rows.told[first], rows.start[first], rows.end[last], rows.feed[first], events)
+    merged = _Rows(rows.read[first], rows.start[first], rows.end[last], rows.feed[first], events)
     joined = first < last
     merged.feed[joined] = _feed_length(merged.change())[joined] / minutes[joined]
     return merged

@@ -108,18 +108,18 @@ class Heater:
 
 
 class Board:
-    """now_s is virtual; say() adds a line to what the host will read. kept: moves kept on record, None: all."""
+    """now_s is virtual; say() adds a line to what the host will read. kept_moves: kept on record, None: all."""
 
-    def __init__(self, machine: Machine, build: BuildOptions, say: Callable[[str], None], kept: int | None = None) -> None:
+    def __init__(self, machine: Machine, build: BuildOptions, say: Callable[[str], None], kept_moves: int | None = None) -> None:
         self.machine, self.build, self.say = machine, build, say
         self.rules = simulation_of(machine)
         self.now_s = 0.0
-        self.motion = Motion(machine, self.note, kept, build.home_start)
+        self.motion = Motion(machine, self.note, kept_moves, build.home_start)
         self.nozzle = Heater("nozzle", machine.nozzle_limit_c, NOZZLE_S)
         self.bed = Heater("bed", machine.bed_limit_c, BED_S)
         self.events: list[tuple[float, str]] = []
         self.troubles: list[tuple[float, str]] = []
-        self._most_events = None if kept is None else EVENTS
+        self._most_events = None if kept_moves is None else EVENTS
         self.unknown = 0
         self.turning: dict[int, tuple[float, float]] = {}
         self.busy_every_s = 0.0

@@ -100,15 +100,22 @@ class Cable:
         """Whether the printer reads nothing, so that the host's writing comes to a halt."""
         return now_s < self._blocked_s
 
+    def reads_nothing(self, now_s: float) -> bool:
+        """Whether the host's bytes are left where they are, so that its writing comes to a halt."""
+        return self._firmware.full or (self.blocked(now_s) and not self._firmware.has_ring)
+
+    def clear(self) -> None:
+        """Nothing is on its way between two turns."""
+
     def due_s(self, now_s: float) -> float:
         """When something happens without further bytes, on the cable's clock; inf: never."""
         firmware_s = inf if self._speed == inf else self._firmware.next_s() / self._speed + LATE_S
         times = (self._in.due_s(), self._out.due_s(), self._blocked_s, self._back_s, firmware_s)
         return min((t for t in times if t > now_s), default=inf)
 
-    def exchange(self, data: bytes, now_s: float = 0.0, until_s: float | None = None) -> bytes:
-        """What the host hears after these bytes; until_s: how far the firmware's clock may run, if not as speed says."""
-        until_s = until_s if until_s is not None else inf if self._speed == inf else now_s * self._speed
+    def exchange(self, data: bytes, now_s: float = 0.0) -> bytes:
+        """What the host hears after these bytes."""
+        until_s = inf if self._speed == inf else now_s * self._speed
         if self._clean:
             answers = self._firmware.advance(until_s) if until_s < inf else b""
             self._firmware.receive(data)

@@ -4,34 +4,17 @@ from collections.abc import Iterator
 from math import inf
 
 from machine.firmware import dialect_of
-from machine.firmware.simulation import SimulationRules
 from machine.simulator.board import Board, Command, Work
 from machine.simulator.motion import WordValues
 from machine.simulator.motion_commands import MOVING
 
 NEAR_C = 1.0  # Marlin's TEMP_WINDOW: a heater within it has arrived
 REPORT_S = 1.0  # Marlin reports temperatures so often while it waits for heat
-CAPABILITIES = {
-    "SERIAL_XON_XOFF": 0,
-    "BINARY_FILE_TRANSFER": 0,
-    "EEPROM": 0,
-    "VOLUMETRIC": 0,
-    "AUTOREPORT_POS": 1,
-    "AUTOREPORT_TEMP": 1,
-    "PROGRESS": 0,
-    "PRINT_JOB": 1,
-    "AUTOLEVEL": 0,
-    "Z_PROBE": 0,
-    "SOFTWARE_POWER": 1,
-    "EMERGENCY_PARSER": 1,
-    "HOST_ACTION_COMMANDS": 1,
-    "SDCARD": 0,
-    "REPORTING": 0,
-    "MOTION_MODES": 0,
-    "ARCS": 1,
-    "BABYSTEPPING": 0,
-    "CHAMBER_TEMPERATURE": 0,
-}
+CAPABILITIES = (
+    "SERIAL_XON_XOFF BINARY_FILE_TRANSFER EEPROM VOLUMETRIC AUTOREPORT_POS AUTOREPORT_TEMP PROGRESS PRINT_JOB AUTOLEVEL Z_PROBE "
+    "SOFTWARE_POWER EMERGENCY_PARSER HOST_ACTION_COMMANDS SDCARD REPORTING MOTION_MODES ARCS BABYSTEPPING CHAMBER_TEMPERATURE"
+)
+THERE = ("PRINT_JOB", "SOFTWARE_POWER", "HOST_ACTION_COMMANDS", "ARCS")  # beside those that the build decides
 ENDSTOP_MM = 0.01
 TEXTS = ("M117", "M118")  # what follows them are no words
 WITHOUT_EFFECT = ("M17", "M73", "M117", "M486", "M572", "M665", "M876", "M900", "T0")
@@ -104,14 +87,10 @@ def _identify_firmware(board: Board, words: WordValues, text: str) -> Work:
         return f"ok {name}"
     board.say(name)
     if rules.has_build_options:
-        known = CAPABILITIES | {
-            "AUTOREPORT_POS": build.autoreport,
-            "AUTOREPORT_TEMP": build.autoreport,
-            "EMERGENCY_PARSER": build.emergency_parser,
-            "REPORTING": build.realtime,
-        }
-        for capability, there in known.items():
-            board.say(f"Cap:{capability}:{int(there)}")
+        built = dict.fromkeys(("AUTOREPORT_POS", "AUTOREPORT_TEMP"), build.autoreport)
+        built |= {"EMERGENCY_PARSER": build.emergency_parser, "REPORTING": build.realtime}
+        for capability in CAPABILITIES.split():
+            board.say(f"Cap:{capability}:{int(built.get(capability, capability in THERE))}")
         if build.geometry:
             board.say(_area(board))
     return None
@@ -198,8 +177,3 @@ COMMANDS: dict[str, Command] = {
     "M302": _allow_cold,
     **dict.fromkeys(WITHOUT_EFFECT, lambda board, words, text: None),
 }
-
-
-def commands_of(rules: SimulationRules) -> dict[str, Command]:
-    """What a firmware knows."""
-    return {name: command for name, command in COMMANDS.items() if name not in rules.lacks}

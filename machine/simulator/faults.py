@@ -1,7 +1,7 @@
 """Fault scripts: what goes wrong on a serial line and in a printer, where or how often, the same at every run of a seed."""
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, log
 from pathlib import Path
@@ -13,17 +13,9 @@ from profiles.toml_text import read_toml
 ByteKind = Literal["drop", "flip", "duplicate", "delay"]
 OkKind = Literal["swallow ok", "truncate ok", "double ok"]
 MomentKind = Literal[
-    "spurious resend",
-    "error",
-    "garbage",
-    "reset",
-    "silent reset",
-    "disconnect",
-    "stall",
-    "block",
-    "heater failure",
+    "spurious resend", "error", "garbage", "reset", "silent reset", "disconnect", "stall", "block", "heater failure",
     "thermal runaway",
-]
+]  # fmt: skip
 Kind = ByteKind | OkKind | MomentKind
 Unit = Literal["byte", "answer", "line"]
 BYTE_KINDS: tuple[Kind, ...] = get_args(ByteKind)
@@ -135,7 +127,7 @@ def read_script(path: Path) -> FaultScript:
         if key not in ("seed", "fault"):
             raise PrinterError(f"{path}: {key} is not known: seed and [[fault]] tables are allowed")
     seed, tables = document.get("seed", 0), document.get("fault", [])
-    if not _whole(seed):
+    if not _is_whole(seed):
         raise PrinterError(f"{path}: seed is {seed!r}: a whole number is allowed")
     if not (isinstance(tables, list) and all(isinstance(table, dict) for table in tables)):
         raise PrinterError(f"{path}: fault is {tables!r}: tables headed [[fault]] are allowed")
@@ -147,13 +139,8 @@ def _read_fault(table: Mapping[str, Any], where: str) -> Fault:
     if kind not in KINDS:
         raise _wrong(where, "kind", kind, ", ".join(KINDS))
     units = units_of(kind)
-    known = [
-        "kind",
-        *units,
-        "chance",
-        *(["to"] if "byte" in units else []),
-        *(key for key, kinds in KEYS.items() if kind in kinds),
-    ]
+    to = ["to"] if "byte" in units else []
+    known = ["kind", *units, "chance", *to, *(key for key, kinds in KEYS.items() if kind in kinds)]
     for key in table:
         if key not in known:
             raise PrinterError(f"{where}: {key} is not a key of {kind!r}: {', '.join(known)} are allowed")
@@ -161,56 +148,48 @@ def _read_fault(table: Mapping[str, Any], where: str) -> Fault:
     if len(placed) != 1:
         given = " and ".join(placed) if placed else "no place"
         raise PrinterError(f"{where}: {kind!r} has {given}: one of {', '.join(units)}, chance is allowed")
-    if table.get("to", "printer") not in ("printer", "host"):
-        raise _wrong(where, "to", table["to"], "printer, host")
+    seconds = table.get("seconds", inf)
+    if kind == "delay" and not (_is_real(seconds) and 0 <= seconds < inf):
+        raise _wrong(where, "seconds", table.get("seconds"), "a number of seconds from 0 up")
+    for key, (fits, allowed) in ALLOWED.items():
+        if key in table and not fits(table[key]):
+            raise _wrong(where, key, table[key], allowed)
+    unit = "" if placed == ["chance"] else placed[0]
     return Fault(
         kind,
-        at=None if placed == ["chance"] else _number(table, placed[0], where, 0 if placed == ["byte"] else 1),
+        at=table.get(unit),
         to_host=table.get("to") == "host",
-        value=_number(table, "bit", where, 0, 7) if "bit" in table else _number(table, "number", where, 0),
-        chance=_chance(table, where),
-        unit="" if placed == ["chance"] else placed[0],  # type: ignore[arg-type]
-        seconds=_seconds(table, kind, where),
-        text=_text(table, where),
+        value=table.get("bit", table.get("number")),
+        chance=float(table.get("chance", 0.0)),
+        unit=unit,  # type: ignore[arg-type]
+        seconds=float(seconds),
+        text=table.get("text", ""),
     )
 
 
-def _number(table: Mapping[str, Any], key: str, where: str, least: int, most: float = inf) -> int | None:
-    value = table.get(key)
-    if value is not None and not (_whole(value) and least <= value <= most):
-        raise _wrong(where, key, value, f"a whole number from {least} " + (f"to {most}" if most < inf else "up"))
-    return value
+def _is_whole(value: Any, least: int | None = None, most: float = inf) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and (least is None or least <= value <= most)
 
 
-def _chance(table: Mapping[str, Any], where: str) -> float:
-    value = table.get("chance", 0.0)
-    if "chance" in table and not (_real(value) and 1e-12 <= value <= 1):
-        raise _wrong(where, "chance", value, "a number above 0, at most 1")
-    return float(value)
-
-
-def _seconds(table: Mapping[str, Any], kind: Kind, where: str) -> float:
-    value = table.get("seconds", inf)
-    if not (_real(value) and value >= 0) or (kind == "delay" and value == inf):
-        allowed = "a number of seconds from 0 up" + ("" if kind == "delay" else ", inf for ever")
-        raise _wrong(where, "seconds", value if "seconds" in table else None, allowed)
-    return float(value)
-
-
-def _text(table: Mapping[str, Any], where: str) -> str:
-    value = table.get("text", "")
-    if not (isinstance(value, str) and all(ord(c) < 256 for c in value)):
-        raise _wrong(where, "text", value, "text of characters up to \\u00ff, one for each byte")
-    return value
-
-
-def _whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _real(value: Any) -> bool:
+def _is_real(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _wrong(where: str, key: str, value: Any, allowed: str) -> PrinterError:
     return PrinterError(f"{where}: {key} is {'missing' if value is None else repr(value)}: {allowed} is allowed")
+
+
+# Key of a fault in a file -> whether a value will do, and what is allowed.
+ALLOWED: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "byte": (lambda value: _is_whole(value, 0), "a whole number from 0 up"),
+    **dict.fromkeys(("answer", "line"), (lambda value: _is_whole(value, 1), "a whole number from 1 up")),
+    "chance": (lambda value: _is_real(value) and 1e-12 <= value <= 1, "a number above 0, at most 1"),
+    "to": (lambda value: value in ("printer", "host"), "printer, host"),
+    "bit": (lambda value: _is_whole(value, 0, 7), "a whole number from 0 to 7"),
+    "number": (lambda value: _is_whole(value, 0), "a whole number from 0 up"),
+    "seconds": (lambda value: _is_real(value) and value >= 0, "a number of seconds from 0 up, inf for ever"),
+    "text": (
+        lambda value: isinstance(value, str) and all(ord(c) < 256 for c in value),
+        "text of characters up to \\u00ff, one for each byte",
+    ),
+}

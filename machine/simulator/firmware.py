@@ -11,7 +11,7 @@ from math import inf
 from machine.firmware import dialect_of
 from machine.gcode.words import read_values, read_words, split_command
 from machine.simulator.board import Board, BuildOptions, Work
-from machine.simulator.commands import TEXTS, commands_of
+from machine.simulator.commands import COMMANDS, TEXTS
 from machine.simulator.macros import command_of
 from machine.simulator.motion_commands import move
 from machine.simulator.receiver import EmergencyParser, Receiver
@@ -30,17 +30,17 @@ MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_
 class SimulatedFirmware:
     """receive() hands bytes over, advance() lets time pass and returns what the printer says meanwhile.
 
-    kept: how many moves stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
+    kept_moves: so many stay on record, None: all. watch: gets each line's count before it begins; True: advance() returns first.
     """
 
     def __init__(
-        self, machine: Machine, build: BuildOptions | None = None, busy_s: float = BUSY_S, kept: int | None = None
+        self, machine: Machine, build: BuildOptions | None = None, busy_s: float = BUSY_S, kept_moves: int | None = None
     ) -> None:
         self._build = build or BuildOptions()
         self._said: list[str] = []
-        self.board = Board(machine, self._build, self._said.append, kept)
+        self.board = Board(machine, self._build, self._said.append, kept_moves)
         self._rules = self.board.rules
-        self._commands, self._macros = commands_of(self._rules), dialect_of(machine).macros
+        self._macros = dialect_of(machine).macros
         self.board.busy_every_s = self._busy_default_s = busy_s if self._build.busy and self._rules.has_build_options else 0.0
         self._receiver = Receiver(self._rules, dialect_of(machine).longest_line, self._build.rx_ring, self._build.checksums)
         self._room = (self._build.queue if self._rules.has_build_options else None) or self._rules.queue_lines
@@ -278,7 +278,7 @@ class SimulatedFirmware:
             macro = command_of(name.upper())
             if macro is not None:
                 return macro(self.board, read_values(rest))
-        command = self._commands.get(name)
+        command = COMMANDS.get(name) if name not in self._rules.lacks else None
         if command is None:
             if not (self._build.realtime and name in ("S0", "P0", "R0")):
                 self.board.unknown += 1

@@ -64,7 +64,7 @@ class Motion:
         self,
         machine: Machine,
         note: Callable[[str, bool], None] = lambda what, trouble: None,
-        kept: int | None = None,
+        kept_moves: int | None = None,
         home_start: bool = True,
     ) -> None:
         rules = simulation_of(machine)
@@ -75,7 +75,7 @@ class Motion:
         rotary = (machine.tilt, machine.turn)
         self._home = [*machine.home[:3], *(a.zero_deg if a.home_deg is None else a.home_deg for a in rotary)]
         self._starts_at_home = rules.starts_at_home and home_start
-        self.executed = ExecutedMoves(kept)
+        self.executed = ExecutedMoves(kept_moves)
         self.planner = Planner(self.executed.add, rules.blocks, rules.min_segment_s)
         self._machine, self._note = machine, note
         self._tcp = TcpKinematics(machine)
@@ -187,7 +187,8 @@ class Motion:
             feed = _length(real, end) / seconds
         strokes = end[5] != real[5]
         most_mm_s2 = self._printing if strokes else self._travelling
-        block = block_of(real, end, feed, self.speeds, self.accelerations, most_mm_s2)
+        speeds, accelerations = self.speeds, self.accelerations
+        block = block_of(real, end, feed, speeds=speeds, accelerations=accelerations, most_mm_s2=most_mm_s2)
         self.place, self._real = list(place), end
         if block is not None:
             self.energised = True

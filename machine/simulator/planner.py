@@ -68,14 +68,14 @@ class Block:
 
 
 class ExecutedMoves:
-    """kept: how many moves stay in `rows` at least (twice as many at most); None: all.
+    """kept_moves: how many moves stay in `rows` at least (twice as many at most); None: all.
 
     moves, strokes, pushed_mm, moving_s: sums over all of them; strokes push filament while another axis moves.
     """
 
-    def __init__(self, kept: int | None = None) -> None:
+    def __init__(self, kept_moves: int | None = None) -> None:
         self.rows = array("d")
-        self._most = None if kept is None else max(1, 2 * kept) * ROW
+        self._most = None if kept_moves is None else max(1, 2 * kept_moves) * ROW
         self.moves = self.strokes = 0
         self.pushed_mm = self.moving_s = 0.0
 
@@ -242,7 +242,7 @@ def corner2(before: Block, after: Block, jerk: float) -> float:
     return v * v
 
 
-def block_of(start: Place, end: Place, feed: float, speeds: Place, accelerations: Place, most_mm_s2: float) -> Block | None:
+def block_of(start: Place, end: Place, feed: float, *, speeds: Place, accelerations: Place, most_mm_s2: float) -> Block | None:
     """A block from place to place; None when nothing moves. most_mm_s2: acceleration set for moves of X Y Z."""
     deltas = [b - a for a, b in zip(start, end, strict=True)]
     x, y, z, tilt, turn, filament = deltas

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from math import inf
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
 from typing import Any, Self
 
 from machine.simulator.board import BuildOptions, build_options
@@ -33,7 +32,7 @@ class SimulatedPrinter:
     link to keep). tcp: a port number of this computer (0: a free one) instead of a terminal; path is then a socket:// address.
     baud: every byte takes the time of 10 bits, both ways, and what a ring of machine.receive_bytes cannot hold is lost (build
     of your own say it themselves); None: USB, as fast as the system, and the host waits. The rate a host opens the path
-    with means nothing. kept: how many moves the record holds at least, None: all (120 bytes a move).
+    with means nothing. kept_moves: how many moves the record holds at least, None: all (120 bytes a move).
     Without pseudo-terminals path is a socket:// address, too. Raises PortError for a link or port that is taken, and for a link
     where there are no terminals.
     """
@@ -48,12 +47,12 @@ class SimulatedPrinter:
         link: Path | None = None,
         tcp: int | None = None,
         baud: int | None = None,
-        kept: int | None = None,
+        kept_moves: int | None = None,
     ) -> None:
         if not speed > 0:
             raise ValueError(f"speed is {speed:g}: it must be above 0")
         # `busy:` must come in real time, or a slow simulation would look dead to the sender.
-        self._firmware = SimulatedFirmware(machine, build or build_options(machine, baud), BUSY_S * min(1.0, speed), kept)
+        self._firmware = SimulatedFirmware(machine, build or build_options(machine, baud), BUSY_S * min(1.0, speed), kept_moves)
         self._cable = Cable(self._firmware, faults if isinstance(faults, FaultScript) else FaultScript(tuple(faults)), speed)
         self._line = self._cable if baud is None else Uart(self._cable, baud)
         self._lock = threading.Lock()
@@ -71,7 +70,7 @@ class SimulatedPrinter:
         self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self._wake.send(b"x")
         if self._thread is not None:
             self._thread.join()
@@ -104,7 +103,7 @@ class SimulatedPrinter:
                 self._plug(there)
             if there:
                 self._answer(answer)
-            reading = [] if self._reads_nothing(now_s) else self._terminal.readable_ends()
+            reading = [] if self._line.reads_nothing(now_s) else self._terminal.readable_ends()
             writing = self._terminal.writable_ends() if self._out else []
             waited_for: list[Any] = [*reading, self._end]
             readable, _, _ = select.select(waited_for, writing, [], self._pause_s(now_s))
@@ -112,16 +111,9 @@ class SimulatedPrinter:
                 return
             data = self._terminal.read() if readable else b""
 
-    def _reads_nothing(self, now_s: float) -> bool:
-        """Whether the host's bytes are left where they are, so that its writing comes to a halt."""
-        if isinstance(self._line, Uart):
-            return self._line.full
-        return self._firmware.full or (self._cable.blocked(now_s) and not self._firmware.has_ring)
-
     def _plug(self, there: bool) -> None:
         self._out = b""
-        if isinstance(self._line, Uart):
-            self._line.clear()
+        self._line.clear()
         if there:
             self._terminal.open()
         else:

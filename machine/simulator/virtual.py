@@ -40,7 +40,7 @@ class VirtualPrinter:
         self._most_s = most_s
         self._cable = Cable(self.firmware, faults, speed=1.0)
         self._line = self._cable if baud is None else Uart(self._cable, baud)
-        self.medium = Medium(self._open, lambda: self.now_s, self._wait)
+        self.medium = Medium(self._open, lambda: self.now_s, self._pass)
 
     @property
     def record(self) -> Record:
@@ -53,9 +53,6 @@ class VirtualPrinter:
             self._pass(READ_S)
             raise PortError(f"port {name} does not exist: no serial port was found")
         return _Line(self, name)
-
-    def _wait(self, seconds: float) -> None:
-        self._pass(seconds)
 
     def _pass(self, seconds: float) -> None:
         self.now_s += seconds
@@ -79,8 +76,7 @@ class VirtualPrinter:
 
     def _exchange_now(self, data: bytes) -> bytes:
         if not self._cable.connected(self.now_s):
-            if isinstance(self._line, Uart):
-                self._line.clear()
+            self._line.clear()
             raise OSError
         return self._line.exchange(data, self.now_s)
 

@@ -5,21 +5,13 @@ from typing import Any
 
 from machine.view.parts import page_colours
 from mdp.decomposition import Decomposition, FrontRow
+from mdp.save import front_values, plane_values
 
 
 def front_record(row: FrontRow) -> dict[str, Any]:
     """A row of a front as pages know it. planes: in print order, from part 2 on; why: of the chosen row, else ""."""
-    return {
-        "parts": row.parts,
-        "support_area_mm2": row.support_area_mm2,
-        "seam_mm": row.seam_mm,
-        "cost_mm2": row.cost_mm2,
-        "time_s": row.time_s,
-        "filament_mm": row.filament_mm,
-        "chosen": row.chosen,
-        "why": row.reason,
-        "planes": [{"normal": plane.normal.tolist(), "offset_mm": plane.offset_mm} for plane in reversed(row.planes)],
-    }
+    planes = [plane_values(plane) for plane in reversed(row.planes)]
+    return front_values(row) | {"why": row.reason, "planes": planes}
 
 
 def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:

@@ -74,8 +74,8 @@ def with_alternatives(report: dict[str, Any], alternatives: Sequence[Alternative
     return report | {"tables": tables}
 
 
-def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = (), folded: bool = False) -> Table:
-    return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": folded}
+def _table(title: str, head: Row, rows: list[Row], notes: Sequence[str] = ()) -> Table:
+    return {"title": title, "head": head, "rows": rows, "notes": list(notes), "folded": False}
 
 
 SOLID = ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²"]
@@ -167,11 +167,7 @@ def _alternatives(alternatives: Sequence[Alternative]) -> Table:
     for way in alternatives:
         costs = ["-"] * 7
         if way.time_s is not None:
-            filament_mm, mass_g, support_mm3 = (
-                way.filament_mm or 0.0,
-                way.filament_g or 0.0,
-                way.support_mm3 or 0.0,
-            )
+            filament_mm, mass_g, support_mm3 = (value or 0.0 for value in (way.filament_mm, way.filament_g, way.support_mm3))
             volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(way.interface_mm3.values()) / 1000:.2f}"]
             scars = [f"{way.seam_mm:.0f}", str(way.findings)]
             costs = [duration(way.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]

@@ -10,6 +10,7 @@ from machine.view.parts import residual_faces, risky_before, risky_before_mm2
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Floats
 from mdp.pose import unit
+from mdp.save import plane_values
 from profiles.axes import RotaryAxis
 from profiles.machine import Machine
 from profiles.profile import Profile
@@ -45,10 +46,7 @@ def solids(decomposition: Decomposition, profile: Profile) -> list[dict[str, Any
     for part in decomposition.parts:
         ends = vertex + len(part.mesh.vertices), face + len(part.mesh.faces)
         centre, radius = _foot(part)
-        base = {
-            "normal": part.base.normal.tolist(), "offset_mm": part.base.offset_mm,
-            "centre_mm": centre.tolist(), "radius_mm": radius,
-        }  # fmt: skip
+        base = plane_values(part.base) | {"centre_mm": centre.tolist(), "radius_mm": radius}
         records.append(
             {
                 "index": part.index,

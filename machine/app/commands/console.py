@@ -20,20 +20,7 @@ from machine.app.terminal.interrupts import calling, interrupting
 from machine.app.terminal.progress import say
 from machine.firmware import dialect_of
 from machine.link.port import open_port
-from machine.link.protocol.events import (
-    Action,
-    Banner,
-    Busy,
-    Echo,
-    Event,
-    FirmwareFault,
-    LineError,
-    Ok,
-    Resend,
-    Start,
-    Temperature,
-    read_event,
-)
+from machine.link.protocol import events
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import LocalProtocolError, PrinterError
 from profiles.folders import state_folder
@@ -51,17 +38,11 @@ HELP = """What you type is sent, one line after the other is answered. Besides:
   /quit     leave; Ctrl-D and Ctrl-C do too
 """
 DIM, RED, YELLOW, CYAN = "2", "31", "33", "36"
-COLOURS: dict[type[Event], str] = {
-    Ok: DIM,
-    Busy: DIM,
-    Temperature: CYAN,
-    Echo: YELLOW,
-    Action: YELLOW,
-    Start: YELLOW,
-    Banner: YELLOW,
-    LineError: RED,
-    Resend: RED,
-    FirmwareFault: RED,
+COLOURS: dict[type[events.Event], str] = {
+    **dict.fromkeys((events.Ok, events.Busy), DIM),
+    events.Temperature: CYAN,
+    **dict.fromkeys((events.Echo, events.Action, events.Start, events.Banner), YELLOW),
+    **dict.fromkeys((events.LineError, events.Resend, events.FirmwareFault), RED),
 }
 
 
@@ -297,10 +278,10 @@ class Shown:
                 self._show(line)
 
     def _show(self, line: bytes) -> None:
-        event = read_event(line)
-        if isinstance(event, Temperature) and not self.reports:
+        event = events.read_event(line)
+        if isinstance(event, events.Temperature) and not self.reports:
             return
-        if isinstance(event, Busy):
+        if isinstance(event, events.Busy):
             self._busy += 1
             if self._busy > 1:
                 return

@@ -12,7 +12,7 @@ from machine.app.printer.network_print import hand_over, print_there, server_ses
 from machine.app.printer.serial_log import SerialLog
 from machine.app.printer.server_checks import check_free, check_server_machine, ready_for_server
 from machine.app.printer.watch_page import serve_watch_page
-from machine.app.requests import ModelRequest, PrintRequest, SendRequest
+from machine.app.requests import ModelRequest, PrintRequest
 from machine.app.terminal.plain import show
 from machine.app.terminal.progress import say
 from machine.app.terminal.report import print_table
@@ -23,21 +23,17 @@ from machine.network.server import PrintServer
 from profiles.errors import GcodeError, NoAnswerError, ServerError
 
 
-def send(request: ModelRequest, sending: SendRequest) -> int:
-    """Hand a G-code file to a print server, and have it printed where that is asked for."""
+def send(request: ModelRequest, address: str, *, start: bool, log: Path | None) -> int:
+    """Hand a G-code file to a print server. start: have it printed at once; log as for a print."""
     if not request.is_gcode:
-        raise GcodeError(
-            f"{request.name} is no G-code file: export makes one of a model, print --port {sending.server} prints it"
-        )
-    with _session(request, sending.server, sending.log, "send") as (server, _):
-        loaded = _checked(request, server, sending.server, sending.start)
-        upload = GcodeUpload(request.name, loaded.program.lines)
-        file = hand_over(server, upload, request.name)
-        if sending.start:
+        raise GcodeError(f"{request.name} is no G-code file: export makes one of a model, print --port {address} prints it")
+    with _session(request, address, log, "send") as (server, _):
+        loaded = _checked(request, server, address, start)
+        file = hand_over(server, GcodeUpload(request.name, loaded.program.lines), request.name)
+        if start:
             check_free(server.name, server.status())
             _start(server, file)
-        done = "prints" if sending.start else "waits"
-        show(f"{file} {done} on {server.name}\n")
+        show(f"{file} {'prints' if start else 'waits'} on {server.name}\n")
     return 0
 
 

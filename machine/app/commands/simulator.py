@@ -31,7 +31,7 @@ def simulate_printer(request: SimulatorRequest) -> int:
     build = read_build_options(request.habits, build_options(machine, baud))
     stop = threading.Event()
     simulated = SimulatedPrinter(
-        machine, request.speed or inf, build=build, faults=script, link=request.link, tcp=request.tcp, baud=baud, kept=KEPT
+        machine, request.speed or inf, build=build, faults=script, link=request.link, tcp=request.tcp, baud=baud, kept_moves=KEPT
     )
     with (
         stopping(stop),

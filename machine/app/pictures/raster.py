@@ -62,22 +62,18 @@ def draw(
     width, height = size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING
     corners = np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes])
     normals = np.concatenate([corner_normals(mesh) for mesh in meshes])
-    paint = np.concatenate(
-        [
-            _paint(mesh, np.asarray(colour, float), red)
-            for mesh, colour, red in zip(meshes, colours, reds or [None] * len(meshes), strict=True)
-        ]
-    )
+    painted = zip(meshes, colours, reds or [None] * len(meshes), strict=True)
+    paint = np.concatenate([_paint(mesh, np.asarray(colour, float), red) for mesh, colour, red in painted])
     group = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
     axes = view.axes
     scale, middle = _framing(corners @ axes.T, width, height)
     scale = scale if span_mm is None else min(width, height) / span_mm
-    screen = _to_screen(corners, axes, scale, middle, width, height)
+    screen = _to_screen(corners @ axes.T - middle, scale, (width, height))
     depth, face = z_buffer(screen, width, height)
     to_light = view.up + 0.55 * axes[2] - 0.65 * axes[0]
     light_axes = View(to_light, axes[0]).axes
     light_scale, light_middle = _framing(corners @ light_axes.T, SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS)
-    lit = _to_screen(corners, light_axes, light_scale, light_middle, SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS)
+    lit = _to_screen(corners @ light_axes.T - light_middle, light_scale, (SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS))
     shadow, _ = z_buffer(lit, SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS)
     light = Light(shadow, 2.5 / light_scale, light_axes[2])
     colour, bent = _shade(Triangles(screen, lit, normals, paint), face, light, axes)
@@ -112,10 +108,9 @@ def _framing(points: Floats, width: int, height: int) -> tuple[float, Floats]:
     return float(min(width * free / extent[0], height * free / extent[1])), 0.5 * (low + high)
 
 
-def _to_screen(corners: Floats, axes: Floats, scale: float, middle: Floats, width: int, height: int) -> Floats:
-    """(m, 3, 3) pixel column, pixel row and depth toward the camera in mm."""
-    seen = corners @ axes.T - middle
-    return np.stack([0.5 * width + scale * seen[..., 0], 0.5 * height - scale * seen[..., 1], seen[..., 2]], axis=-1)
+def _to_screen(seen: Floats, scale: float, size: Size) -> Floats:
+    """(m, 3, 3) pixel column, pixel row and depth toward the camera in mm; seen: corners in camera axes about the centre."""
+    return np.stack([0.5 * size[0] + scale * seen[..., 0], 0.5 * size[1] - scale * seen[..., 1], seen[..., 2]], axis=-1)
 
 
 class Triangles(NamedTuple):

@@ -53,12 +53,13 @@ def in_parts(program: Program, profile: Profile) -> Alternative:
     ours = program.decomposition
     assert ours is not None  # programs of other slicers have nothing to compare with
     count = len(ours.parts)
-    return _figures(f"in {count} part{'s' * (count > 1)}", "", count, program, ours.residual_area_mm2, profile)
+    way = Alternative(f"in {count} part{'s' * (count > 1)}", "", count, risky_mm2=ours.residual_area_mm2)
+    return _figures(way, program, profile)
 
 
 def straight_up(ours: Decomposition, profile: Profile, report: Report | None = None) -> Alternative:
     """The model of a decomposition in one part as it stands."""
-    return _in_one_part("straight up", "as it stands", ours.mesh, ours.risky_area_mm2, profile, report)
+    return _in_one_part(Alternative("straight up", "as it stands", 1, risky_mm2=ours.risky_area_mm2), ours.mesh, profile, report)
 
 
 def best_lying(mesh: Mesh, profile: Profile, report: Report | None = None) -> Alternative:
@@ -66,44 +67,41 @@ def best_lying(mesh: Mesh, profile: Profile, report: Report | None = None) -> Al
     best = _best(mesh, profile)
     turned = standing_still(mesh, best.rotation)
     risky = float(turned.areas_mm2[needing_upright(turned, profile)].sum())
-    return _in_one_part(BEST, in_words(best), turned, risky, profile, report)
+    return _in_one_part(Alternative(BEST, in_words(best), 1, risky_mm2=risky), turned, profile, report)
 
 
 def _best(mesh: Mesh, profile: Profile) -> Orientation:
     return best_orientation(mesh, profile.process.self_supporting_angle_deg)
 
 
-def _in_one_part(
-    name: str, orientation: str, mesh: Mesh, risky_mm2: float, profile: Profile, report: Report | None
-) -> Alternative:
-    """A model in one part as it stands, with support whatever the process says."""
+def _in_one_part(way: Alternative, mesh: Mesh, profile: Profile, report: Report | None) -> Alternative:
+    """A model in one part as it stands, with support whatever the process says. way: what is known of it beforehand."""
     bare = profile.of_all_parts
     profile = bare.model_copy(update={"process": bare.process.model_copy(update={"support": "auto"})})
     pose = level(profile.machine)
-    part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, risky_mm2)
-    whole = Decomposition(name, mesh, (part,), 1, "classic", risky_mm2, risky_mm2, 0, 0, 0.0)
+    part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, way.risky_mm2)
+    whole = Decomposition(way.name, mesh, (part,), 1, "classic", way.risky_mm2, way.risky_mm2, 0, 0, 0.0)
     try:
         program = build(whole, profile, report=report)
     except UserError as error:  # the others can still be compared
-        return Alternative(name, orientation, 1, None, None, None, None, risky_mm2, str(error))
-    return _figures(name, orientation, 1, program, risky_mm2, profile)
+        return replace(way, message=str(error))
+    return _figures(way, program, profile)
 
 
-def _figures(name: str, orientation: str, parts: int, program: Program, risky_mm2: float, profile: Profile) -> Alternative:
+def _figures(way: Alternative, program: Program, profile: Profile) -> Alternative:
+    """A way with what its program comes to."""
     run = program.run
     filament_mm = float(np.max(run.program.filament_mm, initial=0.0))
     supports = [place for place, kind in enumerate(run.program.types) if kind in SUPPORT]
     support_mm3 = float(run.segment_mm3[np.isin(run.program.type[run.segment_row], supports)].sum())
     seam_mm = 0.0 if program.decomposition is None else program.decomposition.seam_mm
-    return Alternative(
-        name=name,
-        orientation=orientation,
-        parts=parts,
+    return replace(
+        way,
         time_s=run.time_s,
         filament_mm=filament_mm,
         filament_g=filament_g(filament_mm, profile.material),
         support_mm3=support_mm3,
-        risky_mm2=max(risky_mm2, 0.0),
+        risky_mm2=max(way.risky_mm2, 0.0),
         message=run.errors[0].message if run.errors else "",
         unsupported_mm2=sum(place.mm2 for place in run.program.unsupported),
         seam_mm=seam_mm,
@@ -136,14 +134,9 @@ def alternatives_json(alternatives: tuple[Alternative, ...]) -> list[dict[str, A
 def compare_table(alternatives: tuple[Alternative, ...]) -> str:
     """The alternatives for a person."""
     rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
-    rows += [[alternative.name, *_costs(alternative), f"{alternative.risky_mm2:.1f} mm2"] for alternative in alternatives]
+    rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm2"] for way in alternatives]
     head, *lines = table(rows).splitlines()
-    notes = [
-        f"{alternative.name}: {note}"
-        for alternative in alternatives
-        for note in (alternative.orientation, alternative.message)
-        if note
-    ]
+    notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
     return "\n".join(["", head, *lines, *notes]) + "\n"
 
 

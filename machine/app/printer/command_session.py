@@ -31,7 +31,9 @@ class CommandSession:
         self._ordered: type[Exception] | None = None
         self._heat = Temperature()
         self._command = ""
-        self.exchange = Exchange(wire, SERIAL, Timing(), self._heard, self._turned, self._lost, limit)
+        self.exchange = Exchange(
+            wire, SERIAL, timing=Timing(), on_event=self._heard, on_turn=self._turned, on_lost=self._lost, limit=limit
+        )
 
     def greet(self) -> None:
         """Agree on line numbers; raises PrinterError."""

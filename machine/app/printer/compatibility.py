@@ -26,55 +26,66 @@ SHAPING = ("shape", "dialect", "coordinates", "tool_mm")
 AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")
 
 
-def identify_printer_at(port: str, baud: int) -> Answer:
-    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is."""
-    with open_port(port, baud) as wire:
-        return identify_printer(wire, baud)
-
-
 def identify_printer(wire: Port, baud: int) -> Answer:
-    """The same for a port that is open already."""
+    """What answers at a port, which must be a printer at this rate; raises PrinterError with a sentence of what it is."""
     port = wire.name
     answer, rate = ask_at_any_rate(wire, baud)
     if answer.kind in (Kind.PRINTER, Kind.BUSY, Kind.HALTED) and rate != baud:
         raise PortError(f"the printer at {port} does not speak at {baud} baud but at {rate}: use --baud {rate}")
     if answer.kind is not Kind.PRINTER:
-        raise _REFUSALS[answer.kind](_why(answer, port, baud))
+        error, refusal, _ = NO_PRINTERS[answer.kind]
+        raise error(refusal.format(port=port, baud=baud, **_words(answer)))
     return answer
 
 
-_REFUSALS: Mapping[Kind, type[PrinterError]] = {
-    Kind.BUSY: PrinterError,
-    Kind.HALTED: FirmwareError,
-    Kind.STRANGER: RemoteProtocolError,
-    Kind.RUBBISH: PortError,
-    Kind.SILENT: SilenceError,
-}
-
-
-def _why(answer: Answer, port: str, baud: int) -> str:
+def _words(answer: Answer) -> dict[str, str]:
+    """What a sentence about an answer may name. Marlin says of its work only that it does something, or waits."""
     words = answer.words[:60]
-    if answer.kind is Kind.BUSY:
-        return f"the printer at {port} is busy ({_work(answer)}): wait until it is done, or restart it"
-    if answer.kind is Kind.HALTED:
-        return f"the printer at {port} has stopped with an error of its own ({words}): switch it off and on again"
-    if answer.kind is Kind.STRANGER:
-        return f"what answers at {port} is no printer: {_stranger(answer)} instead of answering M115"
-    if answer.kind is Kind.RUBBISH:
-        return (
-            f"only rubbish comes from {port} at {baud} baud, and no printer answers at the usual other rates: "
-            f"the firmware's settings tell its rate for --baud"
-        )
-    return (
-        f"nothing answers at {port}: is the printer switched on, and is {baud} baud the firmware's rate? "
-        "One that has halted says nothing until it is switched off and on"
-    )
+    usual = answer.words.startswith(("processing", "paused for", "busy")) or not words
+    work = "it heats, moves or waits for a person" if usual else words
+    stranger = "it sends back what it is told" if answer.words in ECHO else f"it says {words!r}"
+    return {"words": words, "work": work, "stranger": stranger}
+
+
+# What answers that is no printer to print on: the error, as a sentence, and how it is listed.
+NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
+    Kind.BUSY: (
+        PrinterError,
+        "the printer at {port} is busy ({work}): wait until it is done, or restart it",
+        "a printer that is busy ({work}), at {baud} baud",
+    ),
+    Kind.HALTED: (
+        FirmwareError,
+        "the printer at {port} has stopped with an error of its own ({words}): switch it off and on again",
+        "a printer that has stopped with an error ({words}), at {baud} baud",
+    ),
+    Kind.STRANGER: (
+        RemoteProtocolError,
+        "what answers at {port} is no printer: {stranger} instead of answering M115",
+        "something answers but is no printer: {stranger}",
+    ),
+    Kind.RUBBISH: (
+        PortError,
+        "only rubbish comes from {port} at {baud} baud, and no printer answers at the usual other rates: "
+        "the firmware's settings tell its rate for --baud",
+        "rubbish at {baud} baud, and nothing at the usual other rates: --baud N tries another",
+    ),
+    Kind.SILENT: (
+        SilenceError,
+        "nothing answers at {port}: is the printer switched on, and is {baud} baud the firmware's rate? "
+        "One that has halted says nothing until it is switched off and on",
+        "nothing answers",
+    ),
+}
 
 
 def check_port(port: str, baud: int, sim_speed: float) -> Answer | None:
     """What answers at a port, refused at once when it is no printer; None for the simulated one. Raises PrinterError."""
     check_speed(sim_speed)
-    return None if port == SIMULATED else identify_printer_at(port, baud)
+    if port == SIMULATED:
+        return None
+    with open_port(port, baud) as wire:
+        return identify_printer(wire, baud)
 
 
 def is_rate_limited(port: str) -> bool:
@@ -100,29 +111,12 @@ def check_dialect(machine: Machine) -> None:
         )
 
 
-def _work(answer: Answer) -> str:
-    """What a busy printer does: Marlin says only that it does something, or waits."""
-    usual = answer.words.startswith(("processing", "paused for", "busy")) or not answer.words
-    return "it heats, moves or waits for a person" if usual else answer.words[:60]
-
-
-def _stranger(answer: Answer) -> str:
-    return "it sends back what it is told" if answer.words in ECHO else f"it says {answer.words[:60]!r}"
-
-
 def describe_answer(answer: Answer, baud: int) -> str:
     """What answers, for a person."""
     if answer.kind is Kind.PRINTER:
         axes = f", axes {' '.join(answer.letters)}" if answer.letters else ""
         return f"{answer.firmware or 'a printer that does not name its firmware'}{axes}, at {baud} baud"
-    if answer.kind is Kind.STRANGER:
-        return f"something answers but is no printer: {_stranger(answer)}"
-    return {
-        Kind.BUSY: f"a printer that is busy ({_work(answer)}), at {baud} baud",
-        Kind.HALTED: f"a printer that has stopped with an error ({answer.words[:60]}), at {baud} baud",
-        Kind.RUBBISH: f"rubbish at {baud} baud, and nothing at the usual other rates: --baud N tries another",
-        Kind.SILENT: "nothing answers",
-    }[answer.kind]
+    return NO_PRINTERS[answer.kind][2].format(baud=baud, **_words(answer))
 
 
 def check_printer(answer: Answer | None, machine: Machine, force: bool) -> None:
@@ -182,7 +176,7 @@ def firmware_mismatch(answer: Answer, machine: Machine) -> str:
         return ""
     return (
         f"the printer's firmware moves {' '.join(answer.letters)}, but {machine.name} needs {' '.join(wanted)}: "
-        f"{_enumerate(lacking)} {'is' if len(lacking) == 1 else 'are'} missing"
+        f"{' and '.join(lacking)} {'is' if len(lacking) == 1 else 'are'} missing"
     )
 
 
@@ -221,7 +215,3 @@ def _changed(file: str, machine: Machine, key: str, then: object, now: object) -
 
 def _text(value: object) -> str:
     return ", ".join(f"{x:g}" for x in value) if isinstance(value, tuple) else str(value)
-
-
-def _enumerate(letters: list[str]) -> str:
-    return " and ".join(letters)

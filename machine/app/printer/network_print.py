@@ -16,7 +16,7 @@ from machine.app.terminal.progress import reporting, say
 from machine.dryrun.timeline import Timeline, UnknownTimeline
 from machine.link.pending_commands import CancelledError
 from machine.link.progress import ProgramPosition, Progress, last_known
-from machine.network.follow import End, OnStatus, follow_print, follow_running
+from machine.network.follow import End, OnStatus, follow_print
 from machine.network.gcode_upload import GcodeUpload
 from machine.network.server import ACTIVE, JobStatus, PrintServer
 from machine.network.servers import open_server
@@ -103,7 +103,7 @@ def follow_there(server: PrintServer, now: JobStatus, observers: Observers, pers
     """
     progress = ProgressToldByServer()
     with _shown(person, observers, UnknownTimeline(), progress) as on_status:
-        end = follow_running(server, now, on_status=on_status, control=person.control, left=person.gone)
+        end = follow_print(server, now.file, 0, on_status=on_status, control=person.control, left=person.gone, running=now)
     _report_end(end, file_name(now), server.name, progress)
     return end
 
@@ -141,10 +141,7 @@ def _report_end(end: End, file: str, server: str, progress: "ProgressToldByServe
         show(f"printed {file} on {server} in {duration(progress.elapsed_s)}\n")
         return
     after = f" after {progress.line} lines" if progress.line else ""
-    said = {
-        End.LEFT: f"{file} goes on printing on {server}",
-        End.CANCELLED: f"the print was cancelled on {server}{after}",
-    }
+    said = {End.LEFT: f"{file} goes on printing on {server}", End.CANCELLED: f"the print was cancelled on {server}{after}"}
     say(f"tiltprint: interrupted; {said[end]}")
 
 
@@ -167,17 +164,10 @@ class ProgressToldByServer:
             self._told, self._told_s = status, monotonic()
         self.elapsed_s = max(self.elapsed_s, status.elapsed_s or 0.0)
         return Progress(
-            sent=0,
-            acknowledged=0,
-            total=None,
             elapsed_s=self.elapsed_s,
-            left_s=None,
             share=status.share,
             temperature=status.temperature,
             heat_age_s=monotonic() - self._told_s,
-            part=None,
-            parts=None,
-            layer=None,
             state=status.phase.value,
             feed_percent=status.feed_percent or 100.0,
             flow_percent=status.flow_percent or 100.0,

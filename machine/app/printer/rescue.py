@@ -27,20 +27,15 @@ def rescue(port: str, baud: int, emergency: bool) -> str:
     try:
         with open_port(port, baud) as wire:
             if not emergency:
-                return _SENTENCES[heaters_off(wire, SERIAL)]
+                heaters = heaters_off(wire, SERIAL)
+                unproved = heaters is Heaters.UNPROVED
+                return "its heaters may still be on: cut the printer's power" if unproved else heaters.value
             halted = emergency_stop(wire, SERIAL)
     except PortError as error:
         return f"{error}; cut the printer's power"
     return (
         "emergency stop: the printer has halted" if halted else "emergency stop: the printer did not confirm M112: cut the power"
     )
-
-
-_SENTENCES = {
-    Heaters.OFF: "the printer reports its heaters off",
-    Heaters.HALTED: "the printer has halted and switched its heaters off by itself",
-    Heaters.UNPROVED: "its heaters may still be on: cut the printer's power",
-}
 
 
 def _stop_server(address: str) -> str:

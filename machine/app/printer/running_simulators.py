@@ -8,15 +8,10 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TextIO
 
+from machine.link.journal import lock
 from machine.link.port import SerialDevice
 from profiles.folders import state_folder
-
-try:
-    import fcntl
-except ImportError:  # no pseudo-terminals there either
-    fcntl = None  # type: ignore[assignment]
 
 
 @contextmanager
@@ -27,7 +22,7 @@ def announced(description: str, path: str) -> Iterator[Callable[[str], None]]:
     except OSError:  # a full disk: it is not listed
         yield lambda now: None
         return
-    _lock(text)
+    lock(text.fileno())
 
     def tell(now: str) -> None:
         with suppress(OSError):
@@ -56,7 +51,7 @@ def running_simulators() -> tuple[SerialDevice, ...]:
     for file in files:
         with suppress(OSError), file.open("r+", encoding="utf-8") as text:
             path, _, description = text.read().partition("\n")
-            if path and _lock(text):  # an empty one is of a simulator that has not locked it yet
+            if path and lock(text.fileno()):  # an empty one is of a simulator that has not locked it yet
                 file.unlink(missing_ok=True)
                 continue
             if path:
@@ -68,14 +63,3 @@ def _folder() -> Path:
     folder = state_folder() / "simulators"
     folder.mkdir(mode=0o700, exist_ok=True)
     return folder
-
-
-def _lock(text: TextIO) -> bool:
-    """Lock a file for this process; False when another one holds it."""
-    if fcntl is None:
-        return True
-    try:
-        fcntl.flock(text, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True

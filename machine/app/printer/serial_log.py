@@ -7,7 +7,6 @@ from dataclasses import replace
 from datetime import datetime
 from io import BufferedWriter
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from machine.link.medium import SERIAL, Medium, Traffic, Wire
@@ -65,7 +64,7 @@ class SerialLog:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _flush(self) -> None:
@@ -108,7 +107,7 @@ class SerialLog:
 
     def _open(self, file: Path) -> BufferedWriter | None:
         try:
-            return open(file, "wb", opener=_open_private)
+            return open(file, "wb", opener=lambda name, flags: os.open(name, flags, 0o600))
         except OSError as error:
             self._fail(error)
             return None
@@ -116,10 +115,6 @@ class SerialLog:
     def _fail(self, error: OSError) -> None:
         self.trouble = reason(error)
         self._out = None
-
-
-def _open_private(file: str, flags: int) -> int:
-    return os.open(file, flags, 0o600)
 
 
 class TappedWire:

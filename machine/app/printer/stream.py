@@ -1,7 +1,7 @@
 """Stream: a program to a printer, or to the simulated one on a pseudo-terminal, shown to the person watching."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
@@ -47,7 +47,7 @@ def print_program(
     simulated = request.port == SIMULATED
     title = f"{job.name} to {'the simulated printer' if simulated else request.port}"
     journalled = _journal(job, request.journal) if not simulated or request.journal is not None else nullcontext()
-    with new_log("print", title, request.log) as log, _LogPointer(log), journalled as journal:
+    with new_log("print", title, request.log) as log, _pointing_to(log), journalled as journal:
         observers = Observers(log, journal, follow)
         if simulated:
             return _print_simulated(job, request, observers, attendance)
@@ -127,9 +127,9 @@ def stream_program(
             job.program.lines,
             request.port,
             request.baud,
-            on_progress,
-            person.stop,
-            Schedule(timeline.remaining_s, pace),
+            on_progress=on_progress,
+            stop=person.stop,
+            schedule=Schedule(timeline.remaining_s, pace),
             limit=dialect_of(job.profile.machine).longest_line,
             control=person.control,
             profile=job.profile,
@@ -139,21 +139,19 @@ def stream_program(
         )
 
 
-class _LogPointer:
-    """Says where the serial log is when the print goes wrong, and that nothing is logged when that is so."""
-
-    def __init__(self, log: SerialLog) -> None:
-        self._log = log
-
-    def __enter__(self) -> None:
-        if self._log.trouble:
-            say(f"the traffic is not logged: {self._log.file}: {self._log.trouble}")
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, PrinterError):
-            _point_to(self._log)
-        elif isinstance(error, KeyboardInterrupt):  # the second one: nobody waited for the printer's word
-            say("ended at once: whether the heaters are off is not known, look at the printer")
+@contextmanager
+def _pointing_to(log: SerialLog) -> Iterator[None]:
+    """Say where the serial log is when the print goes wrong, and that nothing is logged when that is so."""
+    if log.trouble:
+        say(f"the traffic is not logged: {log.file}: {log.trouble}")
+    try:
+        yield
+    except PrinterError:
+        _point_to(log)
+        raise
+    except KeyboardInterrupt:  # the second one: nobody waited for the printer's word
+        say("ended at once: whether the heaters are off is not known, look at the printer")
+        raise
 
 
 def _point_to(log: SerialLog) -> None:

@@ -9,6 +9,7 @@ import secrets
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 LAST_WORD_S = 2.0  # a page that is open asks twice in this time, so it sees how the print ended
 GRACE_S = 1  # for answers under way when the print ends
+TOLD = ("acknowledged", "total", "share", "elapsed_s", "left_s", "part", "layer", "message")
 UNKNOWN = "this page is at the address that the print has told\n"
 HEADERS = {
     "Cache-Control": "no-store",
@@ -38,23 +40,12 @@ def state_of(progress: Progress | None, state: str = "") -> dict[str, Any]:
     """What the page asks for; progress: None before the first. state: how it ended, else what the progress says."""
     if progress is None:
         return {"state": state or "waiting"}
-    heat = progress.temperature
     return {
         "state": state or progress.state,
         "line": progress.file_line,
-        "acknowledged": progress.acknowledged,
-        "total": progress.total,
-        "share": progress.share,
-        "elapsed_s": progress.elapsed_s,
-        "left_s": progress.left_s,
-        "part": progress.part,
-        "layer": progress.layer,
-        "nozzle_c": heat.nozzle_c,
-        "nozzle_target_c": heat.nozzle_target_c,
-        "bed_c": heat.bed_c,
-        "bed_target_c": heat.bed_target_c,
+        **{key: getattr(progress, key) for key in TOLD},
+        **asdict(progress.temperature),
         "heat_is_old": bool(state) or progress.heat_is_old,
-        "message": progress.message,
     }
 
 

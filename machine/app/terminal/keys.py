@@ -7,7 +7,6 @@ import sys
 import threading
 from collections.abc import Callable
 from time import monotonic
-from types import TracebackType
 from typing import Any, Self
 
 from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command, Control
@@ -66,15 +65,6 @@ class Keyboard:
             self._tell("cancelling")
             self._control.ask(Command.CANCEL)
 
-    def _pause(self) -> None:
-        self._control.ask(Command.PAUSE)
-
-    def _resume(self) -> None:
-        self._control.ask(Command.RESUME)
-
-    def _toggle(self) -> None:
-        self._control.ask(Command.RESUME if self._state in STANDING else Command.PAUSE)
-
     def _cancel(self) -> None:
         self._sure = True
         self._tell(SURE)
@@ -95,9 +85,9 @@ class Keyboard:
 
 
 _ACTS: dict[str, Callable[[Keyboard], None]] = {
-    "p": Keyboard._pause,
-    "r": Keyboard._resume,
-    " ": Keyboard._toggle,
+    "p": lambda board: board._control.ask(Command.PAUSE),
+    "r": lambda board: board._control.ask(Command.RESUME),
+    " ": lambda board: board._control.ask(Command.RESUME if board._state in STANDING else Command.PAUSE),
     "c": lambda board: board._cancel(),
     "q": lambda board: board._explain(),
     "+": lambda board: board._faster(STEP_PERCENT),
@@ -132,7 +122,7 @@ class Typing:
         self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         import termios
 
         os.write(self._wake, b"x")
@@ -176,7 +166,7 @@ class ConsoleTyping:
         self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self._over.set()
         self._thread.join()
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from types import TracebackType
 from typing import Self
 
 from rich.console import Console, Group, RenderableType
@@ -38,14 +37,7 @@ class ScreenState:
 def render(state: ScreenState, now: datetime) -> RenderableType:
     """The whole screen at a moment."""
     progress = state.progress
-    lines = [
-        _head(state),
-        _place(state),
-        _heat(progress),
-        _bar(progress),
-        _times(progress, now),
-        *_words(state.words),
-    ]
+    lines = [_head(state), _place(state), _heat(progress), _bar(progress), _times(progress, now), *_words(state.words)]
     if state.hint or state.keys:
         lines.append(Text(plain_line(state.hint or KEYS), style="bold yellow" if state.hint else "dim"))
     return Group(*lines)
@@ -82,10 +74,7 @@ def _heat(progress: Progress) -> Text:
     old = [f"as last known {progress.heat_age_s:.0f} s ago:"] if progress.heat_is_old and heat.words else []
     phrases = [
         f"{name} {now_c:.1f}" + (f" / {target_c:.0f}" if target_c is not None else "") + " deg C"
-        for name, now_c, target_c in (
-            ("nozzle", heat.nozzle_c, heat.nozzle_target_c),
-            ("bed", heat.bed_c, heat.bed_target_c),
-        )
+        for name, now_c, target_c in (("nozzle", heat.nozzle_c, heat.nozzle_target_c), ("bed", heat.bed_c, heat.bed_target_c))
         if now_c is not None
     ]
     overrides = [f"feed {progress.feed_percent:.0f} %", f"flow {progress.flow_percent:.0f} %"]
@@ -147,7 +136,7 @@ class Screen:
         self._live.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         try:
             self._live.stop()
         except OSError:

@@ -1,5 +1,6 @@
 """Agreement: the deposited plastic beside the model it was made from: what is filled, what lies outside, what hangs in air."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,19 +55,17 @@ def agreement(run: DryRun, mesh: Mesh, profile: Profile) -> tuple[Agreement, Dry
     return result, replace(run, findings=(*run.findings, *problems))
 
 
-def _findings(run: DryRun, share: Share, result: Agreement, profile: Profile) -> list[Finding]:
-    findings = []
+def _findings(run: DryRun, share: Share, result: Agreement, profile: Profile) -> Iterator[Finding]:
     if result.outside > MOST_OUTSIDE:
         row = int(run.segment_row[np.flatnonzero(share.outside)[0]])
         message = (
             f"{100 * result.outside:.1f} % of the extruded length lie outside the model by more than half a line, "
             f"{result.farthest_mm:.2f} mm and more at the worst"
         )
-        findings.append(at_row(run.program, row, "error", "outside", message))
+        yield at_row(run.program, row, "error", "outside", message)
     solid = all(profile.of_part(int(part)).process.infill_density >= 1.0 for part in set(run.program.part.tolist()))
     if solid and result.filled < LEAST_FILLED:
         message = (
             f"the beads fill {100 * result.filled:.1f} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"
         )
-        findings.append(Finding("warning", "unfilled", 0, 0, 0, message))
-    return findings
+        yield Finding("warning", "unfilled", 0, 0, 0, message)

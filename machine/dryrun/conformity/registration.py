@@ -6,6 +6,7 @@ directions tells them apart (the point-to-plane step of Chen and Medioni 1992). 
 out by their distance; a direction in which no wall faces is not told.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,20 +71,14 @@ def shifts(run: DryRun, mesh: Mesh, profile: Profile) -> list[Shift]:
     ]
 
 
-def findings(run: DryRun, moved: list[Shift]) -> list[Finding]:
+def findings(run: DryRun, moved: list[Shift]) -> Iterator[Finding]:
     """An error for every part that lies beside the model."""
-    return [
-        at_row(
-            run.program,
-            shift.row,
-            "error",
-            "shift",
-            f"part {shift.part} lies {shift.size_mm:.2f} mm beside the model, by X{shift.by_mm[0]:+.2f} Y{shift.by_mm[1]:+.2f} "
-            f"Z{shift.by_mm[2]:+.2f}, {MOST_SHIFT_MM:g} mm are allowed",
-        )
-        for shift in moved
-        if shift.size_mm > MOST_SHIFT_MM
-    ]
+    for shift in moved:
+        if shift.size_mm > MOST_SHIFT_MM:
+            by = " ".join(f"{letter}{value:+.2f}" for letter, value in zip("XYZ", shift.by_mm, strict=True))
+            allowed = f"{MOST_SHIFT_MM:g} mm are allowed"
+            message = f"part {shift.part} lies {shift.size_mm:.2f} mm beside the model, by {by}, {allowed}"
+            yield at_row(run.program, shift.row, "error", "shift", message)
 
 
 def _evenly(own: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -105,15 +105,13 @@ def _moves(modal: ModalState, profile: Profile | None, bounds: PrintedBounds | N
     if park is None:
         return [], [], None
     rise, across = 60.0 * machine.z.speed_mm_s, 60.0 * profile.process.travel_speed_mm_s
-    speeds = [rise, across]
-    up = [f"G0 {words} F{feed:.0f}" for words, feed in zip(move_words(machine, park, pose, following), speeds, strict=False)]
+    ways = zip(move_words(machine, park, pose, following), (rise, across), strict=False)
+    up = [f"G0 {words} F{feed:.0f}" for words, feed in ways]
     above = np.array([at[0], at[1], min(at[2] + NEAR_MM, park.lift_mm[2])])
     near, home = Park(tuple(above), tuple(above)), Park(tuple(at), tuple(at))
-    over = [f"G0 {_words(park.lift_mm)} F{across:.0f}"] if not following else []
-    if following:
-        over = [f"G0 {move_words(machine, Park(park.lift_mm, park.lift_mm), pose, True)[0]} F{across:.0f}"]
+    over = move_words(machine, Park(park.lift_mm, park.lift_mm), pose, True)[0] if following else _words(park.lift_mm)
     down = [
-        *over,
+        f"G0 {over} F{across:.0f}",
         f"G0 {move_words(machine, near, pose, following)[0]} F{rise:.0f}",
         f"G1 {move_words(machine, home, pose, following)[0]} F{SLOWLY * rise:.0f}",
     ]
@@ -127,12 +125,9 @@ def _words(place: tuple[float, float, float]) -> str:
 def move_words(machine: Machine, park: Park, pose: Pose, following: bool) -> list[str]:
     """G0 words of the way up and aside, as the firmware calls the places now; following: it follows the table (TCP)."""
     stops = [park.lift_mm] if park.stand_mm == park.lift_mm else [park.lift_mm, park.stand_mm]
-    places = np.array(stops)
     if following:
-        places = followed_places(machine, pose, places)
-        return [f"X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in places]
-    first = f"Z{places[0][2]:.3f}"
-    return [first, *(f"X{x:.3f} Y{y:.3f}" for x, y, _ in places[1:])]
+        return [f"X{x:.3f} Y{y:.3f} Z{z:.3f}" for x, y, z in followed_places(machine, pose, np.array(stops))]
+    return [f"Z{park.lift_mm[2]:.3f}", *map(_words, stops[1:])]
 
 
 def axis_position(machine: Machine, place: tuple[float | None, ...], following: bool) -> tuple[Floats, Pose] | None:

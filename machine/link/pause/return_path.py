@@ -1,6 +1,7 @@
 """Return path: from wherever the head stands back to a print: up, over everything, the table turned at a proved height, down."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import hypot
 
 import numpy as np
@@ -14,7 +15,6 @@ from machine.kinematics.collision import Printed
 from machine.link.pause.park_moves import NEAR_MM, SLOWLY
 from machine.planning.park_position import obstacle_top_mm
 from machine.planning.reorient import Speeds, Turn, route
-from mdp.mesh import Floats
 from mdp.pose import Pose
 from profiles.errors import JournalError
 from profiles.profile import Profile
@@ -22,47 +22,46 @@ from profiles.profile import Profile
 STILL_DEG = 0.01
 
 
-def return_moves(profile: Profile, printed: Printed, at: Floats, pose: Pose, goal: Floats, goal_pose: Pose) -> list[str]:
+def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
     """G0 lines from axis positions at one pose to axis positions at another; G21 and G90 hold. Raises JournalError, MoveError."""
-    machine, process = profile.machine, profile.process
+    machine, process, goal = profile.machine, profile.process, way.target_mm
+    assert goal is not None  # it leads back into a print
     rise, across = 60.0 * machine.z.speed_mm_s, 60.0 * process.travel_speed_mm_s
     near = min(float(goal[2]) + NEAR_MM, machine.z.limits_mm[1])
     down = [f"G0 Z{near:.3f} F{rise:.0f}", f"G1 Z{goal[2]:.3f} F{SLOWLY * rise:.0f}"]
-    if hypot(goal_pose.tilt_deg - pose.tilt_deg, goal_pose.turn_deg - pose.turn_deg) > STILL_DEG:
+    if hypot(way.end.tilt_deg - way.start.tilt_deg, way.end.turn_deg - way.start.turn_deg) > STILL_DEG:
         speeds = Speeds(machine.z.speed_mm_s, process.travel_speed_mm_s)
-        path = route(Turn(pose, goal_pose, at, goal), 0, printed, machine, speeds)
+        path = route(way, 0, printed, machine, speeds)
         return [
             f"G0 Z{path.z_mm:.3f} F{rise:.0f}",
             f"G0 X{path.over_mm[0]:.3f} Y{path.over_mm[1]:.3f} F{across:.0f}",
-            *_turn_commands(profile, pose, goal_pose),
+            *_turn_commands(profile, way.start, way.end),
             f"G0 Z{path.across_z_mm:.3f} F{rise:.0f}",
             f"G0 X{goal[0]:.3f} Y{goal[1]:.3f} F{across:.0f}",
             *down,
         ]
-    height = max(_clear_z_mm(profile, printed, goal_pose), float(at[2]))
+    height = max(_clear_z_mm(profile, printed, way.end), float(way.at_mm[2]))
     return [f"G0 Z{height:.3f} F{rise:.0f}", f"G0 X{goal[0]:.3f} Y{goal[1]:.3f} F{across:.0f}", *down]
 
 
-def homed_return_moves(
-    profile: Profile, printed: Printed, at: Floats, pose: Pose, goal: Floats, goal_pose: Pose, heat: Sequence[str]
-) -> list[str]:
+def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequence[str]) -> list[str]:
     """The same for a firmware that has forgotten where its axes stand: they are set, `heat` is done, the tip rises, X and Y are
     homed.
 
     machine.gcode.resume takes the place of that where the profile has it. Raises JournalError, MoveError, ProfileError.
     """
     machine, dialect = profile.machine, dialect_of(profile.machine)
-    height = _clear_z_mm(profile, printed, pose)
-    values = resume_placeholders(machine, at, pose, height)
+    height = _clear_z_mm(profile, printed, way.start)
+    values = resume_placeholders(machine, way.at_mm, way.start, height)
     named = "machine.gcode.resume"
     if machine.gcode.resume:
         homing = fill_block(machine.gcode.resume, named, values, dialect.longest_line)
     else:
         rise = f"G0 Z{{clear_z_mm}} F{60.0 * machine.z.speed_mm_s:.0f}"
         homing = fill_block("\n".join((*dialect.stands, *heat, rise, "G28 X Y")), named, values, dialect.longest_line)
-    raised = np.array([at[0], at[1], height])
+    raised = replace(way, at_mm=np.array([*way.at_mm[:2], height]))
     after = heat if machine.gcode.resume else ()
-    return ["G21", "G90", *homing, *after, *return_moves(profile, printed, raised, pose, goal, goal_pose)]
+    return ["G21", "G90", *homing, *after, *return_moves(profile, printed, raised)]
 
 
 def _clear_z_mm(profile: Profile, printed: Printed, pose: Pose) -> float:

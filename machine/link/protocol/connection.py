@@ -5,25 +5,9 @@ The caller owns port and clock: it writes what take() gives, hands what it reads
 
 from machine.firmware import Firmware
 from machine.firmware.marlin import MARLIN
-from machine.link.protocol import verdict
+from machine.link.protocol import events, verdict
 from machine.link.protocol.acknowledgement import Acknowledgement
 from machine.link.protocol.decoder import LineDecoder
-from machine.link.protocol.events import (
-    Area,
-    Banner,
-    Busy,
-    Capability,
-    Echo,
-    Event,
-    FirmwareFault,
-    Identity,
-    LineError,
-    Ok,
-    Resend,
-    Start,
-    Wait,
-    is_halt,
-)
 from machine.link.protocol.flow_control import FlowControl
 from machine.link.protocol.framing import LINE_LIMIT, frame
 from machine.link.protocol.greeting import GREETING, Greeting
@@ -50,6 +34,7 @@ class Connection:
         self,
         timing: Timing | None = None,
         now_s: float = 0.0,
+        *,
         limit: int = LINE_LIMIT,
         firmware: Firmware = MARLIN,
         rx_bytes: int | None = None,
@@ -91,13 +76,13 @@ class Connection:
         self._out.clear()
         return out
 
-    def receive(self, data: bytes, now_s: float) -> list[Event]:
+    def receive(self, data: bytes, now_s: float) -> list[events.Event]:
         """The events of received bytes, in any portions."""
         self._timeouts.heard_s = now_s
-        events = self._decoder.receive(data, now_s)
-        for event in events:
+        received = self._decoder.receive(data, now_s)
+        for event in received:
             self._handle(event, now_s)
-        return events
+        return received
 
     def tick(self, now_s: float) -> None:
         """Let time pass: drains, pauses before a repeat, stalls."""
@@ -133,40 +118,45 @@ class Connection:
             self._timeouts.progress_s = now_s
         self._out += self.window.send(command, now_s)
 
-    def _handle(self, event: Event, now_s: float) -> None:
+    def _handle(self, event: events.Event, now_s: float) -> None:
         match event:
-            case Ok():
-                if (identity := event.identity) is not None:
-                    self.greeting.learn(identity)
-                    self.window.rx_bytes = self.greeting.rx_bytes
+            case events.Ok():
+                if identity := events.identity_in(event):
+                    self._learn(identity)
                 self._handle_ok(event, now_s)
-            case Resend() if self.state is not State.SYNC:
+            case events.Resend() if self.state is not State.SYNC:
                 self._handle_resend(event, now_s)
-            case LineError() if self.state in (State.DRAIN, State.SYNC):  # of what came before: no line of ours has a number yet
+            case events.LineError() if self.state in (
+                State.DRAIN,
+                State.SYNC,
+            ):  # of what came before the first number
                 self.greeting.heard = event.text
-            case LineError():
+            case events.LineError():
                 self._oks.expect_resend_ok(self._timeouts.hear_line_error(now_s))
-            case Busy():
+            case events.Busy():
                 self.greeting.heard = event.text
                 self._timeouts.hear_busy(now_s)
-            case Start():
+            case events.Start():
                 self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))
-            case Banner() if self.state not in GREETING_STATES:  # there it follows a `start` that was heeded
+            case events.Banner() if self.state not in GREETING_STATES:  # there it follows a `start` that was heeded
                 self._follow(Signal.START, now_s, verdict.restart(self.window.last_acknowledged))
-            case FirmwareFault():
-                self.halted = self.halted or is_halt(event)
+            case events.FirmwareFault():
+                self.halted = self.halted or events.is_halt(event)
                 self._follow(Signal.FAULT, now_s, verdict.firmware_fault(event.text))
-            case Wait():
+            case events.Wait():
                 if self._questions.hear_idle(bool(self.window.flight)):
                     self._follow(Signal.STALL, now_s)
-            case Echo():
+            case events.Echo():
                 self._oks.hear_echo(event.text)
-            case Identity() | Capability() | Area():
-                self.greeting.learn(event)
-                self.window.rx_bytes = self.greeting.rx_bytes
+            case events.Identity() | events.Capability() | events.Area():
+                self._learn(event)
 
-    def _handle_ok(self, ok: Ok, now_s: float) -> None:
-        """What an `ok` answers depends on the state: M110, a Resend, or a line in flight."""
+    def _learn(self, answer: events.Identity | events.Capability | events.Area) -> None:
+        self.greeting.learn(answer)
+        self.window.rx_bytes = self.greeting.rx_bytes
+
+    def _handle_ok(self, ok: events.Ok, now_s: float) -> None:
+        """What an `ok` answers depends on the state: M110, a events.Resend, or a line in flight."""
         unknown = self._oks.take_unknown()
         if ok.line is not None:
             self._flow.learn(ok.rx_free)
@@ -178,7 +168,7 @@ class Connection:
                 self._follow(Signal.SYNCED, now_s)
         elif self.state is State.QUIET:
             if self.resends.alone and ok.line is None and ok.temperature is None:
-                self._follow(Signal.HUSH, now_s)  # the ok that belongs to the Resend, and nothing else is on its way
+                self._follow(Signal.HUSH, now_s)  # the ok that belongs to the events.Resend, and nothing else is on its way
         elif self.state is State.RENUMBER:
             if self._oks.answers_m110(ok, self.advanced, unknown, now_s):
                 self.window.restart_numbers()
@@ -218,7 +208,7 @@ class Connection:
         ):
             self._follow(Signal.ANSWERED, now_s)
 
-    def _handle_resend(self, resend: Resend, now_s: float) -> None:
+    def _handle_resend(self, resend: events.Resend, now_s: float) -> None:
         ok_until_s = self._timeouts.hear_resend(now_s, self.state is State.RENUMBER)
         if self.greeting.firmware.line.resend_ok:
             self._oks.expect_resend_ok(ok_until_s)

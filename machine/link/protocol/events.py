@@ -41,11 +41,6 @@ class Ok:
     text: str = ""
     position: Position | None = None
 
-    @property
-    def identity(self) -> "Identity | None":
-        """The firmware's name, which Klipper puts behind its ok."""
-        return Identity(self.text[self.text.index(NAME) :]) if NAME in self.text else None
-
 
 @dataclass(frozen=True, slots=True)
 class Resend:
@@ -55,24 +50,38 @@ class Resend:
 
 
 @dataclass(frozen=True, slots=True)
-class Busy:
+class Text:
+    """A line, or what of it matters, as it was said."""
+
+    text: str
+
+
+class Busy(Text):
     """The printer lives but has no time for more lines."""
 
-    text: str
 
-
-@dataclass(frozen=True, slots=True)
-class LineError:
+class LineError(Text):
     """An error of the transmission only (checksum, line number); a Resend follows."""
 
-    text: str
 
-
-@dataclass(frozen=True, slots=True)
-class FirmwareFault:
+class FirmwareFault(Text):
     """Any other error: the printer has stopped or must be stopped."""
 
-    text: str
+
+class Identity(Text):
+    """The FIRMWARE_NAME line of the answer to M115."""
+
+
+class Echo(Text):
+    """Words for people: `echo:`, `//`, `Warning:`."""
+
+
+class Banner(Text):
+    """Words that a firmware says only while it starts; they betray a restart whose `start` was lost."""
+
+
+class Unknown(Text):
+    """Anything else, rubbish included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,13 +90,6 @@ class Capability:
 
     name: str
     present: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """The FIRMWARE_NAME line of the answer to M115."""
-
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,34 +108,13 @@ class Action:
 
 
 @dataclass(frozen=True, slots=True)
-class Echo:
-    """Words for people: `echo:`, `//`, `Warning:`."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class Start:
     """The printer has just started: counters, position and temperatures are gone."""
 
 
 @dataclass(frozen=True, slots=True)
-class Banner:
-    """Words that a firmware says only while it starts; they betray a restart whose `start` was lost."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class Wait:
     """The printer has nothing to do (Repetier says so every second)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Unknown:
-    """Anything else, rubbish included."""
-
-    text: str
 
 
 Report = Temperature | Position | Capability | Identity | Area | Action | Echo | Unknown
@@ -183,6 +164,23 @@ def read_event(raw: bytes) -> Event:
     if folded.startswith(("echo:busy:", "busy:")):
         return Busy(text)
     return _read_report(text)
+
+
+def temperature_in(event: Event) -> Temperature | None:
+    """What a line reports of the heaters: by itself, or behind the ok of M105."""
+    return event.temperature if isinstance(event, Ok) else event if isinstance(event, Temperature) else None
+
+
+def position_in(event: Event) -> Position | None:
+    """Where a line says that the axes stand: by itself, or behind an ok as Smoothie has it."""
+    return event.position if isinstance(event, Ok) else event if isinstance(event, Position) else None
+
+
+def identity_in(event: Event) -> Identity | None:
+    """The firmware's name: a line of its own, or behind an ok as Klipper has it."""
+    if isinstance(event, Ok) and NAME in event.text:
+        return Identity(event.text[event.text.index(NAME) :])
+    return event if isinstance(event, Identity) else None
 
 
 def unknown_command(event: Event) -> str:

@@ -8,32 +8,11 @@ PROBING_S = 1800.0  # a mesh of 15 x 15 points
 HOMING_S = 600.0  # five axes at the speed of the slowest
 HANDS_S = 86400.0  # a person changes the filament
 SLOW_S = {
-    "G4": HEATING_S,
-    "G28": HOMING_S,
-    "G29": PROBING_S,
-    "G30": HOMING_S,
-    "G32": PROBING_S,
-    "G33": PROBING_S,
-    "G34": PROBING_S,
-    "M48": PROBING_S,
-    "M109": HEATING_S,
-    "M116": HEATING_S,
-    "M125": HANDS_S,
-    "M190": HEATING_S,
-    "M191": HEATING_S,
-    "M226": HANDS_S,
-    "M303": HEATING_S,
-    "M400": HEATING_S,
-    # While an AVR writes its EEPROM the receive interrupt is off: bytes that come then are lost.
-    "M500": 10.0,
-    "M502": 10.0,
-    "M600": HANDS_S,
-    "M701": HANDS_S,
-    "M702": HANDS_S,
-    "TEMPERATURE_WAIT": HEATING_S,
-    "BED_MESH_CALIBRATE": PROBING_S,
-    "PAUSE": HANDS_S,
-    "MANUAL_STEPPER": HOMING_S,
+    **dict.fromkeys(("G4", "M109", "M116", "M190", "M191", "M303", "M400", "TEMPERATURE_WAIT"), HEATING_S),
+    **dict.fromkeys(("G29", "G32", "G33", "G34", "M48", "BED_MESH_CALIBRATE"), PROBING_S),
+    **dict.fromkeys(("G28", "G30", "MANUAL_STEPPER"), HOMING_S),
+    **dict.fromkeys(("M125", "M226", "M600", "M701", "M702", "PAUSE"), HANDS_S),
+    **dict.fromkeys(("M500", "M502"), 10.0),  # while an AVR writes its EEPROM the receive interrupt is off: bytes are lost
 }
 
 

@@ -43,10 +43,14 @@ class Signal(Enum):
     LAST_NUMBER = "the last line number was used, and no line is in flight"
 
 
+# What ends a print whatever it is at, and what a lost port leads to.
+_ENDS = {Signal.START: State.LOST, Signal.UNCHECKED: State.LOST, Signal.FAULT: State.HALTED}
+_DOUBTS = {Signal.RECONNECTED: State.PROBING, Signal.IMPOSSIBLE: State.LOST, **_ENDS}
+# Lines are on their way, each to be acknowledged.
+_FEEDING = {Signal.RESEND: State.QUIET, Signal.IMPLAUSIBLE: State.PROBING, Signal.STALL: State.PROBING, **_DOUBTS}
+
 TABLE: dict[State, dict[Signal, State]] = {
-    State.DRAIN: {
-        Signal.HUSH: State.SYNC,
-    },
+    State.DRAIN: {Signal.HUSH: State.SYNC},
     State.SYNC: {
         Signal.SYNCED: State.HELLO,
         Signal.STALL: State.SYNC,
@@ -62,57 +66,16 @@ TABLE: dict[State, dict[Signal, State]] = {
         Signal.START: State.DRAIN,
         Signal.FAULT: State.HALTED,
     },
-    State.OPEN: {
-        Signal.RECONNECTED: State.PROBING,
-        Signal.LAST_NUMBER: State.RENUMBER,
-        Signal.RESEND: State.QUIET,
-        Signal.IMPLAUSIBLE: State.PROBING,
-        Signal.STALL: State.PROBING,
-        Signal.IMPOSSIBLE: State.LOST,
-        Signal.START: State.LOST,
-        Signal.UNCHECKED: State.LOST,
-        Signal.FAULT: State.HALTED,
-    },
-    State.PROBING: {
-        Signal.RECONNECTED: State.PROBING,
-        Signal.ANSWERED: State.OPEN,
-        Signal.RESEND: State.QUIET,
-        Signal.IMPLAUSIBLE: State.PROBING,
-        Signal.STALL: State.PROBING,
-        Signal.SILENT: State.LOST,
-        Signal.IMPOSSIBLE: State.LOST,
-        Signal.START: State.LOST,
-        Signal.UNCHECKED: State.LOST,
-        Signal.FAULT: State.HALTED,
-    },
-    State.QUIET: {
-        Signal.RECONNECTED: State.PROBING,
-        Signal.HUSH: State.REPEAT,
-        Signal.IMPOSSIBLE: State.LOST,
-        Signal.START: State.LOST,
-        Signal.UNCHECKED: State.LOST,
-        Signal.FAULT: State.HALTED,
-    },
-    State.REPEAT: {
-        Signal.RECONNECTED: State.PROBING,
-        Signal.ANSWERED: State.REPEAT,
-        Signal.CAUGHT_UP: State.OPEN,
-        Signal.RESEND: State.QUIET,
-        Signal.IMPLAUSIBLE: State.PROBING,
-        Signal.STALL: State.PROBING,
-        Signal.IMPOSSIBLE: State.LOST,
-        Signal.START: State.LOST,
-        Signal.UNCHECKED: State.LOST,
-        Signal.FAULT: State.HALTED,
-    },
+    State.OPEN: {Signal.LAST_NUMBER: State.RENUMBER, **_FEEDING},
+    State.PROBING: {Signal.ANSWERED: State.OPEN, Signal.SILENT: State.LOST, **_FEEDING},
+    State.QUIET: {Signal.HUSH: State.REPEAT, **_DOUBTS},
+    State.REPEAT: {Signal.ANSWERED: State.REPEAT, Signal.CAUGHT_UP: State.OPEN, **_FEEDING},
     State.RENUMBER: {
         Signal.RECONNECTED: State.RENUMBER,
         Signal.SYNCED: State.OPEN,
         Signal.STALL: State.RENUMBER,
         Signal.SILENT: State.LOST,
-        Signal.START: State.LOST,
-        Signal.UNCHECKED: State.LOST,
-        Signal.FAULT: State.HALTED,
+        **_ENDS,
     },
     State.HALTED: {},
     State.LOST: {},

@@ -505,7 +505,13 @@ def cancelled(text: GcodeFile, port: str) -> Path:
     stop = Flag()
     with journal_of(text, "first") as journal:
         outcome = print_lines(
-            text, port, 250000, lambda told: stop.set() if told.file_line > 190 else None, stop, profile=PROFILE, journal=journal
+            text,
+            port,
+            250000,
+            on_progress=lambda told: stop.set() if told.file_line > 190 else None,
+            stop=stop,
+            profile=PROFILE,
+            journal=journal,
         )
     assert outcome.cancelled
     return journal.path

@@ -664,6 +664,27 @@ def framed_as(line: str) -> str:
     return frame(int(number), command).decode().strip()
 
 
+BESIDES: dict[str, Callable[[BuildOptions], list[Fault]]] = {
+    "the number becomes that of the line before": lambda build: [Fault("flip", byte(LINE + 1, 2, build), value=0)],
+    "the checksum's star becomes a newline": lambda build: [
+        Fault("flip", wire(build).index(b"*", byte(LINE, 0, build)), value=5)
+    ],
+    "a byte doubled": lambda build: [Fault("duplicate", byte(LINE, 7, build))],
+    "bytes of answers lost": lambda build: [Fault("drop", 1500 + n, True) for n in (0, 71, 133, 280)],
+    "bytes of answers flipped": lambda build: [Fault("flip", 1500 + n, True, n % 7) for n in (0, 71, 133, 280)],
+    "the last oks lost": lambda build: [Fault("swallow ok", answer(LINE, build) + 85 + n) for n in range(3)],
+    "a damaged greeting": lambda build: [Fault("drop", 3), Fault("flip", 20, value=2), Fault("drop", 30, True)],
+}
+
+
+@BOTH
+@pytest.mark.parametrize("name", BESIDES)
+def test_what_else_noise_may_do_is_healed(build: BuildOptions, name: str) -> None:
+    done = printed(BESIDES[name](build), build)
+    assert_exact(done)
+    assert (done.sent, done.heard) != (clean(build).sent, clean(build).heard)
+
+
 def test_every_scenario_has_its_number() -> None:
     named = {int(name[14:16]) for name in globals() if name.startswith("test_scenario_")}
     assert named == set(range(1, 48))

@@ -2,7 +2,6 @@ import errno
 import os
 import pty
 import signal
-import socket
 import threading
 import tty
 from collections.abc import Callable, Iterator
@@ -11,18 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import serial
 
-from machine.link.medium import Medium
 from machine.link.port import open_port, refusal
-from machine.link.progress import ProgramPosition, Progress, Schedule
-from machine.link.protocol.framing import frame
+from machine.link.progress import Progress, Schedule
 from machine.link.protocol.timeout import Timing
 from machine.link.stream import Outcome, print_lines
 from machine.reader.parse import parse_gcode
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import HEALED, Fault, random_script
-from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import FirmwareError, LocalProtocolError, PortError, PrinterError, SilenceError
@@ -92,7 +87,7 @@ def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
     told: list[Progress] = []
     body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + body, printer.path, 250000, told.append, timing=PATIENT)
+        print_lines(HEAT + body, printer.path, 250000, on_progress=told.append, timing=PATIENT)
     last = told[-1]
     assert (last.sent, last.acknowledged, last.total) == (6, 6, 6)
     assert (last.part, last.parts, last.layer, last.share) == (2, 2, 2, 0.5)
@@ -112,7 +107,7 @@ COMMENTED = {
 def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) -> None:
     told: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, told.append, timing=PATIENT)
+        print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, on_progress=told.append, timing=PATIENT)
     parsed = parse_gcode(COMMENTED[slicer], MACHINE)
     assert (told[-1].layer, told[-1].part or 0) == (2, parsed.part[-1]) == (parsed.layer[-1], parsed.part[-1])
 
@@ -120,7 +115,7 @@ def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) ->
 def test_m73_and_m220_count_in_lower_case_too() -> None:
     told: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
-        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, told.append, timing=PATIENT)
+        print_lines([*HEAT, "m73 p50", "m220 s80"], printer.path, 250000, on_progress=told.append, timing=PATIENT)
     assert (told[-1].share, told[-1].feed_percent) == (0.5, 80.0)
 
 
@@ -128,7 +123,9 @@ def test_the_time_left_is_that_of_the_lines_left_at_the_feed_override() -> None:
     told: list[Progress] = []
     with SimulatedPrinter(MACHINE) as printer:
         schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=2.0)
-        print_lines(iter(["G21", "M220 S50", "G90"]), printer.path, 250000, told.append, schedule=schedule, timing=PATIENT)
+        print_lines(
+            iter(["G21", "M220 S50", "G90"]), printer.path, 250000, on_progress=told.append, schedule=schedule, timing=PATIENT
+        )
     assert told[-1].left_s == pytest.approx((1000.0 - 300.0) / 2.0 / 0.5)
     assert told[-1].total is None
 
@@ -137,11 +134,6 @@ def test_where_the_pace_is_not_known_the_one_so_far_holds() -> None:
     schedule = Schedule(lambda line: 1000.0 - 100.0 * line, pace=None)
     assert schedule.left_s(2, 4, 10.0, 50.0) == pytest.approx(600.0 * 10.0 / 200.0)
     assert schedule.left_s(2, 2, 10.0, 50.0) is None
-
-
-def test_m73_s_minutes_follow_the_feed_override() -> None:
-    place = ProgramPosition(minutes_left=3.0, reported_at_s=10.0)
-    assert place.left_s(20.0, 200.0) == pytest.approx(80.0)
 
 
 @pytest.mark.parametrize("bad", ["M117 schön", "M117 " + "x" * 90, "G1 X1*5", "M112", "M0 wait"])
@@ -191,7 +183,9 @@ def _once_sent(count: int, act: Callable[[], object]) -> Callable[[Progress], No
 def test_stopping_leaves_heaters_off_and_moves_nothing_home(lines: list[str]) -> None:
     stop = threading.Event()
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
-        outcome = print_lines(["M106 S255", *lines], printer.path, 250000, _once_sent(2, stop.set), stop=stop, timing=PATIENT)
+        outcome = print_lines(
+            ["M106 S255", *lines], printer.path, 250000, on_progress=_once_sent(2, stop.set), stop=stop, timing=PATIENT
+        )
         record = printer.record
     assert outcome.cancelled
     assert outcome.heaters_off
@@ -204,7 +198,7 @@ def test_without_an_emergency_parser_stopping_still_switches_the_heaters_off() -
     stop = threading.Event()
     with SimulatedPrinter(MACHINE, speed=5.0, build=BuildOptions(emergency_parser=False)) as printer:
         lines = ["M104 S200", *(["G1 X5 F3000", "G1 X0"] * 999)]
-        outcome = print_lines(lines, printer.path, 250000, _once_sent(9, stop.set), stop=stop, timing=PATIENT)
+        outcome = print_lines(lines, printer.path, 250000, on_progress=_once_sent(9, stop.set), stop=stop, timing=PATIENT)
         assert outcome.heaters_off
         assert printer.record.nozzle_target_c == 0.0
 
@@ -213,7 +207,7 @@ def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         press = _once_sent(9, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT))
         with pytest.raises(KeyboardInterrupt):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, press, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=press, timing=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
         assert printer.record.happened("nozzle 200")
 
@@ -225,68 +219,11 @@ def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
 
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         with pytest.raises(ZeroDivisionError):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, burst, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=burst, timing=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
 
 
 PROGRAM = ["M104 S200", "M109 S200", *strokes(300)]
-WIRE = [b"N0 M110 N0*125\n", frame(1, "M115"), frame(2, "M105"), frame(3, "M155 S2")]
-WIRE += [frame(4 + i, line) for i, line in enumerate(PROGRAM)]
-
-
-def byte_of(line: int, offset: int = 0) -> int:
-    """Where a byte of a wire line stands in the faultless stream to the printer; negative offsets count from its end."""
-    return sum(len(w) for w in WIRE[:line]) + (offset if offset >= 0 else len(WIRE[line]) + offset)
-
-
-def answered(lines: int) -> bytes:
-    """What a faultless printer says to the first wire lines."""
-    firmware = SimulatedFirmware(MACHINE)
-    firmware.receive(b"".join(WIRE[:lines]))
-    return firmware.advance()
-
-
-LINE = answered(50).count(b"\n")  # answers and bytes before the strokes that the faults below aim at
-BYTE = len(answered(50))
-LOST_LINE = tuple(Fault("drop", byte_of(50, i)) for i in range(len(WIRE[50])))
-SURVIVED = {
-    "a byte lost": (Fault("drop", byte_of(50, 9)),),
-    "a bit flipped in a number": (Fault("flip", byte_of(50, 9), value=0),),
-    "the leading N lost": (Fault("drop", byte_of(50)),),
-    "the newline lost, two lines melt": (Fault("drop", byte_of(50, -1)),),
-    "a whole line lost": LOST_LINE,
-    "the number becomes that of the line before": (Fault("flip", byte_of(51, 2), value=0),),
-    "the checksum's star becomes a newline": (Fault("flip", byte_of(50, WIRE[50].index(b"*")), value=5),),
-    "a byte doubled": (Fault("duplicate", byte_of(50, 7)),),
-    "an ok lost": (Fault("swallow ok", LINE, True),),
-    "three oks lost in a row": tuple(Fault("swallow ok", LINE + n, True) for n in range(3)),
-    "the last oks lost": tuple(Fault("swallow ok", LINE + n, True) for n in range(250, 253)),
-    "bytes of answers lost": tuple(Fault("drop", BYTE + n, True) for n in (0, 71, 133, 280)),
-    "bytes of answers flipped": tuple(Fault("flip", BYTE + n, True, n % 7) for n in (0, 71, 133, 280)),
-    "a resend of an acknowledged line": (Fault("spurious resend", LINE, True, 45),),
-    "a resend of a line far back": (Fault("spurious resend", LINE, True, 10),),
-    "a resend of a line to come": (Fault("spurious resend", LINE, True, 999),),
-    "a damaged greeting": (Fault("drop", 3), Fault("flip", 20, value=2), Fault("drop", 30, True)),
-}
-
-
-@pytest.mark.parametrize("build", [BuildOptions(), PLAIN], ids=["advanced", "plain"])
-@pytest.mark.parametrize("name", SURVIVED)
-def test_a_fault_is_healed(name: str, build: BuildOptions) -> None:
-    outcome, record = run(PROGRAM, SURVIVED[name], build)
-    assert_executed(record, PROGRAM)
-    assert outcome.acknowledged == len(PROGRAM)
-
-
-@pytest.mark.parametrize(("kind", "build"), [
-    ("reset", BuildOptions()), ("reset", PLAIN), ("silent reset", BuildOptions()), ("silent reset", PLAIN)])  # fmt: skip
-def test_a_restart_in_mid_print_stops_it_at_once(kind: str, build: BuildOptions) -> None:
-    with SimulatedPrinter(MACHINE, build=build, faults=[Fault(kind, byte_of(100), unit="byte")]) as printer:  # type: ignore[arg-type]
-        with pytest.raises(FirmwareError, match="restarted"):
-            print_lines(PROGRAM, printer.path, 250000, timing=QUICK)
-        record = printer.record
-    assert_executed(record, PROGRAM, whole=False)
-    assert 60 < len(record.end) < 97  # the planner's sixteen are lost too
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -306,7 +243,7 @@ def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
         other = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
         kill = _once_sent(9, lambda: os.write(other, b"\nM112\n"))
         with pytest.raises(FirmwareError, match="Printer halted"):
-            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, kill, timing=PATIENT)
+            print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=kill, timing=PATIENT)
         os.close(other)
         assert printer.record.nozzle_target_c == 0.0
 
@@ -342,15 +279,6 @@ def test_an_impossible_baud_rate_is_named(baud: int) -> None:
         open_port("/dev/null", baud)
 
 
-def test_a_port_that_another_program_holds_is_busy() -> None:
-    with (
-        SimulatedPrinter(MACHINE) as printer,
-        serial.Serial(printer.path, exclusive=True),
-        pytest.raises(PortError, match="is busy: another program holds it"),
-    ):
-        print_lines(["G28"], printer.path, 250000)
-
-
 def test_a_port_without_rights_names_the_group_that_has_them(tmp_path: Path) -> None:
     sentence = refusal(str(tmp_path), 115200, PermissionError(errno.EACCES, "denied"))
     assert "belongs to group" in sentence
@@ -366,40 +294,3 @@ def test_a_cable_pulled_out_is_one_error_for_reading_and_writing() -> None:
         with pytest.raises(PortError, match="was lost"):
             act()
     port.close()
-
-
-def test_a_cable_pulled_in_mid_print_ends_it_and_leaves_no_thread() -> None:
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    firmware = SimulatedFirmware(MACHINE)
-
-    def serve() -> None:
-        while firmware._taken < 100:
-            firmware.receive(os.read(master, 4096))
-            os.write(master, firmware.advance())
-        os.close(master)
-
-    before, server = set(threading.enumerate()), threading.Thread(target=serve, daemon=True)
-    server.start()
-    with pytest.raises(PortError, match=r"was lost.*its heaters may still be on"):
-        print_lines(PROGRAM, os.ttyname(slave), 250000, timing=QUICK, medium=Medium(lost_s=0.3))
-    server.join(PATIENCE_S)
-    os.close(slave)
-    assert set(threading.enumerate()) <= before
-
-
-def test_a_printer_behind_a_socket_is_printed_on_too() -> None:
-    firmware, server = SimulatedFirmware(MACHINE), socket.create_server(("localhost", 0))
-
-    def serve() -> None:
-        host, _ = server.accept()
-        with host:
-            while data := host.recv(4096):
-                firmware.receive(data)
-                host.sendall(firmware.advance())
-
-    threading.Thread(target=serve, daemon=True).start()
-    with server:
-        outcome = print_lines(PROGRAM, f"socket://localhost:{server.getsockname()[1]}", 115200, timing=PATIENT)
-    assert outcome.acknowledged == len(PROGRAM)
-    assert_executed(firmware.record(), PROGRAM)

@@ -130,7 +130,7 @@ def test_a_halt_forgets_the_filament_that_was_not_pushed() -> None:
 
 def test_a_short_record_keeps_the_last_moves_and_all_sums() -> None:
     lines = ["M302 P1", "M83", *(f"G1 X{k % 50} E0.1 F6000" for k in range(1, 2001)), "M400"]
-    long, short = ran(lines).record(), SimulatedFirmware(MACHINE, BuildOptions(busy=False, home_start=False), kept=100)
+    long, short = ran(lines).record(), SimulatedFirmware(MACHINE, BuildOptions(busy=False, home_start=False), kept_moves=100)
     short.receive("".join(f"{line}\n" for line in lines).encode())
     short.advance()
     few = short.record()

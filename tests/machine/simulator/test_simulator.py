@@ -10,7 +10,6 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from machine.link.protocol.framing import frame
 from machine.simulator.board import BuildOptions, Heater
 from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
@@ -37,63 +36,8 @@ def ran(text: str) -> SimulatedFirmware:
     return firmware
 
 
-def test_a_numbered_line_is_taken_with_ok() -> None:
-    firmware = printer()
-    assert answer(firmware, b"N0 M110 N0*125\n" + frame(1, "G1 X5")) == ["ok", "ok"]
-    assert firmware.record().end[:, 0].tolist() == [5.0]
-
-
-def test_any_line_number_may_be_set_in_both_ways_of_writing() -> None:
-    firmware = printer()
-    assert answer(firmware, b"N-1 M110 N-1*125\n" + frame(0, "G1 X1")) == ["ok", "ok"]
-    assert answer(firmware, b"M110 N70\n") == ["ok"]
-
-
-def test_a_wrong_checksum_is_refused_in_marlins_words() -> None:
-    assert answer(printer(), "N1 G28*19\n") == ["Error:checksum mismatch, Last Line: 0", "Resend: 1", "ok"]
-
-
 def test_a_missing_checksum_is_refused_in_marlins_words() -> None:
     assert answer(printer(), "N1 G28\n") == ["Error:No Checksum with line number, Last Line: 0", "Resend: 1", "ok"]
-
-
-@pytest.mark.parametrize("number", [3, 99])
-def test_a_number_too_high_is_refused_in_marlins_words(number: int) -> None:
-    said = answer(printer(), frame(number, "G28"))
-    assert said == ["Error:Line Number is not Last Line Number+1, Last Line: 0", "Resend: 1", "ok"]
-
-
-def test_a_refusal_throws_away_what_waits_behind() -> None:
-    firmware = printer()
-    assert len(answer(firmware, frame(2, "G1 X1") + frame(1, "G1 X2") + b"N2 G1")) == 3
-    assert answer(firmware, frame(1, "G1 X3")) == ["ok"]
-
-
-def test_a_repeat_of_the_last_two_lines_is_swallowed_in_silence() -> None:
-    firmware = printer()
-    answer(firmware, frame(1, "G1 X1") + frame(2, "G1 X2") + frame(3, "G1 X3"))
-    assert answer(firmware, frame(3, "G1 X3") + frame(2, "G1 X2")) == []
-    assert answer(firmware, frame(1, "G1 X1"))[1] == "Resend: 4"
-
-
-def test_a_line_over_95_characters_loses_its_checksum() -> None:
-    said = answer(printer(), b"N1 M117 " + b"x" * 90 + b"*11\n")
-    assert said[0] == "Error:No Checksum with line number, Last Line: 0"
-
-
-def test_a_lost_n_makes_an_unknown_command_that_is_still_answered() -> None:
-    assert answer(printer(), "5 G92 Z0*3\n") == ['echo:Unknown command: "5 G92 Z0"', "ok"]
-
-
-def test_unnumbered_lines_comments_and_blank_lines_are_as_in_marlin() -> None:
-    assert answer(printer(), ";c\n\n  \nG21 ; mm\nG1X1 F600;go\n") == ["ok", "ok"]
-
-
-def test_advanced_ok_tells_number_and_free_places() -> None:
-    firmware = printer(BuildOptions())
-    assert answer(firmware, frame(1, "G21") + frame(2, "G1 X9")) == ["ok N1 P15 B2", "ok N2 P14 B3"]
-    assert answer(firmware, "G91\n") == ["ok P14 B3"]
-    assert answer(firmware, frame(3, "M105"))[0].startswith("ok T:20.00 /0.00 B:20.00 /0.00")
 
 
 def test_ok_is_withheld_while_fifteen_blocks_are_planned() -> None:
@@ -103,30 +47,12 @@ def test_ok_is_withheld_while_fifteen_blocks_are_planned() -> None:
     assert len(answer(firmware, "", until_s=2.5)) in (2, 3)
 
 
-def test_busy_comes_every_two_seconds_of_a_long_wait() -> None:
-    assert answer(printer(), "G4 S9\n") == ["echo:busy: processing"] * 4 + ["ok"]
-
-
 def test_waiting_for_heat_tells_temperatures_every_second_until_they_are_reached() -> None:
     firmware = printer()
     *reports, last = answer(firmware, "M109 S200\n")
     assert last == "ok"
     assert 20 < len(reports) < 120
     assert firmware.board.nozzle.at(firmware.board.now_s) == pytest.approx(199.0, abs=0.1)
-
-
-def test_m108_ends_a_wait_for_heat() -> None:
-    firmware = printer()
-    answer(firmware, "M109 S200\n", until_s=5.0)
-    assert answer(firmware, "M108\n", until_s=5.0)[-2:] == ["ok", "ok"]
-
-
-@pytest.mark.parametrize(("parser", "at_once"), [(True, True), (False, False)])
-def test_m112_is_read_past_full_queues_only_by_an_emergency_parser(parser: bool, at_once: bool) -> None:
-    firmware = printer(BuildOptions(emergency_parser=parser))
-    answer(firmware, "G4 S20\n" * 6, until_s=1.0)
-    said = answer(firmware, "N99 M112*0\n", until_s=1.0)
-    assert ("Error:Printer halted. kill() called!" in said) == at_once
 
 
 def test_after_kill_there_is_silence_until_reset() -> None:
@@ -145,23 +71,10 @@ def test_m410_cuts_the_move_under_way_and_drops_the_rest() -> None:
     assert answer(firmware, "M114\n", until_s=6.0)[0].startswith(f"X:{firmware.record().end[-1, 0]:.2f} ")
 
 
-def test_temperature_reports_come_by_themselves_after_m155() -> None:
-    firmware = printer()
-    answer(firmware, "M155 S2\n", until_s=0.0)
-    assert len(answer(firmware, "", until_s=9.0)) == 4
-    assert answer(firmware, "M155 S0\n", until_s=30.0)[-1] == "ok"
-
-
 def test_m114_and_g92_tell_all_axes() -> None:
     said = answer(printer(), "G92 X1 A-30 C725 E2\nM114\n")
     assert said[0] == said[2]
     assert said[0].startswith("X:1.00 Y:0.00 Z:0.00 A:-30.00 C:725.00 E:2.00 Count X:0 ")
-
-
-def test_m115_names_itself_and_its_capabilities() -> None:
-    said = answer(printer(), "M115\n")
-    assert said[0].startswith("FIRMWARE_NAME:Marlin")
-    assert "Cap:AUTOREPORT_TEMP:1" in said
 
 
 def test_g92_renames_the_place_and_moves_nothing() -> None:
@@ -180,19 +93,6 @@ def test_g90_makes_filament_absolute_again_as_in_marlin() -> None:
     assert record.end[:, 5].tolist() == [1.0, 2.0, 2.5]
 
 
-def test_soft_limits_clamp_and_are_counted() -> None:
-    record = ran("G0 A200\nG1 X-999 F6000\n").record()
-    assert record.end[0, 3] == 95.0
-    assert record.end[1, 0] == -160.0
-    assert record.clamped == 2
-
-
-def test_cold_extrusion_moves_without_filament() -> None:
-    firmware = printer()
-    assert answer(firmware, "M83\nG1 X1 E1\n") == ["ok", "echo: cold extrusion prevented", "ok"]
-    assert firmware.record().end[0, [0, 5]].tolist() == [1.0, 0.0]
-
-
 def test_homing_is_on_record_as_an_event() -> None:
     firmware = ran("G28 X Y\n")
     assert firmware.record().events[-1][1] == "homed XY"
@@ -204,10 +104,6 @@ def test_heaters_and_fan_at_the_end_are_on_record() -> None:
     assert (record.nozzle_target_c, record.bed_target_c, record.fan) == (210.0, 60.0, 0.5)
     record = ran("M140 S60\nM106\nM107\nM140 S0\n").record()
     assert (record.bed_target_c, record.fan) == (0.0, 0.0)
-
-
-def test_display_and_setup_commands_are_answered() -> None:
-    assert answer(printer(), "M73 P1 R2\nM117 Hi X5\nM204 P500\nM84\nM18\nT0\nM400\n") == ["ok"] * 7
 
 
 def test_commands_may_be_written_with_zeros_and_without_blanks() -> None:

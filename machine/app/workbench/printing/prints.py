@@ -21,7 +21,7 @@ from machine.app.workbench.printing.order import Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.news import News
 from machine.firmware.line import check_baud
-from machine.link.medium import stable_name
+from machine.link.port import stable_name
 from machine.network.address import is_server_address, parse_server_address
 from profiles.errors import PrinterError
 

@@ -16,7 +16,7 @@ from machine.link.progress import Progress
 from machine.link.protocol.events import Temperature
 from tests.machine.peers import PATIENCE_S
 
-MOMENT = Progress(0, 0, None, 0.0, None, None, Temperature(), None, None, None)
+MOMENT = Progress(0.0, Temperature())
 
 
 def asked(*keys: str, state: str = "printing") -> list[PendingCommand]:

@@ -55,7 +55,7 @@ def test_the_pose_is_that_of_the_acknowledged_line() -> None:
 
 
 def test_what_is_not_known_is_left_out() -> None:
-    unknown = Progress(0, 0, None, 0.0, None, None, Temperature(), None, None, None)
+    unknown = Progress(0.0, Temperature())
     _, place, heat, bar, times, _ = lines(unknown)
     assert (place, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far")
     assert "%" not in bar

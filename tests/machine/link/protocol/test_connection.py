@@ -24,7 +24,6 @@ from machine.link.protocol.events import (
 )
 from machine.link.protocol.framing import LINE_LIMIT, command_of, frame
 from machine.link.protocol.questions import QUESTIONS_MOST
-from machine.link.protocol.resends import ASKED_LIMIT
 from machine.link.protocol.states import State
 from machine.link.protocol.timeout import Timing
 from machine.link.protocol.verdict import SYNC_TRIES
@@ -213,16 +212,6 @@ def test_many_resends_for_lines_in_flight_cause_one_repetition_one_by_one() -> N
     assert table.connection.state is State.OPEN
 
 
-def test_a_resend_without_its_ok_goes_on_after_a_pause() -> None:
-    table = opened(advanced=False)
-    line = table.send("G1 X1")
-    table.say(b"Resend: 11\n")
-    table.wait(0.13)
-    assert table.wire() == line
-    table.say(b"ok\n")
-    assert table.connection.window.acknowledged == 11
-
-
 @pytest.mark.parametrize("advanced", [True, False])
 def test_a_lost_ok_is_cleared_up_by_a_new_question_never_by_a_repeat(advanced: bool) -> None:
     table = opened(advanced=advanced)
@@ -233,18 +222,6 @@ def test_a_lost_ok_is_cleared_up_by_a_new_question_never_by_a_repeat(advanced: b
     assert table.wire() == frame(12, "M105")
     table.say(b"ok T:20.00 /0.00\n")
     assert (table.connection.state, table.connection.window.acknowledged) == (State.OPEN, 12)
-
-
-def test_a_question_answered_by_resend_shows_which_line_was_lost() -> None:
-    table = opened(advanced=False)
-    line = table.send("G1 X1")
-    table.wait(30.1)
-    table.wire()
-    table.say(b"Error:Line Number is not Last Line Number+1, Last Line: 10\nResend: 11\nok\n")
-    table.wait(0.13)
-    assert table.wire() == line
-    table.say(b"ok\n")
-    assert table.wire() == frame(12, "M105")
 
 
 def test_busy_shortens_the_timeout_and_restarts_it() -> None:
@@ -281,15 +258,6 @@ def test_heating_may_take_its_time_and_is_asked_about_ever_later() -> None:
     assert table.connection.state is State.OPEN
 
 
-def test_a_dead_printer_is_given_up_in_bounded_time() -> None:
-    table = opened()
-    table.send("G1 X1")
-    while table.connection.fault is None and table.now_s < 1000:
-        table.wait(0.5)
-    assert isinstance(table.connection.fault, SilenceError)
-    assert table.now_s < 30.0 * (QUESTIONS_MOST + 2)
-
-
 def test_a_question_that_would_overflow_the_buffer_of_a_printer_in_a_long_move_waits_longer() -> None:
     table = opened()
     table.send(*["G1 X100.123 Y100.123 E1.12345"] * 2, "G1 X100.123 Y100.123 E1.12345 F1800.5")
@@ -297,13 +265,6 @@ def test_a_question_that_would_overflow_the_buffer_of_a_printer_in_a_long_move_w
     assert table.wire() == b""
     table.wait(1.1)
     assert table.wire() == frame(14, "M105")
-
-
-def test_two_waits_with_a_line_in_flight_ask_at_once() -> None:
-    table = opened()
-    table.send("G1 X1")
-    table.say(b"wait\nwait\n")
-    assert table.wire() == frame(12, "M105")
 
 
 @pytest.mark.parametrize("surplus", [b"ok\n", b"ok\nok\nok\n", b"ok N99 P15 B3\n", b"ok N4 P15 B3\n"])
@@ -359,15 +320,6 @@ def test_a_single_damaged_resend_number_does_no_harm() -> None:
     assert line == frame(11, "G1 X1")
 
 
-def test_the_same_line_asked_for_again_and_again_ends_the_print() -> None:
-    table = opened()
-    table.send("G1 X1")
-    for asked in range(ASKED_LIMIT + 1):
-        assert table.connection.fault is None, asked
-        table.say(b"Resend: 11\nok\n")
-    assert isinstance(table.connection.fault, RemoteProtocolError)
-
-
 @CHUNKS
 @pytest.mark.parametrize(("said", "state", "error"), [
     (b"start\n", State.LOST, FirmwareError),
@@ -384,14 +336,6 @@ def test_fatal_words_end_the_conversation(size: int, said: bytes, state: State, 
     assert table.wire() == b""
     with pytest.raises(LocalProtocolError):
         table.send("G1 X2")
-
-
-def test_a_torn_line_that_the_printer_did_not_understand_does_no_harm() -> None:
-    table = opened()
-    table.send("G1 X1")
-    table.say(b'echo:Unknown command: "11 G1 X1*97"\nok P15 B3\n')
-    assert table.connection.fault is None
-    assert table.connection.window.acknowledged == 10
 
 
 ACTS: dict[str, Callable[[Table, int], object]] = {
@@ -590,14 +534,6 @@ def test_an_error_whose_words_never_come_is_an_error() -> None:
     assert isinstance(table.connection.fault, FirmwareError)
 
 
-def test_an_error_of_the_line_whose_resend_is_lost_is_asked_about_at_once() -> None:
-    table = opened()
-    table.send("G1 X1")
-    table.say(b"Error:checksum mismatch, Last Line: 10\nok\n")
-    table.wait(0.6)
-    assert table.wire() == frame(12, "M105")
-
-
 def test_a_line_asked_for_in_every_tenth_line_is_too_much_noise() -> None:
     table = opened()
     for number in range(11, 300):
@@ -649,24 +585,6 @@ def test_a_restart_is_heard_behind_rubbish_and_by_its_other_words(said: bytes) -
     table.send("G1 X1")
     table.say(said)
     assert "restarted in the middle of the print" in str(table.connection.fault)
-
-
-def test_a_mended_cable_is_followed_by_a_question_and_what_was_lost_is_repeated() -> None:
-    table = opened()
-    line = table.send("G1 X1")
-    table.say(b"ok N1")
-    table.connection.reconnect(table.now_s)
-    assert table.wire() == frame(12, "M105")
-    table.say(b"Error:Line Number is not Last Line Number+1, Last Line: 10\nResend: 11\nok\n")
-    table.wait(0.2)
-    assert table.wire() == line
-
-
-def test_a_printer_that_restarted_behind_a_mended_cable_is_not_printed_on() -> None:
-    table = opened()
-    table.connection.reconnect(table.now_s)
-    table.say(b"Resend: 1\nok\n" * 2)
-    assert "restarted without a word" in str(table.connection.fault)
 
 
 def test_words_of_the_card_reader_do_not_stop_a_print() -> None:
