@@ -1,7 +1,6 @@
 """Part settings: what a person sets for one part alone, and which part it is for when planes come, go or change their order."""
 
-from machine.app.workbench.bench.following import Cuts, part_after
-from profiles.errors import PlanError
+from machine.app.workbench.bench.renumbering import Cuts, number_after
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, with_part_settings
 from profiles.toml_text import read_value
@@ -28,14 +27,6 @@ def own_values(profile: Profile, part: int) -> dict[str, object]:
     return next((dict(each.process) for each in profile.parts if each.part == part), {})
 
 
-def check_part(part: object, parts: int) -> int:
-    """The number of a part. Raises PlanError for one that is not there; an uncut model is part 1."""
-    most = max(parts, 1)
-    if not isinstance(part, int) or isinstance(part, bool) or not 1 <= part <= most:
-        raise PlanError(f"part is {part!r}: {'1 is' if most == 1 else f'1 to {most} are'} allowed")
-    return part
-
-
 def option(own: PartSettings) -> str:
     """What `--part` is given for them: `2:walls=5,seam=rear`."""
     return f"{own.part}:{','.join(f'{key}={_typed(value)}' for key, value in own.process.items())}"
@@ -45,10 +36,10 @@ def _typed(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def following(profile: Profile, before: Cuts, after: Cuts) -> Profile:
+def renumbered(profile: Profile, before: Cuts, after: Cuts) -> Profile:
     """The profile with settings for the parts that they were made for, among other planes; what a part that is gone had goes with
     it."""
-    places = ((each, part_after(before, after, each.part)) for each in profile.parts)
+    places = ((each, number_after(before, after, each.part)) for each in profile.parts)
     kept = [each.model_copy(update={"part": part}) for each, part in places if part is not None]
     kept.sort(key=lambda each: each.part)
     return profile if kept == profile.parts else profile.model_copy(update={"parts": kept})

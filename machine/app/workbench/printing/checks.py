@@ -6,7 +6,7 @@ from typing import Any
 
 from machine.app.pipeline import compilers
 from machine.app.workbench.printing.order import PrintOrder, State
-from machine.app.workbench.printing.teller import Said, Teller
+from machine.app.workbench.printing.reporter import Said, StateReporter
 from machine.dryrun.dryrun import dry_run, summary
 from machine.program import Program
 from profiles.errors import PlanError
@@ -21,7 +21,7 @@ LEFT: State = {"end": "left", "sentence": "nothing was printed"}
 class Checks:
     """What has been found in order, told as it is found; where --force goes past something, the words for that stand instead."""
 
-    def __init__(self, teller: Teller, said: Said) -> None:
+    def __init__(self, teller: StateReporter, said: Said) -> None:
         self.teller = teller
         self._said = said
         self._passed: tuple[str, ...] = ()

@@ -21,8 +21,8 @@ from machine.app.workbench.printing.at_port import print_at_port
 from machine.app.workbench.printing.at_server import follow_on_server, print_on_server
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
+from machine.app.workbench.printing.reporter import Said, StateReporter
 from machine.app.workbench.printing.rest import go_on
-from machine.app.workbench.printing.teller import Said, Teller
 from machine.app.workbench.work.worker import LENGTH
 from machine.network.address import is_server_address
 from profiles.errors import UserError
@@ -35,7 +35,7 @@ def main() -> None:
         os.dup2(nowhere.fileno(), 0)
         os.dup2(nowhere.fileno(), 1)
     order: Order = _read(asked)
-    teller = Teller(answers, first_state(order))
+    teller = StateReporter(answers, first_state(order))
     person = AtPage(teller)
     Thread(target=_listen, args=(asked, person), daemon=True).start()
     said = Said(teller)

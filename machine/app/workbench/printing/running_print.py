@@ -9,10 +9,11 @@ from contextlib import suppress
 from machine.app.crash import log_bug
 from machine.app.printer.rescue import STOP, cancel_on_server, rescue
 from machine.app.requests import SIMULATED
-from machine.app.workbench.printing.at_page import LEAVE
+from machine.app.workbench.printing.at_page import BEGIN, LEAVE
 from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
 from machine.app.workbench.work.processes import Process, end_process, start_process
 from machine.app.workbench.work.worker import LENGTH, frame
+from machine.link.pending_commands import Command
 from profiles.errors import PrinterError, UserError
 
 COMMAND = (sys.executable, "-m", "machine.app.workbench.printing.process")
@@ -79,7 +80,7 @@ class RunningPrint:
         if self.state["phase"] != "ready" or not self.asking or self._given_up:
             raise PrinterError("this print cannot begin now: it is not ready, or over")
         self._begun = True
-        self.say(("begin",))
+        self.say((BEGIN,))
 
     def fail(self, error: Exception) -> None:
         """It could not be printed at all, by a fault of this program."""
@@ -99,15 +100,19 @@ class RunningPrint:
         if asking and not isinstance(self._order, ResumeOrder):
             self._kill()
             return
-        self.say(("cancel",))
+        self.say((Command.CANCEL,))
         self._cancelled = not asking
         if asking:
             asyncio.get_running_loop().call_later(LEAVE_S, self._kill)
 
+    def leave(self) -> None:
+        """Let a print server go on with it by itself."""
+        self.say((LEAVE,))
+
     def end(self) -> None:
         """End it because the workbench ends: as a cancel does, but what a print server prints goes on there."""
         if self.state["server"] and not self.asking:
-            self.say((LEAVE,))
+            self.leave()
         else:
             self.cancel()
 
@@ -122,7 +127,7 @@ class RunningPrint:
             self._ended = True
             self._kill()
         else:
-            self.say(("emergency",))
+            self.say((Command.EMERGENCY_STOP,))
             asyncio.get_running_loop().call_later(EMERGENCY_S, self._kill)
 
     def _kill(self) -> None:

@@ -53,7 +53,7 @@ class Workbench:
         for session in self.sessions.values():
             if session.benches != benches:
                 session.benches = benches
-                session.tell()
+                session.notify()
 
 
 def _described(number: int, session: Session) -> OpenBench:

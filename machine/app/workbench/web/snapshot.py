@@ -7,6 +7,7 @@ from typing import Any
 from machine.app.workbench.bench.bench import Bench
 from machine.app.workbench.bench.model import Model
 from machine.app.workbench.bench.planes import Cuts
+from machine.app.workbench.session.commands import Need, lacking
 from machine.app.workbench.session.session import Session
 from machine.app.workbench.web.slices import slices_told
 from machine.view.front import front_record
@@ -33,6 +34,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "answers": session.answers,
         "busy": session.busy,
         "preparing": session.readiness.preparing > 0,
+        "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": history.now.word if history.before else "",
         "redo": history.undone[-1].word if history.undone else "",
         "model": None if bench.model is None else _model(bench.model),
@@ -58,7 +60,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "trial": _trial(session),
         "zones": _zones(bench),
         "marks": marks_key(bench),
-        "refused": asdict(session.trying.refused) if session.problem and session.trying.refused else None,
+        "refused": asdict(session.trials.refused) if session.problem and session.trials.refused else None,
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
         "given": asdict(bench.given),
@@ -103,9 +105,9 @@ def _model(model: Model) -> dict[str, Any]:
 
 def _trial(session: Session) -> dict[str, Any] | None:
     """The figures of the planes that were tried last, or why they cannot be cut."""
-    if session.trying.trial is None or session.trying.trial[0].sought != session.bench.sought:
+    if session.trials.trial is None or session.trials.trial[0].sought != session.bench.sought:
         return None
-    _, cuts, trial = session.trying.trial
+    _, cuts, trial = session.trials.trial
     return {"cuts": _cuts(cuts), **asdict(trial)}
 
 

@@ -46,7 +46,9 @@ def session(lines: list[str], profile: Profile = PROFILE) -> Any:
         Path("page.html"), file(lines), "key", 60.0, 1.0, known, Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
     )
     bench = SimpleNamespace(model=SimpleNamespace(name="box.stl"), profile=profile)
-    return SimpleNamespace(closed=False, bench=bench, slicing=SimpleNamespace(needed=lambda: sliced))
+    return SimpleNamespace(
+        closed=False, bench=bench, slicing=SimpleNamespace(needed=lambda: SimpleNamespace(bench=bench, sliced=sliced))
+    )
 
 
 class Silent:

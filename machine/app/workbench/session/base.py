@@ -1,4 +1,4 @@
-"""Desk: what all work of a session stands on: the history, the processes, and the pages that wait for news."""
+"""Session base: what all work of a session stands on: the history, the processes, and the pages that wait for changes."""
 
 import asyncio
 import sys
@@ -10,7 +10,7 @@ from typing import Any
 
 from machine.app.crash import log_bug
 from machine.app.workbench.bench.bench import Bench, History, Step
-from machine.app.workbench.work.news import News
+from machine.app.workbench.work.observable import Observable
 from machine.app.workbench.work.received import Received
 from machine.app.workbench.work.worker_pool import TaskQueue, WorkerPools
 from profiles.errors import UserError
@@ -21,7 +21,7 @@ LONGEST_ASK = 80  # letters of the name of a command
 MOST_ANSWERS = 20  # the pages are told what became of so many commands with a name, the last ones
 
 
-class Desk(News):
+class SessionBase(Observable):
     """All from the event loop; the pages wait for `changed`.
 
     problem: what could not be done last; answers: to the last commands that a page gave a name, by that: why they were refused,
@@ -55,7 +55,7 @@ class Desk(News):
         for tasks in (self.quick, self.long, self.hand):
             tasks.close()
         self.received.remove()
-        self.tell()
+        self.notify()
 
     def new_file(self) -> Path:
         """A place for what a task makes, which goes with the session at the latest."""
@@ -86,14 +86,14 @@ class Desk(News):
             self.problem = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, sys.argv)}"
         if len(self.problem) > LONGEST_SENTENCE:
             self.problem = f"{self.problem[:LONGEST_SENTENCE]} ..."
-        self.tell()
+        self.notify()
         return self.problem
 
     def answer(self, ask: object, refusal: str = "") -> None:
         """Tell the pages what became of a command, the one that gave it by the name that it gave it, if it did."""
         if isinstance(ask, str) and len(ask) <= LONGEST_ASK:
             self.answers = dict([*self.answers.items(), (ask, refusal)][-MOST_ANSWERS:])
-        self.tell()
+        self.notify()
 
     def do(self, word: str, bench: Bench, told: str = "") -> None:
         """Take a further step, which can be undone. told: what it has taken away, beside what its step says itself."""
@@ -121,15 +121,15 @@ class Desk(News):
         self.history = history
         for follow in self.followers:
             follow()
-        self.tell()
+        self.notify()
 
     @contextmanager
     def waiting(self, words: str) -> Iterator[None]:
         """While it is open, the pages show what they wait for."""
         self.busy = words
-        self.tell()
+        self.notify()
         try:
             yield
         finally:
             self.busy = ""
-            self.tell()
+            self.notify()

@@ -1,10 +1,10 @@
-"""News: a version that grows with every change, and whoever waits for a newer one."""
+"""Observable: a version that grows with every change, and whoever waits for a newer one."""
 
 import asyncio
 from collections.abc import Callable
 
 
-class News:
+class Observable:
     """All from the event loop. listeners: called with every change, before whoever waits for it."""
 
     def __init__(self) -> None:
@@ -12,7 +12,7 @@ class News:
         self.listeners: list[Callable[[], None]] = []
         self._changed = asyncio.Event()
 
-    def tell(self) -> None:
+    def notify(self) -> None:
         """Let the pages know that something has changed."""
         self.version += 1
         self._changed.set()

@@ -1,4 +1,4 @@
-"""Teller: tells the server the newest state of a print, from a thread of its own: who prints never waits for who listens."""
+"""Reporter: tells the server the newest state of a print, from a thread of its own: who prints never waits for who listens."""
 
 from collections import deque
 from threading import Event, Lock, Thread
@@ -11,7 +11,7 @@ LINES_KEPT = 100
 LAST_WORD_S = 5.0  # a server that stands still is not waited for any longer
 
 
-class Teller:
+class StateReporter:
     """tell() from any thread; what comes while the server does not read is put together, so nothing is ever held back."""
 
     def __init__(self, out: BinaryIO, state: State) -> None:
@@ -48,7 +48,7 @@ class Teller:
 class Said:
     """What the program says on stdout and stderr, as the last lines of the state."""
 
-    def __init__(self, teller: Teller) -> None:
+    def __init__(self, teller: StateReporter) -> None:
         self._teller = teller
         self._lines: deque[str] = deque(maxlen=LINES_KEPT)
         self._half, self.count = "", 0

@@ -49,16 +49,16 @@ def _between(before: Floats, after: Floats) -> Floats:
     return turn
 
 
-def carried_zones(zones: Zones, move: Placing) -> Zones:
+def moved_zones(zones: Zones, move: Placing) -> Zones:
     """The zones on the same places of the model. Raises PlanError for a box that a plan could not have there."""
     kinds = {
-        kind: tuple(_carried(zone, move, f"{kind} {number}") for number, zone in enumerate(getattr(zones, kind), start=1))
+        kind: tuple(_moved(zone, move, f"{kind} {number}") for number, zone in enumerate(getattr(zones, kind), start=1))
         for kind in ZONE_KINDS
     }
     return Zones(**kinds)
 
 
-def carried_part(part: PlannedPart, move: Placing) -> PlannedPart:
+def moved_part(part: PlannedPart, move: Placing) -> PlannedPart:
     """A part whose plane, where it is given whole, goes through the same places of the model."""
     if part.normal is None or part.offset_mm is None:
         return part
@@ -66,16 +66,16 @@ def carried_part(part: PlannedPart, move: Placing) -> PlannedPart:
     return replace(part, normal=_vector(normal), offset_mm=move.factor * part.offset_mm + float(normal @ move.shift_mm))
 
 
-def _carried(zone: AnyZone, move: Placing, label: str) -> AnyZone:
+def _moved(zone: AnyZone, move: Placing, label: str) -> AnyZone:
     if isinstance(zone, Zone):
-        return _carried_box(zone, move, label)
+        return _moved_box(zone, move, label)
     if isinstance(zone, Grown):
         place = move.factor * move.turn @ np.array(zone.point_mm) + move.shift_mm
         return replace(zone, point_mm=_vector(np.round(place, POINT_DIGITS)))
     return zone
 
 
-def _carried_box(box: Zone, move: Placing, label: str) -> Zone:
+def _moved_box(box: Zone, move: Placing, label: str) -> Zone:
     axes = box.along(move.turn).T  # the box's own, which go along, as rows
     low, high = (move.factor * np.array(corner) + axes @ move.shift_mm for corner in (box.min_mm, box.max_mm))
     level = np.round(axes)

@@ -8,7 +8,7 @@ from mdp.plans.plan_file import PlannedPart
 Cuts = Sequence[PlannedPart]
 
 
-def part_after(before: Cuts, after: Cuts, part: int) -> int | None:
+def number_after(before: Cuts, after: Cuts, part: int) -> int | None:
     """The number that a part has among other planes: a part goes with its plane, also where that was moved alone, and part 1
     stays on the platform. None: it is gone."""
     place = part - 2
@@ -21,12 +21,12 @@ def part_after(before: Cuts, after: Cuts, part: int) -> int | None:
     return part if len(before) == len(after) and after[place] not in before else None
 
 
-def following_stops(stops: Sequence[Stop], before: Cuts, after: Cuts) -> tuple[tuple[Stop, ...], tuple[Stop, ...]]:
+def renumbered_stops(stops: Sequence[Stop], before: Cuts, after: Cuts) -> tuple[tuple[Stop, ...], tuple[Stop, ...]]:
     """The stops among other planes, and those whose parts are gone. One that was typed for a part that has not been there yet
     stays as it is."""
     kept, gone = list[Stop](), list[Stop]()
     for stop in stops:
-        part = stop.part if stop.part > len(before) + 1 else part_after(before, after, stop.part)
+        part = stop.part if stop.part > len(before) + 1 else number_after(before, after, stop.part)
         if part is None:
             gone.append(stop)
         else:
