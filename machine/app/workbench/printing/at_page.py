@@ -26,10 +26,10 @@ ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the quest
 class AtPage:
     """hear() and leave() from the thread that listens to the server, all else from the one that prints."""
 
-    def __init__(self, teller: StateReporter) -> None:
+    def __init__(self, reporter: StateReporter) -> None:
         self.control, self.stop, self.words = Control(), Flag(), PrinterMessages(WORDS_KEPT)
         self.agreed = False  # to what was found: from then on something may move
-        self._teller = teller
+        self._reporter = reporter
         self._answers: SimpleQueue[bool] = SimpleQueue()
         self._gives_up, self._halts = Flag(), Flag()
 
@@ -60,11 +60,16 @@ class AtPage:
     @contextmanager
     def uploading(self) -> Iterator[Report]:
         """How far the file has been handed over, as its state."""
-        yield lambda text, share=None: self._teller.tell(phase="uploading", upload=(text, share))
+        yield lambda text, share=None: self._reporter.tell(phase="uploading", upload=(text, share))
 
     def gives_up(self) -> bool:
         """Whether there is to be no print on a server, as long as none has begun; an emergency stop is given to the printer."""
         return (self._gives_up.is_set() or self.stop.is_set()) and not self._halts.is_set()
+
+    def has_stopped(self) -> bool:
+        """Whether the print has been stopped at once, at its end: the order was heard and is not waiting any more."""
+        waiting = iter(self.control.take, None)
+        return self._halts.is_set() and all(request.command != Command.EMERGENCY_STOP for request in waiting)
 
     def gone(self) -> bool:
         """Whether a print on a server is left."""
@@ -74,8 +79,8 @@ class AtPage:
     def show(self, observers: Observers, course: Timeline) -> Iterator["_Shown"]:
         """The print as its state."""
         journal = "" if observers.journal is None else str(observers.journal.path)
-        self._teller.tell(log=log_told(observers.log), journal=journal)
-        yield _Shown(self._teller, course, self.words)
+        self._reporter.tell(log=log_told(observers.log), journal=journal)
+        yield _Shown(self._reporter, course, self.words)
 
 
 def log_told(log: SerialLog) -> str:
@@ -87,15 +92,15 @@ class _Shown:
     """A display whose screen is the state that the pages are told. Moments are counted: a print of which nothing changes, as a
     paused one on a print server, is heard of all the same."""
 
-    def __init__(self, teller: StateReporter, course: Timeline, words: PrinterMessages) -> None:
-        self._teller, self._course, self._words = teller, course, words
+    def __init__(self, reporter: StateReporter, course: Timeline, words: PrinterMessages) -> None:
+        self._reporter, self._course, self._words = reporter, course, words
         self._opened = False  # before, a person is asked
         self._moments = 0
 
     def open(self) -> None:
         """The pages show it from now on."""
         self._opened = True
-        self._teller.tell(phase="printing", upload=None)
+        self._reporter.tell(phase="printing", upload=None)
 
     def __call__(self, progress: Progress) -> None:
         if not self._opened:
@@ -105,7 +110,7 @@ class _Shown:
         words = tuple(plain_line(word) for word in self._words.last)
         self._moments += 1
         moment = told(progress, self._course) | {"moment": self._moments}
-        self._teller.tell(phase=phase, progress=moment, words=words)
+        self._reporter.tell(phase=phase, progress=moment, words=words)
 
 
 def told(progress: Progress, course: Timeline) -> dict[str, Any]:

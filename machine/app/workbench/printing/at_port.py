@@ -14,7 +14,7 @@ from machine.link.identification import Answer
 def print_at_port(order: PrintOrder, person: AtPage, checks: Checks) -> State:
     """Check, ask, print; how it ended. Raises UserError."""
     job = _checked(order, checks)
-    checks.teller.tell(phase="ready")
+    checks.reporter.tell(phase="ready")
     if not person.agrees():
         return LEFT
     return STOPPED if print_program(job, order.printing, attendance=person) else DONE
@@ -22,7 +22,7 @@ def print_at_port(order: PrintOrder, person: AtPage, checks: Checks) -> State:
 
 def _checked(order: PrintOrder, checks: Checks) -> LoadedProgram:
     """The job, when nothing speaks against it."""
-    printing, profile, tell = order.printing, order.profile, checks.teller.tell
+    printing, profile, tell = order.printing, order.profile, checks.reporter.tell
     check_baud(printing.baud)
     answer = check_port(printing.port, printing.baud, printing.sim_speed)
     with checks.that(_answers(answer, order)):

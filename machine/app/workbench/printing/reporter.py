@@ -1,13 +1,11 @@
 """Reporter: tells the server the newest state of a print, from a thread of its own: who prints never waits for who listens."""
 
-from collections import deque
 from threading import Event, Lock, Thread
 from typing import Any, BinaryIO
 
 from machine.app.workbench.printing.order import State
 from machine.app.workbench.work.worker import frame
 
-LINES_KEPT = 100
 LAST_WORD_S = 5.0  # a server that stands still is not waited for any longer
 
 
@@ -17,7 +15,7 @@ class StateReporter:
     def __init__(self, out: BinaryIO, state: State) -> None:
         self._out, self._state = out, state
         self._lock, self._changed, self._over = Lock(), Event(), False
-        self._thread = Thread(target=self._serve, name="teller", daemon=True)
+        self._thread = Thread(target=self._serve, name="reporter", daemon=True)
         self._thread.start()
 
     def tell(self, **values: Any) -> None:
@@ -43,33 +41,3 @@ class StateReporter:
                 self._out.flush()
             except (OSError, ValueError):  # the server is gone: the print ends by what it hears, not by what it says
                 return
-
-
-class Said:
-    """What the program says on stdout and stderr, as the last lines of the state."""
-
-    def __init__(self, teller: StateReporter) -> None:
-        self._teller = teller
-        self._lines: deque[str] = deque(maxlen=LINES_KEPT)
-        self._half, self.count = "", 0
-
-    def since(self, count: int) -> list[str]:
-        """The lines that were said after so many."""
-        return list(self._lines)[len(self._lines) - min(self.count - count, len(self._lines)) :]
-
-    def write(self, text: str) -> int:
-        """Take text; whole lines are told."""
-        *lines, self._half = (self._half + text).split("\n")
-        said = [line for line in lines if line.strip()]
-        self._lines.extend(said)
-        self.count += len(said)
-        if said:
-            self._teller.tell(said=tuple(self._lines))
-        return len(text)
-
-    def flush(self) -> None:
-        """Nothing is held back."""
-
-    def isatty(self) -> bool:
-        """It is no terminal."""
-        return False

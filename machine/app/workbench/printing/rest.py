@@ -14,13 +14,13 @@ def go_on(order: ResumeOrder, person: AtPage, checks: Checks) -> State:
     """Tell, ask the printer, ask the person, print the rest; how it ended. Raises UserError."""
     named = machine_profile(order.machine) if order.machine else None
     cut_off = read_resumption(order.journal, order.printing, named)
-    checks.teller.tell(name=cut_off.name, machine=cut_off.profile.machine.name)
+    checks.reporter.tell(name=cut_off.name, machine=cut_off.profile.machine.name)
     for sentence in cut_off.told():
         checks.add(sentence)
     compilers.wait_for(compilers.DRY_RUN)
 
     def agrees(question: str) -> bool:
-        checks.teller.tell(phase="ready", question=question)
+        checks.reporter.tell(phase="ready", question=question)
         return person.agrees()
 
     def which(question: str, heights: tuple[float, ...]) -> float | None:

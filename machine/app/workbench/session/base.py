@@ -8,7 +8,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from machine.app.crash import log_bug
+from machine.app.crash import bug_in_words
 from machine.app.workbench.bench.bench import Bench, History, Step
 from machine.app.workbench.work.observable import Observable
 from machine.app.workbench.work.received import Received
@@ -80,10 +80,7 @@ class SessionBase(Observable):
 
     def refuse(self, error: Exception) -> str:
         """Tell the pages what could not be done, a bug with the log that it got; the sentence."""
-        if isinstance(error, UserError):
-            self.problem = str(error)
-        else:
-            self.problem = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log_bug(error, sys.argv)}"
+        self.problem = str(error) if isinstance(error, UserError) else bug_in_words(error, sys.argv)
         if len(self.problem) > LONGEST_SENTENCE:
             self.problem = f"{self.problem[:LONGEST_SENTENCE]} ..."
         self.notify()

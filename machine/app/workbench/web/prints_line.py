@@ -10,8 +10,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.websockets import WebSocket
 
-from machine.app.crash import log_bug
-from machine.app.requests import FORCE_GOES_ON
+from machine.app.crash import bug_in_words, log_bug
 from machine.app.workbench.printing.commands import PageOfPrints, obey
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.session.workbench import Workbench
@@ -78,8 +77,6 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
             asked = parsed(text, MOST_COMMAND)
             obey(page, asked)
         except UserError as error:
-            await send(socket, json.dumps({"problem": str(error), "forcible": FORCE_GOES_ON in str(error)}))
+            await send(socket, json.dumps({"problem": str(error), "forcible": error.forcible}))
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the prints go on
-            log = log_bug(error, ())
-            told = f"a bug in tiltprint: {type(error).__name__}: {error}; the details are in {log}"
-            await send(socket, json.dumps({"problem": told}))
+            await send(socket, json.dumps({"problem": bug_in_words(error, ())}))

@@ -41,7 +41,7 @@ function showPrint(print, commands) {
   const news = `${print.name}: ${over ? print.sentence : progress ? progress.state : phase}`; // a reader need not hear every per cent
   if ($("run-news").textContent !== news) $("run-news").textContent = news;
   const asking = !runs && !uploads && (!over || end === "refused");
-  listIn("run-checks", asking ? [...print.checks, ...(figures && !over ? [figuresTold(figures)] : [])] : []);
+  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on because of --force` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   $("run-ask").hidden = phase !== "ready" || !commands;
   $("ask-told").textContent = print.question || (print.starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"

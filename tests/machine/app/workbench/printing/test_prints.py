@@ -17,14 +17,16 @@ from typing import Any
 
 import pytest
 
+from machine.app.printer.compatibility import refuse
 from machine.app.requests import PrintRequest
+from machine.app.terminal.plain import said_to
+from machine.app.terminal.progress import say
 from machine.app.workbench.printing import running_print
 from machine.app.workbench.printing.at_page import BEGIN, LEAVE, AtPage
 from machine.app.workbench.printing.commands import COMMANDS, PageOfPrints, obey
 from machine.app.workbench.printing.order import FollowOrder, Order, PrintOrder, ResumeOrder
 from machine.app.workbench.printing.prints import Prints
 from machine.app.workbench.printing.process import Checks, carry_out
-from machine.app.workbench.printing.reporter import Said
 from machine.app.workbench.printing.running_print import RunningPrint
 from machine.app.workbench.work.worker import LENGTH
 from machine.link.pending_commands import Command, Control
@@ -177,6 +179,7 @@ LEAVES = """
 import pickle, struct, sys
 length = struct.Struct(sys.argv[1])
 told = {"phase": "printing", "server": True, "progress": {"state": "printing"}, "end": "left", "sentence": "it goes on"}
+told["stop_given"] = False
 for phase in ("printing", "over"):
     text = pickle.dumps(told | {"phase": phase})
     sys.stdout.buffer.write(length.pack(len(text)) + text)
@@ -255,7 +258,7 @@ class Heard:
 ])  # fmt: skip
 def test_what_print_refuses_is_refused_with_its_sentence(wanted: Order, sentence: str, forcible: bool) -> None:
     heard = Heard()
-    end = carry_out(wanted, Agreeing(), Checks(heard, Said(heard)))  # type: ignore[arg-type]
+    end = carry_out(wanted, Agreeing(), Checks(heard))  # type: ignore[arg-type]
     assert end["sentence"].startswith(sentence)
     assert (end["end"], end["forcible"]) == ("refused", forcible)
 
@@ -273,7 +276,7 @@ def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_a
         job.start("vase.gcode")
         job.steps = 10_000
         kept = replace(order(address), profile=profile, starts=False)
-        end = carry_out(kept, person, Checks(heard, Said(heard)))  # type: ignore[arg-type]
+        end = carry_out(kept, person, Checks(heard))  # type: ignore[arg-type]
         assert (job.state, job.files["hour.gcode"].decode()) == ("printing", HOUR)
         assert not any(asked.endswith("/start") for asked in job.asked)
         log = Path(heard.state["log"]).read_text()
@@ -288,7 +291,7 @@ class Attended:
     def __init__(self, wanted: PrintOrder) -> None:
         self.heard = Heard()
         self.person = AtPage(self.heard)  # type: ignore[arg-type]
-        checks = Checks(self.heard, Said(self.heard))  # type: ignore[arg-type]
+        checks = Checks(self.heard)  # type: ignore[arg-type]
         threading.Thread(target=lambda: self.heard.tell(**carry_out(wanted, self.person, checks)), daemon=True).start()
         self.until(lambda state: "phase" in state)
         self.person.hear(BEGIN)
@@ -329,6 +332,32 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
         one.person.hear(Command.EMERGENCY_STOP)
         assert one.until(lambda told: told.get("end"))["sentence"].startswith(stopped.format(address))
         assert job.halted
+        assert one.person.has_stopped()
+
+
+def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
+    person = AtPage(Heard())  # type: ignore[arg-type]
+    assert not person.has_stopped()
+    person.hear(Command.EMERGENCY_STOP)
+    assert not person.has_stopped()
+
+
+def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> None:
+    heard = Heard()
+    checks = Checks(heard)  # type: ignore[arg-type]
+    with said_to(checks.hear):
+        with checks.that("the axes are there"):
+            refuse("an axis is missing", force=True)
+        with checks.that("the file is whole"):
+            say("one moment")
+        with pytest.raises(PrinterError, match="too hot") as refused, checks.that("it is cool"):
+            refuse("too hot", force=False)
+    assert refused.value.forcible
+    assert heard.state["checks"] == (
+        {"text": "an axis is missing", "forced": True},
+        {"text": "the file is whole", "forced": False},
+    )
+    assert heard.state["said"] == ("an axis is missing", "one moment")
 
 
 def page_of(prints: Prints, name: str = "me") -> PageOfPrints:
