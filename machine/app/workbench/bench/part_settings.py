@@ -9,22 +9,22 @@ from profiles.toml_text import read_value
 def with_part_setting(profile: Profile, part: int, key: str, value: str | None) -> Profile:
     """The profile with another value of a key of the process for one part; None: as all parts have it. Raises ProfileError."""
     name = key.removeprefix("process.")
-    kept = own_values(profile, part)
-    kept.pop(name, None)
-    changed = kept if value is None else {**kept, name: read_value(value.strip())}
-    others = [each for each in profile.parts if each.part != part]
+    values = own_values(profile, part)
+    values.pop(name, None)
+    changed = values if value is None else {**values, name: read_value(value.strip())}
+    others = [own for own in profile.parts if own.part != part]
     return with_part_settings(profile.of_all_parts, [*others, *([PartSettings(part=part, process=changed)] if changed else [])])
 
 
 def without_part_settings(profile: Profile, part: int) -> Profile:
     """The profile with that part as all parts are."""
-    others = [each for each in profile.parts if each.part != part]
+    others = [own for own in profile.parts if own.part != part]
     return profile.model_copy(update={"parts": others})
 
 
 def own_values(profile: Profile, part: int) -> dict[str, object]:
     """What a part has of its own, by the keys of the process."""
-    return next((dict(each.process) for each in profile.parts if each.part == part), {})
+    return next((dict(own.process) for own in profile.parts if own.part == part), {})
 
 
 def option(own: PartSettings) -> str:
@@ -39,7 +39,7 @@ def _typed(value: object) -> str:
 def renumbered(profile: Profile, before: Cuts, after: Cuts) -> Profile:
     """The profile with settings for the parts that they were made for, among other planes; what a part that is gone had goes with
     it."""
-    places = ((each, number_after(before, after, each.part)) for each in profile.parts)
-    kept = [each.model_copy(update={"part": part}) for each, part in places if part is not None]
-    kept.sort(key=lambda each: each.part)
-    return profile if kept == profile.parts else profile.model_copy(update={"parts": kept})
+    places = ((own, number_after(before, after, own.part)) for own in profile.parts)
+    values = [own.model_copy(update={"part": part}) for own, part in places if part is not None]
+    values.sort(key=lambda own: own.part)
+    return profile if values == profile.parts else profile.model_copy(update={"parts": values})

@@ -11,27 +11,27 @@ Cuts = Sequence[PlannedPart]
 def number_after(before: Cuts, after: Cuts, part: int) -> int | None:
     """The number that a part has among other planes: a part goes with its plane, also where that was moved alone, and part 1
     stays on the platform. None: it is gone."""
-    place = part - 2
-    if place < 0:
+    index = part - 2
+    if index < 0:
         return part
-    if place >= len(before):
+    if index >= len(before):
         return None
-    if before[place] in after:
-        return after.index(before[place]) + 2
-    return part if len(before) == len(after) and after[place] not in before else None
+    if before[index] in after:
+        return after.index(before[index]) + 2
+    return part if len(before) == len(after) and after[index] not in before else None
 
 
 def renumbered_stops(stops: Sequence[Stop], before: Cuts, after: Cuts) -> tuple[tuple[Stop, ...], tuple[Stop, ...]]:
     """The stops among other planes, and those whose parts are gone. One that was typed for a part that has not been there yet
     stays as it is."""
-    kept, gone = list[Stop](), list[Stop]()
+    stays, gone = list[Stop](), list[Stop]()
     for stop in stops:
         part = stop.part if stop.part > len(before) + 1 else number_after(before, after, stop.part)
         if part is None:
             gone.append(stop)
         else:
-            kept.append(Stop(part, stop.layer, stop.height_mm, stop.change))
-    return tuple(kept), tuple(gone)
+            stays.append(Stop(part, stop.layer, stop.height_mm, stop.change))
+    return tuple(stays), tuple(gone)
 
 
 def gone_in_words(word: str, gone: Sequence[tuple[int, str]]) -> str:

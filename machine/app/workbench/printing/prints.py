@@ -43,7 +43,7 @@ class Prints(Observable):
     @property
     def running(self) -> list[RunningPrint]:
         """Those of which something goes on."""
-        return [each for each in self.prints if not each.over]
+        return [job for job in self.prints if not job.over]
 
     def snapshot(self) -> dict[str, Any]:
         """What every page is told."""
@@ -53,8 +53,8 @@ class Prints(Observable):
             "asking": self._over is not None,
             "journals": self._journals_told(),
             "prints": [
-                {**each.state, "number": each.number, "holder": each.holder, "held": bool(self._pages[each.holder])}
-                for each in self.prints
+                {**job.state, "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
+                for job in self.prints
             ],
         }
 
@@ -77,19 +77,17 @@ class Prints(Observable):
     async def end_all(self) -> list[str]:
         """End every print as a cancel does, but leave those on print servers, and wait for that; the last words of each."""
         running = self.running
-        for each in running:
-            each.end()
-        while any(not each.over for each in running):
+        for job in running:
+            job.end()
+        while any(not job.over for job in running):
             await self.changed(self.version)
-        return [
-            line for each in running for line in (*each.state["said"][-2:], f"{each.state['port']}: {each.state['sentence']}")
-        ]
+        return [line for job in running for line in (*job.state["said"][-2:], f"{job.state['port']}: {job.state['sentence']}")]
 
     def begin(self, page: str, order: Order) -> None:
         """Have something printed, commanded by a page. Raises PrinterError where the port, or the journal, is in use."""
         port = order.printing.port
         starts = not isinstance(order, PrintOrder) or order.starts
-        if starts and any(each.state["starts"] and _same(each.state["port"], port) for each in self.running):
+        if starts and any(job.state["starts"] and _same(job.state["port"], port) for job in self.running):
             raise PrinterError(f"port {port} prints already: wait until that is done, or cancel it")
         if isinstance(order, ResumeOrder) and realpath(order.journal) in map(realpath, self._journals_in_use()):
             raise PrinterError(f"journal {order.journal}: its print goes on already, or has not ended")
@@ -102,8 +100,8 @@ class Prints(Observable):
     def _forget_old(self, port: str) -> None:
         """Drop what is over at a port that prints anew, and all but the newest of what is over elsewhere. What runs stays:
         only what is listed can be stopped."""
-        over = [each for each in self.prints if each.over and not _same(each.state["port"], port)][-MOST_OVER:]
-        self.prints = [each for each in self.prints if not each.over or each in over]
+        over = [job for job in self.prints if job.over and not _same(job.state["port"], port)][-MOST_OVER:]
+        self.prints = [job for job in self.prints if not job.over or job in over]
 
     async def _print(self, begun: RunningPrint) -> None:
         try:
@@ -115,9 +113,9 @@ class Prints(Observable):
         """The one that was named, all when none was or there never was such a one: in doubt everything stops. One that is over
         already, in the list or not any more, stops no other: a button is pressed twice in a fright, and a press may come late."""
         known = isinstance(number, int) and 0 < number <= self._last
-        for each in self.prints if known else self.running:
-            if each.number == number or not known:
-                each.stop_at_once()
+        for job in self.prints if known else self.running:
+            if job.number == number or not known:
+                job.stop_at_once()
 
     def numbered(self, number: object) -> RunningPrint:
         """The print of a number. Raises PrinterError where it is not there."""
@@ -131,11 +129,11 @@ class Prints(Observable):
         if self._journals is None:
             return None
         in_use = self._journals_in_use()
-        return [asdict(each) | {"path": str(each.path)} for each in self._journals if str(each.path) not in in_use]
+        return [asdict(journal) | {"path": str(journal.path)} for journal in self._journals if str(journal.path) not in in_use]
 
     def _journals_in_use(self) -> set[str]:
         """The journals of prints that run, and of those whose rest is printed."""
-        return {path for each in self.running for path in (each.state["journal"], each.state["resumes"]) if path}
+        return {path for job in self.running for path in (job.state["journal"], job.state["resumes"]) if path}
 
     def look_for_journals(self) -> None:
         """Read which prints can be gone on with."""
@@ -159,10 +157,10 @@ class Prints(Observable):
 
     async def _ask_ports(self, baud: int, over: Flag) -> None:
         try:
-            used = [each.state["port"] for each in self.running]
+            used = [job.state["port"] for job in self.running]
             devices = await asyncio.to_thread(known_ports)
             reports = await asyncio.to_thread(ask_ports, devices, baud, over, [*used, *map(stable_name, used)])
-            self._ports = [_port(each) for each in reports]
+            self._ports = [_port(report) for report in reports]
         finally:
             self._over = None
             self.notify()

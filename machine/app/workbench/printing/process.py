@@ -15,12 +15,11 @@ from typing import BinaryIO
 from machine.app.crash import bug_in_words
 from machine.app.terminal.plain import said_to
 from machine.app.workbench.printing.at_page import AtPage
-from machine.app.workbench.printing.at_port import print_at_port
+from machine.app.workbench.printing.at_port import go_on, print_at_port
 from machine.app.workbench.printing.at_server import follow_on_server, print_on_server
 from machine.app.workbench.printing.checks import Checks
 from machine.app.workbench.printing.order import FollowOrder, Order, ResumeOrder, State, first_state
 from machine.app.workbench.printing.reporter import StateReporter
-from machine.app.workbench.printing.rest import go_on
 from machine.app.workbench.work.worker import read_frames, take_pipes
 from machine.network.address import is_server_address
 from profiles.errors import UserError

@@ -30,9 +30,9 @@ class Pricing:
 
     async def _price(self, bench: Bench) -> None:
         prices = {}
-        for place in places_to_price(bench):
+        for row in places_to_price(bench):
             with suppress(UserError):  # then it has none
-                prices[place] = await self._session.long.run("price_row", bench, place)
+                prices[row] = await self._session.long.run("price_row", bench, row)
             if self._session.bench is not bench:
                 return
         self._session.become(self._session.history.amended(with_prices(bench, prices)))

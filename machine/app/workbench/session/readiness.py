@@ -44,7 +44,7 @@ class Readiness:
 
     def _number_of(self, bench: Bench) -> int:
         made_of = (bench.model and bench.model.key, bench.rotation, bench.zones)
-        if any(one is not other for one, other in zip(made_of, self._made_of, strict=True)) or not self._serves(bench.profile):
+        if any(new is not old for new, old in zip(made_of, self._made_of, strict=True)) or not self._serves(bench.profile):
             self._made_of, self._profile, self._number = made_of, bench.profile, next(_numbers)
         return self._number
 

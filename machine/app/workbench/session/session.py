@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from weakref import finalize
@@ -26,8 +26,6 @@ from machine.app.workbench.session.base import SessionBase
 from machine.app.workbench.session.comparing import Comparing
 from machine.app.workbench.session.finding import Finding
 from machine.app.workbench.session.marking import Marking
-from machine.app.workbench.session.open_bench import OpenBench
-from machine.app.workbench.session.pieces import Pieces
 from machine.app.workbench.session.pricing import Pricing
 from machine.app.workbench.session.readiness import Readiness
 from machine.app.workbench.session.slicing import Slicing
@@ -42,6 +40,17 @@ from profiles.errors import PlanError
 from profiles.profile import Profile
 
 
+@dataclass(frozen=True)
+class OpenBench:
+    """What the pages of all benches are told of each: its number, its model's name, how many parts that is cut into (0: not yet),
+    and the work under way in a word."""
+
+    number: int
+    name: str
+    parts: int
+    work: str
+
+
 class Session(SessionBase):
     """A bench with all work on it. resting: key of a model, and the ways in which it rests; benches: all that are open,
     this one too."""
@@ -52,8 +61,9 @@ class Session(SessionBase):
         self.trials = PlaneTrials(self, self.readiness)
         self.finding = Finding(self)
         self.comparing = Comparing(self, self.slicing)
-        self.pieces, self._pricing, self.standing = Pieces(self), Pricing(self), StandingModel(self)
-        self._settling = asyncio.Lock()
+        self._pricing, self.standing = Pricing(self), StandingModel(self)
+        self._settling, self._drawing = asyncio.Lock(), asyncio.Lock()
+        self._pieces: tuple[Bench, Path] | None = None  # drawn last
         self.marking = Marking(self, self.trials)
         self._ranking: asyncio.Task[None] | None = None
         self.resting: tuple[str, tuple[Resting, ...]] = ("", ())
@@ -108,6 +118,19 @@ class Session(SessionBase):
         """What a task makes of the parts on the bench. Raises UserError where they cannot be cut."""
         with self.waiting(word):
             return await self.quick.run(task, self.bench, *given)
+
+    async def pieces(self) -> Path:
+        """The parts as bodies of their own, as `work.pieces` packs them, cut once for all that ask. Raises UserError where they
+        cannot be cut."""
+        bench = self.bench
+        async with self._drawing:
+            if self._pieces is None or self._pieces[0].shaped != bench.shaped:
+                out = self.new_file()
+                await self.quick.run("draw_pieces", bench, out)
+                if self._pieces is not None:
+                    self._pieces[1].unlink(missing_ok=True)
+                self._pieces = bench, out
+            return self._pieces[1]
 
     def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> Coroutine[Any, Any, None]:
         """The work of taking other names and settings; those of the bench by then, for several may be asked for at once. key: the

@@ -48,9 +48,9 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
     """What answers a request for the log of a print, as far as it is written."""
 
     async def answer(request: Request) -> Response:
-        for each in prints.prints:
-            log = each.state["log"]
-            if each.number == request.path_params["print"] and log and Path(log).is_file():
+        for job in prints.prints:
+            log = job.state["log"]
+            if job.number == request.path_params["print"] and log and Path(log).is_file():
                 return FileResponse(log, media_type="text/plain")
         return Response("there is no log of this print\n", 404)
 

@@ -138,7 +138,7 @@ async def _pedestal(session: Session, request: Request) -> Response:
 
 
 async def _pieces(session: Session, request: Request) -> Response:
-    return FileResponse(await session.pieces.file(), media_type="application/octet-stream")
+    return FileResponse(await session.pieces(), media_type="application/octet-stream")
 
 
 async def _marks(session: Session, request: Request) -> Response:

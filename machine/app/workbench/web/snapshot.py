@@ -47,8 +47,8 @@ def snapshot(session: Session) -> dict[str, Any]:
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATFORM_TOLERANCE_MM,
         "resting": [
-            {"rotation": each.rotation, "words": each.words, "overhang_mm2": each.overhang_mm2, "height_mm": each.height_mm}
-            for each in resting
+            {"rotation": rest.rotation, "words": rest.words, "overhang_mm2": rest.overhang_mm2, "height_mm": rest.height_mm}
+            for rest in resting
         ],
         "search": None if search is None else {"text": search.searched.text, "planes": planes},
         **slices_told(session),
@@ -64,12 +64,12 @@ def snapshot(session: Session) -> dict[str, Any]:
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
         "notes": session.finding.notes if bench.rows else (),
         "given": asdict(bench.given),
-        "part_settings": [{"part": each.part, "keys": list(each.process)} for each in bench.profile.parts],
+        "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
         "priced": bench.priced,
         "stops": [asdict(stop) for stop in bench.stops],
         "copies": bench.copies,
         "machine": machine_bodies(bench.profile.machine, known=True),
-        "benches": [asdict(each) for each in session.benches],
+        "benches": [asdict(bench) for bench in session.benches],
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }

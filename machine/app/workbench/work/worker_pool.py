@@ -81,8 +81,8 @@ class WorkerPool:
 
     async def _take(self, tasks: "TaskQueue") -> Worker:
         """The process that these tasks had last, else a new one, else the one that has rested longest."""
-        self._idle = [each for each in self._idle if each.process.returncode is None]
-        own = [each for each in self._idle if each.tasks is tasks]
+        self._idle = [worker for worker in self._idle if worker.process.returncode is None]
+        own = [worker for worker in self._idle if worker.tasks is tasks]
         if not own and self._may_start:
             self._starting += 1
             try:

@@ -16,8 +16,7 @@ from machine.app.workbench.bench.command_line import export_command
 from machine.app.workbench.bench.settings import named
 from machine.app.workbench.session.commands import obey
 from machine.app.workbench.session.session import Session
-from machine.app.workbench.work.marks import mark_bench, unmark_bench
-from machine.app.workbench.work.models import read_model
+from machine.app.workbench.work.models import mark_bench, read_model, unmark_bench
 from machine.app.workbench.work.standing import Standing
 from machine.app.workbench.work.worker_pool import WorkerPools
 from mdp.decomposition import FrontRow
