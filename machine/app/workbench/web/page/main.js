@@ -1,7 +1,7 @@
 // Main: the line to the server, the picture and the panels put together.
 
 import { cameraOf, CORNERS, handle, VIEWS } from "../../../../view/template/camera.js";
-import { bounds, RAD } from "../../../../view/template/math.js";
+import { RAD } from "../../../../view/template/math.js";
 import { $, made, needsKey, notice } from "../../../../view/template/page.js";
 import { tabsOf } from "../../../../view/template/tabs.js";
 import { benchesPanel } from "./benches.js";
@@ -11,7 +11,7 @@ import { marksPanel } from "./marks-panel.js";
 import { modelPanel, sizePanel } from "./model-panel.js";
 import { obstacleOf } from "./obstacle.js";
 import { partsPanel } from "./parts-panel.js";
-import { pictureOf, placesDrawn } from "./picture.js";
+import { pictureOf } from "./picture.js";
 import { apartPanel } from "./pieces.js";
 import { planesPanel } from "./planes-panel.js";
 import { printFrame } from "./print-frame.js";
@@ -236,4 +236,4 @@ function keysOf(bench, camera, picture) {
 }
 
 main();
-Object.assign(globalThis, { $, bounds, placesDrawn }); // for whoever tries the page from a console
+globalThis.$ = $; // for whoever tries the page from a console; modules["FOLDER/NAME"] has the rest
